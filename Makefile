@@ -70,7 +70,7 @@ reference: $(VENV)/ready ## the committed report with its records, anew, into re
 
 DRAWN := mechanisms 200 --beside mbref=taylor
 
-drawn: $(VENV)/ready ## every card on random mechanisms, for the committed report; resumes from build/drawn/
+drawn: $(VENV)/ready ## every check on random mechanisms, for the committed report; resumes from build/drawn/
 	mkdir -p build/drawn
 	for engine in mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --$(DRAWN) --json \
 	    --records build/drawn/$$engine.jsonl > reports/reference/conformance/$${engine}_drawn.json; done

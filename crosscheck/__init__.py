@@ -1,8 +1,8 @@
-"""crosscheck: the same mechanism in several engines, against truth.
+"""crosscheck: simulate a mechanism in several engines and compare each motion with the true motion.
 
-The names below are loaded when they are first used, so that ``import crosscheck`` costs nothing.
-``find_engine`` and ``run_study`` are the functions ``crosscheck.engine.engine`` and
-``crosscheck.study.study``, which the modules of these names would hide here.
+The public names are imported at first access, so that ``import crosscheck`` takes little time.
+``find_engine`` is the function ``crosscheck.engine.engine`` and ``run_study`` the function
+``crosscheck.study.study``. Here the modules ``engine`` and ``study`` would hide them under their own names.
 """
 
 from __future__ import annotations

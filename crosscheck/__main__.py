@@ -1,4 +1,4 @@
-"""`python -m crosscheck`: the same as the command `crosscheck`."""
+"""Entry point of ``python -m crosscheck``, which runs the command ``crosscheck``."""
 
 import sys
 

@@ -1,6 +1,6 @@
-"""The Engine interface, the refusals of engines, and the table of engines.
+"""The interface ``Engine`` that every engine adapter implements, and the table of the known engines.
 
-An engine of a third party needs to import nothing but this module.
+A third-party engine adapter needs to import this module only.
 """
 
 from __future__ import annotations
@@ -81,16 +81,17 @@ class Setting:
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:
-    """Return the settings of the family "tuned", or of the first family, coarse to fine."""
+    """Return the settings of the family "tuned", or of the first family if there is none, coarse to fine."""
     families = [setting.family for setting in settings]
     best = BEST if BEST in families or not families else families[0]
     return [setting for setting in settings if setting.family == best]
 
 
 class Engine(ABC):
-    """A simulator that takes a Scene and returns a Trajectory. Constructed without arguments.
+    """Interface of an engine adapter: it simulates a Scene and returns a Trajectory. Its constructor takes no
+    arguments.
 
-    The third-party package is imported inside the methods, so that naming an engine loads nothing.
+    An adapter imports the engine's package inside its methods, so that constructing it imports nothing.
 
     Attributes
     ----------
@@ -110,7 +111,7 @@ class Engine(ABC):
 
     name: str
     package: str  # name of the package to install
-    supports: Supports = Supports()  # everything else is refused
+    supports: Supports = Supports()  # all other joints, drivers and loads are refused
     rounding: float = 2.0**-52  # relative rounding of the engine's arithmetic; 2**-23 in single precision
     families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
     integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
@@ -129,7 +130,8 @@ class Engine(ABC):
     def cannot(self, scene: Scene) -> Cannot | None:
         """Return the refusal of a scene, or None if the engine can run it.
 
-        Undeclared joints, drivers and loads come first, then the result of ``refuses``.
+        Joints, drivers and loads that ``supports`` does not declare are refused first. Then ``refuses`` is
+        asked.
         """
         return self.supports.missing(scene) or self.refuses(scene)
 
@@ -142,7 +144,8 @@ class Engine(ABC):
         """Return the settings of all families for a scene, coarse to fine in each family."""
 
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
-        """Return the settings of one family, coarse to fine; none if it does not serve the scene."""
+        """Return the settings of one family, coarse to fine; an empty list if the family cannot run the
+        scene."""
         return [setting for setting in self.settings(scene) if setting.family == family]
 
     def serves(self, scene: Scene, family: str) -> bool:
@@ -154,23 +157,26 @@ class Engine(ABC):
         return best_family(self.settings(scene))
 
     def has_family(self, family: str) -> bool:
-        """Return whether `run` accepts a family that `settings` may leave out."""
+        """Return whether `run` accepts a family. An engine may accept families that `settings` does not
+        list."""
         return False
 
     def family_parts(self) -> FamilyParts:
-        """Return the parts of which families are composed; empty if there are none."""
+        """Return the parts of which names of families are composed, such as integrators; empty if there are
+        none."""
         return {}
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
-        """Return a line of the engine's own code or XML that makes a setting; empty where it has none."""
+        """Return the line of the engine's own code or XML that makes a setting; empty if no such line is
+        known."""
         return ""
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
-        """Import and compile what the families need, ahead of the first run in a process."""
+        """Import and compile what the families need, before the first run in a process."""
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate from t = 0 and sample.
+        """Simulate a scene from t = 0 and return the states at the sample times.
 
         Parameters
         ----------
@@ -190,16 +196,18 @@ class Engine(ABC):
 
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
-OPTIONAL = ("simbody", "sundials", "ondsel")  # take part where their packages are installed
-GENERATORS = ("casadi", "heyoka")  # take part where they are named: each scene is compiled first
-LARGE = ("drake", "dart", "bullet", "mjx", "warp")  # take part where they are named: packages are large
+OPTIONAL = ("simbody", "sundials", "ondsel")  # these run by default if their packages are installed
+# these run only if they are named, since they compile code for each scene first
+GENERATORS = ("casadi", "heyoka")
+# these run only if they are named, since their packages are large
+LARGE = ("drake", "dart", "bullet", "mjx", "warp")
 ON_REQUEST = (*GENERATORS, *LARGE)
-ALL = "all"  # names every engine that is installed
+ALL = "all"  # this name selects every installed engine
 ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of crosscheck's engines and of engines in installed packages."""
+    """Return the names of crosscheck's engines and of the engines that installed packages register."""
     return (
         *BUILT_IN,
         *OPTIONAL,
@@ -209,7 +217,7 @@ def engine_names() -> tuple[str, ...]:
 
 
 def default_engines() -> tuple[str, ...]:
-    """Return the engines that run when none is named.
+    """Return the names of the engines that run if the user names none.
 
     Engines that run on request only, and optional engines that are not installed, are left out.
     """
@@ -218,7 +226,7 @@ def default_engines() -> tuple[str, ...]:
 
 
 def all_engines() -> tuple[str, ...]:
-    """Every engine that is installed, also those that run on request."""
+    """Return the names of all installed engines, including engines that run only if they are named."""
     return tuple(name for name in engine_names() if installed(name))
 
 
@@ -262,4 +270,4 @@ def engine(name: str) -> Engine:
 def _as_engine(name: str, found: object) -> Engine:
     if isinstance(found, Engine):
         return found
-    raise LookupError(f"{name!r} is not an engine: it does not implement crosscheck.engine.Engine")
+    raise LookupError(f"{name!r} is not an engine: the object does not implement crosscheck.engine.Engine")

@@ -1,4 +1,5 @@
-"""Refusals of engines: what an adapter declares, and the first part of a scene that it does not."""
+"""Refusals of engines: the features that an adapter supports, and the first feature of a scene that is
+missing."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ from mbref.scene import Scene
 
 
 class Owner(enum.Enum):
-    """The part that would have to change before an engine could do what it refuses."""
+    """The owner of a gap: the adapter, the engine or the engine's model would have to change to run a
+    scene."""
 
     ADAPTER = "missing in the adapter"
     ENGINE = "missing in the engine"
@@ -19,7 +21,7 @@ class Owner(enum.Enum):
 
 @dataclass(frozen=True)
 class Cannot:
-    """A refusal, given before running.
+    """A refusal to simulate a scene, reported before the run.
 
     Attributes
     ----------

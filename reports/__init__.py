@@ -1,1 +1,1 @@
-"""reports: pages rendered from stored records; nothing here simulates."""
+"""reports: pages rendered from stored records. This package runs no simulation."""

@@ -1,4 +1,4 @@
-"""`python -m reports`: have crosscheck make the missing records, then render the report from them."""
+"""`python -m reports`: make the missing records with crosscheck, then render the report from them."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from crosscheck.cli import collection
+from crosscheck.cli.moving_picture import moving_picture
 from crosscheck.cli.options import add_depth, add_engines, add_reference_time
-from crosscheck.cli.passage import passage
 from crosscheck.cli.scene_request import RequestError, find_scenes
 from mbref.command_line import Parser
 from mbref.scene import SceneError
@@ -27,7 +27,7 @@ TITLES = {  # titles of pages of one section
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Write the report; returns 0, or 2 when something is missing, or 130 when interrupted."""
+    """Write the report; returns 0, 2 for bad input or a missing package, or 130 after an interrupt."""
     if missing := [package for module, package in NEEDS.items() if find_spec(module) is None]:
         _notice(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
         return 2
@@ -60,10 +60,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _picture(path: Path) -> int:
-    """Write the README's moving picture."""
+    """Write the animated picture of the README."""
     from reports import mechanisms
 
-    found = passage()
+    found = moving_picture()
     runs = [Run(record) for record in found.records]
     path.write_text(mechanisms.compared(found.scene, found.exact, runs, found.singular))
     _notice(f"written: {path}")
@@ -71,7 +71,7 @@ def _picture(path: Path) -> int:
 
 
 def _render(folder: Path, names: Sequence[str]) -> int:
-    """Render a folder of records again; nothing is run."""
+    """Render the records of a folder again; nothing runs."""
     from reports import sections, stored
     from reports.sections import paper
 
@@ -89,7 +89,7 @@ def _render(folder: Path, names: Sequence[str]) -> int:
 
 
 def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Block]:
-    """The blocks of the named sections; only the records they need are made."""
+    """Return the blocks of the named sections; only the records that they need are made."""
     from reports import sections, stored
     from reports.sections import closed_loops, paper, stability
 
@@ -132,8 +132,10 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
         "--section", action="append", choices=sections, metavar="S", help="only this one; may repeat"
     )
     parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
-    parser.add_argument("--render", metavar="DIR", help="render the records of a report again, run nothing")
-    parser.add_argument("--picture", metavar="FILE", help="write only the moving picture of the README")
+    parser.add_argument(
+        "--render", metavar="DIR", help="render the records of a report again, without any run"
+    )
+    parser.add_argument("--picture", metavar="FILE", help="write only the animated picture of the README")
     return parser
 
 

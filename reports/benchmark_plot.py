@@ -1,4 +1,4 @@
-"""The picture of `benchmarks/speed.py`: what a simulated second costs at each error, scene by scene."""
+"""Figure of `benchmarks/speed.py`: CPU time for a simulated second at each error level, scene by scene."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ LIMIT, NARROW = "limit", 0.06  # distance of the engines' marks, in data units
 
 
 def draw(data: Mapping[str, Any]) -> Figure:
-    """One panel a level of error; ``data`` as the benchmark stores it.  No mark: an error not reached."""
+    """Return one panel for each error level; ``data`` is the benchmark's JSON document.
+
+    An error level that an engine does not reach has no mark.
+    """
     scenes = data["scenes"]
     levels = next(iter(scenes.values()))["levels"]
     costs = {name: _best(scene["curves"]) for name, scene in scenes.items()}
@@ -40,7 +43,7 @@ def draw(data: Mapping[str, Any]) -> Figure:
 
 
 def _best(curves: Sequence[Mapping[str, Any]]) -> dict[str, list[float]]:
-    """Each engine's least cost at every level, over its families."""
+    """Return each engine's least cost at every error level, over its families."""
     found: dict[str, list[list[float]]] = {}
     for curve in curves:
         found.setdefault(curve["engine"], []).append([math.inf if c is None else c for c in curve["cost"]])

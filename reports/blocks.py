@@ -1,6 +1,6 @@
-"""The parts of a section as data: headings, sentences, tables and figures.
+"""Blocks: the parts of a section (headings, sentences, tables and figures) as data.
 
-A section makes blocks once; ``render`` writes them as HTML and as Markdown.
+A section returns blocks; ``reports.render`` writes them as HTML and as Markdown.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure as PlotFigure
 
-    Drawing = PlotFigure | str  # a figure of matplotlib, or a mechanism as SVG
+    Drawing = PlotFigure | str  # a figure of matplotlib, or a mechanism as SVG text
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,8 @@ class Text:
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as they are printed; the columns in ``right`` hold numbers and are right-aligned.
+    """Table with the cells as they are printed; the columns in ``right`` contain numbers and are
+    right-aligned.
 
     ``folded`` tables are long: the page shows their ``caption`` and opens them on demand.
     """
@@ -46,7 +47,8 @@ class Table:
 
 @dataclass(frozen=True)
 class Figure:
-    """A picture: ``name`` is unique in the report and a file name, ``caption`` how to read it."""
+    """A picture: ``name`` is unique in the report and becomes a file name, ``caption`` explains the
+    picture."""
 
     name: str
     caption: str
@@ -54,12 +56,12 @@ class Figure:
 
 
 class Linked(str):
-    """A cell that leads to a place of the page; in Markdown its text alone."""
+    """A table cell that links to a place in the page; Markdown shows its text only."""
 
     href: str
 
     def __new__(cls, text: str, href: str) -> Linked:
-        """The text, with the id of the place, ``#`` included."""
+        """Return the text; ``href`` is the id of the place with ``#``."""
         made = super().__new__(cls, text)
         made.href = href
         return made
@@ -67,8 +69,8 @@ class Linked(str):
 
 @dataclass(frozen=True)
 class Opening:
-    """The first screen: a headline, sentences by what they answer, and a mechanism that moves (SVG, or
-    empty)."""
+    """The top of the page: a headline, sentences with the question that each answers, and an animated
+    mechanism (SVG, or empty)."""
 
     headline: str
     sentences: Mapping[str, str]
@@ -78,7 +80,7 @@ class Opening:
 
 @dataclass(frozen=True)
 class Moving:
-    """Mechanisms that move side by side: title and SVG of each."""
+    """Animated mechanisms side by side: title and SVG of each."""
 
     caption: str
     panels: Sequence[tuple[str, str]]
@@ -97,7 +99,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class HeatMap:
-    """Cells by row and column; ``label`` names the quantity of the columns."""
+    """A heat map: cells by row and column; ``label`` names the quantity of the columns."""
 
     caption: str
     label: str
@@ -107,8 +109,8 @@ class HeatMap:
 
 @dataclass(frozen=True)
 class Verdict:
-    """One family in a cell of the matrix: its grade and sign, the lines below, its place, and the link to its
-    best run."""
+    """One family in a cell of the matrix: grade and sign, further lines, its id in the page, and the link to
+    its best run."""
 
     family: str
     grade: str
@@ -120,8 +122,11 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Matrix:
-    """Scenes × engines: ``engines`` are (name, title, tone, mark), ``cells[scene][engine]`` the verdicts on
-    an engine's families; empty where it has no run."""
+    """Matrix of scenes and engines.
+
+    ``engines`` are (name, title, tone, mark). ``cells[scene][engine]`` contains the verdicts on the families
+    of an engine, and is empty if the engine has no run.
+    """
 
     caption: str
     engines: Sequence[tuple[str, str, int, str]]
@@ -131,8 +136,8 @@ class Matrix:
 
 @dataclass(frozen=True)
 class Plot:
-    """A figure that can be asked: its caption, SVG, the legend (engine, tone, mark, families), and the same
-    numbers as a Figure for Markdown."""
+    """An interactive figure: caption, SVG, legend (engine, tone, mark, families), and its numbers as a Figure
+    for Markdown."""
 
     caption: str
     svg: str
@@ -142,7 +147,7 @@ class Plot:
 
 @dataclass(frozen=True)
 class Card:
-    """A run in the page: its place, settings, grade, numbers by name, message, command, and what made it."""
+    """A run in the page: its id, settings, grade, numbers by name, message, command and origin."""
 
     place: str
     settings: str
@@ -156,8 +161,7 @@ class Card:
 
 @dataclass(frozen=True)
 class Record:
-    """The runs of an engine's family on a scene, shown when one is asked for; ``back`` is the place in the
-    matrix that leads here."""
+    """The runs of a family on a scene, shown on demand; ``back`` links to the cell of the matrix."""
 
     place: str
     scene: str
@@ -169,7 +173,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines printed as they are, in a fixed-width face."""
+    """Lines printed unchanged in a fixed-width font."""
 
     text: str
 

@@ -1,4 +1,4 @@
-"""The look of engines in the page: a place in the list of colours, a mark, and a word for a grade."""
+"""Colours and marks of engines in the page, and words for grades."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from crosscheck.engine import engine_names
 from crosscheck.study.speed_sentences import title
 from crosscheck.study.verdict import DEFAULTS, Grade
 
-TONES = 7  # colours of the style sheet; engines of third parties share the last
+TONES = 7  # number of colours in the style sheet; third-party engines share the last one
 SIGNS: Mapping[Grade, str] = {
     Grade.RIGHT: "=",
     Grade.INACCURATE: "≈",
@@ -17,7 +17,7 @@ SIGNS: Mapping[Grade, str] = {
     Grade.FAILED: "×",
     Grade.UNJUDGED: "?",
 }
-MARKS = (  # paths within five pixels of the origin
+MARKS = (  # SVG paths within five pixels of the origin
     "M5 0A5 5 0 1 1-5 0 5 5 0 1 1 5 0Z",
     "M-4.4-4.4H4.4V4.4H-4.4Z",
     "M0-5.4 5 3.8H-5Z",
@@ -29,27 +29,27 @@ MARKS = (  # paths within five pixels of the origin
 
 
 def tone(engine: str) -> int:
-    """The number of an engine's colour and mark, the same everywhere."""
+    """Return the number of an engine's colour and mark, which is equal in all pictures."""
     names = _names()
     return min(names.index(engine), TONES - 1) if engine in names else TONES - 1
 
 
 @functools.cache
 def _names() -> tuple[str, ...]:
-    """The engines known here; looking for entry points takes 50 ms."""
+    """Return the names of crosscheck's own engines; looking for third-party engines would take 50 ms."""
     return tuple(engine_names())
 
 
 def mark(engine: str) -> str:
-    """The path of an engine's mark."""
+    """Return the SVG path of an engine's mark."""
     return MARKS[tone(engine)]
 
 
 def named(engine: str, family: str) -> str:
-    """An engine and a family in words."""
+    """Return engine and family as text."""
     return f"{title(engine)}, {family}"
 
 
 def is_hollow(family: str) -> bool:
-    """Whether a family's marks are drawn hollow: the library's defaults."""
+    """Return whether a family's marks have no filling: this marks the library's defaults."""
     return family == DEFAULTS

@@ -1,4 +1,4 @@
-"""The look shared by every picture, and pictures as SVG text and PNG bytes, the same each time."""
+"""Style of all figures, and figures as SVG text and PNG bytes that are reproducible bit by bit."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STYLE: Any = {
 
 
 def canvas(width: float = 7.2, height: float = 4.0, rows: int = 1) -> tuple[Figure, list[Axes]]:
-    """A figure of ``rows`` axes above one another sharing x; sizes in inches."""
+    """Return a figure of ``rows`` axes above each other with a common x axis; sizes in inches."""
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(width, height), layout="constrained")
         axes = figure.subplots(rows, 1, sharex=True, squeeze=False)
@@ -50,7 +50,7 @@ def canvas(width: float = 7.2, height: float = 4.0, rows: int = 1) -> tuple[Figu
 
 
 def colour(engine: str) -> str:
-    """The engine's colour, the same in every picture; engines of third parties share the last ones."""
+    """Return the engine's colour, equal in every picture; third-party engines share the last colours."""
     names = engine_names()
     return COLOURS[names.index(engine) % len(COLOURS)] if engine in names else COLOURS[-1]
 
@@ -59,7 +59,7 @@ Look = dict[str, Any]  # keyword arguments of a line
 
 
 def looks(curves: Iterable[Curve]) -> Mapping[Curve, Look]:
-    """Line and marker of every (engine, family): colour by engine, marker and dash by family."""
+    """Return line and marker of every (engine, family): colour by engine, marker and dash by family."""
     styles: dict[Curve, Look] = {}
     for engine, group in itertools.groupby(sorted(set(curves)), key=lambda curve: curve[0]):
         for i, curve in enumerate(group):
@@ -69,7 +69,7 @@ def looks(curves: Iterable[Curve]) -> Mapping[Curve, Look]:
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
-    """The legend of ``axes`` in columns under the figure, where it covers nothing."""
+    """Place the legend of ``axes`` in columns below the figure, so that it covers nothing."""
     handles, labels = axes.get_legend_handles_labels()
     if handles:
         with matplotlib.rc_context(STYLE):

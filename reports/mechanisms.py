@@ -1,4 +1,4 @@
-"""Mechanisms as the report and the README show them: runs over a true motion, branches, and poses in turn."""
+"""Pictures of mechanisms in the report and the README: runs over the true motion, branches, and poses."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from mbref.trajectory import Trajectory
 from reports import figures
 from reports.runs import Run, power
 
-BEHIND = Look(GREY, 9.0, 0.45)  # the true motion, behind a run
-RUN = 3.5  # px, thickness of the bodies of a run
+BEHIND = Look(GREY, 9.0, 0.45)  # look of the true motion behind a run
+RUN = 3.5  # px, thickness of the bodies in a run
 POSES = 8
 FINE = 12  # points of a path between two samples
-ACCURACY = ("rtol", "step")  # settings that a title shows
+ACCURACY = ("rtol", "step")  # settings shown in a title
 OPENING, BRANCH = Form(480.0, 34.0, 330.0), Form(420.0, 40.0, 300.0)
 
 
@@ -37,7 +37,8 @@ def motion_of(scene: Scene, record: Mapping[str, Any]) -> Trajectory:
 
 
 def over_truth(scene: Scene, exact: Trajectory, run: Trajectory | None, engine: str) -> str:
-    """Return the true motion in grey, and in front of it a run at the same times in its engine's colour."""
+    """Return a picture of the true motion in grey, and of a run at equal times in front of it in its engine's
+    colour."""
     layers = _run_over(exact, run, engine) if run else [Layer(exact, BEHIND, ())]
     words, timeline = f"The mechanism {scene.name} in motion", Timeline.of(exact.times)
     return picture(scene, [Panel(layers)], words, timeline, form=OPENING, shown=[exact])
@@ -78,13 +79,15 @@ def compared(scene: Scene, exact: Trajectory, runs: Sequence[Run], marks: Sequen
 
 
 def poses(scene: Scene, motion: Trajectory) -> str:
-    """Return poses over one another, the last in full colour, and the paths of the centres of mass."""
+    """Return a picture of poses on top of each other, the last in full colour, with the paths of the centres
+    of mass."""
     panel = Panel(_poses(motion, POSES, 5.0), paths=[path(motion, b) for b in range(len(scene.body))])
     return picture(scene, [panel], f"{scene.name}: poses", form=Form(), shown=[motion])
 
 
 def poses_side_by_side(scene: Scene, motions: Mapping[str, tuple[str, Trajectory]], number: int) -> str:
-    """Return ``number`` poses of several motions side by side; the first item of each is a second title."""
+    """Return a picture of ``number`` poses of several motions side by side; the first item of each motion is
+    a subtitle."""
     panels = [
         Panel([layer._replace(more=()) for layer in _poses(motion, number, 4.0)], [title, line])
         for title, (line, motion) in motions.items()
@@ -98,7 +101,8 @@ def _run_over(exact: Trajectory, run: Trajectory, engine: str) -> list[Layer]:
 
 
 def _poses(motion: Trajectory, number: int, thickness: float) -> list[Layer]:
-    """Return a layer for each of some samples, later ones darker; the last has signs and names."""
+    """Return a layer for each of ``number`` samples, later ones darker; the last layer has joint signs and
+    names."""
     samples = np.unique(np.linspace(0, len(motion.times) - 1, number).astype(int))
     layers = [
         Layer(sample(motion, k), Look(thickness=thickness / 2, opacity=0.15 + 0.4 * i / len(samples)), ())
@@ -108,7 +112,7 @@ def _poses(motion: Trajectory, number: int, thickness: float) -> list[Layer]:
 
 
 def sample(motion: Trajectory, chosen: int | slice) -> Trajectory:
-    """Return some samples of a motion, given by number or as a slice."""
+    """Return the selected samples of a motion; ``chosen`` is a sample number or a slice."""
     part = slice(chosen, chosen + 1) if not isinstance(chosen, slice) else chosen
     fields = ("times", "position", "orientation", "velocity", "angular_velocity")
     arrays = {name: getattr(motion, name)[part] for name in fields}
@@ -116,6 +120,7 @@ def sample(motion: Trajectory, chosen: int | slice) -> Trajectory:
 
 
 def path(motion: Trajectory, body: int) -> np.ndarray:
-    """Return points (n, 3), m, of the path of a centre of mass: cubics between samples, by its velocities."""
+    """Return points (n, 3), m, on the path of a centre of mass: cubic interpolation between samples with its
+    velocities."""
     t, r, v = motion.times, motion.position[:, body], motion.velocity[:, body]
     return r if len(t) < 2 else CubicHermiteSpline(t, r, v)(np.linspace(t[0], t[-1], FINE * len(t)))

@@ -1,4 +1,4 @@
-"""Blocks as one self-contained HTML page, and as Markdown with pictures in files."""
+"""Writes blocks as one self-contained HTML page, and as Markdown with pictures in files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from reports.blocks import (
 
 CODE = re.compile("`([^`]+)`")
 NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b|--[\w-]+")
-TITLE = "Closed-loop mechanisms: engines against truth"
+TITLE = "Closed-loop mechanisms: engines compared with the true motion"
 
 
 def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
@@ -51,7 +51,7 @@ def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
 
 
 def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> str:
-    """The page; ``drawn`` has the SVG element of every figure by name."""
+    """Return the HTML page; ``drawn`` maps the name of every figure to its SVG element."""
     environment = Environment(
         loader=PackageLoader("reports"),
         autoescape=True,
@@ -70,7 +70,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> 
 
 
 def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
-    """The report as Markdown that shows figures/NAME.png."""
+    """Return the report as Markdown that shows figures/NAME.png."""
     return "\n\n".join([f"# {title}", *map(_markdown, blocks)]) + "\n"
 
 
@@ -108,7 +108,7 @@ def _heat(cell: Cell) -> str:
 
 
 def _matrix(matrix: Matrix) -> str:
-    """The matrix as a table: the engine's best family, then its library's defaults."""
+    """Return the matrix as a table: the engine's best family, then its library's defaults."""
     rows = [
         [
             scene,
@@ -132,32 +132,33 @@ def _rows(table: Table) -> str:
 
 
 def _line(cells: Sequence[str]) -> str:
-    """One line of a Markdown table; what would end a cell or a line is taken out of it."""
+    """Return one line of a Markdown table; characters that would end a cell or a line are removed."""
     return "| " + " | ".join(_words(cell).replace("|", "\\|") for cell in cells) + " |"
 
 
 def _words(text: str) -> str:
-    """The text on one line, without tags of HTML."""
+    """Return the text on one line without HTML tags."""
     return " ".join(text.replace("&", "&amp;").replace("<", "&lt;").split())
 
 
 def numbers(text: str) -> Markup:
-    """The text for the page, its numbers and options unbroken, its commands as code."""
+    """Return the text for the page: numbers and options are not broken, commands are set as code."""
     unbroken = NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text)))
     return Markup(CODE.sub(r"<code>\1</code>", unbroken))
 
 
 def breakable(name: str) -> Markup:
-    """A name for the page that may be broken behind its underscores and plus signs."""
+    """Return a name for the page that may be broken after underscores and plus signs."""
     return escape(name).replace("_", Markup("_<wbr>")).replace("+", Markup("+<wbr>"))
 
 
 def file_name(name: str) -> str:
-    """The name of a figure as a file name: a name that is none, such as ../up, gets a number of its own."""
+    """Return the name of a figure as a file name; a name that is no valid file name, such as ../up, is
+    replaced by a number."""
     plain = re.sub(r"[^\w-]+", "-", name).strip("-")[:80]
     return plain if plain and plain == name else f"{plain}-{zlib.crc32(name.encode()):08x}"
 
 
 def slug(text: str) -> str:
-    """A heading as the id of its place in the page."""
+    """Return a heading's id in the page."""
     return re.sub(r"\W+", "-", text.lower()).strip("-")

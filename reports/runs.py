@@ -1,4 +1,4 @@
-"""Run: a stored record as the sections read it, and the groupings they share."""
+"""Runs as the sections of a report read them, made from stored records, and their groups by scene."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ Curve = tuple[str, str]  # engine, family
 
 @dataclass(frozen=True)
 class Run:
-    """One record of the study. ``error`` is NaN where no truth could be compared with."""
+    """One record of the study; ``error`` is NaN if there is no truth."""
 
     record: Record
 
@@ -56,7 +56,8 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """The reason of the end, one sentence: the engine's, else the outcome's."""
+        """Return the reason of the run's end in one sentence: the engine's message, otherwise the
+        outcome's."""
         return self.record["message"] or self.outcome.sentence
 
     @property
@@ -69,7 +70,8 @@ class Run:
 
     @property
     def drawn(self) -> tuple[float, float]:
-        """Error and time (s) on logarithmic axes; the error no lower than it is known."""
+        """Return error and time (s) for logarithmic axes; the error is at least the bound on the truth's own
+        error."""
         return drawn(self.record, self.seconds)
 
     @property
@@ -79,26 +81,29 @@ class Run:
 
     @property
     def said(self) -> str:
-        """The error for a table cell: ``< 3e-12`` below the bound on the truth's own error."""
+        """Return the error for a table cell: ``< 3e-12`` if it is below the bound on the truth's own
+        error."""
         return error_text(self.record)
 
     @property
     def is_false_success(self) -> bool:
-        """Whether the run says it completed and yet is WRONG."""
+        """Return whether the run reports that it completed although its grade is WRONG."""
         return self.completed and self.error > WRONG
 
     @property
     def is_short_of_tolerance(self) -> bool:
-        """Whether the run says it completed and has EXCESS times the error it was asked for, if it was."""
+        """Return whether the run reports that it completed although its error exceeds EXCESS times its
+        relative tolerance, if it has one."""
         rtol = self.record["settings"].get("rtol", math.inf)
         return self.completed and self.error > EXCESS * rtol
 
     def rate(self, count: str) -> float:
-        """A cost of the record, such as ``steps``, a second of simulation; NaN for a run without any."""
+        """Return a cost of the record, such as ``steps``, per second of simulation; NaN if the record has
+        none."""
         return float(self.record["cost"][count]) / self.t_end if self.t_end > 0 else math.nan
 
     def metric(self, name: str) -> float:
-        """A metric of the record; NaN where it has none."""
+        """Return a metric of the record; NaN if it has none."""
         value = self.record["metrics"].get(name)
         return math.nan if value is None else float(value)
 
@@ -109,29 +114,31 @@ class Run:
 
 @dataclass(frozen=True)
 class SceneRuns:
-    """A scene and its runs: what the sections about one scene are given."""
+    """A scene and its runs, with all data that the sections on one scene need."""
 
     scene: Scene
     runs: Sequence[Run]
-    gate: Sequence[Record] = ()  # short runs that show whether the engines simulate the same mechanism
+    gate: Sequence[Record] = ()  # short runs that show whether the engines simulate equal mechanisms
     truth: Record | None = None  # record made by `crosscheck.study.truths`
-    motion: Record | None = None  # the run of largest error at the instants shown of the truth's motion
+    motion: Record | None = None  # run of largest error, sampled at the frames of the truth's animation
     branches: Sequence[Record] = ()  # runs along the branches that meet at singular positions
 
     def difference(self) -> str | None:
-        """The first field in which an engine's mechanism is another one; None when all agree."""
+        """Return the first quantity in which an engine's mechanism differs; None if all agree."""
         return model_difference(self.scene, self.gate) if self.gate else None
 
     @cached_property
     def differences(self) -> Mapping[str, str]:
-        """By engine, how the mechanism that it simulates differs from the scene; empty without a truth."""
+        """Return for each engine that simulates another mechanism how it differs from the scene; empty
+        without a truth."""
         if not (self.truth and self.truth["kind"]):
             return {}
         at_start = model_differences(self.scene, self.gate) if self.gate else {}
         return at_start | force_differences(self.scene, [run.record for run in self.runs])
 
     def exact(self, times: np.ndarray) -> Trajectory | None:
-        """The true motion at times (k,), in the time that its record was given; None where unknown."""
+        """Return the true motion at times (k,), computed within the CPU time that the truth's record used;
+        None if unknown."""
         truth = self._truth()
         try:
             return None if truth is None else truth.poses(times)
@@ -139,28 +146,29 @@ class SceneRuns:
             return None
 
     def exact_part(self, motion: Trajectory) -> Trajectory | None:
-        """The true motion at a motion's times, or at the first of them where it is known no further."""
+        """Return the true motion at a motion's times, up to the time to which it is known."""
         return exact_motion(motion, self._truth())
 
     def _truth(self) -> Truth | None:
         return truth_for(self.scene, SECONDS if self.truth is None else self.truth["given"])
 
     def curves(self) -> dict[Curve, list[Run]]:
-        """Runs by engine and family, in the order of the records."""
+        """Return the runs by engine and family, in the order of the records."""
         curves: dict[Curve, list[Run]] = {}
         for run in self.runs:
             curves.setdefault(run.curve, []).append(run)
         return curves
 
     def varied_settings(self, run: Run) -> str:
-        """The settings of a run that vary along its curve, as printed (``rtol=1e-06``); all if alone."""
+        """Return the settings that vary along a run's curve as text (``rtol=1e-06``); all settings if the run
+        is alone."""
         return varied_settings(run.record, [other.record for other in self.runs])
 
     def completed(self) -> list[Run]:
         return [run for run in self.runs if run.completed]
 
     def best(self) -> dict[Curve, Run]:
-        """Return for each curve the completed run of least error, otherwise the run that got furthest."""
+        """Return for each curve the completed run of least error, otherwise the run that ended last."""
         return {curve: min(runs, key=_rank) for curve, runs in self.curves().items()}
 
 
@@ -177,8 +185,11 @@ def by_scene(
     motions: Iterable[Record] = (),
     branches: Iterable[Record] = (),
 ) -> list[SceneRuns]:
-    """Runs grouped by scene, in the order of ``scenes``, with the scene's records of the gate, of its truth
-    and of the motions shown; scenes without runs are left out."""
+    """Return the runs grouped by scene, in the order of ``scenes``.
+
+    Each group also has the scene's short runs (``gates``), its truth and its animated motions. Scenes without
+    runs are left out.
+    """
     runs, gate, along = (_of_scenes(found, scenes) for found in (records, gates, branches))
     truth, motion = ({record["scene"]: record for record in group} for group in (truths, motions))
     return [
@@ -200,32 +211,33 @@ def _of_scenes(records: Iterable[Record], scenes: Collection[str]) -> dict[str, 
 
 
 def ended_briefly(run: Run) -> str:
-    """``20 s`` for a run of the paper that completed, else end time and footnote or name of the outcome."""
+    """Return ``20 s`` for a completed run of the paper, otherwise the end time with the footnote or the
+    outcome's name."""
     return "20 s" if run.completed else f"{run.t_end:.4g} s {run.outcome.letter or run.outcome.label}"
 
 
 def plain(value: Any) -> str:
-    """A setting as text, numbers in their shortest form."""
+    """Return a setting as text, with numbers in their shortest form."""
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def number(value: float, digits: int = 2) -> str:
-    """A measured number for a table cell; an en dash where there is none."""
+    """Return a measured number for a table cell; an en dash if it is missing."""
     return "–" if not math.isfinite(value) else f"{value:.{digits}g}"
 
 
 def ratio(value: float) -> str:
-    """A multiple for a table cell."""
+    """Return a ratio for a table cell."""
     return "–" if not math.isfinite(value) else f"{value:.1f}"
 
 
 def short(level: float) -> str:
-    """An error level in words of the page: 1e-3."""
+    """Return an error level as text: 1e-3."""
     return f"{level:.0e}".replace("e-0", "e-")
 
 
 def power(value: float) -> str:
-    """An error for a table cell: one decimal and a power of ten."""
+    """Return an error for a table cell: one decimal and a power of ten."""
     return "–" if not math.isfinite(value) else "0" if value == 0 else f"{value:.1e}"
 
 
@@ -233,12 +245,13 @@ ROUNDING = 1e-11  # smaller differences from the judge's solution are rounding
 
 
 def beyond_rounding(value: float) -> str:
-    """A difference for a table cell that is the same on every machine: rounding is not printed."""
+    """Return a difference for a table cell. Differences at rounding level vary between machines and are not
+    printed."""
     return f"< {ROUNDING:g}" if 0 < value < ROUNDING else power(value)
 
 
 def duration(seconds: float) -> str:
-    """Seconds with the unit that suits them."""
+    """Return a duration in s, ms or µs."""
     if not math.isfinite(seconds):
         return "–"
     for unit, scale in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):

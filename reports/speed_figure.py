@@ -1,4 +1,4 @@
-"""Time against error as SVG whose text keeps its size: widths are percentages, heights pixels."""
+"""SVG figure of time against error whose text keeps its size: widths are percentages, heights are pixels."""
 
 from __future__ import annotations
 
@@ -12,14 +12,15 @@ from reports.engine_looks import is_hollow, mark, named, tone
 from reports.places import of_run
 from reports.runs import Run, SceneRuns, duration
 
-HEIGHT, TOP, FOOT = 380.0, 26.0, 40.0  # px: of the axes, above and below them
-LEAST_WIDE = 18  # percent of the width that the name of a grade takes
-MOST_LABELS = 7  # most tick labels on an axis
+HEIGHT, TOP, FOOT = 380.0, 26.0, 40.0  # px; height of the axes, margin above, margin below
+LEAST_WIDE = 18  # least width of a grade's zone, in percent of the width, at which its name is shown
+MOST_LABELS = 7  # largest number of tick labels on an axis
 DASHES = ("", "6 4", "2 4", "9 3 2 3")
 
 
 def speed_svg(scene_runs: SceneRuns, description: str) -> str:
-    """The figure of a scene, every completed run a mark that leads to its record; empty without errors."""
+    """Return the figure of a scene, in which every completed run is a mark that links to its record; empty
+    without errors."""
     shown = [run for run in scene_runs.completed() if math.isfinite(run.error)]
     if not shown:
         return ""
@@ -47,18 +48,18 @@ def toggles(scene_runs: SceneRuns) -> list[tuple[str, int, str, list[str]]]:
 
 
 class _Axes:
-    """Logarithmic axes of whole decades."""
+    """Logarithmic axes that span whole decades."""
 
     def __init__(self, errors: Sequence[float], times: Sequence[float]):
         self.x0, self.x1 = _decades(errors)
         self.y0, self.y1 = _decades(times)
 
     def x(self, error: float) -> float:
-        """Percent of the width."""
+        """Return the horizontal position of an error in percent of the width."""
         return 100 * min(max((math.log10(error) - self.x0) / (self.x1 - self.x0), 0.0), 1.0)
 
     def y(self, time: float) -> float:
-        """Pixels from the top."""
+        """Return the vertical position of a time in pixels from the top."""
         return HEIGHT * (self.y1 - math.log10(time)) / (self.y1 - self.y0)
 
 
@@ -72,7 +73,7 @@ def _ticks(low: int, high: int) -> range:
 
 
 def _zones(axes: _Axes) -> Iterator[str]:
-    """The grades along the axis of errors."""
+    """Return the zones of the grades along the axis of errors."""
     ends = [axes.x(10.0**axes.x0), axes.x(FLOOR), axes.x(FALSE_SUCCESS), 100.0]
     for word, left, right in zip(("right", "inaccurate", "wrong"), ends, ends[1:], strict=False):
         wide = right - left
@@ -118,7 +119,7 @@ def _curves(scene_runs: SceneRuns, axes: _Axes) -> Iterator[str]:
 
 
 def _mark(scene_runs: SceneRuns, run: Run, x: float, y: float) -> str:
-    """A mark that leads to its record and carries the run's numbers as data."""
+    """Return a mark that links to its record and has the run's numbers as data attributes."""
     settings, cost = scene_runs.varied_settings(run), run.record["cost"]
     measured = f"error {run.said}, {duration(run.seconds)}, {cost['steps']} steps"
     said = escape(f"{named(*run.curve)}, {settings}: {measured}")

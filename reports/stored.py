@@ -1,4 +1,5 @@
-"""A report's folder read back: its scenes, records, times, truths and motions, without any run."""
+"""Reads the stored contents of a report's folder (scenes, records, times, truths and motions), without any
+run."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ from reports.runs import SceneRuns, by_scene
 
 
 def groups(folder: Path) -> list[SceneRuns]:
-    """The runs of a folder by scene; FileNotFoundError where it has no scenes or records."""
+    """Return the runs of a folder by scene; raises FileNotFoundError if it has no scenes or records."""
     if not (folder / "records.jsonl").exists() or not (folder / "scenes").is_dir():
         raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
@@ -34,8 +35,8 @@ def groups(folder: Path) -> list[SceneRuns]:
 
 
 def verified(folder: Path) -> list[Record]:
-    """The verdicts that `crosscheck verify ENGINE --json` printed into ``folder``/conformance/*.json, in the
-    order of the engines that are known here."""
+    """Return the verdicts that `crosscheck verify ENGINE --json` wrote to ``folder``/conformance/*.json,
+    crosscheck's own engines first."""
     order = list(engine_names())
     found = [json.loads(path.read_text()) for path in sorted((folder / "conformance").glob("*.json"))]
     return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))
@@ -46,7 +47,7 @@ def _is_gate(scene: Scene, record: Record) -> bool:
 
 
 def _ordered(records: Sequence[Record]) -> list[Record]:
-    """By engine, those known here first, and from coarse to fine in each family."""
+    """Return the records by engine, crosscheck's own first, and from coarse to fine in each family."""
     engines = list(dict.fromkeys([*engine_names(), *(r["engine"] for r in records)]))
 
     def place(record: Record) -> tuple[int, str, list[float]]:

@@ -1,4 +1,4 @@
-"""Measured quantities over time, one line for the most accurate run of every engine and family."""
+"""Plots of measured quantities over time, one line for the most accurate run of every engine and family."""
 
 from __future__ import annotations
 
@@ -10,21 +10,23 @@ from matplotlib.figure import Figure
 from reports import figures
 from reports.runs import Curve, Run, SceneRuns
 
-SMALLEST = 1e-17  # magnitudes below are drawn here: zero has no place on a logarithmic axis
+SMALLEST = 1e-17  # smaller magnitudes are plotted at this value, since a logarithmic axis has no zero
 
 Panels = Sequence[np.ndarray]
 Series = Mapping[Curve, Panels]  # for each curve one (k,) array per panel
 
 
 def series(scene_runs: SceneRuns, measure: Callable[[Run], Panels | None]) -> dict[Curve, Panels]:
-    """``measure`` of the best run of every curve with at least two samples, where it says something."""
+    """Return ``measure`` of the best run of every curve that has at least two samples; curves without values
+    are left out."""
     best = {curve: run for curve, run in scene_runs.best().items() if len(run.trajectory.times) > 1}
     measured = {curve: measure(run) for curve, run in best.items()}
     return {curve: panels for curve, panels in measured.items() if panels is not None}
 
 
 def plot(scene_runs: SceneRuns, values: Series, labels: Sequence[str]) -> Figure:
-    """Magnitudes over time on logarithmic axes, one panel a label; a cross where a run ended early."""
+    """Return a plot of magnitudes over time on a logarithmic axis, one panel for each label; a cross marks an
+    early end."""
     figure, panels = figures.canvas(7.2, 1.1 + 2.3 * len(labels), len(labels))
     looks, best = figures.looks(scene_runs.curves()), scene_runs.best()
     for i, (axes, label) in enumerate(zip(panels, labels, strict=True)):
@@ -43,12 +45,12 @@ def plot(scene_runs: SceneRuns, values: Series, labels: Sequence[str]) -> Figure
 
 
 def _drawable(values: np.ndarray) -> np.ndarray:
-    """Magnitudes for a logarithmic axis; what is not finite is left out of the line."""
+    """Return magnitudes for a logarithmic axis; values that are not finite are removed."""
     sizes = np.abs(values)
     return np.where(np.isfinite(sizes), np.maximum(sizes, SMALLEST), np.nan)
 
 
 def largest(values: Series, panel: int = 0) -> tuple[tuple[Curve, float], tuple[Curve, float]]:
-    """The curves whose largest magnitude is least and greatest, with it."""
+    """Return the curves whose largest magnitude is least and greatest, with these magnitudes."""
     peaks = {curve: float(np.abs(parts[panel]).max()) for curve, parts in values.items()}
     return min(peaks.items(), key=lambda p: p[1]), max(peaks.items(), key=lambda p: p[1])

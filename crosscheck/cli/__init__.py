@@ -1,9 +1,9 @@
-"""The command `crosscheck`: its options, its lists and the tables it prints."""
+"""The command ``crosscheck``: its options and the tables that it prints."""
 
 import gc
 
 collects = gc.isenabled()
-gc.disable()  # no search for garbage among imported objects
+gc.disable()  # garbage collection would only cost time during the imports
 from crosscheck.cli.commands import main  # noqa: E402
 
 gc.freeze()

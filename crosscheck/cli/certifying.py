@@ -1,4 +1,4 @@
-"""`crosscheck certify`: the motion of a scene to many digits, as a table to be kept."""
+"""`crosscheck certify`: write the motion of a scene to many decimal digits as a table."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from crosscheck.study.progress import followed
 
 
 def certify(arguments: argparse.Namespace) -> int:
-    """Write the table, or print it; returns 0.
+    """Write or print the table of `crosscheck certify`; returns the exit status 0.
 
-    Raises RequestError for a bad request, and where the digits of both formulations differ.
+    Raises RequestError for a bad request, and if the digits of the two formulations differ.
     """
     from crosscheck.judge.reference.certify import NotCertified, certified
 
@@ -36,12 +36,12 @@ def certify(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_without_flint() -> None:
-    """Raise RequestError where the package for numbers of many digits is not installed."""
+    """Raise RequestError if python-flint, the package for arithmetic of many digits, is not installed."""
     if importlib.util.find_spec("flint") is None:
         raise RequestError("certify: the package python-flint is not installed: pip install python-flint")
 
 
 def _refuse_missing_folder(file: str | None) -> None:
-    """Raise RequestError where a file cannot be written for want of its folder."""
+    """Raise RequestError if the folder of an output file does not exist."""
     if file and not Path(file).parent.is_dir():
         raise RequestError(f"--out: {Path(file).parent} must be in an existing folder")

@@ -1,4 +1,4 @@
-"""The records of a report: of its scenes in the engines, and of the paper's tables and figures."""
+"""Records of a report: runs of its scenes in the engines, and of the paper's tables and figures."""
 
 from __future__ import annotations
 
@@ -22,20 +22,21 @@ from mbref.records import looked_at
 from mbref.scene import Scene
 
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
-REPEATS = 3  # timed runs of each setting, in turns
+REPEATS = 3  # timed runs of each setting; the settings take turns
 Notice = Callable[[str], None]  # takes one sentence for the user
 
 
 class Paper(NamedTuple):
-    """Records of the paper's tables and figures by label, and what explains its Table I."""
+    """Records of the runs of the paper's tables and figures by label, and the ``Illustration`` of its Table
+    I."""
 
     records: runs.Records
     illustration: Illustration
 
 
 class Runs(NamedTuple):
-    """The runs of a report: scenes and engines, or None for the default ones, their depth, and the time (s)
-    for a reference."""
+    """Request of a report: scenes and engines (None: the default ones), depth, and CPU time (s) of a
+    reference."""
 
     scenes: Sequence[Scene] | None
     engines: Sequence[str] | None
@@ -44,9 +45,9 @@ class Runs(NamedTuple):
 
 
 def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
-    """The records of a comparison, stored in ``out``.
+    """Return the records of a comparison, which are stored in the folder ``out``.
 
-    Raises RequestError for an unknown engine, and when none is installed.
+    Raises RequestError for an unknown engine, and if no named engine is installed.
     """
     scenes, engines, is_quick = wanted.scenes, find_engines(wanted.engines, notice), wanted.is_quick
     if scenes is None:
@@ -72,13 +73,14 @@ def closed_loops() -> list[Record]:
 
 
 def stability_ladders(out: Path, notice: Notice) -> list[Record]:
-    """The records of the stability ladders, stored in ``out``/stability.jsonl."""
+    """Return the records of the stability ladders, which are stored in ``out``/stability.jsonl."""
     out.mkdir(parents=True, exist_ok=True)
     return stability.run(out / "stability.jsonl", find_engines(None, notice))
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
-    """Return records of the paper's runs, stored in ``out``/paper*: for its tables, or for all studies."""
+    """Return the records of the paper's runs, stored in ``out``/paper*: of its tables only, or of all
+    studies."""
     out.mkdir(parents=True, exist_ok=True)
     path, timed = out / store.FILE, runs.timed()
     cases = runs.cases() | timed | (runs.studies() if is_whole else {})
@@ -95,7 +97,10 @@ def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
 
 
 def stored_paper(out: Path) -> Paper:
-    """The paper's records of a folder; nothing is run.  Raises FileNotFoundError where it has none."""
+    """Return the records of the paper's runs that a folder stores, without any run.
+
+    Raises FileNotFoundError if the folder has none.
+    """
     records, times = store.indexed(out), looked_at(out / TIMINGS)
     timed = {label: with_time(record, times) for label, record in records.items()}
     return Paper(timed, illustration(out / ILLUSTRATION))

@@ -1,4 +1,4 @@
-"""The command `crosscheck`: studies, verdicts, recorded motions, the suite, reports and references."""
+"""Functions that carry out the commands of `crosscheck`."""
 
 from __future__ import annotations
 
@@ -36,8 +36,8 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command line; returns the exit status: 0 done as asked, 1 otherwise, 2 bad input, 130 interrupted
-    (`parser.EXIT` says what each command counts as done)."""
+    """Run a command line; returns the exit status: 0 done, 1 otherwise, 2 bad input, 130 interrupted
+    (`parser.EXIT` defines "done" for each command)."""
     known = parser()
     arguments = known.parse_args(argv)
     try:
@@ -73,7 +73,7 @@ def _run(arguments: argparse.Namespace) -> int:
     finished: list[Record] = []
     try:
         studied(cases, finished)
-    finally:  # also when interrupted: the finished runs are shown
+    finally:  # show the finished runs, also after an interrupt
         by_key = {record["key"]: record for record in finished}
         records = [by_key[k] for k in dict.fromkeys(map(key, cases)) if k in by_key]
         if arguments.json:
@@ -90,7 +90,7 @@ def _verify(arguments: argparse.Namespace) -> int:
 
     (engine,) = request.find_engines([arguments.engine], notice)
     if arguments.mechanisms:
-        return _verify_drawn(engine, arguments)
+        return _verify_random(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time, engine)
     with counted("verifying", len(chosen) + 1) as advance:
         runner = suite.runner(engine, arguments.time_limit, arguments.in_process)
@@ -103,7 +103,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     return COMPLETED if found.conforms else OTHERWISE
 
 
-def _verify_drawn(engine: str, arguments: argparse.Namespace) -> int:
+def _verify_random(engine: str, arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import deep
     from crosscheck.conformance.deep_table import tables as deep_tables
 
@@ -137,11 +137,11 @@ def _paper(arguments: argparse.Namespace) -> int:
 
 
 def _rendered(options: Sequence[str]) -> int:
-    """The report stands above this package, so it is started as a program and never imported."""
+    """Run `python -m reports` as a program. This package must not import `reports`, which depends on it."""
     with subprocess.Popen([sys.executable, "-m", "reports", *options]) as program:
         try:
             return program.wait()
-        except KeyboardInterrupt:  # the program is interrupted too, stores its records and ends by itself
+        except KeyboardInterrupt:  # Ctrl-C interrupts the program, too: wait until it has stored its records
             return program.wait()
 
 

@@ -1,4 +1,5 @@
-"""`crosscheck compare`: a verdict on a mechanism; `crosscheck tune`: an engine's settings for an error."""
+"""`crosscheck compare`: a verdict on the engines. `crosscheck tune`: settings of an engine that reach an
+error."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ from mbref.formats import options_of
 
 def compare(arguments: argparse.Namespace) -> int:
     """Print a verdict, tables and a plot for each scene, or the records with the verdict as JSON; returns 1
-    where engines simulate different mechanisms."""
+    if engines simulate different mechanisms."""
     if arguments.repeats < REPEATS:
         raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
     asked = asked_of(arguments, sweep.QUICK_SAMPLES)

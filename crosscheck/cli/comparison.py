@@ -1,4 +1,4 @@
-"""`crosscheck.compare`: engines compared on a mechanism, as an object with a verdict, rows and records."""
+"""The function `crosscheck.compare`, whose result has a verdict, rows and records."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ from mbref.scene import Scene
 if TYPE_CHECKING:
     import pandas
 
-TRUTH = ("kind", "bound", "until", "seconds", "reason", "both")  # fields of a truth's record that are shown
+TRUTH = ("kind", "bound", "until", "seconds", "reason", "both")  # shown fields of a truth's record
 WIDTH = 80
 Row = dict[str, Any]
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One mechanism in several engines. ``print`` shows the output of `crosscheck compare`.
+    """Comparison of several engines on one mechanism. ``print`` shows the output of `crosscheck compare`.
 
     Attributes
     ----------
@@ -53,22 +53,22 @@ class Comparison:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Sentences of the verdict: headline, right, fast, breaks and truth."""
+        """Return the sentences of the verdict: headline, right, fast, breaks and truth."""
         return verdict([self.judged], self._unlike)
 
     @property
     def _unlike(self) -> str | None:
-        """The difference, where no truth shows which engine it is due to."""
+        """Return the difference between the engines' mechanisms if no truth shows which engine is wrong."""
         return None if self.judged.differences else self.difference
 
     @property
     def records(self) -> Sequence[Record]:
-        """Records of all runs."""
+        """Return the records of all runs."""
         return self.judged.records
 
     @property
     def rows(self) -> list[Row]:
-        """One dictionary for each run, completed runs with the least error first.
+        """Return one dictionary for each run: completed runs first, in the order of increasing error.
 
         Keys: engine, family, settings, verdict, outcome, end time (s), error and the other metrics, CPU
         seconds of stepping, and steps.
@@ -189,7 +189,7 @@ def _several(names: str | Sequence[str] | None) -> Sequence[str] | None:
 
 
 def comparisons(found: Collection, paths: dict[str, str], reference_time: float) -> list[Comparison]:
-    """Return one comparison for each scene of a collection.
+    """Return one Comparison for each scene of a collection of records.
 
     ``paths`` are the names of the scenes in commands.
     """
@@ -220,4 +220,4 @@ def _row(record: Record) -> Row:
 
 
 def _silent(sentence: str) -> None:
-    """Tell nobody."""
+    """Ignore a sentence for the user."""

@@ -1,4 +1,4 @@
-"""`crosscheck diff`: what changed beyond noise between two sets of records."""
+"""`crosscheck diff`: changes between two sets of records that exceed the noise of errors and times."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from crosscheck.study.wording import runs
 
 COUNT = (
     "{} of {} runs of both sets changed. Changes are: another outcome or end; an error "
-    f"(above {NOISE:g}) or another measure (above {MEASURE_NOISE:g}) by more than {ERROR_RATIO:g} times; "
+    f"(above {NOISE:g}) or another metric (above {MEASURE_NOISE:g}) by more than {ERROR_RATIO:g} times; "
     f"on the same machine a time by more than {TIME_RATIO:g} times, {SINGLE_RATIO:g} where it was measured "
     "once."
 )
-NONE_OF_BOTH = "The sets have no run in common, so nothing is compared."
+NONE_OF_BOTH = "The two sets have no run in common, so nothing is compared."
 HEADER = ("scene", "engine", "family", "settings", "change")
 
 
 def show(console: Console, old: str, new: str, is_all: bool) -> bool:
-    """Print versions, machines, how many runs one set alone has, and the runs that changed, or all runs;
-    returns whether any did.
+    """Print versions, machines, the numbers of runs that only one set has, and the changed runs or all runs;
+    returns whether any run changed.
 
     Raises RequestError for a file without records.
     """
@@ -62,7 +62,7 @@ def show(console: Console, old: str, new: str, is_all: bool) -> bool:
 
 
 def _of_one_set(changed: Sequence[Change]) -> Iterator[str]:
-    """Return for every engine the number of runs that only one set has."""
+    """Return for each engine the number of runs that only one of the two sets has."""
     alone = [change for change in changed if change.old is None or change.new is None]
     counts = Counter((change.identity[1], *change.sentences) for change in alone)
     yield from (f"{engine}: {runs(number)} {sentence}" for (engine, sentence), number in counts.items())

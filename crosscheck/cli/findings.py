@@ -1,4 +1,5 @@
-"""`crosscheck findings`: the stored findings, and which of them the installed engines still have."""
+"""`crosscheck findings`: stored violations found in engines, and whether the installed versions still have
+them."""
 
 from __future__ import annotations
 
@@ -15,7 +16,7 @@ from mbref.scene_fields import meant
 
 
 def chosen(names: Sequence[str]) -> list[Finding]:
-    """The findings of those names, or all; RequestError for an unknown name."""
+    """Return the findings of the given names, or all findings; raises RequestError for an unknown name."""
     known = {found.name: found for found in findings()}
     if faults := [
         f"unknown finding {name!r}; known: {', '.join(known)}{meant(name, known)}"
@@ -27,7 +28,7 @@ def chosen(names: Sequence[str]) -> list[Finding]:
 
 
 def show(console: Console, names: Sequence[str], recheck: bool) -> None:
-    """Print the findings; with ``recheck`` run each proof and print its answer in a further column."""
+    """Print findings; with ``recheck`` run the proof of each and print its result in a further column."""
     wanted = chosen(names)
     columns = ["finding", "engine", "found in", "what it does"]
     table = Table(*columns, *(["installed", "status", "measured"] if recheck else []), box=SIMPLE)

@@ -1,4 +1,5 @@
-"""`crosscheck judge` and `crosscheck reference`: a recorded motion judged, and the reference as a table."""
+"""`crosscheck judge`: errors of a recorded motion. `crosscheck reference`: the reference motion as a
+table."""
 
 from __future__ import annotations
 
@@ -45,7 +46,7 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
-        verdict = "right within the bound" if c.is_right else "[bold]off[/bold]"
+        verdict = "right within the bound on the reference" if c.is_right else "[bold]off[/bold]"
         unit = SI[kind_of(c.name)]
         table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", verdict, begins)
     console().print(table)
@@ -66,7 +67,9 @@ def write_reference(arguments: argparse.Namespace) -> int:
     times = request.sample_times(scene, arguments.times, arguments.samples)
     table = reference_table(scene, times, arguments.reference_time)
     if not len(table["time"]):
-        raise RequestError(f"{scene.name}: has no reference in {arguments.reference_time:g} CPU seconds")
+        raise RequestError(
+            f"{scene.name}: no reference was found in {arguments.reference_time:g} CPU seconds"
+        )
     try:
         write(table, Path(arguments.out))
     except OSError as error:

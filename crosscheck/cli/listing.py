@@ -1,4 +1,4 @@
-"""The tables of `crosscheck list`: scenes, engines, methods, metrics and support."""
+"""The tables of `crosscheck list`: scenes, engines, methods, settings, metrics and support."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def show(console: Console, what: str | None) -> None:
 
 
 def show_versions(console: Console) -> None:
-    """The versions of crosscheck and of every engine, a line each."""
+    """Print the version of crosscheck and of each engine, one line each."""
     console.print(f"crosscheck {mbref.__version__}")
     for name in engine_names():
         console.print(f"{name} {missing_package(name) or engine(name).version()}")

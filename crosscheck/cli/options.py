@@ -20,7 +20,7 @@ DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # allowed values of --digits
 
 
 def add_selection(parser: argparse.ArgumentParser) -> None:
-    """Scenes, engines, families, sample times, tolerance and limits of runs."""
+    """Add options for scenes, engines, families, sample times, tolerance and limits of runs."""
     parser.add_argument(
         "scene",
         nargs="+",
@@ -47,7 +47,8 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=_option,
         metavar="NAME=VALUE",
-        help="an option of the one engine and family named, instead of its sweep; may repeat",
+        help="an option of the single named engine and family, which replaces the sweep over its "
+        "options; may repeat",
     )
     add_depth(parser)
     when = parser.add_mutually_exclusive_group()
@@ -67,7 +68,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
 
 
 def add_engines(parser: argparse.ArgumentParser) -> None:
-    """The engines that run."""
+    """Add the option that chooses engines."""
     parser.add_argument(
         "--engine",
         action="append",
@@ -109,7 +110,7 @@ def _not_negative(text: str) -> float:
 
 
 def numbers(text: str) -> list[float]:
-    """Numbers separated by commas."""
+    """Parse numbers separated by commas."""
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
@@ -117,42 +118,44 @@ def numbers(text: str) -> list[float]:
 
 
 def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_LIMIT) -> None:
-    """Times that a run and a reference may take, and the form of the output; a ``time_limit`` of None depends
-    on the depth."""
+    """Add the time limits of a run and of a reference, and the option ``--json``. Without ``time_limit`` (s)
+    the limit depends on the depth."""
     default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} otherwise"
     parser.add_argument(
         "--time-limit",
         type=positive,
         default=time_limit,
         metavar="T",
-        help=f"CPU seconds a run may take, and seconds it may wait without computing; default: {default}",
+        help="limit of a run: CPU seconds, and also seconds of waiting without computing; default: "
+        f"{default}",
     )
     add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
 
 
 def add_reference_time(parser: argparse.ArgumentParser) -> None:
-    """The time that a reference may take."""
+    """Add the option for the CPU time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
     parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
 
 
 def whole(text: str) -> int:
-    """A positive whole number of a command line."""
+    """Parse a positive whole number."""
     if not text.isdecimal() or not int(text):
         raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text}")
     return int(text)
 
 
 def digits(text: str) -> int:
-    """A number of decimal digits that two formulations can be asked to agree on."""
+    """Parse a number of decimal digits within the allowed range."""
     if not (text.isdecimal() and FEWEST_DIGITS <= int(text) <= MOST_DIGITS):
         raise argparse.ArgumentTypeError(f"must be from {DIGITS}, got {text}")
     return int(text)
 
 
 def length(text: str) -> float:
-    """A positive length of a command line, such as 1mm or 0.5 in, m; metres without a unit."""
+    """Parse a positive length such as 1mm or 0.5 in; returns metres, which is also the unit if none is
+    given."""
     try:
         value = in_si(text if text[-1:].isalpha() else f"{text} m", "length")
     except ValueError as error:
@@ -161,7 +164,7 @@ def length(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """A positive number of a command line."""
+    """Parse a positive number."""
     number = _number(text)
     if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"must be positive, got {text}")

@@ -38,16 +38,16 @@ EXIT = (
     "exit status: 0 when the command did what was asked, 1 otherwise, 2 for bad input, 130 when interrupted. "
     "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
     "failures of engines are results, and `compare` 1 where two engines simulate different "
-    "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a card is violated "
-    "or no scene was run, `diff` where sets differ beyond noise."
+    "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a check fails "
+    "or no scene was run, `diff` where two sets of records differ by more than noise."
 )
 
 
 def parser() -> argparse.ArgumentParser:
-    """The parser; its result has the name of the command as ``command``."""
+    """Return the command-line parser; its result has the name of the command in the field ``command``."""
     found = Parser(
         prog="crosscheck",
-        description="The same mechanism in several engines, against truth.",
+        description="Simulate a mechanism in several engines and compare each motion with the true motion.",
         epilog=FIRST + fill(EXIT, 79),
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -201,16 +201,21 @@ def _add_verify(commands: Commands) -> None:
         action="store_true",
         help="run in this process: fast, but a crash ends all, and repeated runs share the process",
     )
-    drawn = parser.add_argument_group("random mechanisms instead of scenes; runs are in this process")
+    drawn = parser.add_argument_group(
+        "checks on random mechanisms instead of scenes; all runs are in this process"
+    )
     drawn.add_argument(
-        "--mechanisms", type=whole, metavar="N", help="check every card on N random mechanisms"
+        "--mechanisms", type=whole, metavar="N", help="make every check on N random mechanisms"
     )
     drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
     drawn.add_argument(
         "--records", metavar="FILE", help="store verdicts in this file, and reuse the stored ones"
     )
     drawn.add_argument(
-        "--beside", action="append", metavar="E[=F]", help="an engine (and family) to agree with; may repeat"
+        "--beside",
+        action="append",
+        metavar="E[=F]",
+        help="an engine (and family) with which the motions must agree; may repeat",
     )
     add_limits(parser)
 

@@ -1,4 +1,4 @@
-"""The request of a command line, checked before anything runs: scenes, engines, settings, sample times."""
+"""Validation of a command line's request before anything runs: scenes, engines, settings and sample times."""
 
 from __future__ import annotations
 
@@ -24,11 +24,9 @@ SAMPLES = 101
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
-    """The named engines, every installed one for "all", or the default ones; one whose package is missing is
-    left out with a ``notice``.
-
-    Raises RequestError for an unknown name, and when nothing is left.
-    """
+    """Return the named engines, every installed engine for "all", or the default engines. An engine whose
+    package is missing is left out with a ``notice``. Raises RequestError for an unknown name, and if no
+    engine is left."""
     named = [name for given in names or () for name in (all_engines() if given == ALL else [given])]
     wanted = list(dict.fromkeys(named or default_engines()))
     faults = [fault for name in wanted if (fault := _unknown_engine(name))]
@@ -43,11 +41,10 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
 
 
 def find_specimens(names: Sequence[str] | None, reference_time: float, name: str = "") -> list[Specimen]:
-    """The conformance suite's specimens of those scenes, or all, with so much time (s) for a reference.
-
-    Planar loops are among all if the engine of that ``name`` runs no spatial ones; a ``.toml`` file is held
-    against every card.  RequestError for a name the suite has not, SceneError for a faulty file.
-    """
+    """Return the scenes of the conformance suite with these names, or all of them, each with its truth.
+    ``reference_time`` is the CPU time (s) of a reference. Planar loops are added if the engine called
+    ``name`` refuses spatial ones. Every check applies to a ``.toml`` file. Raises RequestError for an unknown
+    name, SceneError for a faulty file."""
     suite = [*specimens(), *planar_specimens()]
     known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in suite}
     given = {
@@ -64,14 +61,14 @@ def find_specimens(names: Sequence[str] | None, reference_time: float, name: str
 
 
 def _unknown_engine(name: str) -> str | None:
-    """The fault of an engine name that leads to no engine; ``module:attribute`` is a name too."""
+    """Return the fault of an engine name that leads to no engine; ``module:attribute`` is allowed, too."""
     try:
         engine(name)
     except LookupError as error:
         return str(error.args[0])
     except (ImportError, AttributeError, ValueError) as error:
         return f"engine {name!r} cannot be loaded: {error}"
-    except Exception as error:  # whatever the code of an adapter raises when it is imported
+    except Exception as error:  # the import of an adapter can raise any exception
         last = traceback.extract_tb(error.__traceback__)[-1]
         said = f"{type(error).__name__}: {error} ({last.filename}, line {last.lineno})"
         return f"engine {name!r} cannot be loaded: {said}"
@@ -79,7 +76,7 @@ def _unknown_engine(name: str) -> str | None:
 
 
 def missing_package(name: str) -> str | None:
-    """The sentence that says what to install, or None when the engine is there."""
+    """Return the sentence on how to install a missing engine, or None if it is installed."""
     try:
         engine(name).version()
     except ImportError:
@@ -90,11 +87,9 @@ def missing_package(name: str) -> str | None:
 
 
 def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None) -> Scene:
-    """The scene with the end that was asked for, so that engines choose their settings for that motion.
-
-    ``times`` alone end it at the last of them.  Raises RequestError when the end is not positive or comes
-    before a sample.
-    """
+    """Return the scene with the requested end time, for which engines then choose their settings. Without a
+    ``duration`` (s) the last of the ``times`` is the end. Raises RequestError if the end is not positive or
+    earlier than a sample time."""
     if times is not None:
         _check_times(times)
     end = duration if duration is not None else times[-1] if times else scene.duration
@@ -106,10 +101,8 @@ def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None)
 
 
 def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> np.ndarray:
-    """Sample times (k,) in s: those given, or ``samples`` equally spaced over the scene's duration.
-
-    Raises RequestError when they are not finite, not ≥ 0 or do not increase.
-    """
+    """Return the given sample times (k,) in s, or ``samples`` equally spaced ones over the scene's duration.
+    Raises RequestError if they are not finite, negative or not increasing."""
     if times is not None:
         _check_times(times)
         return np.array(times)
@@ -129,8 +122,8 @@ def _check_times(times: Sequence[float]) -> None:
 
 
 class Choice(NamedTuple):
-    """Which settings of the engines are run: of these ``families`` (None: all) or the one setting given, at
-    this tolerance (None: the sweep's), at quick depth of few families."""
+    """Selection of settings: these ``families`` (None: all) or one ``setting``, at the tolerance ``rtol``
+    (None: the sweep over tolerances); ``is_quick`` selects few families."""
 
     families: Sequence[str] | None = None
     setting: Setting | None = None
@@ -139,7 +132,7 @@ class Choice(NamedTuple):
 
     @property
     def is_named(self) -> bool:
-        """Whether families, or one setting, are named."""
+        """Return whether the user named families or a setting."""
         return self.families is not None or self.setting is not None
 
 
@@ -147,11 +140,12 @@ def choice(
     engines: Sequence[str], families: Sequence[str], options: Sequence[tuple[str, Any]] | None,
     rtol: float | None, is_quick: bool,
 ) -> Choice:  # fmt: skip
-    """The choice of a command line; RequestError for options without the engine and family they are of."""
+    """Return the selection of settings that a command line makes. Raises RequestError for options of a
+    setting without the name of one engine and one family."""
     if options is None:
         return Choice(families or None, None, rtol, is_quick)
     if len(engines) != 1 or len(families) != 1:
-        raise RequestError("--option: needs one --engine and one --setting that it is of")
+        raise RequestError("--option: needs one --engine and one --setting to which the option belongs")
     return Choice(families, Setting(families[0], dict(options)), rtol, is_quick)
 
 
@@ -159,11 +153,10 @@ def plan(
     scenes: Sequence[Scene], engines: Sequence[str], chosen: Choice, times: Sequence[np.ndarray],
     time_limit: float, notice: Notice,
 ) -> list[Case]:  # fmt: skip
-    """The runs of every scene in every engine that can, with the settings chosen.
-
-    ``times`` has one array a scene.  An engine that cannot run a scene is left out with a ``notice``.
-    Raises RequestError for families that no engine has, and with the reasons when nothing is left.
-    """
+    """Return the runs of every scene in every engine that can simulate it, with the selected settings.
+    ``times`` has one array (k,) for each scene. An engine that cannot run a scene is left out with a
+    ``notice``. Raises RequestError for families that no engine has, and with the engines' reasons if no run
+    is left."""
     if not time_limit > 0:
         raise RequestError(f"--time-limit: must be positive, got {time_limit:g}")
     if chosen.setting is not None:
@@ -199,8 +192,8 @@ def _with_file(scene: Scene, name: str, setting: Setting) -> Setting:
 
 
 def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:
-    """Faults of options that neither the family's settings nor, apart from the sweep, the engine has; none
-    where the family is beyond the sweep."""
+    """Return a sentence for each option that neither the settings of the family nor the engine knows; none if
+    the engine's sweep does not contain the family."""
     sweep = settings(name, scene)
     own = [offered.options for offered in sweep if offered.family == setting.family]
     swept = {option for offered in sweep for option in offered.options}
@@ -218,7 +211,7 @@ def _able(
     scenes: Sequence[Scene], engines: Sequence[str], times: Sequence[np.ndarray], time_limit: float,
     notice: Notice,
 ) -> list[Case]:  # fmt: skip
-    """Every setting of every engine that can run a scene; RequestError where none can."""
+    """Return every setting of every engine that can run a scene; raises RequestError if no engine can."""
     cases, reasons = [], []
     for scene, when in zip(scenes, times, strict=True):
         able, unable = default_cases(scene, engines, None, when, time_limit)
@@ -232,7 +225,7 @@ def _able(
 
 
 def _named(cases: Sequence[Case], families: Sequence[str], notice: Notice) -> list[Case]:
-    """The cases of the families; an engine that has none of them is left out with a ``notice``."""
+    """Return the cases of the named families; an engine without any of them is left out with a ``notice``."""
     chosen = _of_families(cases, families)
     for name in dict.fromkeys(case.engine for case in cases):
         if all(case.engine != name for case in chosen):
@@ -241,8 +234,8 @@ def _named(cases: Sequence[Case], families: Sequence[str], notice: Notice) -> li
 
 
 def _of_families(cases: Sequence[Case], families: Sequence[str]) -> list[Case]:
-    """The cases of these families; one that an engine has beyond its sweep is run at the options of the
-    sweep's first family.  Raises RequestError for a family that no engine has."""
+    """Return the cases of the named families. A family that an engine accepts but does not list takes the
+    options of the engine's first family. Raises RequestError for a family that no engine has."""
     offered = dict.fromkeys(case.setting.family for case in cases)
     beyond = {family: _having(family, cases) for family in dict.fromkeys(families) if family not in offered}
     if faults := [_unknown_family(family, offered) for family, having in beyond.items() if not having]:
@@ -256,12 +249,12 @@ def _of_families(cases: Sequence[Case], families: Sequence[str]) -> list[Case]:
 
 
 def _having(family: str, cases: Sequence[Case]) -> list[str]:
-    """The engines of the cases that have the family."""
+    """Return the names of the engines among the cases that accept the family."""
     return [name for name in dict.fromkeys(case.engine for case in cases) if engine(name).has_family(family)]
 
 
 def _of_first_family(cases: Sequence[Case], engines: Sequence[str]) -> list[Case]:
-    """Return for each engine the cases of the first family of its sweep."""
+    """Return for each engine the cases of the first family in its sweep."""
     first = {name: next(c.setting.family for c in cases if c.engine == name) for name in engines}
     return [case for case in cases if first.get(case.engine) == case.setting.family]
 
@@ -273,7 +266,8 @@ def _unknown_family(name: str, offered: Iterable[str]) -> str:
 
 
 def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:
-    """One run of every family that has a tolerance, at this one; the others keep their sweep."""
+    """Return one run at the tolerance for each family that has a tolerance; other families keep their
+    sweep."""
     if not (math.isfinite(rtol) and rtol > 0):
         raise RequestError(f"--rtol: must be positive, got {rtol:g}")
     chosen: dict[tuple[str, str, str], Case] = {}

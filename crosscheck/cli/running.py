@@ -1,4 +1,4 @@
-"""Shared by the commands that run engines: the runs asked for, their progress, and the output."""
+"""Functions shared by the commands that run engines: the requested runs, their progress, and the output."""
 
 from __future__ import annotations
 
@@ -31,7 +31,8 @@ PIPED_WIDTH = 180  # characters of a line, so that no cell of a table is folded
 
 
 class Asked(NamedTuple):
-    """Scenes, engines, their settings, sample times (k,) of every scene, and the CPU time (s) of a run."""
+    """Request of a command line: scenes, engines, settings, sample times (k,) of every scene, CPU time (s) of
+    a run."""
 
     scenes: Sequence[Scene]
     engines: Sequence[str]
@@ -57,7 +58,7 @@ def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
 
 
 def cases_of(arguments: argparse.Namespace) -> list[Case]:
-    """The runs asked for; a scene that an engine cannot run is reported on standard error."""
+    """Return the requested runs; each refusal of an engine is reported on standard error."""
     asked = asked_of(arguments)
     if asked.chosen.setting is None:
         scouted(asked.scenes, asked.engines)
@@ -68,7 +69,8 @@ def cases_of(arguments: argparse.Namespace) -> list[Case]:
 
 
 def studied(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
-    """The records of the cases with progress; each is appended to ``finished`` as it ends."""
+    """Run the cases with a progress bar and return their records; each record is appended to ``finished`` as
+    its run ends."""
     with shown("running", len(cases)) as advance:
 
         def progress(done: int, total: int, record: Record) -> None:
@@ -79,28 +81,28 @@ def studied(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
 
 
 def missing_truths(cases: Sequence[Case], records: Sequence[Record]) -> list[str]:
-    """Sentences on the scenes whose true motion is not known at all times that their runs reached."""
+    """Return a sentence for each scene whose true motion is unknown at some time that its runs reached."""
     unjudged = {r["scene"] for r in records if not is_judged(r)}
     asked = {case.scene.name: case for case in cases if case.scene.name in unjudged}
     return [unknown(c.scene, known_at(c.scene, c.times, c.reference_time)) for c in asked.values()]
 
 
 def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]:
-    """{"scene", "records"} of every scene."""
+    """Return one dictionary {"scene", "records"} for each scene."""
     names = dict.fromkeys(case.scene.name for case in cases)
     return [{"scene": name, "records": [public(r) for r in records if r["scene"] == name]} for name in names]
 
 
 def print_json(documents: Sequence[Document]) -> None:
-    """Print the document of one scene, or a list with the documents of several scenes."""
+    """Print the JSON document of one scene, or a list of the documents of several scenes."""
     print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
 
 
 def console(width: int = PIPED_WIDTH) -> Console:
-    """Standard output; of so many columns when it is no terminal."""
+    """Return a console on standard output; ``width`` (columns) applies if the output is no terminal."""
     return Console(width=None if sys.stdout.isatty() else width, markup=False, highlight=False)
 
 
 def notice(sentence: str) -> None:
-    """A sentence for the user, on standard error."""
+    """Print a sentence for the user on standard error."""
     print(sentence, file=sys.stderr)

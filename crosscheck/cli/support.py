@@ -1,7 +1,7 @@
-"""Support matrix, feature by feature and scene by scene, from every engine's `cannot`.
+"""Support matrix: which features and scenes each engine can simulate, from the engines' method `cannot`.
 
-``python -m crosscheck.cli.support docs/engines.md`` renews the block of a document, without a path it
-prints the block.
+``python -m crosscheck.cli.support docs/engines.md`` replaces the matrix in a document. Without a path the
+program prints the matrix.
 """
 
 from __future__ import annotations
@@ -18,52 +18,55 @@ from mbref.scenes import SCENES
 
 CAN = "✓"
 BEGIN, END = "<!-- support -->", "<!-- /support -->"
-KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # the engines of the document's block, installed or not
-Ask = Callable[[str, Scene], Cannot | None]  # (engine name, scene)
+KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # engines in the matrix of the document, installed or not
+Ask = Callable[[str, Scene], Cannot | None]  # function of (engine name, scene) that returns a refusal or None
 
 
 @dataclass(frozen=True)
 class Support:
-    """``answers[row][engine]``: None where the engine can, else the reason and who could change it."""
+    """Support matrix: ``answers[row][engine]`` is None if the engine can simulate the row, otherwise its
+    refusal."""
 
     engines: Sequence[str]
     answers: Mapping[str, Mapping[str, Cannot | None]]
 
     def __or__(self, other: Support) -> Support:
-        """The rows of both, of the same engines."""
+        """Return a matrix with the rows of both matrices, which have the same engines."""
         return Support(self.engines, {**self.answers, **other.answers})
 
     def row(self, name: str, notes: Sequence[str]) -> list[str]:
-        """A row's cells: CAN, or the number of its gap's sentence in ``notes``."""
+        """Return the cells of a row: CAN, or the number that the reason of the refusal has in ``notes``."""
         found = self.answers[name]
         return [CAN if (gap := found[e]) is None else f"– {_number(notes, e, gap)}" for e in self.engines]
 
     def notes(self) -> list[str]:
-        """One sentence for every different gap of an engine, in the order of the rows."""
+        """Return one sentence for each different refusal of an engine, in the order of the rows."""
         gaps = [(e, gap) for found in self.answers.values() for e, gap in found.items() if gap is not None]
         return list(dict.fromkeys(_note(e, gap) for e, gap in gaps))
 
 
 def of_features(engines: Sequence[str], ask: Ask | None = None) -> Support:
-    """Support of every feature, asked on the feature's probe scene; nothing is simulated.
+    """Return the support of every feature: each engine's ``cannot`` is called with a probe scene of the
+    feature.
 
-    The engines' packages are not needed.  ``ask`` defaults to the engines' own ``cannot``.
+    Nothing is simulated, and the engines' packages are not needed. ``ask`` replaces the engines' ``cannot``.
     """
     return _support(engines, {**feature_scenes(), "motion without masses": undetermined()}, ask or _ask)
 
 
 def of_scenes(engines: Sequence[str], ask: Ask | None = None) -> Support:
-    """Support of every built-in scene."""
+    """Return the support of every built-in scene."""
     return _support(engines, {name: make() for name, make in SCENES.items()}, ask or _ask)
 
 
 def markdown(engines: Sequence[str]) -> str:
-    """The document's block, markers included: features × engines."""
+    """Return the matrix of features and engines as Markdown, between its two markers."""
     return "\n".join([BEGIN, *_table("feature", of_features(engines)), END]) + "\n"
 
 
 def block_of(text: str) -> str:
-    """The block between the markers of a document, markers included; ValueError where there is none."""
+    """Return the matrix between the markers of a document, markers included; raises ValueError if there is
+    none."""
     start, end = text.find(BEGIN), text.find(END)
     if not 0 <= start < end:
         raise ValueError(f"no {BEGIN} … {END}")
@@ -99,7 +102,8 @@ def _number(notes: Sequence[str], name: str, gap: Cannot) -> int:
 
 
 def refresh(path: str | Path) -> None:
-    """Replace a document's block by the present one; ValueError where it has none."""
+    """Replace the matrix in a document by the present one; raises ValueError if the document has no
+    markers."""
     text = Path(path).read_text()
     Path(path).write_text(text.replace(block_of(text), markdown(KNOWN)))
 

@@ -31,16 +31,20 @@ from crosscheck.study.tuning import Criterion, known_error
 from crosscheck.study.verdict import Grade, Judged
 from mbref.scene import Scene
 
-MEASURED = ("violation_position", "energy_error")  # metrics that the table of runs shows beside the error
-SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns, so that numbers stay whole
-OUTCOME_WIDTH = 13  # characters at most, so that a table fits 80 columns
+MEASURED = ("violation_position", "energy_error")  # metrics in further columns of the table of runs
+SETTINGS_WIDTH, NUMBER_WIDTH = 15, 8  # least widths of columns in characters, so that numbers are not broken
+OUTCOME_WIDTH = 13  # width of the column of outcomes in characters, so that a table fits 80 columns
 BEST = {"violation_position": "closure", "energy_error": "energy", "reaction_error": "reactions"}
-NO_ENERGY = "energy –: a driver or damper works, or samples are too far apart to count turns"
-TEXT_COLUMNS = 3  # the columns from the left that hold words and may be folded
+NO_ENERGY = (
+    "energy –: not conserved because of a driver or damper, or samples are too far apart to "
+    "follow the rotations"
+)
+TEXT_COLUMNS = 3  # number of leading columns that contain words, which may be folded
 
 
 def print_runs(console: Console, records: Sequence[Record]) -> None:
-    """One table a scene: settings, outcome, end time, error, violation, energy and time of every run."""
+    """Print one table for each scene: settings, outcome, end time, error, violation, energy and time of every
+    run."""
     header = ("engine, family", "settings", "outcome", "error", "closure", "energy", "time (s)")
     for name, group in by_scene(records).items():
         table = _table(name, header)
@@ -52,8 +56,9 @@ def print_runs(console: Console, records: Sequence[Record]) -> None:
 
 
 def print_comparison(console: Console, group: Judged, said: Verdict, path: str, with_ratio: bool) -> None:
-    """The verdict on a scene, its runs with the least error first, the plot, the engines' best runs and the
-    settings to use; no ratios of times where the engines simulate different mechanisms."""
+    """Print the verdict on a scene, its runs in the order of increasing error, the plot, each engine's best
+    run and recommended settings. Ratios of times are left out if the engines simulate different
+    mechanisms."""
     records = group.records
     console.print(f"\n{group.scene.name}, {group.scene.duration:g} s: {_counts(group)}\n")
     _print_verdict(console, said)
@@ -67,7 +72,8 @@ def print_comparison(console: Console, group: Judged, said: Verdict, path: str, 
 
 
 def _ranked(group: Judged, letters: Mapping[tuple[str, str], str], with_ratio: bool) -> Table:
-    """The runs with the least error first, and times as multiples of the fastest if asked for."""
+    """Return the table of runs in the order of increasing error; ``with_ratio`` adds times as multiples of
+    the fastest."""
     records = group.records
     fastest = min((_cost(r) for r in group.comparable if is_completed(r)), default=math.nan)
     header = ("", "engine, family", "settings", "verdict", "error", "time (s)", *["ratio"] * with_ratio)
@@ -93,8 +99,8 @@ def print_tuning(
     scene: Scene,
     path: str,
 ) -> None:
-    """Print settings that reach a criterion, first the engine's own, then settings that crosscheck
-    integrates, either the cheapest first, with the cheapest's commands; else the nearest run."""
+    """Print the settings that reach a criterion, cheapest first: first settings of the engine's own
+    integrators, then settings that crosscheck integrates. Without any, print the nearest run."""
     if not reached:
         nearest = min(records, key=lambda r: (not is_completed(r), wanted.measure(r), -r["t_end"]))
         console.print(_unreached(wanted, nearest), soft_wrap=True)
@@ -127,7 +133,7 @@ def _print_settings(console: Console, heading: str, records: Sequence[Record], w
 
 
 def _to_set(found: Engine, record: Record) -> str:
-    """Return the description of a run's family of settings, and its options with their descriptions."""
+    """Return the description of a run's family, and of each of its options."""
     family = found.families.get(record["family"], "")
     options = [
         f"{n} = {_value(v)} ({found.options[n]})" if n in found.options else f"{n} = {v}"
@@ -139,7 +145,7 @@ def _to_set(found: Engine, record: Record) -> str:
 
 
 def _unreached(wanted: Criterion, nearest: Record) -> str:
-    """The sentence above the nearest run: an error that is not reached, or that nothing could tell."""
+    """Return the sentence above the nearest run: no setting reaches the criterion, or no error is known."""
     bound = error_bound(nearest)
     if not is_completed(nearest):
         return f"No setting reaches {wanted.name}: no run completes. The one that got furthest:"
@@ -166,7 +172,7 @@ def _counts(group: Judged) -> str:
 
 
 def _print_best(console: Console, group: Judged) -> None:
-    """Violation, energy and reactions of every engine's run of least error."""
+    """Print violation, energy error and reaction error of each engine's run of least error."""
     header = ("engine, family", "settings", "error", *BEST.values())
     table = _table("every engine's run of least error", header, 2)
     for r in group.best().values():
@@ -178,9 +184,10 @@ def _print_best(console: Console, group: Judged) -> None:
 
 
 def _print_advice(console: Console, group: Judged, path: str) -> None:
-    """The command of every engine's fastest run that reaches LEVEL, else of its best one."""
+    """Print the command of each engine's fastest run within the error LEVEL, otherwise of its most accurate
+    run."""
     cheapest, best = group.cheapest(LEVEL), group.best()
-    console.print(f"\nsettings to use: the fastest run within {SAID}, else the best")
+    console.print(f"\nsettings to use: the fastest run within {SAID}, otherwise the most accurate run")
     for name in best:
         r = cheapest.get(name, best[name])
         if is_completed(r):
@@ -188,8 +195,8 @@ def _print_advice(console: Console, group: Judged, path: str) -> None:
 
 
 def _print_own_code(console: Console, group: Judged) -> None:
-    """Print for each engine a line of its own code or XML: the fastest run within LEVEL, else the best, among
-    settings that the engine itself has."""
+    """Print a line of each engine's own code or XML for its fastest run within the error LEVEL, otherwise for
+    its most accurate run, among settings that the engine itself has."""
     found = group.within(LEVEL, lambda r: bool(own_code(group.scene, r)))
     if found:
         console.print("\nto copy into your model: settings that an engine itself has")
@@ -219,7 +226,7 @@ def _graded(group: Judged, record: Record) -> str:
 
 
 def _at(record: Record) -> str:
-    """A line ``at 0.1 s``; nothing for a run that completed or was ended from outside."""
+    """Return a line such as ``at 0.1 s``; empty for a run that completed or ran out of time."""
     silent = is_completed(record) or record["outcome"] in ("TIMED_OUT", "CRASHED")
     return "" if silent else f"\nat {max(record['t_end'], 0):.4g} s"
 
@@ -229,17 +236,17 @@ def _cost(record: Record) -> float:
 
 
 def _measured(record: Record, metric: str) -> str:
-    """A metric; – where there is none and for a run that never moved."""
+    """Return the text of a metric; – if it is missing, and for a run that ended at its start."""
     return "–" if never_moved(record) else _number(record["metrics"].get(metric))
 
 
 def _seconds(record: Record) -> str:
-    """The time of stepping; – for a run that never moved."""
+    """Return the time of stepping as text; – for a run that ended at its start."""
     return "–" if never_moved(record) else _number(_cost(record))
 
 
 def _print_messages(console: Console, records: Sequence[Record]) -> None:
-    """Print the causes of failed runs; settings of a family with equal causes share a line."""
+    """Print the causes of failed runs; settings of a family with the same cause share a line."""
     reported: dict[tuple[str, str], list[str]] = {}
     for r in records:
         if not is_completed(r):
@@ -270,12 +277,13 @@ def _number(value: float | None) -> str:
 
 
 def listing_table(title: str, header: Sequence[str]) -> Table:
-    """A table of words, folded where it must be."""
+    """Return an empty table of words, whose cells may be folded."""
     return _table(title, header, len(header))
 
 
 def _table(title: str, header: Sequence[str], words: int = TEXT_COLUMNS) -> Table:
-    """A table whose first columns hold words and may be folded; its numbers are never broken."""
+    """Return an empty table whose first columns contain words and may be folded; its numbers are never
+    broken."""
     table = Table(title=f"\n{title}", box=None, padding=(0, 1, 0, 0), title_justify="left", pad_edge=False)
     for i, name in enumerate(header):
         width = SETTINGS_WIDTH if name == "settings" else 0 if i < words else NUMBER_WIDTH

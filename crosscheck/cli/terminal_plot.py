@@ -1,4 +1,4 @@
-"""Speed against error in the characters of a terminal."""
+"""Plot of computing time against error in characters, for a terminal."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ WIDTH, HEIGHT = 64, 16  # characters of the plot
 
 
 def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -> Text:
-    """Error (right: larger) against time (up: slower), both logarithmic, one letter a family."""
+    """Return a plot of errors (to the right: larger) and times (upwards: slower), both logarithmic, one
+    letter for each family."""
     plotted = [r for r in records if is_completed(r) and math.isfinite(error(r))]
     points = [(*_place(r), letters[engine_and_family(r)]) for r in plotted]
     if not points:
@@ -29,13 +30,14 @@ def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -
 
 
 def _place(record: Record) -> tuple[float, float]:
-    """Decades of error, drawn no lower than it is known, and time; exact zeros at the lower end."""
+    """Return the decimal logarithms of error and time. The error is at least the truth's bound; zeros are at
+    the lower end."""
     off, seconds = drawn(record, record["cost"]["seconds"])
     return math.log10(off), math.log10(seconds)
 
 
 def _range(values: Sequence[float]) -> tuple[float, float]:
-    """Whole decades around the values."""
+    """Return the range of whole decades that contains the values."""
     low, high = math.floor(min(values)), math.ceil(max(values))
     return low, high if high > low else low + 1
 

@@ -1,1 +1,1 @@
-"""The conformance suite: what every engine, built-in or third-party, can be held against."""
+"""The conformance suite: checks for any engine, whether it is built in or from a third party."""

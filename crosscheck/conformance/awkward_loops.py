@@ -1,4 +1,5 @@
-"""Awkward loops: skew cylindrical joints, rounded redundant rows, passages near singular positions."""
+"""Random loops with numerical difficulties: skew cylindrical joints, rounded redundant rows, positions near
+singular ones."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ from mbref.scene import (
 
 # --- loops -------------------------------------------------------------------------------------------------
 def rccc(rng: Rng) -> Scene:
-    """The spatial four-link loop of a revolute and three cylindrical joints on skew axes."""
+    """Return a spatial four-link loop of a revolute and three cylindrical joints on skew axes."""
     points = np.array([(0, 0, 0), (0.1, 0.4, 0.1), (0.7, 0.6, -0.1), (0.8, 0.0, 0.0)])
     points += 0.05 * rng.normal(size=(4, 3))
     axes = [direction(rng) for _ in points]
@@ -37,7 +38,7 @@ def rccc(rng: Rng) -> Scene:
 
 
 def universal_loop(rng: Rng) -> Scene:
-    """A spatial loop R-U-C-U-R of five links, two freedoms."""
+    """Return a spatial loop R-U-C-U-R of five links with two degrees of freedom."""
     points = np.array([(0, 0, 0), (0.1, 0.4, 0.1), (0.5, 0.6, -0.1), (0.9, 0.5, 0.1), (1.0, 0.0, 0.0)])
     points += 0.05 * rng.normal(size=(5, 3))
     axes = [direction(rng) for _ in points]
@@ -46,7 +47,7 @@ def universal_loop(rng: Rng) -> Scene:
 
 
 def planar_loop(rng: Rng) -> Scene:
-    """A loop of a revolute, a planar, a universal and a spherical joint, closed on the ground."""
+    """Return a loop of a revolute, a planar, a universal and a spherical joint, closed through the ground."""
     points = np.array([(0, 0, 0), (0.2, 0.4, 0.1), (0.7, 0.5, -0.1), (0.8, 0.0, 0.1)])
     points += 0.05 * rng.normal(size=(4, 3))
     axes = [direction(rng) for _ in points]
@@ -56,7 +57,8 @@ def planar_loop(rng: Rng) -> Scene:
 
 
 def rounded_door(rng: Rng) -> Scene:
-    """A swinging door of five hinges on one rounded axis, and a second one on the first."""
+    """Return a swinging door on five coaxial hinges whose axes are rounded, with a second door on the
+    first."""
     axis, out = direction(rng), direction(rng)
     frame = out - axis * (out @ axis)
     door = rod("door", 0 * frame, frame, rng)
@@ -76,8 +78,8 @@ def rounded_door(rng: Rng) -> Scene:
 
 
 def rounded_platform(rng: Rng) -> Scene:
-    """A platform on three parallel legs of equal length, each hinged twice: planar loops, six to seven rows
-    redundant, rounded."""
+    """Return a platform on three parallel legs of equal length with hinges at both ends: planar loops with
+    six or seven redundant rows, whose numbers are rounded."""
     up = np.array([math.sin(0.4), math.cos(0.4), 0.0]) * rng.uniform(0.4, 0.8)
     feet = [np.array([x, 0.0, z]) for x, z in zip((0.0, 0.5, 1.1), rng.uniform(-0.3, 0.3, 3), strict=True)]
     legs = [rod(f"leg{k}", foot, foot + up, rng) for k, foot in enumerate(feet)]
@@ -92,7 +94,8 @@ def rounded_platform(rng: Rng) -> Scene:
 
 # --- near singular positions ------------------------------------------------------------------------------
 def pushed_dead_centre(rng: Rng) -> Scene:
-    """A slider-crank that starts 1e-3 to 1e-6 rad from its dead centre, given the velocity of its slider."""
+    """Return a slider-crank that starts 1e-3 to 1e-6 rad from its dead centre with a given velocity of its
+    slider."""
     angle = 10.0 ** rng.uniform(-6, -3)
     scene = slider_crank(angle, 0.3, 0.9).with_(name="pushed_dead_centre", duration=0.2)
     slider = scene.body[2].model_copy(update={"velocity": (-5.0 * angle, 0.0, 0.0)})
@@ -100,27 +103,29 @@ def pushed_dead_centre(rng: Rng) -> Scene:
 
 
 def nearly_folding(rng: Rng) -> Scene:
-    """Crank and rod differ by 1e-3 to 1e-5 of themselves: the slider nearly stops at the crank's axis."""
+    """Return a slider-crank whose crank and rod differ in length by a fraction 1e-3 to 1e-5: the slider
+    nearly stops at the crank's axis."""
     less = 1 - 10.0 ** rng.uniform(-5, -3)
     scene = slider_crank(1.2, 0.3 * less, 0.3).with_(name="nearly_folding", duration=0.4)
     return turning(scene, 6.0)
 
 
 def nearly_parallel(rng: Rng) -> Scene:
-    """A four-bar that passes its straight position at 1e-3 to 1e-5 of its size."""
+    """Return a four-bar that passes its straight position at a distance of 1e-3 to 1e-5 of its size."""
     off = 10.0 ** rng.uniform(-5, -3)
     places = ((0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (1.3, 0.4, 0.0), (1.0 + off, 0.0, 0.0))
     return turning(linkage("nearly_parallel", places), -4.0).with_(duration=0.6)
 
 
 def two_straight(rng: Rng) -> Scene:
-    """A parallelogram of exact sides 5 : 3 : 4 that turns through both of its straight positions."""
+    """Return a parallelogram with sides in the ratio 5 : 3 : 4, exact in floating point, that turns through
+    both straight positions."""
     base = linkage("two_straight", ((0, 0, 0), (0.375, 0.5, 0), (1.375, 0.5, 0), (1, 0, 0)))
     return turning(base, -float(rng.uniform(5.0, 9.0))).with_(duration=0.8)
 
 
 def locking(rng: Rng) -> Scene:
-    """A driven crank that its linkage cannot follow to the end: it locks on the way."""
+    """Return a linkage with a driven crank that locks before the end of the simulation."""
     places = np.array([(0, 0, 0), (0.3, 0.4, 0), (0.8, 0.4, 0), (0.9, 0, 0)])
     places[:, :2] += 0.02 * rng.normal(size=(4, 2))
     scene = linkage("locking", [triple(p) for p in places])

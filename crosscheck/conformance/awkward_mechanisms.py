@@ -1,7 +1,7 @@
-"""Mechanisms from seeds, awkward in one way each: fast tops, thin links, stiff dampers, drivers with a phase,
-and the loops of `awkward_loops.py`.
+"""Random mechanisms, each with one numerical difficulty: fast tops, thin links, stiff dampers, drivers with a
+phase, and the loops of `awkward_loops.py`.
 
-Poses are consistent by construction, velocities follow from those that are given.
+Poses satisfy the joints by construction. Velocities follow from the given ones.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ from mbref.scene import (
 
 # --- tops ------------------------------------------------------------------------------------------------
 def fast_top(rng: Rng) -> Scene:
-    """A lopsided top on a ball joint, at 100 to 300 rad/s, its inertia not about its axis."""
+    """Return an unsymmetric top on a ball joint at 100 to 300 rad/s, with a principal axis inclined to the
+    body's axis."""
     place = 0.3 * direction(rng)
     principal = np.array([1.0, 1.3, 1.9]) * rng.uniform(0.01, 0.05)
     turn = rotations.to_matrix(rotations.from_vector(rng.normal(size=3)))
@@ -72,7 +73,7 @@ def fast_top(rng: Rng) -> Scene:
 
 
 def gimbal(rng: Rng) -> Scene:
-    """A rotor in two rings, the inner one's axis inclined, on a torsion spring."""
+    """Return a rotor in two gimbal rings with an inclined inner axis, on a torsion spring."""
     axes = [direction(rng) for _ in range(3)]
     names = ("ground", "outer", "inner", "rotor")
     bodies = [
@@ -90,7 +91,8 @@ def gimbal(rng: Rng) -> Scene:
 
 
 def tumbling_chain(rng: Rng) -> Scene:
-    """Three bodies on ball and universal joints, thrown: eight to nine freedoms, chaotic in seconds."""
+    """Return three bodies on ball and universal joints with large velocities: eight or nine degrees of
+    freedom, chaotic within seconds."""
     points = np.cumsum(np.vstack([np.zeros(3), 0.4 * np.array([direction(rng) for _ in range(3)])]), axis=0)
     kinds, axes = ("spherical", "universal", "spherical"), [direction(rng) for _ in range(3)]
     names = ("ground", "b0", "b1", "b2")
@@ -106,8 +108,8 @@ def tumbling_chain(rng: Rng) -> Scene:
 
 # --- sizes and stiffness -----------------------------------------------------------------------------------
 def thin_links(rng: Rng) -> Scene:
-    """A spatial loop R-S-S-R with an idle spin of its coupler, whose inertia about its axis is 1e-7 of that
-    across."""
+    """Return a spatial loop R-S-S-R whose coupler can spin freely; its inertia about that axis is 1e-7 of the
+    inertia across."""
     points = np.array([(0, 0, 0), (0.1, 0.3, 0.1), (1.5, 0.6, -0.2), (1.6, 0.0, 0.1)])
     points[1:] += 0.05 * rng.normal(size=(3, 3))
     axes = [direction(rng) for _ in points]
@@ -117,7 +119,8 @@ def thin_links(rng: Rng) -> Scene:
 
 
 def stiff_dampers(rng: Rng) -> Scene:
-    """A four-bar with a spring of 1e4 to 1e6 N/m across it that is overdamped a hundred times."""
+    """Return a four-bar with a diagonal spring of 1e4 to 1e6 N/m and a damping of a hundred times the
+    critical one."""
     places = np.array([(0, 0, 0), (0.1, 0.3, 0), (0.6, 0.5, 0), (0.7, -0.1, 0)])
     places[:, :2] += 0.03 * rng.normal(size=(4, 2))
     stiffness = 10.0 ** rng.uniform(4, 6)
@@ -133,7 +136,8 @@ def stiff_dampers(rng: Rng) -> Scene:
 
 
 def stiff_chain(rng: Rng) -> Scene:
-    """A tree of three freedoms with torsion springs, of which one is overdamped by 1e3 to 1e5."""
+    """Return a tree of three degrees of freedom with torsion springs, one of which is damped 1e3 to 1e5 times
+    beyond critical."""
     points = np.cumsum(np.vstack([np.zeros(3), 0.3 * np.array([direction(rng) for _ in range(3)])]), axis=0)
     names, axes = ("ground", "b0", "b1", "b2"), [direction(rng) for _ in range(3)]
     bodies = [rod(n, p, q, rng) for n, p, q in zip(names[1:], points[:-1], points[1:], strict=True)]
@@ -159,7 +163,7 @@ def stiff_chain(rng: Rng) -> Scene:
 
 
 def mass_ratios(rng: Rng) -> Scene:
-    """A planar five-bar, turned, with masses of a milligram to a ton."""
+    """Return a rotated planar five-bar with masses from a milligram to a ton."""
     places = np.array([(0, 0, 0), (0.2, 0.4, 0), (0.6, 0.7, 0), (1.0, 0.3, 0), (1.1, -0.2, 0)])
     places[:, :2] += 0.05 * rng.normal(size=(5, 2))
     masses = rng.permutation([1e-6, 1.0, 1e-3, 1e3]).tolist()
@@ -167,7 +171,7 @@ def mass_ratios(rng: Rng) -> Scene:
 
 
 def millimetres(rng: Rng) -> Scene:
-    """A slider-crank in millimetres, tonnes and newtons, far from the origin."""
+    """Return a slider-crank in millimetres, tonnes and newtons, far from the origin."""
     far, crank, length = 1e3 * rng.normal(size=3), rng.uniform(30, 60), rng.uniform(120, 180)
     angle = rng.uniform(0.3, 2.5)
     b = np.array([crank * math.cos(angle), crank * math.sin(angle), 0.0])
@@ -191,14 +195,15 @@ def millimetres(rng: Rng) -> Scene:
 
 # --- drivers -----------------------------------------------------------------------------------------------
 def wave(rng: Rng, rate: float) -> Driver:
-    """A driver of J0: a steady rate, a little acceleration, and a shaking with a phase."""
+    """Return a driver of joint J0: a steady rate, a small acceleration, and a sine wave with a phase."""
     size, frequency, phase = rng.uniform(0.02, 0.1), rng.uniform(20, 80), rng.uniform(-3, 3)
     sine = Sine(amplitude=float(size), frequency=float(frequency), phase=float(phase))
     return Driver(joint="J0", polynomial=(float(-size * math.sin(phase)), rate, 0.7), sine=sine)
 
 
 def phased_crank(rng: Rng) -> Scene:
-    """A spatial crank-rocker R-S-U-R driven with a phase; its coupler cannot spin."""
+    """Return a spatial crank-rocker R-S-U-R whose driver has a phase; the coupler cannot spin about its
+    axis."""
     points = np.array([(0, 0, 0), (0.05, 0.12, 0.0), (0.8, 0.5, 0.2), (0.9, -0.1, 0.0)])
     points[2:] += 0.03 * rng.normal(size=(2, 3))
     axes = [np.array(Z), direction(rng), direction(rng), np.array([0.1, 0.2, 1.0])]
@@ -207,7 +212,8 @@ def phased_crank(rng: Rng) -> Scene:
 
 
 def phased_slide(rng: Rng) -> Scene:
-    """A slide driven with a phase that shakes a pendulum on a universal joint, itself on a spring."""
+    """Return a slide driven by a wave with a phase; it shakes a pendulum on a universal joint with a
+    spring."""
     names, axis = ("ground", "cart", "bob"), direction(rng)
     cart = rod("cart", (-0.1, 0, 0), (0.1, 0, 0), rng)
     bob = rod("bob", (0, 0, 0), 0.5 * direction(rng), rng)
@@ -233,7 +239,8 @@ def phased_slide(rng: Rng) -> Scene:
 
 # --- many bodies -------------------------------------------------------------------------------------------
 def chain_of_twenty(rng: Rng) -> Scene:
-    """Twenty rods on ball joints and hinges in turn, hanging nearly straight, the last one on a spring."""
+    """Return twenty rods on alternating ball joints and hinges that hang nearly straight, with a spring at
+    the last one."""
     steps = np.array([0.0, 0.0, -0.1]) + 0.01 * rng.normal(size=(20, 3))
     points = np.cumsum(np.vstack([np.zeros(3), steps]), axis=0)
     names = ["ground", *(f"b{k}" for k in range(20))]
@@ -266,7 +273,7 @@ def chain_of_twenty(rng: Rng) -> Scene:
 
 
 def every_load(rng: Rng) -> Scene:
-    """A loop of three freedoms and a free body with every load on them."""
+    """Return a loop of three degrees of freedom and a free body, with every type of load."""
     scene = universal_loop(rng).with_(name="every_load", duration=0.5)
     free = rod("free", (0.5, 1.0, 0.5), (0.8, 1.2, 0.6), rng)
     free = free.model_copy(update={"angular_velocity": triple(3 * rng.normal(size=3))})
@@ -316,5 +323,5 @@ AWKWARD: dict[str, Callable[[Rng], Scene]] = {
 
 
 def awkward(name: str, seed: int) -> Scene:
-    """One mechanism of a kind."""
+    """Return the mechanism of a kind for a seed."""
     return AWKWARD[name](np.random.default_rng(seed)).with_(name=f"{name}_{seed}")

@@ -1,4 +1,5 @@
-"""Parts of awkward mechanisms: rods with products of inertia, rings of joints, rounded numbers."""
+"""Parts of the random mechanisms with numerical difficulties: rods with products of inertia, chains of
+joints, rounded numbers."""
 
 from __future__ import annotations
 
@@ -27,31 +28,31 @@ Place = Sequence[float] | np.ndarray
 
 
 def triple(values: Any) -> Triple:
-    """Three doubles."""
+    """Return three numbers as Python floats."""
     x, y, z = (float(v) for v in values)
     return x, y, z
 
 
 def rows(matrix: np.ndarray) -> tuple[Triple, Triple, Triple]:
-    """A matrix (3, 3) as the format has it."""
+    """Return a matrix (3, 3) as tuples, as the scene format stores it."""
     x, y, z = (triple(row) for row in matrix)
     return x, y, z
 
 
 def direction(rng: Rng) -> np.ndarray:
-    """A unit vector (3,)."""
+    """Return a random unit vector (3,)."""
     v = rng.normal(size=3)
     return np.asarray(v / np.linalg.norm(v))
 
 
 def turned(rng: Rng, scene: Scene) -> Scene:
-    """The scene turned and shifted, so that its numbers are rounded."""
+    """Return the scene rotated and shifted, so that its numbers are rounded."""
     turn = rotations.to_matrix(rotations.from_vector(rng.normal(size=3)))
     return Isometry(turn, rng.normal(size=3)).change(scene)
 
 
 def rod(name: str, start: Place, stop: Place, rng: Rng, thickness: float = 0.05) -> Body:
-    """A body between two points with products of inertia."""
+    """Return a body between two points with products of inertia."""
     way = np.subtract(stop, start)
     length, mass = float(np.linalg.norm(way)), float(rng.uniform(0.3, 3.0))
     along = way / length
@@ -67,7 +68,8 @@ def rod(name: str, start: Place, stop: Place, rng: Rng, thickness: float = 0.05)
 
 
 def ring(rng: Rng, name: str, kinds: Sequence[str], axes: Sequence[np.ndarray], points: np.ndarray) -> Scene:
-    """Rods through points (k, 3), a joint of a kind with an axis at each, from the ground to the ground."""
+    """Return rods through points (k, 3) from the ground back to the ground, with a joint of given kind and
+    axis at each point."""
     names = ["ground", *(f"link{k}" for k in range(len(points) - 1)), "ground"]
     bodies = [rod(n, p, q, rng) for n, p, q in zip(names[1:-1], points[:-1], points[1:], strict=True)]
     joints = [
@@ -78,7 +80,8 @@ def ring(rng: Rng, name: str, kinds: Sequence[str], axes: Sequence[np.ndarray], 
 
 
 def joint(name: str, kind: str, bodies: tuple[str, str], place: Any, axis: np.ndarray) -> Joint:
-    """A joint at a place, its axis or the first of two perpendicular ones given."""
+    """Return a joint at a point with the given axis, which is the first of two perpendicular axes if it has
+    two."""
     other = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     axes = (triple(axis), triple(other / np.linalg.norm(other)))
     return JOINT_TYPES[kind].at(
@@ -87,13 +90,13 @@ def joint(name: str, kind: str, bodies: tuple[str, str], place: Any, axis: np.nd
 
 
 def turning_first(scene: Scene, spin: np.ndarray) -> Scene:
-    """The scene with the first body's angular velocity."""
+    """Return the scene with the given angular velocity of the first body."""
     first = scene.body[0].model_copy(update={"angular_velocity": triple(spin)})
     return scene.with_(body=(first, *scene.body[1:]))
 
 
 def slider_crank(angle: float, crank: float, length: float) -> Scene:
-    """A planar slider-crank with its crank at an angle."""
+    """Return a planar slider-crank at a given crank angle."""
     b = np.array([crank * math.cos(angle), crank * math.sin(angle), 0.0])
     c = np.array([b[0] + math.sqrt(length**2 - b[1] ** 2), 0.0, 0.0])
     bodies = (

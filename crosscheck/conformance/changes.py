@@ -1,4 +1,4 @@
-"""Changed copies of scenes and of their items."""
+"""Functions that return changed copies of scenes, bodies, joints, drivers and loads."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ Item = TypeVar("Item", bound=Entry)
 
 
 def mapped(item: Item, fields: Mapping[str, Callable[[Any], Any]]) -> Item:
-    """A validated copy of a body, joint, driver or load with the named fields mapped, where it has them."""
+    """Return a validated copy of a body, joint, driver or load. Each named field that it has is replaced by
+    the value of a function."""
     given = fields_of(item)
     changed = {n: _plain(f(given[n])) for n, f in fields.items() if given.get(n) is not None}
     return type(item)(**{**given, **changed})
 
 
 def replaced(item: Item, **fields: Any) -> Item:
-    """A validated copy with some fields replaced."""
+    """Return a validated copy with some fields replaced."""
     return type(item)(**{**fields_of(item), **{name: _plain(value) for name, value in fields.items()}})
 
 
 def fields_of(item: Entry) -> dict[str, Any]:
-    """The fields of an item by name."""
+    """Return the fields of a body, joint, driver or load as a dictionary."""
     return {name: getattr(item, name) for name in type(item).model_fields}
 
 
@@ -34,7 +35,7 @@ def _plain(value: Any) -> Any:
 
 
 def nudged(scene: Scene, rounding: float = ROUNDING) -> Scene:
-    """The scene with masses, gravity and positions moved by two units in the last place."""
+    """Return the scene with masses, gravity and positions changed by two units in the last place."""
     factor = 1.0 + 2.0 * rounding
 
     def grown(values: Sequence[float] | None) -> tuple[float, ...] | None:
@@ -54,7 +55,7 @@ def nudged(scene: Scene, rounding: float = ROUNDING) -> Scene:
 
 
 def weighed(scene: Scene) -> Scene:
-    """Another scene of the same name: with masses twice as large, under another gravity."""
+    """Return another scene with the name of the first one: masses are twice as large, and gravity differs."""
     bodies = [body.model_copy(update={"mass": body.mass and 2 * body.mass}) for body in scene.body]
     x, y, z = scene.gravity
     return scene.with_(body=tuple(bodies), gravity=(x + 1.0, y - 2.0, z + 3.0))

@@ -1,4 +1,4 @@
-"""Scenes whose motion is a formula written down here: the suite's exact motions beside the truths."""
+"""Scenes whose exact motions are formulas of this module, as a second source beside the judge's truths."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ MASS, MOMENT, ARM = 2.0, 0.03, 0.4  # kg, kg m² about z, m from the axis to the
 
 
 def free_fall() -> tuple[Scene, Exact]:
-    """A tossed body that spins about its own z: p + v t + g t²/2, and the angle w t."""
+    """Return a thrown body that spins about its z axis: p + v t + g t²/2, rotation angle w t."""
     place, velocity, spin = (0.1, 0.2, 0.0), (1.0, 3.0, 0.0), 2.0
     thrown = _body(place).model_copy(update={"velocity": velocity, "angular_velocity": (0.0, 0.0, spin)})
     scene = Scene(name="free_fall", gravity=DOWN, duration=0.5, body=(thrown,))
@@ -42,7 +42,8 @@ def free_fall() -> tuple[Scene, Exact]:
 
 
 def pendulum() -> tuple[Scene, Exact]:
-    """A physical pendulum let go at 1.2 rad: sin(θ/2) = sin(θ₀/2) cd(ω t), Jacobi's elliptic function."""
+    """Return a physical pendulum released at 1.2 rad: sin(θ/2) = sin(θ₀/2) cd(ω t), Jacobi's elliptic
+    function."""
     released = 1.2
     place = (ARM * math.sin(released), -ARM * math.cos(released), 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
@@ -58,7 +59,7 @@ def pendulum() -> tuple[Scene, Exact]:
 
 
 def oscillator() -> tuple[Scene, Exact]:
-    """A mass on a spring and a damper, sliding along x."""
+    """Return a mass with a spring and a damper that slides along x."""
     stiffness, damping, length, start = 50.0, 3.0, 0.5, 0.8
     joint = Translational(name="slide", bodies=("ground", "body"), anchor=ORIGIN, axis=X)
     place = (start, 0.0, 0.0)
@@ -79,7 +80,8 @@ def oscillator() -> tuple[Scene, Exact]:
 
 
 def torsion() -> tuple[Scene, Exact]:
-    """A body off the axis of a revolute joint with a torsion spring and damper; no gravity."""
+    """Return a body on a revolute joint with a torsion spring and damper, its centre off the axis, without
+    gravity."""
     stiffness, damping, natural = 6.0, 0.2, 0.9
     place = (ARM, 0.0, 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
@@ -94,7 +96,7 @@ def torsion() -> tuple[Scene, Exact]:
 
 
 def driven() -> tuple[Scene, Exact]:
-    """A body turned by a driver: the angle is what the driver says."""
+    """Return a body whose angle is prescribed by a driver."""
     driver = Driver(joint="pivot", polynomial=(0.0, 1.0, -0.5), sine=Sine(amplitude=0.3, frequency=5.0))
     place = (ARM, 0.0, 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
@@ -109,7 +111,8 @@ def driven() -> tuple[Scene, Exact]:
 
 
 def turntable() -> tuple[Scene, Exact]:
-    """A body off the axis that a driver speeds up evenly, gravity along the axis: the moment is constant."""
+    """Return a body with its centre off a vertical axis, driven at constant angular acceleration: the
+    driver's moment is constant."""
     driver = Driver(joint="pivot", polynomial=(0.0, 1.5, 2.0))
     place = (ARM, 0.0, 0.0)
     joint = Revolute(name="pivot", bodies=("ground", "body"), anchor=ORIGIN, axis=Z)
@@ -136,18 +139,18 @@ def _body(place: tuple[float, float, float]) -> Body:
 
 
 def _decay(t: np.ndarray, stiffness: float, damping: float) -> np.ndarray:
-    """y (k,) with y'' = -stiffness y - damping y', y(0) = 1, y'(0) = 0."""
+    """Return the solution y (k,) of y'' = -stiffness y - damping y' with y(0) = 1 and y'(0) = 0."""
     root = cmath.sqrt(damping**2 / 4 - stiffness)
     a, b = -damping / 2 + root, -damping / 2 - root
     return np.real((a * np.exp(b * t) - b * np.exp(a * t)) / (a - b))
 
 
 def _about_z(angle: np.ndarray) -> np.ndarray:
-    """Orientations (k, 1, 4) turned about z."""
+    """Return orientations (k, 1, 4) rotated about z by the given angles."""
     return rotations.from_vector(np.outer(angle, Z))[:, None]
 
 
 def _swung(angle: np.ndarray, place: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Poses of a body turned about the z axis through the origin, from ``place``."""
+    """Return the poses of a body that turns about the z axis through the origin and starts at ``place``."""
     turned = _about_z(angle)
     return rotations.rotate(turned, np.array(place)), turned

@@ -1,7 +1,8 @@
-"""Every card on many drawn mechanisms, each until it has its number; records are kept, so that a run resumes.
+"""Checks on many random mechanisms, until each check is decided on the planned number. Records are stored, so
+that a run resumes.
 
-All cards that ask something of a mechanism share its runs: the judged run, its perturbed run, coarser ones
-and the exact motion are made once.
+All checks on a mechanism share its runs: the judged run, its perturbed run, runs at coarser settings, and the
+exact motion.
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from crosscheck.conformance import suite
-from crosscheck.conformance.drawn import floating, mechanism, rotor, without_masses
 from crosscheck.conformance.properties import PROPERTIES
+from crosscheck.conformance.random_scenes import floating, mechanism, rotor, without_masses
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
 from crosscheck.conformance.trial import Bench, Broken, Specimen, difference, set_up
@@ -23,13 +24,18 @@ from mbref.records import append, opened
 from mbref.scene import Scene
 
 AGREEMENT = "agreement"
-ABOUT = "Trajectories of two engines agree within what the measured order and floor of both leave of error."
-MOST = 3  # seeds for each mechanism asked for, where a card says nothing of some
+ABOUT = (
+    "Trajectories of two engines agree within the sum of their errors, estimated from order and "
+    "accuracy limit."
+)
+# largest number of seeds for each planned mechanism; some mechanisms are outside the domain of a check
+MOST = 3
 DECIDED = (PASS, FAIL)
 NOTHING: dict[str, Any] = {"verdicts": ()}
-ELSEWHERE = ("momentum", "replayed", "dead end", "refined")  # cards of other kinds, or of scenes of the suite
+# checks that need other mechanisms (listed below), or scenes of the suite
+ELSEWHERE = ("momentum", "replayed", "dead end", "refined")
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
-    (mechanism, (RUN, AGREEMENT, *(card for card in PROPERTIES if card not in ELSEWHERE))),
+    (mechanism, (RUN, AGREEMENT, *(check for check in PROPERTIES if check not in ELSEWHERE))),
     (floating, ("energy", "momentum", "reversed")),
     (rotor, ("replayed",)),
     (without_masses, (REFUSAL,)),
@@ -37,8 +43,11 @@ KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
 
 
 class Plan(NamedTuple):
-    """So many ``mechanisms`` for each card, from seed ``first`` on, in an engine's best family or the one
-    named; ``beside`` are engines to agree with, as NAME or NAME=FAMILY."""
+    """Plan: number of ``mechanisms`` for each check, the first seed, and the engine with a family of settings
+    (empty: its best).
+
+    ``beside`` names engines whose motions must agree, as NAME or NAME=FAMILY.
+    """
 
     engine: str
     mechanisms: int
@@ -49,8 +58,8 @@ class Plan(NamedTuple):
 
 @dataclass
 class Tally:
-    """Counts of verdicts by card and status, the largest part of the allowance that was used and where, and
-    the violations."""
+    """Counts of verdicts by check and status, the largest ratio of a measured value to its limit, and the
+    violations."""
 
     plan: Plan
     version: str = ""
@@ -61,41 +70,43 @@ class Tally:
 
     @property
     def conforms(self) -> bool:
-        """Whether no card is violated, and some mechanism was run."""
+        """Return whether no check fails and at least one mechanism ran."""
         return not self.violations and self.decided(RUN) > 0
 
     def open(self) -> list[str]:
-        """Cards that are not decided on as many mechanisms as planned."""
-        cards = list(dict.fromkeys(card for _, asked in KINDS for card in asked))
-        asked = [card for card in cards if card != AGREEMENT or self.plan.beside]
-        return [card for card in asked if self.decided(card) < self.plan.mechanisms]
+        """Return the checks that are decided on fewer mechanisms than planned."""
+        checks = list(dict.fromkeys(check for _, asked in KINDS for check in asked))
+        asked = [check for check in checks if check != AGREEMENT or self.plan.beside]
+        return [check for check in asked if self.decided(check) < self.plan.mechanisms]
 
-    def decided(self, card: str) -> int:
-        """Mechanisms that a card was decided on."""
-        counts = self.counts.get(card, Counter())
+    def decided(self, check: str) -> int:
+        """Return the number of mechanisms on which a check was decided."""
+        counts = self.counts.get(check, Counter())
         return sum(counts[status] for status in DECIDED)
 
     def add(self, record: dict[str, Any]) -> None:
-        """Count a record's verdicts except for older cards; of a run that ended early count only that
-        card."""
+        """Count the verdicts of a record, except verdicts by older versions of a check.
+
+        If the run itself failed, only that verdict counts.
+        """
         self.version, self.seeds = record["version"], self.seeds + 1
         ended = [v["scene"] for v in record["verdicts"] if v["property"] == RUN and v["status"] == FAIL]
         for verdict in record["verdicts"]:
-            card = verdict["property"]
-            if verdict["card"] != card_of(card) or (card != RUN and verdict["scene"] in ended):
+            check = verdict["property"]
+            if verdict["card"] != check_of(check) or (check != RUN and verdict["scene"] in ended):
                 continue
-            self.counts.setdefault(card, Counter())[verdict["status"]] += 1
+            self.counts.setdefault(check, Counter())[verdict["status"]] += 1
             if verdict["status"] == FAIL:
                 self.violations.append(verdict)
             elif verdict["measured"] and verdict["allowed"]:
                 part = verdict["measured"] / verdict["allowed"]
-                self.worst[card] = max(self.worst.get(card, (0.0, "")), (part, verdict["scene"]))
+                self.worst[check] = max(self.worst.get(check, (0.0, "")), (part, verdict["scene"]))
 
     def to_record(self) -> dict[str, Any]:
-        """The counts as JSON."""
-        cards = {
+        """Return the counts as a JSON document."""
+        checks = {
             name: {
-                "card": card_of(name),
+                "card": check_of(name),
                 "about": about(name),
                 **counts,
                 "worst": self.worst.get(name, (0.0, "")),
@@ -109,25 +120,27 @@ class Tally:
             "mechanisms": self.plan.mechanisms,
             "first_seed": self.plan.first,
             "seeds": self.seeds,
-            "cards": cards,
+            "cards": checks,
             "violations": self.violations,
         }
 
 
-def card_of(name: str) -> str:
-    """A card with its version."""
-    return Verdict(name, "", PASS).card()
+def check_of(name: str) -> str:
+    """Return the name of a check with its version."""
+    return Verdict(name, "", PASS).check()
 
 
 def about(name: str) -> str:
-    """The check of a card in a sentence."""
+    """Return the sentence that describes a check."""
     return ABOUT if name == AGREEMENT else suite.abouts()[name]
 
 
 def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None] | None = None) -> Tally:
-    """Judge drawn mechanisms in this process until each card is decided on as many as planned, or seeds are
-    MOST times as many; records at ``path`` (JSON lines) are taken instead of runs, and added to where a card
-    is new."""
+    """Judge random mechanisms in this process until each check is decided on the planned number of them.
+
+    The search ends after MOST times as many seeds. Records at ``path`` (JSON lines) replace runs; verdicts of
+    new checks are added to them.
+    """
     known, tally = opened(path), Tally(plan)
     for seed in itertools.islice(itertools.count(plan.first), MOST * plan.mechanisms):
         wanted = tally.open()
@@ -137,7 +150,7 @@ def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None
         before = known.get(key, NOTHING)
         if missing := unasked(before, wanted):
             added = _record(plan, seed, missing)
-            asked = [*before.get("asked", ()), *map(card_of, missing)]
+            asked = [*before.get("asked", ()), *map(check_of, missing)]
             verdicts = [*before["verdicts"], *added["verdicts"]]
             known[key] = {"key": key, **added, "asked": asked, "verdicts": verdicts}
             append(path, known[key])
@@ -148,45 +161,46 @@ def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None
 
 
 def unasked(record: dict[str, Any], wanted: Collection[str]) -> list[str]:
-    """Cards, of those wanted, that a seed's record says nothing of, in this version of the card; none where
-    the run itself failed."""
+    """Return the wanted checks, in their present version, on which a seed's record has no verdict; none if
+    its run failed."""
     if any(v["property"] == RUN and v["status"] == FAIL for v in record["verdicts"]):
         return []
     asked = {*record.get("asked", ()), *(verdict["card"] for verdict in record["verdicts"])}
-    return [card for card in wanted if card_of(card) not in asked]
+    return [check for check in wanted if check_of(check) not in asked]
 
 
 def _record(plan: Plan, seed: int, wanted: Collection[str]) -> dict[str, Any]:
-    """The verdicts of one seed: a card is asked of the next kind of mechanism where it has none yet."""
+    """Return the verdicts of one seed. A check without verdict on one kind of mechanism is made on the next
+    kind."""
     runner, version = InProcess(engine(plan.engine), plan.engine), ""
     verdicts: list[Verdict] = []
     for draw, asked in KINDS:
         decided = {verdict.property for verdict in verdicts if verdict.status in DECIDED}
-        cards = [card for card in asked if card in wanted and card not in decided]
-        if cards:
+        checks = [check for check in asked if check in wanted and check not in decided]
+        if checks:
             specimen = Specimen(draw(seed), None, True, reference_time=0.0)
             bench = suite.asked(runner, specimen, plan.family)
             version = bench.version if isinstance(bench, Bench) else version
-            verdicts += _verdicts(plan, bench, cards) if isinstance(bench, Bench) else [bench]
+            verdicts += _verdicts(plan, bench, checks) if isinstance(bench, Bench) else [bench]
     return {"version": version, "verdicts": [suite.record_of(verdict) for verdict in verdicts]}
 
 
-def _verdicts(plan: Plan, bench: Bench, cards: Sequence[str]) -> Iterator[Verdict]:
-    """Return the verdicts of the cards; only the verdict on the run if it does not complete."""
-    if not bench.cannot and REFUSAL not in cards and (run := suite.first_run(bench)).status == FAIL:
+def _verdicts(plan: Plan, bench: Bench, checks: Sequence[str]) -> Iterator[Verdict]:
+    """Return the verdicts of the checks; only the verdict on the run if it does not complete."""
+    if not bench.cannot and REFUSAL not in checks and (run := suite.first_run(bench)).status == FAIL:
         yield run
         return
-    for card in cards:
-        if bench.cannot and card != REFUSAL:
-            yield Verdict(card, bench.scene.name, CANNOT, reason=str(bench.cannot))
-        elif card == AGREEMENT:
+    for check in checks:
+        if bench.cannot and check != REFUSAL:
+            yield Verdict(check, bench.scene.name, CANNOT, reason=str(bench.cannot))
+        elif check == AGREEMENT:
             yield from (agreement(bench, other) for other in plan.beside)
         else:
-            yield suite.verdict_on(card, bench)
+            yield suite.verdict_on(check, bench)
 
 
 def agreement(bench: Bench, other: str) -> Verdict:
-    """Check the motion against another engine (NAME or NAME=FAMILY), by the finest settings of both."""
+    """Compare the motion with another engine's (NAME or NAME=FAMILY), both at their finest settings."""
     name, (called, _, family) = bench.scene.name, other.partition("=")
     beside = set_up(InProcess(engine(called), called), bench.specimen, family)
     if beside.cannot:

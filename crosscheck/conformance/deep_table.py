@@ -1,4 +1,4 @@
-"""The tables of a run on random mechanisms, for a terminal."""
+"""Terminal tables of the checks on random mechanisms."""
 
 from __future__ import annotations
 
@@ -8,32 +8,33 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.deep import Tally, about, card_of
+from crosscheck.conformance.deep import Tally, about, check_of
 from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, RUN
 
 COLUMNS = (PASS, FAIL, CANNOT, OUTSIDE)
 
 
 def tables(tally: Tally) -> Iterator[Table | Text]:
-    """Cards with their counts and the largest part of an allowance that was used; then the violations."""
+    """Return a table of checks with their counts and the largest ratio of value to limit, then the
+    violations."""
     plan = tally.plan
     first, last = plan.first, plan.first + tally.seeds - 1
     title = f"{plan.engine} {tally.version} {plan.family}: random mechanisms, seeds {first} to {last}"
     numbers = (Column(name, justify="right") for name in COLUMNS)
-    table = Table("card", *numbers, "largest value / allowance", "it checks", title=title, box=SIMPLE)
+    table = Table("check", *numbers, "largest value / allowance", "it checks", title=title, box=SIMPLE)
     for name, counts in tally.counts.items():
         used, scene = tally.worst.get(name, (0.0, ""))
         row = (str(counts[status]) for status in COLUMNS)
-        table.add_row(card_of(name), *row, f"{used:.0e} {scene}" if used else "", about(name))
+        table.add_row(check_of(name), *row, f"{used:.0e} {scene}" if used else "", about(name))
     yield table
     for v in tally.violations:
         numbers_of = "" if v["measured"] is None else f" {v['measured']:.3g}, allowed {v['allowed']:.3g}"
-        yield Text(f"fail: {v['scene']}, {v['card']}:{numbers_of} {v['reason']}".rstrip())
+        yield Text(f"fail: {v['scene']}, {v['check']}:{numbers_of} {v['reason']}".rstrip())
     yield Text(_summary(tally))
 
 
 def _summary(tally: Tally) -> str:
-    """Return the number of violations, and of how many mechanisms that is known."""
+    """Return a sentence with the number of violations and the number of mechanisms that ran."""
     ran, drawn = tally.decided(RUN), f"{tally.seeds} random mechanisms"
     if not ran:
         return f"{tally.plan.engine}: ran none of {drawn}, so it is not judged"

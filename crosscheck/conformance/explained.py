@@ -1,4 +1,5 @@
-"""Known violations of cards with cause and remedy, and the defects that prove the cards, read from data."""
+"""Known violations of checks with cause and remedy, and planted defects that the checks detect, read from
+data files."""
 
 from __future__ import annotations
 
@@ -11,34 +12,34 @@ FOLDER = Path(__file__).parent
 
 
 class Explanation(NamedTuple):
-    """The cause of an engine's violation of a card and its remedy; a sentence each."""
+    """Cause and remedy of an engine's violation of a check, one sentence each."""
 
     cause: str
     remedy: str
 
 
 class Proof(NamedTuple):
-    """A planted defect, and the scene and the card that tell it."""
+    """A planted defect, with the scene and the check that detect it."""
 
     about: str
     scene: str
-    card: str
+    check: str
 
 
 @functools.cache
 def explanations() -> dict[tuple[str, str, str], Explanation]:
-    """By engine, card without its version, and scene."""
+    """Return the explanations by (engine, check without its version, scene)."""
     found = tomllib.loads((FOLDER / "explained.toml").read_text()).get("violation", ())
     return {
-        (entry["engine"], card, scene): Explanation(entry["cause"], entry["remedy"])
+        (entry["engine"], check, scene): Explanation(entry["cause"], entry["remedy"])
         for entry in found
-        for card in entry["cards"]
+        for check in entry["checks"]
         for scene in entry["scenes"]
     }
 
 
 @functools.cache
 def proofs() -> tuple[Proof, ...]:
-    """Every defect of the zoo."""
+    """Return all planted defects."""
     found = tomllib.loads((FOLDER / "proved_by.toml").read_text())["defect"]
     return tuple(Proof(**entry) for entry in found)

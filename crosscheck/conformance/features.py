@@ -1,4 +1,4 @@
-"""Probe scenes: one small scene for every feature a scene may have, named after it."""
+"""Small scenes, one for every feature of the scene format, named after the feature."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ BODY = Body(
     position=PLACE,
     orientation=tuple(rotations.from_vector(np.array([0.3, -0.2, 0.5])).tolist()),
 )
-ACROSS = (1.0, -1.0, 0.5)  # axis of joints without rotation, along which the body can fall
+ACROSS = (1.0, -1.0, 0.5)  # axis of joints that block rotation but let the body fall along the axis
 PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))}
 JOINTS: Mapping[str, Joint] = {
     name: kind.at("J", LINK, **PLACES, axis=AXIS if kind.facts.free_rotations else ACROSS)
@@ -61,8 +61,10 @@ DRIVERS = {
 
 
 def feature_scenes() -> dict[str, Scene]:
-    """Scenes by feature: kinds of joint, driver and load; loops; kinematics. None comes
-    to a singular position, from where motions need not be unique."""
+    """Return a scene for each feature: types of joint, driver and load; loops; kinematics.
+
+    No scene reaches a singular position, behind which motions need not be unique.
+    """
     probes = {f"{kind} joint": _probe(kind, joint) for kind, joint in JOINTS.items()}
     probes |= {
         f"{kind} driver": _probe(f"{kind}_driver", JOINTS[kind], driver=(d,)) for kind, d in DRIVERS.items()
@@ -79,23 +81,23 @@ def feature_scenes() -> dict[str, Scene]:
 
 
 def undetermined() -> Scene:
-    """A body without mass that nothing moves: dynamics without data, which every engine must refuse."""
+    """Return a body without mass and driver. Its motion is undetermined, and every engine must refuse it."""
     return massless(_probe("undetermined", PIVOTED))
 
 
 def is_undetermined(scene: Scene) -> bool:
-    """Whether a scene has neither masses nor drivers that prescribe its motion."""
+    """Return whether a scene has neither masses nor drivers that determine its motion."""
     return not scene.has_mass() and rank(scene) < 6 * len(scene.body)
 
 
 def massless(scene: Scene) -> Scene:
-    """The scene with every mass and inertia left out."""
+    """Return the scene without masses and inertias."""
     bare = [body.model_copy(update={"mass": None, "inertia": None}) for body in scene.body]
     return scene.with_(name=f"massless_{scene.name}", body=tuple(bare), load=())
 
 
 def _carrier(load: Load) -> Joint:
-    """The joint of the probe of a load: one that leaves its action free to show."""
+    """Return the joint for the scene of a load, chosen such that the load causes motion."""
     return TURNS if load.acts_on == "joint" else JOINTS["spherical"]
 
 

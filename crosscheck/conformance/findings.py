@@ -1,4 +1,5 @@
-"""Violations that the suite finds, shrunk and kept: a scene file and the command that replays it."""
+"""Violations found by the suite: reduced to a small scene and stored with the command that repeats the
+check."""
 
 from __future__ import annotations
 
@@ -14,22 +15,25 @@ from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import Bench, Specimen, set_up
 from mbref.scene import GROUND, Joint, Load, Scene, SceneError
 
-TRIES = 60  # scenes tried while a violation is made small
+TRIES = 60  # largest number of scenes tried to reduce a violation
 
 
-def violates(runner: Runner, card: str) -> Callable[[Scene], bool]:
-    """Whether a scene makes a card fail on the runner's engine."""
+def violates(runner: Runner, check: str) -> Callable[[Scene], bool]:
+    """Return whether the runner's engine fails a check on a scene."""
 
     def fails(scene: Scene) -> bool:
         bench = set_up(runner, Specimen(scene, None, True))
-        return not bench.cannot and suite.verdict_on(card, bench).status == suite.FAIL
+        return not bench.cannot and suite.verdict_on(check, bench).status == suite.FAIL
 
     return fails
 
 
 def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> Scene:
-    """The smallest scene found that still fails: with fewer loads, drivers, joints and bodies, a shorter
-    duration and rounder numbers; the scene itself when nothing can go."""
+    """Return the smallest scene found that still fails.
+
+    Loads, drivers, joints and bodies are removed, the duration is shortened and numbers are rounded. The
+    scene itself is returned if none of these is possible.
+    """
     left, found = tries, True
     while found and left > 0:
         found = False
@@ -44,14 +48,17 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> 
 
 
 def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path, called: str = "") -> Path:
-    """Write a scene file that begins with the violation and the command that replays it; its path.
-    ``called`` is a scene of the suite which the command names in the file's place."""
+    """Write a scene file whose comments describe the violation and the command that repeats the check; return
+    its path.
+
+    ``called`` names a scene of the suite, which the command then uses in place of the file.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{engine}_{verdict.property}_{scene.name}.toml".replace(" ", "_").replace(":", "_")
     scene.save(path)
     numbers = "" if verdict.measured is None else f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
     words = [
-        f"{engine}: {verdict.card()} fails{numbers} {verdict.reason}".rstrip(),
+        f"{engine}: {verdict.check()} fails{numbers} {verdict.reason}".rstrip(),
         f"crosscheck verify {engine} --scene {repr(called) if called else path}",
     ]
     path.write_text("".join(f"# {word}\n" for word in words) + path.read_text())
@@ -59,8 +66,8 @@ def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path, called
 
 
 def found(bench: Bench, verdict: suite.Verdict, folder: Path) -> Path:
-    """Make a violation small and keep it; the file's path."""
-    if bench.specimen.dead_end:  # a smaller scene may have no dead end
+    """Reduce a violation and store it; return the file's path."""
+    if bench.specimen.dead_end:  # a smaller scene may lose its dead end
         return keep(bench.scene, verdict, bench.runner.name, folder, bench.scene.name)
     small = shrunk(bench.scene, violates(bench.runner, verdict.property))
     again = verdict
@@ -70,7 +77,7 @@ def found(bench: Bench, verdict: suite.Verdict, folder: Path) -> Path:
 
 
 def _smaller(scene: Scene) -> Iterator[Scene]:
-    """Valid scenes with less in them, the largest cuts first."""
+    """Yield valid smaller scenes, starting with the largest reductions."""
     for candidate in (*_without_bodies(scene), *_without_items(scene), *_simpler(scene)):
         try:
             smaller = candidate()

@@ -1,4 +1,4 @@
-"""Random mechanisms with armatures and a coupling: ``random_mechanisms`` with rotors and gears."""
+"""Random mechanisms of ``random_mechanisms`` with additional armatures and a coupling."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ TRIES = 40
 
 
 def geared_mechanism(seed: int) -> Scene:
-    """A random mechanism with armatures and, where that leaves a freedom, a coupling of two coordinates.
+    """Return a random mechanism with armatures. It also has a coupling of two joint coordinates if a degree
+    of freedom remains.
 
-    The same seed gives the same scene.
+    The result depends on the seed only.
     """
     scene, rng = random_mechanism(seed), np.random.default_rng([seed, 1])
     joints = [
@@ -46,7 +47,8 @@ def _coupling(
 
 
 def _moving(scene: Scene, rng: np.random.Generator) -> Scene | None:
-    """The scene with random velocities that its rows allow; None where no finite motion is left."""
+    """Return the scene with random velocities that its constraints allow; None if no finite motion
+    remains."""
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     _, sizes, vt = np.linalg.svd(rows * units)

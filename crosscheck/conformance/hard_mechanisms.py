@@ -1,6 +1,6 @@
-"""Mechanisms that are hard for a reference: stiff, nearly singular, rounded, fast, ill-scaled.
+"""Mechanisms that are hard for the reference solution: stiff, nearly singular, rounded, fast or badly scaled.
 
-Most have no closed form.  Each starts from rest, or the velocity of one body determines the others'.
+Most have no closed form.  Each starts from rest, or the velocity of one body determines all others.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ Point = Sequence[float] | np.ndarray
 
 
 def bar(name: str, start: Point, stop: Point, mass: float = 1.0) -> Body:
-    """A bar between two points of the xy-plane, its x axis along it."""
+    """Return a bar between two points of the xy-plane, with its x axis along the bar."""
     way = np.subtract(stop, start)
     half, length = math.atan2(way[1], way[0]) / 2, float(np.linalg.norm(way))
     long = mass * length**2 / 12
@@ -51,13 +51,13 @@ def _q(half: float) -> tuple[float, float, float, float]:
 
 
 def hinge(name: str, first: str, second: str, place: Point) -> Revolute:
-    """About z."""
+    """Return a hinge about z."""
     x, y, z = place
     return Revolute(name=name, bodies=(first, second), anchor=(x, y, z), axis=Z)
 
 
 def linkage(name: str, places: Sequence[Point], masses: Sequence[float] = (1.0, 1.0, 1.0)) -> Scene:
-    """Bars between successive points, hinged to each other and at both ends to the ground."""
+    """Return bars between successive points, hinged to each other and to the ground at both ends."""
     names = ["ground", *(f"bar{k}" for k in range(len(places) - 1)), "ground"]
     bars = [bar(n, p, q, m) for n, p, q, m in zip(names[1:-1], places[:-1], places[1:], masses, strict=True)]
     pins = [
@@ -70,7 +70,7 @@ FOUR = ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0), (0.6, 0.5, 0.0), (0.7, -0.1, 0.0))
 
 
 def stiff_spring() -> Scene:
-    """A four-bar with a spring of 1e6 N/m across, which vibrates at 3000 rad/s."""
+    """Return a four-bar with a diagonal spring of 1e6 N/m, which vibrates at 3000 rad/s."""
     spring = Spring(
         bodies=("bar0", "bar2"),
         points=((0.05, 0.15, 0), (0.65, 0.2, 0)),
@@ -82,20 +82,23 @@ def stiff_spring() -> Scene:
 
 
 def strong_damping() -> Scene:
-    """A four-bar whose hinge is damped a thousand times more than it has inertia."""
+    """Return a four-bar with a strongly damped hinge: its damping over its inertia is about 1000 1/s."""
     spring = TorsionSpring(joint="P1", stiffness=10.0, damping=100.0, natural_angle=0.5)
     return linkage("strong_damping", FOUR).with_(load=(spring,), duration=0.3)
 
 
 def near_singular() -> Scene:
-    """An almost-parallelogram that passes its straight position at a thousandth of its size."""
+    """Return an almost-parallelogram that passes its straight position at a distance of 1e-3 of its size."""
     places = ((0.0, 0.0, 0.0), (0.3, 0.4, 0.0), (1.3, 0.4, 0.0), (1.0004, 0.0, 0.0))
     return linkage("near_singular", places).with_(duration=1.0)
 
 
 def start_near_singular() -> Scene:
-    """Coupler and rocker start a thousandth of a radian from their dead centre, at a given rate of the crank:
-    the least difference of that rate is magnified."""
+    """Return a four-bar whose coupler and rocker start 1e-3 rad from their dead centre, at a given rate of
+    the crank.
+
+    The motion amplifies small differences of that rate.
+    """
     crank, coupler, rocker, ground = 0.3, 0.8, 0.6, 1.5
     reach = coupler + rocker - 1e-7
     x = (crank**2 + ground**2 - reach**2) / (2 * ground)
@@ -108,19 +111,20 @@ def start_near_singular() -> Scene:
 
 
 def turning(scene: Scene, rate: float) -> Scene:
-    """The linkage with the first bar at a rate (rad/s)."""
+    """Return the linkage with the first bar at a given rate (rad/s)."""
     first = scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)})
     return scene.with_(body=(first, *scene.body[1:]))
 
 
 def two_crossings() -> Scene:
-    """A parallelogram of 5 : 3 : 4 that falls through both of its straight positions."""
+    """Return a parallelogram with sides in the ratio 5 : 3 : 4 that falls through both straight positions."""
     base = linkage("two_crossings", ((0, 0, 0), (0.375, 0.5, 0), (1.375, 0.5, 0), (1, 0, 0)))
     return turning(base, -6.0).with_(duration=0.8)
 
 
 def rounded_redundancy() -> Scene:
-    """A six-bar of eight parallel hinges, six rows redundant, turned so that anchors and axes are rounded."""
+    """Return a rotated six-bar of eight parallel hinges: six rows are redundant, and its numbers are
+    rounded."""
     base = linkage("rounded_redundancy", FOUR)
     mid, far, low = (0.35, 0.4, 0.0), (0.45, 1.0, 0.0), (1.0, 0.7, 0.0)
     bars = (*base.body, bar("bar3", mid, far), bar("bar4", far, low))
@@ -134,7 +138,7 @@ def rounded_redundancy() -> Scene:
 
 
 def fast_driver() -> Scene:
-    """A crank and a slider; the crank's rate shakes at 400 rad/s, from a phase of 1.3 rad."""
+    """Return a driven slider-crank whose crank rate oscillates at 400 rad/s with a phase of 1.3 rad."""
     b, c = (0.1, 0.1, 0.0), (0.5, 0.0, 0.0)
     slider = Body(name="slider", mass=0.5, inertia=(1e-3, 1e-3, 1e-3), position=c)
     joints = (
@@ -152,7 +156,8 @@ def fast_driver() -> Scene:
 
 
 def point_masses() -> Scene:
-    """Four masses of 1e-8 kg m² at the ends of five bars of fixed length, pulled together by a spring."""
+    """Return four bodies of 1e-8 kg m² at the ends of five bars of fixed length, pulled together by a
+    spring."""
     places = [(0.5, 0.0, 0.0), (0.5, 0.0, 0.6), (1.0, 0.3, 0.2), (0.2, 0.7, 0.4)]
     names = ["p0", "p1", "p2", "p3"]
     bodies = [
@@ -182,7 +187,8 @@ def point_masses() -> Scene:
 
 
 def free_bodies() -> Scene:
-    """Two free bodies, one tumbling about its middle axis, on a damped spring whose line passes both."""
+    """Return two free bodies connected by a damped spring; one tumbles about its intermediate principal
+    axis."""
     racket = Body(
         name="racket",
         mass=1.0,
@@ -210,7 +216,7 @@ def free_bodies() -> Scene:
 
 
 def whip() -> Scene:
-    """Eight bodies on balls and universal joints, from the ceiling to the floor."""
+    """Return eight bodies on ball and universal joints between two points of the ground."""
     places = np.array([(0.25 * k, 0.1 * (k % 2), 0.05 * (k % 3)) for k in range(9)])
     names, bars, pins = ["ground", *(f"b{k}" for k in range(8))], [], []
     for k in range(8):
@@ -225,13 +231,13 @@ def whip() -> Scene:
 
 
 def mass_ratio() -> Scene:
-    """A grain of a milligram between a kilogram and half a ton."""
+    """Return a milligram body between bodies of a kilogram and half a ton."""
     places = ((0.0, 0.0, 0.0), (0.4, 0.2, 0.0), (0.9, 0.1, 0.0), (1.2, -0.3, 0.0))
     return linkage("mass_ratio", places, (1.0, 1e-6, 500.0)).with_(duration=1.0)
 
 
 def planes() -> Scene:
-    """A block on a slope with a pendulum on it, which a bar of fixed length ties to another block."""
+    """Return a block on a slope with a pendulum, which a bar of fixed length connects to another block."""
     slope = (0.0, 1.0, 0.4)
     first, second = (0.0, 0.0, 0.0), (0.8, 0.0, 0.3)
     inertia = ((0.02, 0.001, 0.0), (0.001, 0.03, 0.002), (0.0, 0.002, 0.025))

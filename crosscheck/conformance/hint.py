@@ -1,7 +1,7 @@
-"""Hints for engines that fail: the changed term that explains the accelerations of an engine best.
+"""Hints for failing engines: the term of the equations whose change explains an engine's accelerations best.
 
-Accelerations are differences of the engine's own velocities at the middle of a failing scene, and the judge's
-terms are taken at the engine's own state there, so that errors of the integration do not count.
+Accelerations are finite differences of the engine's velocities in the middle of a failing scene. The judge's
+terms are evaluated at the engine's own state there, so that integration errors have no influence.
 """
 
 from __future__ import annotations
@@ -20,21 +20,24 @@ from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants
 from crosscheck.processes.pool import ChildFailed
 from mbref.scene import Scene
 
-WRONG = 1e-3  # of the accelerations: differences of velocities are exact to 1e-5 in engines that conform
-EXPLAINED = 0.02  # of the difference that may remain with a changed term
-MOST = 8  # failing scenes that are looked at, those with fewest terms first
-WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # of central differences of order 8
+# relative error of accelerations that counts as wrong; finite differences are exact to 1e-5 in engines that
+# conform
+WRONG = 1e-3
+EXPLAINED = 0.02  # fraction of the difference that may remain after a change that explains it
+MOST = 8  # largest number of examined failing scenes; scenes that need the fewest terms come first
+WEIGHTS = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 
 
 class Failure(NamedTuple):
-    """First check (card) of the suite that fails on a scene."""
+    """The first check of the suite that an engine fails on a scene."""
 
     specimen: Specimen
-    card: str
+    check: str
 
 
 def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
-    """Return one sentence on the cause that explains most failing scenes; empty without any to look at."""
+    """Return one sentence on the cause that explains most failing scenes; empty if no scene can be
+    examined."""
     ordered = sorted(failures, key=lambda failure: len(parts_of(failure.specimen.scene)))
     asked = [failure for failure in ordered if failure.specimen.scene.has_mass()][:MOST]
     found = [pair for failure in asked for pair in _looked_at(runner, failure, family)]
@@ -43,7 +46,9 @@ def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
     wrong = [(failure, changes) for failure, changes in found if changes is not None]
     first, _ = (wrong or found)[0]
     needs = ", ".join(parts_of(first.specimen.scene))
-    begin = f"hint: begin with the scene {first.specimen.scene.name!r}, card {first.card} (it needs: {needs})"
+    begin = (
+        f"hint: begin with the scene {first.specimen.scene.name!r}, check {first.check} (it needs: {needs})"
+    )
     if not wrong:
         return f"{begin}; accelerations agree with the judge's, so look at the integration or at the output"
     count = Counter(change for _, changes in wrong for change in changes)
@@ -67,11 +72,12 @@ def parts_of(scene: Scene) -> list[str]:
     return [part for part in PARTS if needed[part]]
 
 
-Changes = set[tuple[str, str]] | None  # parts and changes that explain wrong accelerations; None where right
+# (part, change) pairs that explain wrong accelerations; None if the accelerations are right
+Changes = set[tuple[str, str]] | None
 
 
 def _looked_at(runner: Runner, failure: Failure, family: str) -> Iterator[tuple[Failure, Changes]]:
-    """Yield a failure with what explains it; nothing where the engine has no motion to look at."""
+    """Yield a failure with the changes that explain it; nothing if the engine has no motion there."""
     with suppress(Broken, ChildFailed):
         yield failure, explanations(set_up(runner, failure.specimen, family))
 
@@ -94,7 +100,8 @@ def explanations(bench: Bench) -> Changes:
 
 
 def _differences(scene: Scene, bench: Bench) -> np.ndarray:
-    """Accelerations (6 nb,) in the middle of near samples, angular ones times the scene's length."""
+    """Return accelerations (6 nb,) from finite differences of neighbouring samples; angular ones are
+    multiplied by the scene's length."""
     motion = bench.close
     rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=-1)
     step = float(motion.times[1] - motion.times[0])
@@ -105,5 +112,6 @@ def _differences(scene: Scene, bench: Bench) -> np.ndarray:
 
 
 def _least(scene: Scene) -> float:
-    """The acceleration that covers the scene's length in its duration, below which none counts."""
+    """Return the acceleration that moves a body by the scene's length within its duration; smaller ones are
+    ignored."""
     return scene_length(scene) / scene.duration**2

@@ -1,7 +1,9 @@
-"""Probes that move: bodies that tumble, joints and loads between moving bodies, loops that spin in space.
+"""Test scenes in motion: bodies that tumble, joints and loads between moving bodies, loops that spin in
+space.
 
-Every probe has bodies off their joints, full inertias, turned body frames, a gravity along no axis and
-initial velocities that the joints allow, so that every term of the equations takes part.
+In every scene the centres of mass are off the joints, inertias are full matrices, body frames are rotated,
+and gravity is along no axis. Initial velocities satisfy the joints. So every term of the equations
+contributes.
 """
 
 from __future__ import annotations
@@ -50,7 +52,7 @@ DRIVEN = Driver(joint="J", polynomial=(-0.3 * float(np.sin(0.7)), 0.8, -0.5),
 
 
 def moving_probes() -> dict[str, Scene]:
-    """Scenes by feature; the names of joints, drivers and loads agree with `feature_scenes`."""
+    """Return scenes by feature; the names of joints, drivers and loads agree with `feature_scenes`."""
     found = {f"{kind} joint": _pair(joint) for kind, joint in JOINTS.items()}
     found |= {f"{kind} driver": _pair(JOINTS[kind], driver=(DRIVEN,)) for kind in DRIVERS}
     found |= {f"{kind} load": _pair(_carrier(kind), load=(_load(kind),)) for kind in LOADS}
@@ -73,14 +75,18 @@ def moving_probes() -> dict[str, Scene]:
 
 
 def dead_end() -> Scene:
-    """A slider-crank of crank 0.3 m and rod 0.25 m, whose crank is driven beyond the angle where the rod
-    stands square on the slider's line: there the slider's speed grows without bound; behind is no pose."""
+    """Return a slider-crank (crank 0.3 m, rod 0.25 m) driven beyond the angle at which the rod is
+    perpendicular to the slider's line.
+
+    There the slider's speed grows without bound, and no pose exists beyond it.
+    """
     crank = Driver(joint="A", polynomial=(0.0, 4.0))
     return slider_crank(0.3, 0.25, 0.2, "dead end").with_(driver=(crank,), duration=0.5)
 
 
 def heavy_top() -> Scene:
-    """A symmetric top on its tip, spinning, nutating: I₁ = 0.02, I₃ = 0.012 kg m² about its centre."""
+    """Return a spinning, nutating symmetric top on its tip: I₁ = 0.02, I₃ = 0.012 kg m² about its centre of
+    mass."""
     turned = rotations.from_vector(np.array([0.6, 0.0, 0.0]))
     arm = rotations.rotate(turned, np.array([0.0, 0.0, 0.15]))
     spin = rotations.rotate(turned, np.array([0.5, 1.0, 40.0]))
@@ -92,7 +98,7 @@ def heavy_top() -> Scene:
 
 
 def spinning_loop() -> Scene:
-    """Ground, crank, rod and lever in a closed spatial chain of hinge, universal, ball and skew hinge."""
+    """Return a closed spatial loop of crank, rod and lever with hinge, universal, ball and skew hinge."""
     rng = np.random.default_rng(5)
     crank, rod, lever = (
         BODY.model_copy(update={"name": name, "position": place, "orientation": _turn(rng)})
@@ -115,7 +121,7 @@ def spinning_loop() -> Scene:
 
 
 def door() -> Scene:
-    """A leaf in two hinges on one slanted axis: five redundant rows."""
+    """Return a body on two hinges with a common inclined axis: five redundant rows."""
     axis = np.array([0.3, -0.2, 1.0])
     hinges = tuple(
         Revolute(name=name, bodies=("ground", "body"), anchor=(0.1 + h * axis).tolist(), axis=axis.tolist())
@@ -125,7 +131,8 @@ def door() -> Scene:
 
 
 def wound_spring() -> Scene:
-    """A body turning by some turns about a slanted hinge on the ground, against a spring and its weight."""
+    """Return a body that makes several turns about an inclined hinge, against a torsion spring and its
+    weight."""
     hinge = JOINTS["revolute"]
     axis = np.array(hinge.directions[0]) / np.linalg.norm(hinge.directions[0])
     swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor_pair[0]))
@@ -136,7 +143,8 @@ def wound_spring() -> Scene:
 
 
 def floating_pair() -> Scene:
-    """Two bodies on a hinge in flight, with a damped spring and a damped torsion spring between them."""
+    """Return two bodies in flight connected by a hinge, with a damped spring and a damped torsion spring
+    between them."""
     springs = (_load("spring"), TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=-0.6))
     scene = Scene(name="floating", gravity=GRAVITY, duration=0.3, body=(HUB, BODY), load=springs,
                   joint=(replaced(JOINTS["revolute"], bodies=("hub", "body")),))  # fmt: skip
@@ -145,7 +153,8 @@ def floating_pair() -> Scene:
 
 
 def two_drivers() -> Scene:
-    """Two hinges one after the other, driven by a quartic and a wave, and by a wave of negative amplitude."""
+    """Return two successive driven hinges: one by a quartic polynomial and a wave, one by a wave of negative
+    amplitude."""
     hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
     drivers = (
         Driver(joint="H", polynomial=(0.0, 0.8, -0.5, 0.9, -0.3), sine=Sine(amplitude=0.2, frequency=4.0)),
@@ -157,7 +166,8 @@ def two_drivers() -> Scene:
 
 
 def several_springs() -> Scene:
-    """Hub and body on ball joints, two springs that pull and push, two forces and two moments on one body."""
+    """Return two bodies on ball joints with two springs (one in tension, one in compression), two forces, and
+    two moments on one body."""
     joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
     points = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
     springs = (
@@ -178,7 +188,8 @@ def several_springs() -> Scene:
 
 
 def dampers_alone() -> Scene:
-    """Hub and body on ball joints, a damper without stiffness and a spring without natural length."""
+    """Return two bodies on ball joints with a damper without stiffness and a spring of zero natural
+    length."""
     joints = (BEARING, Spherical(name="J", bodies=("hub", "body"), anchor=(0.0, 0.0, 0.0)))
     ends = ((-0.3, 0.6, 0.0), (0.4, -0.1, 0.1))
     links = (
@@ -192,7 +203,7 @@ def dampers_alone() -> Scene:
 
 
 def two_torsion_springs() -> Scene:
-    """Two hinges one after the other, about the first a damper alone, about the second a stiff spring."""
+    """Return two successive hinges: the first with a damper only, the second with a stiff torsion spring."""
     hub = Revolute(name="H", bodies=("ground", "hub"), anchor=(-0.4, 0.3, 0.1), axis=(0.3, -0.4, 1.0))
     joints = (hub, replaced(JOINTS["revolute"], bodies=("hub", "body")))
     springs = (TorsionSpring(joint="H", stiffness=0.0, damping=0.3, natural_angle=2.0),
@@ -204,7 +215,7 @@ def two_torsion_springs() -> Scene:
 
 
 def light_and_heavy() -> Scene:
-    """The body at a 2000th of its mass on a hub of a hundred times its own, and of a tenth of its size."""
+    """Return a light, small body on a heavy hub; the masses differ by a factor of about 1e5."""
     heavy = replaced(HUB, mass=200.0, inertia=100.0 * np.array(HUB.inertia))
     light = replaced(BODY, mass=0.00075, inertia=np.array(BODY.inertia) / 200000.0)
     joints = (BEARING, replaced(JOINTS["revolute"], bodies=("hub", "body")))
@@ -214,7 +225,7 @@ def light_and_heavy() -> Scene:
 
 
 def rounded_velocities() -> Scene:
-    """The spinning loop with velocities of two digits, which the joints do not allow quite."""
+    """Return the spinning loop with velocities rounded to two digits, which violate the joints slightly."""
     scene = spinning_loop()
     names = ("velocity", "angular_velocity")
     bodies = [
@@ -225,7 +236,8 @@ def rounded_velocities() -> Scene:
 
 
 def consistent(scene: Scene, twists: np.ndarray) -> Scene:
-    """The scene with the velocities nearest to twists (nb, 6), world, that its joints allow."""
+    """Return the scene with the velocities that its joints allow and that are nearest to twists (nb, 6) in
+    world axes."""
     still = scene.with_(driver=())
     rows, _ = jacobian(still, 0.0, *initial_poses(scene))
     _, s, vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(6 * len(scene.body)))
@@ -239,14 +251,15 @@ def consistent(scene: Scene, twists: np.ndarray) -> Scene:
 
 
 def _pair(joint: Joint, driver: tuple[Driver, ...] = (), load: tuple[Load, ...] = ()) -> Scene:
-    """Ground, hub on a ball joint, and the body on the joint in question; a driver's start is its own."""
+    """Return ground, a hub on a ball joint, and a body on the given joint; a driver starts at the joint's
+    initial coordinate."""
     between = replaced(joint, bodies=("hub", "body"))
     scene = Scene(name="pair", gravity=GRAVITY, duration=DURATION, body=(HUB, BODY), joint=(BEARING, between),
                   driver=driver, load=load)  # fmt: skip
     moving = _launched(scene)
     if not scene.driver:
         return moving
-    hub, body = moving.body  # the driver says how the body moves beside the hub
+    hub, body = moving.body  # the driver determines the motion of the body relative to the hub
     return moving.with_(body=(hub, replaced(body, velocity=None, angular_velocity=None)))
 
 
@@ -255,7 +268,7 @@ def _launched(scene: Scene) -> Scene:
 
 
 def _sides(scene: Scene) -> np.ndarray:
-    """Factors (nb, 1) that set neighbours turning against each other."""
+    """Return factors (nb, 1), +1 and -1, that make neighbouring bodies turn in opposite directions."""
     return np.array([[1.0 if k % 2 else -0.8] for k in range(len(scene.body))])
 
 

@@ -1,6 +1,6 @@
-"""Planar probes: closed loops of hinges and slides in one plane, which an engine of planar mechanisms runs.
+"""Planar test scenes: closed loops of hinges and slides in one plane, for engines of planar mechanisms.
 
-All axes of hinges are along z, and all centres of mass lie in the plane z = 0.
+All hinge axes are along z, and all centres of mass lie in the plane z = 0.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mbref.scene import (
 )
 
 Z, DOWN = (0.0, 0.0, 1.0), (0.0, -9.81, 0.0)
-DURATION = 0.1  # s, within which none comes to a singular position
+DURATION = 0.1  # s; within it no loop comes to a singular position
 Point = tuple[float, float]
 Links = Mapping[str, tuple[Point, Point]]  # name → ends of a rod at t = 0
 
@@ -67,7 +67,7 @@ def planar_specimens() -> list[Specimen]:
 
 
 def left_out(simulator: Engine | None) -> set[str]:
-    """Return the names of the planar loops, none for an engine that runs no spatial ones."""
+    """Return the names of the planar loops if an engine refuses spatial ones, otherwise nothing."""
     return set() if simulator is not None and is_planar(simulator) else set(planar_loops())
 
 
@@ -102,7 +102,7 @@ def _middle(first: Point, second: Point) -> tuple[float, float, float]:
 
 
 def _rod(name: str, first: Point, second: Point) -> Body:
-    """A uniform rod of 2 kg/m between two points, or a block of 0.5 kg where both are the same."""
+    """Return a uniform rod of 2 kg/m between two points, or a block of 0.5 kg if the points coincide."""
     length = math.dist(first, second)
     mass = 2.0 * length if length else 0.5
     across = mass * length**2 / 12 + 1e-4
@@ -153,7 +153,7 @@ def _slider_crank() -> tuple[Links, Sequence[Joint]]:
 
 
 def _inverted_slider_crank() -> tuple[Links, Sequence[Joint]]:
-    """A crank whose pin slides along a rocker."""
+    """Return a crank whose pin slides along a rocker."""
     links = {
         "crank": ((0.0, 0.0), (0.15, 0.2)),
         "pin": ((0.15, 0.2), (0.15, 0.2)),
@@ -184,7 +184,7 @@ def _five_bar() -> tuple[Links, Sequence[Joint]]:
 
 
 def _six_bar() -> tuple[Links, Sequence[Joint]]:
-    """Watt's: a four-bar whose rocker drives a second loop."""
+    """Return Watt's six-bar linkage: a four-bar whose rocker drives a second loop."""
     links, joints = _four_bar()
     more = {"link": ((0.55, 0.175), (0.9, 0.3)), "arm": ((0.9, 0.3), (1.0, 0.0))}
     return {**links, **more}, (

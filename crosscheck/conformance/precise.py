@@ -1,4 +1,5 @@
-"""Cards on the last digits of a run: single precision, noise between samples, rates as exact as claimed."""
+"""Checks on the last digits of a run: single precision, noise between samples, accuracy of velocities and
+accelerations."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def smooth(bench: Bench) -> Finding:
 
 
 def refined(bench: Bench) -> Finding | Outside:
-    """Without joints, differences of successive settings decrease to the rounding of the engine."""
+    """Check that differences of successive settings decrease to the engine's rounding, in scenes without
+    joints."""
     if len(bench.sweep) < SWEPT:
         return Outside("the engine offers fewer than three settings that complete")
     allowed = max(SAME_MOTION, GRAINS * bench.rounding, bench.steps_before)
@@ -38,7 +40,8 @@ def refined(bench: Bench) -> Finding | Outside:
 
 
 def settled(bench: Bench) -> Finding | Outside:
-    """Velocities, accelerations and reactions are as accurate as the engine's settings explain."""
+    """Check that errors of velocities, accelerations and reactions are explained by the differences between
+    settings."""
     if len(bench.settings) < 2:
         return Outside("the engine offers one setting")
     if np.isnan(bench.exact.velocity).any():
@@ -47,7 +50,8 @@ def settled(bench: Bench) -> Finding | Outside:
 
 
 def _rates(bench: Bench) -> Iterator[Finding]:
-    """Against the exact ones: velocities; accelerations and reactions, where the engine gives them."""
+    """Return differences from the exact velocities and, if the engine gives them, accelerations and
+    reactions."""
     scene, motion, exact = bench.scene, bench.motion, bench.exact
     steps, perturbed_difference = (
         _speeds_apart(bench, motion, run) for run in (*bench.sweep[1:2], bench.perturbed)
@@ -63,8 +67,8 @@ def _rates(bench: Bench) -> Iterator[Finding]:
 
 
 def _speeds_apart(bench: Bench, first: Trajectory, second: Trajectory) -> float:
-    """Largest difference of velocities over the scene's length, and of angular velocities, over the rate of
-    the motion."""
+    """Return the largest difference of velocities over the scene's length and of angular velocities, relative
+    to the rate of the motion."""
     linear = np.abs(first.velocity - second.velocity).max() / scene_length(bench.scene)
     angular = np.abs(first.angular_velocity - second.angular_velocity).max()
     return float(max(linear, angular)) / motion_rate(bench.scene, bench.motion)

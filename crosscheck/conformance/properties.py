@@ -1,4 +1,4 @@
-"""Properties that an engine is held to: one property, one short function of a bench."""
+"""The checks of the conformance suite; each is one short function of a bench."""
 
 from __future__ import annotations
 
@@ -44,18 +44,18 @@ from mbref.scene import Moment, Scene, SceneError
 from mbref.trajectory import Outcome, Trajectory
 
 SECOND = ("acceleration", "angular_acceleration")
-NORMS = 4.0  # roundings of the engine by which the length of a quaternion may be off
+NORMS = 4.0  # largest deviation of a quaternion's length from 1, in roundings of the engine
 STATE = ("position", "orientation", "velocity", "angular_velocity")
-NO_ENDS = (Outcome.COMPLETED, Outcome.CRASHED, Outcome.TIMED_OUT)  # not allowed at a dead end
-DENSE = 65  # samples from which the work of a moment is summed to 1e-8
+NO_ENDS = (Outcome.COMPLETED, Outcome.CRASHED, Outcome.TIMED_OUT)  # outcomes that are wrong at a dead end
+DENSE = 65  # number of samples with which the work of a moment is integrated to 1e-8
 
 
 Check = Callable[[Bench], Finding | Cannot | Outside]
 
 
 class Property(NamedTuple):
-    """A card: ``about`` is what is checked, against what; ``of`` selects the specimens, and ``version``
-    grows when the check changes, so that verdicts of different versions are kept apart."""
+    """A check: ``about`` describes it, ``of`` selects the scenes to which it applies. ``version`` increases
+    when the check changes, so that verdicts of different versions are kept apart."""
 
     about: str
     check: Check
@@ -219,7 +219,8 @@ def determinism(bench: Bench) -> Finding:
 
 
 def _bits_apart(first: Trajectory, other: Trajectory) -> float:
-    """Largest difference of two numbers, states, accelerations and reactions; infinite where one has none."""
+    """Return the largest difference between two runs in states, accelerations and reactions; infinite if only
+    one run has a number."""
     pairs = [(getattr(first, name), getattr(other, name)) for name in (*STATE, *SECOND)]
     found = other.reactions or {}
     pairs += [(wrench, found.get(joint)) for joint, wrench in (first.reactions or {}).items()]
@@ -267,7 +268,7 @@ def _accuracy_of(bench: Bench, scene: Scene, run: Trajectory) -> float:
 
 
 def changed(relation: Relation, bench: Bench) -> Scene | Outside:
-    """The scene changed; raises Broken where the motion makes no valid scene."""
+    """Return the changed scene; raises Broken if its initial state is not valid."""
     try:
         return relation.change(bench.scene, bench.motion)
     except (SceneError, ValueError) as fault:
@@ -275,7 +276,7 @@ def changed(relation: Relation, bench: Bench) -> Scene | Outside:
 
 
 def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
-    """Some samples of a run."""
+    """Return a run at some of its samples."""
     arrays = {name: getattr(run, name)[samples] for name in ("times", *STATE)}
     return replace(run, **arrays, acceleration=None, angular_acceleration=None, reactions=None)
 

@@ -1,7 +1,7 @@
 """The suite as pytest tests: ``pytest --pyargs crosscheck.conformance --engine NAME``.
 
-Every card on every scene is a test.  The modules of the suite are imported when an engine is named, so that
-other test runs in the same environment load nothing.
+Every check on every scene is a pytest test. The modules of the suite are imported only if the option
+``--engine`` is given, so that other test runs import nothing.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from crosscheck.conformance.suite import Verdict
     from crosscheck.conformance.trial import Bench
 
-KEPT = "crosscheck/verdicts"  # key of earlier verdicts in pytest's cache
+KEPT = "crosscheck/verdicts"  # key of the stored verdicts in pytest's cache
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options of the suite."""
+    """Add the command-line options of the suite."""
     group = parser.getgroup("crosscheck", "conformance of an engine")
     group.addoption("--engine", metavar="NAME", help="the engine to test, or module:attribute")
     group.addoption(
@@ -45,7 +45,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_report_header(config: pytest.Config) -> list[str]:
-    """The seed and the depth, so that a run can be repeated."""
+    """Return the line with engine, depth and seed, by which a run can be repeated."""
     if not config.getoption("engine"):
         return []
     seed, count = config.getoption("mechanism_seed"), config.getoption("mechanisms")
@@ -56,7 +56,7 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
 
 
 class Session:
-    """The benches of a test run, made when first asked for."""
+    """The benches of a test run; each is made at first access."""
 
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.features import undetermined
@@ -75,42 +75,43 @@ class Session:
         drawn = [Specimen(random_mechanism(seed), None, deep) for seed in seeds]
         planar = planar_specimens() if is_planar(engine(self.name)) else []
         known = [Specimen(undetermined()), *specimens(deep), *planar, *drawn]
-        if not deep:  # Gauss's principle in the place of references, which take 20 s for a mechanism
+        if not deep:  # replace references, which take 20 s each, by Gauss's principle
             known = [replace(specimen, reference_time=0.0) for specimen in known]
         self.specimens = {specimen.scene.name: specimen for specimen in known}
         self.benches: dict[str, Bench] = {}
         self.cache = config.cache if config.pluginmanager.hasplugin("cacheprovider") else None
         self.known = self.cache.get(KEPT, {}) if self.cache else {}
 
-    def cards(self) -> list[tuple[str, str]]:
-        """(scene, card) of every test."""
-        from crosscheck.conformance.suite import REFUSAL, cards_of
+    def checks(self) -> list[tuple[str, str]]:
+        """Return (scene, check) of every test."""
+        from crosscheck.conformance.suite import REFUSAL, checks_of
 
         undetermined = next(iter(self.specimens))
         cases = [(undetermined, REFUSAL)]
         for name, specimen in list(self.specimens.items())[1:]:
-            cases += [(name, card) for card in (REFUSAL, *cards_of(specimen))]
+            cases += [(name, check) for check in (REFUSAL, *checks_of(specimen))]
         return cases
 
     def bench(self, scene: str) -> Bench:
-        """The bench of a scene; raises ChildFailed where the engine cannot even answer."""
+        """Return the bench of a scene; raises ChildFailed if the engine crashes while it is asked for its
+        settings."""
         from crosscheck.conformance.trial import set_up
 
         if scene not in self.benches:
-            self.benches = {scene: set_up(self.runner, self.specimens[scene])}  # only the last is kept
+            self.benches = {scene: set_up(self.runner, self.specimens[scene])}  # keep only the latest bench
         return self.benches[scene]
 
-    def verdict(self, scene: str, card: str) -> Verdict:
-        """The verdict, taken from a run before where that is asked for."""
+    def verdict(self, scene: str, check: str) -> Verdict:
+        """Return the verdict, or the stored one of an earlier run if that is requested."""
         from crosscheck.conformance.suite import CANNOT, PASS, REFUSAL, Verdict, verdict_on
 
-        key = f"{self.name} {scene} {Verdict(card, scene, PASS).card()}"
+        key = f"{self.name} {scene} {Verdict(check, scene, PASS).check()}"
         if self.config.getoption("resume") and self.known.get(key) == PASS:
-            return Verdict(card, scene, PASS, reason="in an earlier run")
+            return Verdict(check, scene, PASS, reason="in an earlier run")
         bench = self.bench(scene)
-        if bench.cannot and card != REFUSAL:
-            return Verdict(card, scene, CANNOT, reason=str(bench.cannot))
-        found = verdict_on(card, bench)
+        if bench.cannot and check != REFUSAL:
+            return Verdict(check, scene, CANNOT, reason=str(bench.cannot))
+        found = verdict_on(check, bench)
         self.known[key] = found.status
         if self.cache:
             self.cache.set(KEPT, self.known)
@@ -120,7 +121,7 @@ class Session:
 def _check(name: str) -> None:
     """Raise pytest.UsageError before any test if the name leads to no engine.
 
-    A module of the working directory is found, and child processes find it as well.
+    The working directory is added to the module search path, also for child processes.
     """
     from crosscheck.engine import engine
 
@@ -131,7 +132,7 @@ def _check(name: str) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Make the session's benches known to the hooks."""
+    """Create the session that the other hooks use."""
     config.stash[SESSION] = Session(config) if config.getoption("engine") else None
 
 
@@ -139,22 +140,23 @@ SESSION: pytest.StashKey[Session | None] = pytest.StashKey()
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """One test for every card on every scene."""
-    if "crosscheck_card" in metafunc.fixturenames:
+    """Create one test for every check on every scene."""
+    if "crosscheck_case" in metafunc.fixturenames:
         session = metafunc.config.stash[SESSION]
-        cases: list[Any] = session.cards() if session else []
-        metafunc.parametrize("crosscheck_card", cases, ids=[f"{scene}: {card}" for scene, card in cases])
+        cases: list[Any] = session.checks() if session else []
+        metafunc.parametrize("crosscheck_case", cases, ids=[f"{scene}: {check}" for scene, check in cases])
 
 
 @pytest.fixture
-def crosscheck_verdict(crosscheck_card: tuple[str, str], request: pytest.FixtureRequest) -> Verdict:
-    """The verdict on a card; where it fails and ``--findings`` is given, its scene is made small and kept."""
+def crosscheck_verdict(crosscheck_case: tuple[str, str], request: pytest.FixtureRequest) -> Verdict:
+    """Return the verdict on a check. If it fails and ``--findings`` is given, its scene is reduced and
+    stored."""
     from crosscheck.conformance.findings import found
     from crosscheck.conformance.suite import FAIL
 
     session = request.config.stash[SESSION]
     assert session is not None
-    verdict, folder = session.verdict(*crosscheck_card), request.config.getoption("findings")
+    verdict, folder = session.verdict(*crosscheck_case), request.config.getoption("findings")
     if verdict.status == FAIL and folder:
         path = found(session.bench(verdict.scene), verdict, Path(folder))
         request.node.add_report_section("call", "finding", f"kept as {path}")

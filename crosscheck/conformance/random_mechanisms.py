@@ -1,4 +1,5 @@
-"""Random loop mechanisms from seeds, and their initial accelerations in several engines beside mbref's."""
+"""Random closed-loop mechanisms from seeds, and their initial accelerations in several engines compared with
+mbref's."""
 
 from __future__ import annotations
 
@@ -30,20 +31,25 @@ from mbref.trajectory import Outcome
 Triple = tuple[float, float, float]
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
 KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
-TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)  # probability of each kind to join a body to the tree
+# probability of each joint type when a body is added to the tree
+TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)
 CLOSING = (0.4, 0.15, 0.2, 0.05, 0.1, 0.08, 0.0, 0.02)  # probabilities of joint types that close a loop
 PLANAR = 0.65  # fraction of the mechanisms whose axes are parallel, so that their loops are redundant
 HINGED = 0.25  # fraction of the loops that are a second hinge on the axis of the first
 TRIES = 60
-MOST_DRAWS = 1000  # attempts to generate a mechanism; usually a few suffice
+MOST_DRAWS = 1000  # largest number of attempts to generate a mechanism; usually a few suffice
 DURATION = 0.01  # s
 CONTINUES = 1e-9  # relative residual of the acceleration equations below which a mobility is finite
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """One mechanism: redundant rows, ``distance`` to singularity (the least singular value above the rank
-    of the Jacobian with rows of unit length and lengths over the scene's), and error by engine."""
+    """Comparison on one mechanism: its redundant rows, its ``distance`` to singularity, and the error of each
+    engine.
+
+    ``distance`` is the smallest nonzero singular value of the Jacobian, with rows of unit length and lengths
+    relative to the scene's.
+    """
 
     scene: Scene
     redundant: int
@@ -52,10 +58,11 @@ class Comparison:
 
 
 def random_mechanism(seed: int) -> Scene:
-    """A mechanism of 3 to 8 bodies and 1 to 3 loops that can move, with loads and velocities.
+    """Return a movable mechanism of 3 to 8 bodies and 1 to 3 loops, with loads and velocities.
 
-    Poses are consistent by construction, velocities by projection; a mobility that would not outlast
-    the instant (a singular position) is drawn again.  The same seed gives the same scene.
+    Poses satisfy the joints by construction, velocities by projection. A mechanism that is singular at its
+    start, so that it has a velocity but no finite motion, is replaced by another. The result depends on the
+    seed only.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MOST_DRAWS):
@@ -65,8 +72,11 @@ def random_mechanism(seed: int) -> Scene:
 
 
 def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
-    """Initial accelerations of a scene in the engines, each at the finest setting of its best family,
-    and by Gauss's principle with the judge's own equations, against mbref's; runs in this process."""
+    """Compare initial accelerations with mbref's: of each engine at the finest setting of its best family,
+    and by Gauss's principle with the judge's equations.
+
+    All runs are in this process.
+    """
     reference = initial_accelerations(scene, REFERENCE)
     values = singular_values(scene)
     rank = rank_of(values)
@@ -81,8 +91,11 @@ def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
 
 
 def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
-    """Accelerations at t = 0 and angular ones times the scene's length (2 nb, 3), m/s², world, as the
-    engine's own output; None when the run ends otherwise or reports none."""
+    """Return an engine's own output of the accelerations at t = 0, and of the angular ones times the scene's
+    length (2 nb, 3), m/s², world axes.
+
+    None if the run fails or contains no accelerations.
+    """
     simulator = engine(name)
     setting = simulator.best_settings(scene)[-1]
     run = simulator.run(scene, np.array([0.0, scene.duration / 100]), setting)
@@ -96,7 +109,8 @@ def _apart(found: np.ndarray | None, reference: np.ndarray) -> float:
 
 
 class _Drawing:
-    """One drawing: random numbers, the direction planar mechanisms share, and what is drawn so far."""
+    """State of the generation of one mechanism: random numbers, the axis of planar mechanisms, and the parts
+    so far."""
 
     def __init__(self, rng: np.random.Generator):
         self.rng = rng
@@ -106,7 +120,7 @@ class _Drawing:
         self.joints: list[Joint] = []
 
     def scene(self, name: str) -> Scene | None:
-        """The mechanism; None when no loop could be closed or its mobility is of the instant."""
+        """Return the mechanism; None if no loop could be closed or it is singular at its start."""
         places = {GROUND: np.zeros(3), **{body.name: np.array(body.position) for body in self.bodies}}
         names = list(places)
         for k in range(1, len(names)):
@@ -116,7 +130,7 @@ class _Drawing:
         return self.moving(name) if closed == loops else None
 
     def close(self, names: Sequence[str], places: dict[str, np.ndarray]) -> bool:
-        """Whether a joint could be added that leaves some motion."""
+        """Add a joint that closes a loop, and return whether it leaves some motion."""
         for _ in range(TRIES):
             first, second = map(str, self.rng.choice(names, 2, replace=False))
             hinges = [j for j in self.joints if isinstance(j, Revolute)]
@@ -130,7 +144,7 @@ class _Drawing:
         return False
 
     def moving(self, name: str) -> Scene | None:
-        """The scene with random velocities and loads; None when the motion cannot go on."""
+        """Return the scene with random velocities and loads; None if no finite motion exists."""
         scene = Scene(
             name=name,
             gravity=(0.0, 0.0, -9.81),
@@ -175,7 +189,8 @@ class _Drawing:
     def joint(
         self, first: str, second: str, places: dict[str, np.ndarray], weights: Sequence[float]
     ) -> Joint:
-        """A joint of a random kind between two bodies, about half-way; along the shared axis if planar."""
+        """Return a joint of random type between two bodies, about half-way; planar mechanisms use their
+        common axis."""
         kind = str(self.rng.choice(KINDS, p=weights))
         middle = self.point((places[first] + places[second]) / 2)
         along, across = self.axis if self.planar else self.direction(), self.direction()
@@ -192,7 +207,8 @@ class _Drawing:
         )
 
     def second_hinge(self, hinge: Revolute) -> Joint:
-        """Another joint on the axis of a revolute one, between the same bodies: redundant."""
+        """Return another joint on the axis of a revolute joint between the same bodies, whose rows are
+        redundant."""
         axis = np.array(hinge.axis)
         anchor = triple(np.array(hinge.anchor) + self.rng.uniform(0.2, 0.6) * axis)
         kind: type[Joint] = Spherical
@@ -209,13 +225,13 @@ class _Drawing:
 
 
 def triple(v: np.ndarray) -> Triple:
-    """An array (3,) as numbers of a scene."""
+    """Return an array (3,) as a tuple of floats."""
     x, y, z = map(float, v)
     return x, y, z
 
 
 def _null_space(scene: Scene) -> np.ndarray:
-    """Orthonormal basis (6 nb, freedoms) of the twists that the joints allow at t = 0."""
+    """Return an orthonormal basis (6 nb, degrees of freedom) of the twists that the joints allow at t = 0."""
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     _, s, vt = np.linalg.svd(rows, full_matrices=True)
     return vt[int(np.sum(s > RANK * s[0])) :].T

@@ -1,4 +1,5 @@
-"""Metamorphic relations: a scene changed so that its motion, known or not, changes in a known way."""
+"""Metamorphic relations: a change of a scene changes its motion in a known way, even if the motion itself is
+unknown."""
 
 from __future__ import annotations
 
@@ -29,13 +30,18 @@ from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
 HEAVIER = 2.5
-FLIP = np.diag([1.0, -1.0, 1.0])  # reflection of body frames in a mirrored scene; keeps them right-handed
+# reflects the body frames of a mirrored scene, so that they stay right-handed
+FLIP = np.diag([1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Relation:
-    """``about`` says it; ``change(scene, motion)`` is another scene, or the reason why there is none, and
-    ``expect(scene, motion)`` the other scene's motion, made of the motion of the first."""
+    """A relation: ``about`` describes it, ``change(scene, motion)`` returns the changed scene or the reason
+    why there is none.
+
+    ``expect(scene, motion)`` returns the expected motion of the changed scene, computed from the motion of
+    the first scene.
+    """
 
     about: str
     change: Callable[[Scene, Trajectory], Scene | Outside]
@@ -44,29 +50,32 @@ class Relation:
 
 @dataclass(frozen=True)
 class Isometry:
-    """x → matrix x + shift: a rotation, a translation, or, with determinant -1, a mirror image."""
+    """Map x → matrix x + shift: a rotation, a translation, or, with determinant -1, a mirror image."""
 
     matrix: np.ndarray  # (3, 3) orthogonal
     shift: np.ndarray  # (3,) m
 
     def place(self, point: Any) -> Any:
-        """Points (…, 3)."""
+        """Return the images of points (…, 3)."""
         return np.asarray(point) @ self.matrix.T + self.shift
 
     def polar(self, vector: Any) -> Any:
-        """Velocities, forces (…, 3)."""
+        """Return the images of polar vectors (…, 3): velocities and forces."""
         return np.asarray(vector) @ self.matrix.T
 
     def axial(self, vector: Any) -> Any:
-        """Angular velocities, moments and axes of rotation (…, 3), which a mirror leaves along itself."""
+        """Return the images of axial vectors (…, 3): angular velocities, moments and axes of rotation.
+
+        A mirror keeps their component normal to its plane.
+        """
         return np.linalg.det(self.matrix) * self.polar(vector)
 
     def turn(self, orientation: Any) -> np.ndarray:
-        """Unit quaternions (…, 4)."""
+        """Return the images of orientations, unit quaternions (…, 4)."""
         return rotations.from_matrix(self.matrix @ rotations.to_matrix(orientation) @ self._body())
 
     def inertia(self, value: Any) -> Any:
-        """Principal moments, or a matrix along the body axes."""
+        """Return the image of an inertia: principal moments, or a matrix in body axes."""
         array = np.asarray(value)
         return array if array.ndim == 1 else self._body() @ array @ self._body()
 
@@ -74,7 +83,7 @@ class Isometry:
         return np.eye(3) if np.linalg.det(self.matrix) > 0 else FLIP
 
     def change(self, scene: Scene) -> Scene:
-        """The scene moved as a whole, gravity and loads included."""
+        """Return the scene moved as a whole, including gravity and loads."""
         fields = {
             "position": self.place,
             "anchor": self.place,
@@ -89,7 +98,7 @@ class Isometry:
             "inertia": self.inertia,
             "orientation": self.turn,
         }
-        # the axis of a driven displacement; others are of rotations
+        # this axis belongs to a displacement and is a polar vector, axes of rotations are axial
         along: dict[str | None, Callable[[Any], Any]] = {"displacement": self.polar}
         joints = [
             mapped(joint, {**fields, "axis": along.get(joint.facts.driven, self.axial)})
@@ -103,7 +112,7 @@ class Isometry:
         )
 
     def expect(self, motion: Trajectory) -> Trajectory:
-        """The motion moved as a whole, accelerations and reactions too."""
+        """Return the motion moved as a whole, including accelerations and reactions."""
         moved = replace(
             motion,
             position=self.place(motion.position),
@@ -117,7 +126,8 @@ class Isometry:
 def with_pushes(
     to: Trajectory, motion: Trajectory, linear: Mapped, angular: Mapped, force: Mapped, moment: Mapped
 ) -> Trajectory:
-    """A motion with another's accelerations and reactions, mapped; None where that has none."""
+    """Return the motion ``to`` with the mapped accelerations and reactions of another motion; None if these
+    are missing."""
     return replace(
         to,
         acceleration=None if motion.acceleration is None else linear(motion.acceleration),
@@ -130,12 +140,13 @@ def with_pushes(
 
 
 def times(factor: float) -> Mapped:
-    """Multiplication."""
+    """Return the function that multiplies by a factor."""
     return lambda value: factor * np.asarray(value)
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Masses, inertias, forces, stiffnesses and dampings times a factor: the motion stays the same."""
+    """Return the scene with masses, inertias, forces, stiffnesses and dampings times a factor; its motion is
+    unchanged."""
 
     fields = dict.fromkeys(("mass", "inertia", "force", "moment", "stiffness", "damping"), times(factor))
     return scene.with_(
@@ -145,12 +156,12 @@ def scaled(scene: Scene, factor: float) -> Scene:
 
 
 def reordered(scene: Scene) -> Scene:
-    """Bodies, joints and loads listed in reverse: the motion stays the same."""
+    """Return the scene with bodies, joints and loads in reverse order; its motion is unchanged."""
     return scene.with_(body=scene.body[::-1], joint=scene.joint[::-1], load=scene.load[::-1])
 
 
 def shaken(scene: Scene, seed: int) -> Scene:
-    """Every place (m) and direction of a scene is off by rounding, at random."""
+    """Return the scene with random changes by rounding of every position (m) and direction."""
     random = np.random.default_rng(seed)
 
     def shake(value: Any) -> np.ndarray:
@@ -164,7 +175,8 @@ def shaken(scene: Scene, seed: int) -> Scene:
 
 
 def in_other_units(scene: Scene, length: float, time: float) -> Scene:
-    """The scene with its lengths and times multiplied, and all else as its units say; masses stay."""
+    """Return the scene with lengths and times multiplied, and all other numbers converted according to their
+    units; masses are unchanged."""
     speed, push = length / time, length / time**2
 
     places = dict.fromkeys(
@@ -215,23 +227,23 @@ def _other_units(about: str, length: float, time: float) -> Relation:
 
 
 def same(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion itself, of a change that leaves it what it is."""
+    """Return the motion itself, for changes that leave it unchanged."""
     return motion
 
 
 def heavier(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion with reactions times HEAVIER."""
+    """Return the motion with reactions multiplied by HEAVIER."""
     return with_pushes(motion, motion, times(1), times(1), times(HEAVIER), times(HEAVIER))
 
 
 def opposite(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion with reactions reversed, of joints whose anchors stay together."""
+    """Return the motion with reactions reversed, for joints whose two anchors stay together."""
     kept = joints_kept(motion, pinned(scene))
     return with_pushes(kept, kept, times(1), times(1), times(-1), times(-1))
 
 
 def undriven(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion without the reactions of driven joints."""
+    """Return the motion without the reactions of driven joints."""
     driven = [driver.joint for driver in scene.driver]
     return joints_kept(motion, [joint.name for joint in scene.joint if joint.name not in driven])
 
@@ -247,7 +259,7 @@ def _isometry(about: str, matrix: np.ndarray, shift: Sequence[float] = (0.0, 0.0
 
 
 def unchanged(about: str, change: Callable[[Scene], Scene | Outside]) -> Relation:
-    """The relation of a change that leaves the motion unchanged."""
+    """Return the relation of a change that leaves the motion unchanged."""
     return Relation(about, lambda scene, motion: change(scene), same)
 
 
@@ -257,23 +269,29 @@ RELATIONS = {
     "translated": _isometry("translated, the motion is translated too", np.eye(3), (0.3, -0.5, 0.0)),
     "mirrored": _isometry("mirrored, the motion is mirrored too", np.eye(3) - 2 * np.outer(NORMAL, NORMAL)),
     "scaled": Relation(
-        "with masses and loads times 2.5, the motion stays", lambda s, _: scaled(s, HEAVIER), heavier
+        "with masses and loads times 2.5, the motion is unchanged", lambda s, _: scaled(s, HEAVIER), heavier
     ),
-    "reordered": unchanged("with bodies and joints in reverse order, the motion stays", reordered),
-    "relabelled": Relation("with other names, the motion stays", lambda s, _: relabelled(s), renamed),
+    "reordered": unchanged("with bodies and joints in reverse order, the motion is unchanged", reordered),
+    "relabelled": Relation("with other names, the motion is unchanged", lambda s, _: relabelled(s), renamed),
     "swapped": Relation(
-        "with the bodies of every joint exchanged, the motion stays", lambda s, _: swapped(s), opposite
+        "with the bodies of every joint exchanged, the motion is unchanged", lambda s, _: swapped(s), opposite
     ),
-    "stretched": unchanged("with axis vectors 1000 times as long, the motion stays", stretched),
-    "duplicated": unchanged("with a duplicate joint, the motion stays", duplicated),
-    "satisfied": unchanged("with a joint that the motion satisfies anyway, the motion stays", satisfied),
-    "split": Relation("with a body as two welded halves, the motion stays", lambda s, _: split(s), of_halves),
-    "negated": unchanged("with the other sign of every quaternion, the motion stays", negated),
+    "stretched": unchanged("with axis vectors 1000 times as long, the motion is unchanged", stretched),
+    "duplicated": unchanged("with a duplicate joint, the motion is unchanged", duplicated),
+    "satisfied": unchanged(
+        "with a joint that the motion satisfies anyway, the motion is unchanged", satisfied
+    ),
+    "split": Relation(
+        "with a body as two welded halves, the motion is unchanged", lambda s, _: split(s), of_halves
+    ),
+    "negated": unchanged("with the other sign of every quaternion, the motion is unchanged", negated),
     "enlarged": _other_units("four times as large, the motion is twice as slow (Froude)", 4.0, 2.0),
-    "in millimetres": _other_units("with its lengths in millimetres, the motion stays", 1000.0, 1.0),
+    "in millimetres": _other_units("with its lengths in millimetres, the motion is unchanged", 1000.0, 1.0),
     "restarted": Relation("restarted from its state half way, the motion is continued", *RESTARTED),
     "reversed": Relation(
         "started from the last state with reversed velocities, the motion runs backwards", *REVERSED
     ),
-    "replayed": Relation("with the driver replaced by its moment, the motion stays", replayed, undriven),
+    "replayed": Relation(
+        "with the driver replaced by its moment, the motion is unchanged", replayed, undriven
+    ),
 }

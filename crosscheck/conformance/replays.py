@@ -1,4 +1,5 @@
-"""Scenes made of a motion: started from a state of it, run back from its end, driven by its own moment."""
+"""Scenes that are made from a simulated motion: started at one of its states, run backwards, or driven by its
+driver's moment."""
 
 from __future__ import annotations
 
@@ -20,7 +21,8 @@ CONSTANT = 1e-6  # relative variation below which a driver's moment counts as co
 
 
 def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scene:
-    """The scene from a sample of its motion on, velocities times ``sense``; drivers and springs go on."""
+    """Return the scene that starts at a sample of its motion with velocities times ``sense``; drivers and
+    springs continue."""
     t, carry = float(motion.times[sample]), _Carry(scene, motion, sample)
     angles = joint_coordinates(
         scene, motion.times, motion.position, motion.orientation, motion.angular_velocity
@@ -57,7 +59,8 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
 
 
 class _Carry:
-    """Points and directions given at t = 0, carried by their bodies to a sample."""
+    """Map of points and directions given at t = 0 to their places at a sample, where they move with their
+    bodies."""
 
     def __init__(self, scene: Scene, motion: Trajectory, sample: int):
         self.scene, self.motion, self.sample = scene, motion, sample
@@ -94,7 +97,7 @@ class _Carry:
 
 
 def _later(driver: Driver, t: float) -> Driver:
-    """The driver from time t on, measured from where it has come."""
+    """Return the driver as a function of the time since t, measured from its value at t."""
     moved = np.polynomial.Polynomial(driver.polynomial)(np.polynomial.Polynomial([t, 1.0])).coef
     wave = driver.sine and replaced(driver.sine, phase=driver.sine.phase + driver.sine.frequency * t)
     moved[0] -= float(driver_value(driver, t))
@@ -125,7 +128,7 @@ def _backwards(scene: Scene, motion: Trajectory) -> Trajectory:
 def _samples(
     scene: Scene, motion: Trajectory, chosen: np.ndarray, times: np.ndarray, sense: float
 ) -> Trajectory:
-    """Return samples of a motion, and reactions of the joints whose anchors stay together."""
+    """Return samples of a motion, with the reactions of the joints whose two anchors stay together."""
     second, turning = motion.acceleration, motion.angular_acceleration
     kept = joints_kept(motion, pinned(scene)).reactions
     return replace(
@@ -142,12 +145,13 @@ def _samples(
 
 
 def pinned(scene: Scene) -> list[str]:
-    """Joints whose anchors stay together, so that a reaction is at the same point of both bodies."""
+    """Return the names of the joints whose two anchors stay together, so that both bodies feel a reaction at
+    one point."""
     return [joint.name for joint in scene.joint if len(joint.facts.forbidden_translations) == 3]
 
 
 def joints_kept(motion: Trajectory, names: Sequence[str]) -> Trajectory:
-    """The motion with the reactions of those joints alone."""
+    """Return the motion with the reactions of the named joints only."""
     return replace(motion, reactions=motion.reactions and {n: motion.reactions[n] for n in names})
 
 
@@ -156,7 +160,8 @@ REVERSED = _from_the_end, _backwards
 
 
 def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
-    """The driver of a hinge to the ground replaced by the moment that the engine says it gives."""
+    """Return the scene with the driver of a hinge to the ground replaced by the driver's moment in the
+    engine's output."""
     if len(scene.driver) != 1 or not motion.reactions:
         return Outside("the scene does not have exactly one driver, or the engine gives no reactions")
     joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)

@@ -1,4 +1,4 @@
-"""Mechanisms written in another way: other names, other orders, joints twice, a body in halves."""
+"""Equivalent forms of a mechanism: other names, another order, a duplicated joint, a body split in two."""
 
 from __future__ import annotations
 
@@ -14,12 +14,13 @@ from mbref import rotations
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
 from mbref.trajectory import Trajectory
 
-HALF, LIMIT = " half", 0.2  # the halves' distance as a part of the largest that the inertia allows
+# suffix of the half's name; distance of the halves relative to the largest one that the inertia allows
+HALF, LIMIT = " half", 0.2
 UNCHANGED = 1e-12  # fraction of the largest velocity: a smaller change is rounding
 
 
 def relabelled(scene: Scene) -> Scene:
-    """Other names, in the other alphabetical order."""
+    """Return the scene with other names, whose alphabetical order differs."""
     names = {body.name: _name(scene, k) for k, body in enumerate(scene.body)} | {GROUND: GROUND}
     joints = _joints(scene)
 
@@ -36,7 +37,7 @@ def relabelled(scene: Scene) -> Scene:
 
 
 def renamed(scene: Scene, motion: Trajectory) -> Trajectory:
-    """The motion under the names of `relabelled`."""
+    """Return the motion under the names that `relabelled` gives."""
     joints = _joints(scene)
     found = motion.reactions and {joints[name]: wrench for name, wrench in motion.reactions.items()}
     return replace(motion, bodies=tuple(_name(scene, k) for k in range(len(scene.body))), reactions=found)
@@ -51,7 +52,10 @@ def _name(scene: Scene, k: int) -> str:
 
 
 def swapped(scene: Scene) -> Scene | Outside:
-    """The bodies of every joint exchanged; an axis turns round, so that what drives it keeps its sense."""
+    """Return the scene with the two bodies of every joint exchanged.
+
+    Axes are reversed, so that drivers and torsion springs keep their direction.
+    """
     if not scene.joint:
         return Outside("it has no joint")
     return scene.with_(joint=tuple(map(_exchanged, scene.joint)))
@@ -68,7 +72,7 @@ def _back(pair: Any) -> Any:
 
 
 def stretched(scene: Scene) -> Scene | Outside:
-    """Axes 1000 times as long: directions, not lengths."""
+    """Return the scene with axis vectors 1000 times as long: only their directions matter."""
     if not any(hasattr(joint, "axis") or hasattr(joint, "axes") for joint in scene.joint):
         return Outside("no joint has an axis")
     longer = {name: lambda axes: 1000.0 * np.array(axes) for name in ("axis", "axes")}
@@ -76,14 +80,15 @@ def stretched(scene: Scene) -> Scene | Outside:
 
 
 def duplicated(scene: Scene) -> Scene | Outside:
-    """The last joint given twice: redundant rows."""
+    """Return the scene with its last joint given twice, which makes rows redundant."""
     if not scene.joint:
         return Outside("it has no joint")
     return scene.with_(joint=(*scene.joint, replaced(scene.joint[-1], name="again")))
 
 
 def satisfied(scene: Scene) -> Scene | Outside:
-    """A cylindrical joint on the axis of a revolute one, elsewhere on it: redundant rows of another kind."""
+    """Return the scene with an additional cylindrical joint on the axis of a revolute one, which makes rows
+    redundant."""
     hinges = [joint for joint in scene.joint if joint.type == "revolute"]
     if not hinges:
         return Outside("it has no revolute joint on whose axis another could be")
@@ -95,7 +100,8 @@ def satisfied(scene: Scene) -> Scene | Outside:
 
 
 def split(scene: Scene) -> Scene | Outside:
-    """The last body as two halves, one on either side of its centre, welded; joints and loads stay on one."""
+    """Return the scene with the last body split into two welded halves on both sides of its centre; joints
+    and loads stay on one half."""
     body = scene.body[-1]
     if body.mass is None:
         return Outside("bodies have no mass to split")
@@ -114,7 +120,7 @@ def split(scene: Scene) -> Scene | Outside:
 
 
 def _is_corrected(scene: Scene) -> bool:
-    """Whether the velocities that a scene gives are changed until they obey the joints."""
+    """Return whether the velocities that a scene gives contradict its joints, so that they are corrected."""
     linear, angular = initial_twists(scene)
     pairs = [(body.velocity, found) for body, found in zip(scene.body, linear, strict=True)]
     pairs += [(body.angular_velocity, found) for body, found in zip(scene.body, angular, strict=True)]
@@ -180,5 +186,5 @@ def _inertia(body: Body) -> np.ndarray:
 
 
 def negated(scene: Scene) -> Scene:
-    """Every orientation by the other of its two quaternions."""
+    """Return the scene with every orientation given by the other of its two quaternions."""
     return scene.with_(body=tuple(replaced(b, orientation=[-x for x in b.orientation]) for b in scene.body))

@@ -1,4 +1,4 @@
-"""Runners of engines for the suite: in child processes, or in this process for tests."""
+"""Runners call an engine for the suite, in child processes or, for tests, in this process."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ Task = tuple[Scene, Setting]
 
 
 class Runner(Protocol):
-    """One engine, asked and run; raises ChildFailed where the engine cannot even answer."""
+    """Interface of a runner: it asks and runs one engine; raises ChildFailed if the engine crashes when
+    asked."""
 
     @property
     def name(self) -> str:
@@ -31,24 +32,26 @@ class Runner(Protocol):
 
     @property
     def rounding(self) -> float:
-        """Relative rounding of numbers that the engine claims."""
+        """Relative rounding error of the numbers that the engine declares."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        """Return the version, and the reason of a refusal or the settings of the engine or of one family."""
+        """Return the version, and the reason of a refusal or the settings, of the engine or of one family."""
 
     def refuses(self, scene: Scene, family: str) -> Cannot | None:
-        """Why the engine cannot run a scene at settings of a family."""
+        """Return the reason why the engine cannot run a scene at settings of a family, or None."""
 
     def observe(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
-        """A run at times (k,), s, with nothing left of runs before, and what it printed and left behind."""
+        """Return a run at times (k,), s, uninfluenced by earlier runs, with its printed text and the files it
+        left."""
 
     def in_turn(self, tasks: Sequence[Task], times: np.ndarray) -> list[Trajectory]:
-        """Runs of scenes at settings, one after another in one process."""
+        """Return runs of (scene, setting) pairs that follow each other in one process."""
 
 
 @contextlib.contextmanager
 def answering() -> Iterator[None]:
-    """An exception of an engine that is asked is a ChildFailed with its words, as from a child process."""
+    """Turn an exception of an engine that is asked into a ChildFailed with its message, as a child process
+    does."""
     try:
         yield
     except ImportError:
@@ -59,7 +62,8 @@ def answering() -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Isolated:
-    """Every run in a child process with a time limit (s); ``name`` is known, or ``module:attribute``."""
+    """Runner that makes each run in a child process with a time limit (s); ``name`` is a known engine or
+    ``module:attribute``."""
 
     name: str
     time_limit: float
@@ -84,9 +88,9 @@ class Isolated:
 
 @dataclass(frozen=True)
 class InProcess:
-    """Runs in this process, in an empty directory, without limits: for engines that are trusted to return.
+    """Runner in this process, in an empty directory, without limits: for engines that are trusted to return.
 
-    ``called`` is the name by which commands know the engine, where that is not its own.
+    ``called`` is the engine's name in commands if it differs from its own name.
     """
 
     engine: Engine
@@ -120,7 +124,8 @@ class InProcess:
         return [self.observe(scene, times, setting).value for scene, setting in tasks]
 
     def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """A run; an exception or a malformed answer is the outcome CRASHED with its words, as in a child."""
+        """Return a run; an exception or a malformed result becomes the outcome CRASHED with a message, as in
+        a child process."""
         try:
             return answered(self.engine, scene, times, setting)
         except Exception as error:

@@ -1,9 +1,9 @@
 """Hypothesis strategies for tests of engines and methods: mechanisms, the paper's parameters, matrices.
 
 ``mechanisms()`` draws closed-loop mechanisms of any graph: a tree of bodies, then joints that close loops.
-Every joint is given in the pose at t = 0, so that poses are consistent by construction; velocities are
-projected onto what the joints allow.  Numbers are drawn from coarse grids, so that what shrinks is readable:
-fewer bodies, fewer loops, joints of the simplest kind, unturned bodies at rest.
+Every joint is given in the pose at t = 0, so that poses satisfy it by construction; velocities are projected
+onto the velocities that the joints allow. Numbers are taken from coarse grids, so that reduced examples are
+readable: fewer bodies, fewer loops, joints of the simplest type, bodies at rest.
 """
 
 from __future__ import annotations
@@ -49,8 +49,10 @@ def mechanisms(
     kinds: Sequence[str] = KINDS,
     redundant: bool = False,
 ) -> Scene:
-    """A mechanism with mass, gravity, loads and consistent velocities; ``redundant`` adds a second hinge on
-    the axis of a first, whose rows are redundant by construction."""
+    """Return a mechanism with masses, gravity, loads and consistent velocities.
+
+    ``redundant`` adds a second hinge on the axis of a first one, whose rows are redundant.
+    """
     bodies = [draw(_bodies(f"b{k}", k)) for k in range(draw(st.integers(1, most_bodies)))]
     names = [GROUND, *(body.name for body in bodies)]
     joints = [
@@ -80,7 +82,8 @@ def mechanisms(
 
 @st.composite
 def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
-    """One of the paper's mechanisms with its masses and moments of inertia times factors of 1/4 to 4."""
+    """Return one of the paper's mechanisms with masses and moments of inertia multiplied by factors of 1/4 to
+    4."""
     scene = SCENES[draw(st.sampled_from(list(names)))]()
     factors = st.sampled_from((1.0, 0.25, 0.5, 2.0, 4.0))
     bodies = []
@@ -103,7 +106,8 @@ def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
 def matrices(
     draw: st.DrawFn, rank: int | None = None, spectrum: Sequence[float] | None = None, most: int = 8
 ) -> np.ndarray:
-    """A matrix (m, n) of a prescribed rank (or any) and singular values (or within two decades of 1)."""
+    """Return a matrix (m, n) of a given or random rank, with given singular values or values within two
+    decades of 1."""
     least = max(rank or 0, len(spectrum or ()), 1)
     m, n = draw(st.integers(least, max(least, most))), draw(st.integers(least, max(least, most)))
     if spectrum is None:
@@ -116,7 +120,7 @@ def matrices(
 
 @st.composite
 def _bodies(draw: st.DrawFn, name: str, k: int) -> Body:
-    """A body within half a metre of its place in a row, with a full inertia."""
+    """Return a body within half a metre of its place in a row of bodies, with a full inertia matrix."""
     place = np.array(draw(vectors)) / 2 + np.array([0.6 * (k + 1), 0.0, 0.0])
     turn, principal = (rotations.from_vector(np.array(draw(vectors))) for _ in range(2))
     spread = np.array(draw(st.tuples(*[st.integers(1, 4)] * 3))) / 100
@@ -135,7 +139,7 @@ def _bodies(draw: st.DrawFn, name: str, k: int) -> Body:
 def _joints(
     draw: st.DrawFn, name: str, pair: tuple[str, str], bodies: Sequence[Body], kinds: Sequence[str]
 ) -> Joint:
-    """A joint of some kind between two bodies, near the middle of their centres."""
+    """Return a joint of a random type between two bodies, near the middle of their centres."""
     places = {GROUND: np.zeros(3), **{body.name: np.array(body.position) for body in bodies}}
     anchor = ((places[pair[0]] + places[pair[1]]) / 2 + np.array(draw(vectors)) / 4).tolist()
     along = np.array(draw(directions), dtype=float)
@@ -148,7 +152,7 @@ def _joints(
 
 @st.composite
 def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]) -> list[Joint]:
-    """Another joint on the axis of a revolute one; on a new pair of hinges' where there is none."""
+    """Return a second joint on the axis of a revolute joint; without one, a new pair of coaxial hinges."""
     hinges = [joint for joint in joints if isinstance(joint, Revolute)]
     if not hinges:
         return [joints[-1].model_copy(update={"name": "R"})]  # a duplicate joint is redundant
@@ -160,7 +164,7 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
 
 @st.composite
 def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Load]:
-    """Some of a moment, a force and a spring to the ground, all on the last body."""
+    """Return some of a moment, a force and a spring to the ground, all acting on the last body."""
     name, place = bodies[-1].name, np.array(bodies[-1].position)
     point = (place + np.array(draw(vectors)) / 4).tolist()
     known: list[Load] = [

@@ -1,4 +1,4 @@
-"""The suite: every property on every specimen of one engine, as verdicts and as a table."""
+"""The suite: every check on every scene for one engine, as verdicts and as a table."""
 
 from __future__ import annotations
 
@@ -25,16 +25,20 @@ PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
 REFUSAL, RUN = "refusal", "run"
 MARKS = {PASS: ("✓", "green"), FAIL: ("✗", "bold red"), CANNOT: ("–", "yellow"), OUTSIDE: ("○", "dim")}
 FIRST = {
-    REFUSAL: "cannot() refuses scenes that the engine cannot run, with a reason; others have settings.",
+    REFUSAL: "cannot() refuses scenes that the engine cannot run, with a reason, and has settings for "
+    "all others.",
     RUN: "A run with the finest setting of the engine's best family completes.",
 }
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """One property on one scene: ``status`` pass, fail, cannot (the engine), or outside (the scene is out of
-    the property's domain); ``measured`` against ``allowed`` where a number decides; ``reason`` a sentence
-    where one is needed; ``card`` names the property and its version."""
+    """Result of one check on one scene.
+
+    ``status`` is pass, fail, cannot (the engine refuses the scene) or outside (the check does not apply to
+    the scene). A number ``measured`` is compared with ``allowed``. ``reason`` is a sentence if one is needed,
+    and ``check`` is the name of the check with its version.
+    """
 
     property: str
     scene: str
@@ -43,14 +47,14 @@ class Verdict:
     allowed: float | None = None
     reason: str = ""
 
-    def card(self) -> str:
-        """The property with its version: verdicts of different cards are not compared."""
+    def check(self) -> str:
+        """Return the name of the check with its version; verdicts by different versions are not compared."""
         return f"{self.property}/{PROPERTIES[self.property].version if self.property in PROPERTIES else 1}"
 
 
 @dataclass(frozen=True)
 class Conformance:
-    """An engine's behaviour by one card on one scene."""
+    """Verdicts on an engine: of all checks on all scenes, with the engine's version."""
 
     engine: str
     version: str
@@ -60,24 +64,28 @@ class Conformance:
 
     @property
     def conforms(self) -> bool:
-        """Whether no property failed and some passed in a run; an engine that refuses all has none."""
+        """Return whether no check failed and some passed in a run; an engine that refuses all scenes does not
+        conform."""
         failed = any(verdict.status == FAIL for verdict in self.verdicts)
         return not failed and any(v.status == PASS and v.property != REFUSAL for v in self.verdicts)
 
     def to_record(self) -> dict[str, Any]:
-        """The record that ``verify --json`` prints; numbers that are not finite are null."""
+        """Return the record that ``verify --json`` prints; numbers that are not finite are null."""
         verdicts = [record_of(verdict) for verdict in self.verdicts]
         return {**asdict(self), "conforms": self.conforms, "verdicts": verdicts}
 
 
 def record_of(verdict: Verdict) -> dict[str, Any]:
-    """A verdict as JSON; numbers that are not finite are null."""
-    return {"card": verdict.card(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
+    """Return a verdict as a JSON record; numbers that are not finite are null."""
+    return {"card": verdict.check(), **{k: _finite(v) for k, v in asdict(verdict).items()}}
 
 
 def runner(name: str, time_limit: float, in_process: bool = False) -> Runner:
-    """A runner of an engine (a known name or ``module:attribute``), every run in a child process with a
-    ``time_limit`` (s), or all in this process without one.  Raises LookupError."""
+    """Return a runner of an engine (a known name or ``module:attribute``).
+
+    Every run is in a child process with a ``time_limit`` (s), or in this process without a limit. Raises
+    LookupError.
+    """
     return InProcess(engine(name), name) if in_process else Isolated(name, time_limit)
 
 
@@ -87,8 +95,10 @@ def held_against(
     progress: Callable[[str], None] | None = None,
     family: str = "",
 ) -> Conformance:
-    """The verdicts on a runner's engine in its best family of settings, or the one named; runs in this
-    process take place one after another.  ``progress`` receives the scene just done."""
+    """Return the verdicts on a runner's engine in its best family of settings, or in the given one.
+
+    Runs in this process take place one after another. ``progress`` receives each finished scene.
+    """
     versions: set[str] = set()
 
     def examined(specimen: Specimen) -> list[Verdict]:
@@ -110,7 +120,7 @@ def held_against(
 
 
 def _failures(specimens: Sequence[Specimen], verdicts: Sequence[Verdict]) -> list[Failure]:
-    """The first card of a motion that each failing specimen fails."""
+    """Return the first check on the motion that fails, for each failing scene."""
     failed: dict[str, str] = {}
     for verdict in verdicts:
         if verdict.status == FAIL and verdict.property not in FIRST:
@@ -119,7 +129,7 @@ def _failures(specimens: Sequence[Specimen], verdicts: Sequence[Verdict]) -> lis
 
 
 def asked(runner: Runner, specimen: Specimen, family: str = "") -> Bench | Verdict:
-    """A bench; the verdict on the card of refusals where the engine does not even answer."""
+    """Return a bench; if the engine crashes when asked for its settings, return a failed verdict instead."""
     try:
         return set_up(runner, specimen, family)
     except ChildFailed as failure:
@@ -127,14 +137,14 @@ def asked(runner: Runner, specimen: Specimen, family: str = "") -> Bench | Verdi
 
 
 def examine(bench: Bench) -> Iterator[Verdict]:
-    """The verdicts on one bench."""
+    """Return the verdicts of all checks on one bench."""
     yield (first := refusal(bench))
     if first.status == PASS and not bench.cannot:
         yield from _run(bench)
 
 
 def refusal(bench: Bench) -> Verdict:
-    """Whether the engine refuses what it cannot run, and has settings for what it can."""
+    """Check that the engine refuses what it cannot run, and has settings for what it can run."""
     name = bench.scene.name
     impossible = is_undetermined(bench.scene)
     if bench.cannot:
@@ -145,28 +155,29 @@ def refusal(bench: Bench) -> Verdict:
     return Verdict(REFUSAL, name, PASS)
 
 
-def verdict_on(card: str, bench: Bench) -> Verdict:
-    """The verdict of one card, named as in `abouts`, on a bench."""
+def verdict_on(check: str, bench: Bench) -> Verdict:
+    """Return the verdict of one check, named as in `abouts`, on a bench."""
     known = {REFUSAL: refusal, RUN: first_run}
-    return known[card](bench) if card in known else judged(card, bench)
+    return known[check](bench) if check in known else judged(check, bench)
 
 
 def _run(bench: Bench) -> Iterator[Verdict]:
-    """Whether the run at the finest setting completes, and what it shows if it does."""
-    for label in cards_of(bench.specimen):
+    """Return the verdict on completing the run at the finest setting, and then the verdicts on its motion."""
+    for label in checks_of(bench.specimen):
         yield (verdict := verdict_on(label, bench))
         if label == RUN and verdict.status == FAIL:
             return
 
 
-def cards_of(specimen: Specimen) -> list[str]:
-    """Cards that are asked where the engine can run the specimen; of a dead end not that it completes."""
-    asked = [card for card, entry in PROPERTIES.items() if entry.of(specimen)]
+def checks_of(specimen: Specimen) -> list[str]:
+    """Return the checks that apply to a scene which the engine can run; completing is not required at a dead
+    end."""
+    asked = [check for check, entry in PROPERTIES.items() if entry.of(specimen)]
     return asked if specimen.dead_end else [RUN, *asked]
 
 
 def first_run(bench: Bench) -> Verdict:
-    """Whether the run at the finest setting completes."""
+    """Return the verdict on completing the run at the finest setting."""
     try:
         reached = bench.motion.t_end
     except Broken as broken:
@@ -175,7 +186,7 @@ def first_run(bench: Bench) -> Verdict:
 
 
 def judged(label: str, bench: Bench) -> Verdict:
-    """The verdict of one property on a bench whose engine can run the scene."""
+    """Return the verdict of one check on a bench whose engine can run the scene."""
     try:
         found = PROPERTIES[label].check(bench)
     except (Broken, ChildFailed) as broken:
@@ -191,10 +202,10 @@ def judged(label: str, bench: Bench) -> Verdict:
 
 
 def tables(conformance: Conformance) -> Iterator[Table | Text]:
-    """A table of scenes with the number of cards by status, each gap, the cards, and last each failure."""
+    """Return a table of scenes with the number of checks by status, then refusals, checks and failures."""
     properties = [n for n in (*FIRST, *PROPERTIES) if any(v.property == n for v in conformance.verdicts)]
     named = " ".join(filter(None, (conformance.engine, conformance.version, conformance.family)))
-    title = f"{named}: cards that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
+    title = f"{named}: checks that {', '.join(f'{mark} {status}' for status, (mark, _) in MARKS.items())}"
     counts = [Column(mark, justify="right") for mark, _ in MARKS.values()]
     table = Table(
         "scene",
@@ -209,7 +220,7 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
     yield table
     yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == CANNOT)
     yield from _domains(conformance)
-    yield from (Text(f"{_card(name)}: {abouts()[name]}", style="dim") for name in properties)
+    yield from (Text(f"{_check(name)}: {abouts()[name]}", style="dim") for name in properties)
     yield from (_sentence(verdict) for verdict in conformance.verdicts if verdict.status == FAIL)
     if conformance.hint:
         yield Text(conformance.hint)
@@ -217,7 +228,7 @@ def tables(conformance: Conformance) -> Iterator[Table | Text]:
 
 
 def _domains(conformance: Conformance) -> Iterator[Text]:
-    """Why cards do not apply, one line for a card and a reason."""
+    """Return the reasons why checks do not apply to scenes, one line for each check and reason."""
     places: dict[tuple[str, str], list[str]] = {}
     for verdict in conformance.verdicts:
         if verdict.status == OUTSIDE:
@@ -226,12 +237,12 @@ def _domains(conformance: Conformance) -> Iterator[Text]:
         yield Text(f"outside: {name}: {reason} ({', '.join(scenes)})", style="dim")
 
 
-def _card(name: str) -> str:
-    return Verdict(name, "", PASS).card()
+def _check(name: str) -> str:
+    return Verdict(name, "", PASS).check()
 
 
 def abouts() -> dict[str, str]:
-    """The check of every property in a sentence, by name."""
+    """Return the sentence that describes each check, by name."""
     return {**FIRST, **{name: entry.about for name, entry in PROPERTIES.items()}}
 
 
@@ -242,7 +253,7 @@ def _count(verdicts: Sequence[Verdict], status: str) -> Text:
 
 
 def _worst(verdicts: Sequence[Verdict]) -> Text:
-    """The cards that fail, else the pass with the largest share of its allowed error."""
+    """Return the names of the failed checks, otherwise the pass that is nearest to its limit."""
     if failed := [verdict.property for verdict in verdicts if verdict.status == FAIL]:
         return Text(", ".join(failed), style=MARKS[FAIL][1])
     shares = {v.property: v.measured / v.allowed for v in verdicts if v.measured is not None and v.allowed}

@@ -1,4 +1,5 @@
-"""An engine / every card: collected by ``pytest --pyargs crosscheck.conformance --engine NAME``."""
+"""Tests of an engine by the conformance suite, collected by ``pytest --pyargs crosscheck.conformance --engine
+NAME``."""
 
 from __future__ import annotations
 
@@ -7,10 +8,10 @@ import pytest
 from crosscheck.conformance.suite import Verdict
 
 
-def test_card(crosscheck_verdict: Verdict) -> None:
-    """A card fails, passes, or is skipped with the reason why it says nothing here."""
+def test_check(crosscheck_verdict: Verdict) -> None:
+    """Test one check on one scene; it is skipped with a reason if it does not apply."""
     verdict = crosscheck_verdict
     if verdict.status in ("cannot", "outside"):
         pytest.skip(f"{verdict.status}: {verdict.reason}")
     measured = "" if verdict.measured is None else f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
-    assert verdict.status == "pass", f"{verdict.scene}: {verdict.card()}{measured} {verdict.reason}"
+    assert verdict.status == "pass", f"{verdict.scene}: {verdict.check()}{measured} {verdict.reason}"

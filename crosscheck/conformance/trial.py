@@ -1,4 +1,5 @@
-"""Bench: one engine on one specimen scene; its runs, made once and only when a property asks."""
+"""Bench: an engine and a scene on which it is checked. Its runs are made at first access and shared by all
+checks."""
 
 from __future__ import annotations
 
@@ -12,9 +13,9 @@ import numpy as np
 
 from crosscheck.conformance.changes import nudged, weighed
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
-from crosscheck.conformance.drawn import mechanism
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.conformance.moving import dead_end, moving_probes
+from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.conformance.runners import Runner
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
@@ -39,13 +40,16 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 
 SAMPLES = 9
-STEP = 1e-4  # spacing of neighbouring samples / duration: second differences are about 1e-8
+STEP = 1e-4  # spacing of neighbouring samples / duration; second differences then have errors of about 1e-8
 NEIGHBOURS = 4  # samples on each side of the middle one
-TURN = 1e-3  # rad: the most that a motion turns from one neighbouring sample to the next
-SWEPT = 3  # settings from which order and floor are measured
-FASTEST, SLOWEST = 0.1, 0.5  # contractions that are believed: adaptive steps and a floor make others
-COARSER = 1e-8  # tolerance of the second integration of Gauss's principle, 100 times the first tolerance
-SHARE = 0.1  # largest error of the finer one / difference of the two; measured: 0.01 to 0.03
+TURN = 1e-3  # rad; largest rotation between neighbouring samples
+SWEPT = 3  # number of settings from which convergence order and accuracy limit are estimated
+# limits of the estimated contraction: adaptive steps and rounding give values beyond them
+FASTEST, SLOWEST = 0.1, 0.5
+# tolerance of the second integration of Gauss's principle, 100 times the tolerance of the first one
+COARSER = 1e-8
+# bound on (error of the finer integration) / (difference of the two integrations); measured: 0.01 to 0.03
+SHARE = 0.1
 SHORT = {  # built-in scenes with a truth, and end times (s) before their first singular position
     "four_bar": 0.01,
     "four_bar_gravity": 0.12,
@@ -53,30 +57,30 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank": 0.02,
     "spatial_slider_crank_driven": 0.02,
 }
-DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of mechanisms that are part of the suite
-RELATED = (  # the scenes that are changed as relations say at quick depth
+DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of the random mechanisms that belong to the suite
+RELATED = (  # scenes to which the metamorphic relations are applied at quick depth
     "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
     "cylindrical driver", "force load", "tumbling body", *DRAWN,
 )  # fmt: skip
 
 
 class Broken(Exception):
-    """A run that a property needs did not complete."""
+    """A run that a check needs did not complete."""
 
 
 class NoExact(Exception):
-    """The exact motion that a property needs could not be had; the reason."""
+    """The exact motion that a check needs is not available; the message is the reason."""
 
 
 @dataclass(frozen=True)
 class Outside:
-    """A scene is out of a card's domain, and the reason."""
+    """A check does not apply to a scene; the message is the reason."""
 
     reason: str
 
 
 class Finding(NamedTuple):
-    """``measured`` must not exceed ``allowed``; ``remark`` says more."""
+    """Result of a check: ``measured`` must not exceed ``allowed``; ``remark`` adds a note."""
 
     measured: float
     allowed: float
@@ -85,8 +89,8 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Specimen:
-    """A scene of the suite; ``exact`` gives its poses where a formula does, ``related`` asks for the
-    metamorphic relations too, ``reference_time`` is CPU time (s) for a scene without a closed form, and a
+    """A scene of the suite. ``exact`` returns its poses if a formula is known. ``related`` applies the
+    metamorphic relations. ``reference_time`` is the CPU time (s) of a reference if no closed form exists. A
     ``dead_end`` has drivers that the mechanism cannot follow to the end."""
 
     scene: Scene
@@ -97,7 +101,7 @@ class Specimen:
 
 
 def specimens(deep: bool = False) -> list[Specimen]:
-    """Closed forms, scenes with a truth, and one probe for every feature; ``deep`` relates all of them."""
+    """Return all scenes of the suite; ``deep`` applies the metamorphic relations to all of them."""
     forms = [Specimen(*make(), deep or make.__name__ in RELATED) for make in CLOSED_FORMS]
     scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
     known = {scene.name for scene in scenes}
@@ -112,7 +116,8 @@ def specimens(deep: bool = False) -> list[Specimen]:
 
 @dataclass(frozen=True)
 class Bench:
-    """``settings`` are the best family's, coarse to fine."""
+    """An engine and a scene on which it is checked, with the settings of the judged family, coarse to
+    fine."""
 
     runner: Runner
     specimen: Specimen
@@ -127,7 +132,7 @@ class Bench:
 
     @property
     def rounding(self) -> float:
-        """Relative rounding of numbers that the engine claims."""
+        """Relative rounding error of the numbers that the engine declares."""
         return self.runner.rounding
 
     @cached_property
@@ -137,44 +142,44 @@ class Bench:
 
     @cached_property
     def finest(self) -> Observation:
-        """The run at the finest setting."""
+        """Run at the finest setting."""
         return self.observed(self.scene, self.times, self.settings[-1])
 
     @cached_property
     def motion(self) -> Trajectory:
-        """The completed run at the finest setting; raises Broken when there is none."""
+        """Completed run at the finest setting; raises Broken if it did not complete."""
         return completed(self.scene, self.finest.value, len(self.times))
 
     @cached_property
     def close(self) -> Trajectory:
-        """The completed run at evenly spaced times so near that differences of samples are rates."""
+        """Completed run at equally spaced times so near that differences of samples give rates."""
         rate = motion_rate(self.scene, self.motion)
         step = min(STEP * self.scene.duration, TURN / rate)
         return self.run(self.scene, self.scene.duration / 2 + step * np.arange(-NEIGHBOURS, NEIGHBOURS + 1))
 
     def run(self, scene: Scene, times: np.ndarray) -> Trajectory:
-        """A completed run of a scene at the finest setting of the specimen; raises Broken."""
+        """Return a completed run of a scene at the finest setting of this bench's scene; raises Broken."""
         return completed(scene, self.observed(scene, times, self.settings[-1]).value, len(times))
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Why the engine, or the family that is judged, cannot run another scene."""
+        """Return the reason why the engine, in the judged family, cannot run another scene, or None."""
         return self.runner.refuses(scene, self.settings[-1].family)
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
-        """A run in a process of its own, and what it printed and left behind."""
+        """Return a run in a process of its own, with its printed text and the files it left."""
         return self.runner.observe(scene, times, setting)
 
     @property
     def shared_runs(self) -> list[Trajectory]:
-        """Completed runs at the finest setting, in one process: after one at the coarsest, and after one of
-        another scene of the same name."""
+        """Return completed runs at the finest setting that share a process: one follows a run at the coarsest
+        setting. The second one follows a run of another scene with an equal name."""
         coarse, fine = (self.scene, self.settings[0]), (self.scene, self.settings[-1])
         runs = self.runner.in_turn([coarse, fine, (weighed(self.scene), self.settings[-1]), fine], self.times)
         return [completed(self.scene, run, len(self.times)) for run in (runs[1], runs[3])]
 
     @cached_property
     def sweep(self) -> list[Trajectory]:
-        """Completed runs, finest first: at the finest setting, and at the two next that complete."""
+        """Completed runs, finest first: at the finest setting, and at the next two that complete."""
         runs = [self.motion]
         for setting in self.settings[-2::-1]:
             with suppress(Broken):
@@ -188,37 +193,36 @@ class Bench:
 
     @cached_property
     def steps_apart(self) -> float:
-        """Difference of the runs at the two finest settings, 0 where there is but one."""
+        """Difference of the runs at the two finest settings; 0 if only one completes."""
         return self._apart(0) if len(self.sweep) > 1 else 0.0
 
     @cached_property
     def contraction(self) -> float:
-        """Factor by which the difference of successive settings shrinks, by the three finest: the order of
-        convergence in steps of the engine's own settings."""
+        """Factor by which the difference of successive settings decreases, from the three finest settings. It
+        measures the order of convergence in steps of the engine's own settings."""
         before = self.steps_before
         return self.steps_apart / before if before > 0 else 1.0
 
     @cached_property
     def steps_before(self) -> float:
-        """Difference of the runs at the two settings before, 0 where there is none."""
+        """Difference of the runs at the second and third finest settings; 0 if there are fewer."""
         return self._apart(1) if len(self.sweep) == SWEPT else 0.0
 
     @cached_property
     def left(self) -> float:
-        """Error that the finest setting leaves: the sum of all differences that would follow, which shrink
-        by the measured contraction."""
+        """Estimated error of the finest setting: the sum of all further differences between settings."""
         shrink = min(max(self.contraction, FASTEST), SLOWEST)
         return self.steps_apart * shrink / (1 - shrink)
 
     @cached_property
     def resolution(self) -> float:
-        """Largest error of the finest run by the engine's measured order and floor."""
+        """Largest error of the finest run that its measured order and accuracy limit explain."""
         return max(SAME_MOTION, OWN_ACCURACY * self.left, PERTURBED * self.perturbed_apart)
 
     @cached_property
     def rank(self) -> float:
-        """Part of the largest singular value of the joints' rows below which others are zero: RANK, or what
-        the run leaves of residuals and the engine rounds."""
+        """Relative rank tolerance for the Jacobian's singular values: the largest of RANK, and GRAINS times
+        the engine's rounding and the run's residuals."""
         left = float(violation_series(self.scene, self.motion).max())
         return max(RANK, GRAINS * self.rounding, GRAINS * left)
 
@@ -232,12 +236,12 @@ class Bench:
 
     @cached_property
     def perturbed(self) -> Trajectory:
-        """The run of a scene that differs by two units in the last place of every number."""
+        """Run of a scene that differs by two units in the last place of every number."""
         return self.run(nudged(self.scene, self.rounding), self.times)
 
     @cached_property
     def own_pushes(self) -> float:
-        """Return `own_accuracy` of accelerations and unique reactions."""
+        """Value of `own_accuracy` for accelerations and unique reactions."""
         perturbed_difference = pushes_apart(self.scene, self.motion, self.perturbed, self.rank)[0]
         coarser = self.sweep[1] if len(self.sweep) > 1 else self.motion
         steps = pushes_apart(self.scene, self.motion, coarser, self.rank)[0]
@@ -245,19 +249,19 @@ class Bench:
 
     @cached_property
     def own_accuracy(self) -> float:
-        """Largest difference of runs which should agree: multiples of the differences of the two finest
-        settings and of perturbed runs, at least SAME_MOTION."""
+        """Largest difference allowed between runs that should agree. It is a multiple of the difference of
+        the two finest settings and of the perturbed runs, at least SAME_MOTION."""
         return max(SAME_MOTION, OWN_ACCURACY * self.steps_apart, PERTURBED * self.perturbed_apart)
 
     @property
     def floors(self) -> str:
-        """The differences that `own_accuracy` was measured from, in words."""
+        """Text with the differences from which `own_accuracy` was computed."""
         steps = f"the two finest settings by {self.steps_apart:.1e}"
         return f"perturbed runs differ by {self.perturbed_apart:.1e}, {steps}"
 
     @cached_property
     def exact(self) -> Trajectory:
-        """The exact motion at the sample times."""
+        """Exact motion at the sample times."""
         return exact_motion(self.specimen, self.times)
 
     @cached_property
@@ -267,14 +271,15 @@ class Bench:
 
 
 def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
-    """A bench with the engine's answer to the specimen, in its best family or the one named; raises
-    ChildFailed when the engine cannot even say."""
+    """Return a bench with the engine's refusal or settings for the scene, in its best family or the given
+    one. Raises ChildFailed if the engine crashes when asked."""
     version, cannot, settings = runner.offers(specimen.scene, family)
     return Bench(runner, specimen, version, cannot, settings, family)
 
 
 def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
-    """The run with its bodies in the scene's order; raises Broken unless it completed with its samples."""
+    """Return the run with its bodies in the scene's order; raises Broken unless it completed with all
+    samples."""
     if run.outcome is not Outcome.COMPLETED:
         raise Broken(f"{run.outcome.label} after {run.t_end:.3g} s: {run.message or run.outcome.sentence}")
     if len(run.times) != samples:
@@ -285,22 +290,21 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
 
 
 def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
-    """Largest position difference over the scene's length, or rotation angle, between two runs; infinite
-    where one is not finite."""
+    """Return the largest position difference over the scene's length, or rotation angle, between two runs. It
+    is infinite if a number is not finite."""
     worst = float(error_series(scene, first, second).max())
     return worst if np.isfinite(worst) else np.inf
 
 
 def exact_motion(specimen: Specimen, times: np.ndarray) -> Trajectory:
-    """Exact poses at times (k,): of a formula (its velocities are NaN), a truth, or Gauss's principle; raises
-    NoExact."""
+    """Return exact poses at times (k,) from a formula (velocities NaN), a truth, or Gauss's principle."""
     if specimen.exact is None:
         truth = truth_for(specimen.scene, specimen.reference_time)
         try:
             if truth is not None:
                 return truth.poses(times)
         except NoSolution:
-            pass  # without a reference, accelerations at the start are still known
+            pass  # accelerations at the start are still known
         return _of_gauss(specimen.scene, times)
     position, orientation = specimen.exact(times)
     unknown = np.full_like(position, np.nan)
@@ -317,8 +321,8 @@ def _of_gauss(scene: Scene, times: np.ndarray) -> Trajectory:
 
 
 def exact_bound(specimen: Specimen, exact: Trajectory) -> float:
-    """Bound on the error of `exact_motion`: of the formula, the truth, the reference, or what integrations of
-    Gauss's principle at two tolerances differ by."""
+    """Return a bound on the error of `exact_motion`. It is the bound of the formula, truth or reference. For
+    Gauss's principle it follows from two integrations at different tolerances."""
     if exact.engine == GAUSS:
         coarser = gauss_motion(specimen.scene, tuple(exact.times.tolist()), COARSER)
         return SHARE * difference(specimen.scene, exact, coarser)

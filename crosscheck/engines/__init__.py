@@ -1,1 +1,1 @@
-"""Adapters, one folder or file for each engine; the modules beside them are shared by several."""
+"""Adapters of engines, one folder or file for each; the other modules are shared by several adapters."""

@@ -1,4 +1,5 @@
-"""The C or C++ compiler of this machine, for libraries of our functions around an engine."""
+"""Finds and runs the C or C++ compiler of this machine, which compiles crosscheck's functions around an
+engine."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ TIME_LIMIT = 500.0  # s; half a minute is usual
 
 
 class NoLibrary(Exception):
-    """The sentence says why there is none."""
+    """No library can be compiled; the message is the reason."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Compiler:
     commands: Sequence[str]
 
     def path(self) -> str:
-        """The compiler's path; raises NoLibrary where none is installed."""
+        """Return the compiler's path; raises NoLibrary if none is installed."""
         names = (os.environ[self.variable],) if os.environ.get(self.variable) else self.commands
         found = next(filter(None, map(shutil.which, names)), None)
         if found is None:
@@ -32,7 +33,7 @@ class Compiler:
         return found
 
     def run(self, command: Sequence[str]) -> None:
-        """Run a command line of the compiler; raises NoLibrary with the compiler's words."""
+        """Run a command line of the compiler; raises NoLibrary with the compiler's message."""
         try:
             done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=TIME_LIMIT)
         except (OSError, subprocess.TimeoutExpired) as error:

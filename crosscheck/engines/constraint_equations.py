@@ -23,13 +23,14 @@ from mbref.scene import Driver, Joint, Scene
 
 O = np.zeros(3)
 TILDE = np.array([cross_matrix(e) for e in np.eye(3)])
-ACROSS = ((1, 2), (0, 2), (0, 1))  # axes of the first and second frame that a forbidden rotation keeps normal
+# axes of the first and second frame that stay perpendicular if a rotation is forbidden
+ACROSS = ((1, 2), (0, 2), (0, 1))
 Levels = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class Frames:
-    """Bodies (…, nb + 1, 3, ·): position r, rotation A, velocity v, and A', A'' at constant ω'."""
+    """Bodies (…, nb + 1, 3, ·): position r, rotation matrix A, velocity v, and A', A'' at constant ω'."""
 
     r: np.ndarray
     a: np.ndarray
@@ -39,8 +40,8 @@ class Frames:
 
 
 def frames(r: np.ndarray, p: np.ndarray, v: np.ndarray, omega: np.ndarray) -> Frames:
-    """Frames of positions and velocities (…, nb, 3), Euler parameters p (…, nb, 4) of any length, and
-    angular velocities ``omega`` (…, nb, 3) in body axes."""
+    """Return the frames of bodies with positions and velocities (…, nb, 3), Euler parameters p (…, nb, 4) of
+    any length, and angular velocities ``omega`` (…, nb, 3) in body axes."""
     a = rotations.to_matrix(p / np.sqrt(np.sum(p * p, axis=-1, keepdims=True)))
     tilde = np.tensordot(omega, TILDE, 1)
     a, tilde = _grounded(a, np.eye(3)), _grounded(tilde, np.zeros((3, 3)))
@@ -50,14 +51,14 @@ def frames(r: np.ndarray, p: np.ndarray, v: np.ndarray, omega: np.ndarray) -> Fr
 
 
 def _grounded(array: np.ndarray, ground: np.ndarray) -> np.ndarray:
-    """The bodies' array (…, nb, 3, k) with the ground's entry appended."""
+    """Return the bodies' array (…, nb, 3, k) with the ground's entry appended."""
     last = np.broadcast_to(ground, (*array.shape[:-3], 1, *ground.shape))
     return np.concatenate([array, last], axis=-3)
 
 
 @dataclass(frozen=True)
 class _Row:
-    """A row: its joint's index, bodies, anchors on them, e₁ and e₂ on the first, w on the second."""
+    """A row: index of its joint, bodies, anchors on them, e₁ and e₂ on the first body, w on the second."""
 
     kind: str
     joint: int
@@ -95,7 +96,7 @@ def _rows(scene: Scene, k: int, joint: Joint, driver: Driver | None) -> list[_Ro
 
 
 class Constraints:
-    """All rows of a scene, m of them; ``joint`` (m,) is the index of each row's joint."""
+    """All m rows of a scene; ``joint`` (m,) is the index of each row's joint."""
 
     def __init__(self, scene: Scene):
         drivers = {driver.joint: driver for driver in scene.driver}
@@ -108,12 +109,12 @@ class Constraints:
         self.nb = len(scene.body)
 
     def levels(self, t: float, f: Frames) -> np.ndarray:
-        """(3, …, m): Φ, Φ', and Φ'' at zero accelerations, which is -γ."""
+        """Return (3, …, m): Φ, Φ', and Φ'' for zero accelerations, which is -γ."""
         none = np.zeros((3, *f.r.shape[:-3], 0))
         return np.concatenate([none, *(np.stack(group.levels(t, f)) for group in self.groups)], axis=-1)
 
     def jacobian(self, t: float, f: Frames) -> np.ndarray:
-        """∂Φ'/∂(v, ω') (…, m, 6 nb), body after body."""
+        """Return ∂Φ'/∂(v, ω') (…, m, 6 nb), body after body."""
         m = len(self.joint)
         matrix = np.zeros((*f.r.shape[:-3], m, self.nb + 1, 6))
         if m:
@@ -137,14 +138,14 @@ class _Group:
         self.drivers = [(k, row.driver) for k, row in enumerate(rows) if row.driver]
 
     def prescribed(self, t: float) -> np.ndarray:
-        """(3, rows): value, rate and acceleration of each row's driver."""
+        """Return (3, rows): value, rate and acceleration of each row's driver."""
         values = np.zeros((3, len(self.i)))
         for k, driver in self.drivers:
             values[:, k] = motion(driver, t)
         return values
 
     def gap(self, f: Frames) -> Levels:
-        """The vector between the anchors (…, rows, 3, 1), its rate, and its second rate."""
+        """Return the vector between the anchors (…, rows, 3, 1), its first and its second time derivative."""
         (pi, vi, ai), (pj, vj, aj) = self._end(f, self.i, self.si), self._end(f, self.j, self.sj)
         return pj - pi, vj - vi, aj - ai
 
@@ -155,7 +156,7 @@ class _Group:
 
 class _Direction(_Group):
     def turned(self, t: float) -> Levels:
-        """u in its body (rows, 3, 1), its rate and second rate there."""
+        """Return u in body axes (rows, 3, 1), its first and its second time derivative there."""
         if not self.drivers:
             return self.e1, 0 * self.e1, 0 * self.e1
         angle, rate, acceleration = self.prescribed(t)[..., None, None]
@@ -216,12 +217,12 @@ def _of(f: Frames, body: np.ndarray) -> Levels:
 
 
 def _dot(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Products (…,) of columns (…, 3, 1)."""
+    """Return the scalar products (…,) of columns (…, 3, 1)."""
     return np.sum(x * y, axis=(-2, -1))
 
 
 def _back(a: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Columns in body axes of columns in the world."""
+    """Return columns in body axes from columns in world axes."""
     return np.swapaxes(a, -1, -2) @ x
 
 
@@ -230,5 +231,5 @@ def _cross(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def _block(linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    """Rows' parts (…, rows, 6) for one body."""
+    """Return the parts (…, rows, 6) of the rows for one body."""
     return np.concatenate(np.broadcast_arrays(linear, angular), axis=-2)[..., 0]

@@ -1,4 +1,4 @@
-"""Driver motions as plain numbers, and the fastest rate of a scene."""
+"""Driver motions as numbers, and the fastest rate in a scene."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from mbref.scene import Driver, Scene, Spring, TorsionSpring
 from mbref.trajectory import Outcome, Trajectory
 
-SCOUT = (2000, 16000)  # steps of the coarse run that finds how fast a scene turns
-SCOUT_TURN = 0.5  # rad per step that such a run resolves
+SCOUT = (2000, 16000)  # numbers of steps of the coarse run that measures the scene's fastest rate
+SCOUT_TURN = 0.5  # rad; largest rotation in a step of the coarse run
 
 
 def motion(driver: Driver, t: float) -> tuple[float, float, float]:
-    """Value, rate and acceleration of a driver at time t (rad or m, and per second)."""
+    """Return value, rate and acceleration of a driver at time t (rad or m, and per second)."""
     value = rate = acceleration = 0.0
     for c in reversed(driver.polynomial):
         acceleration = acceleration * t + 2 * rate
@@ -30,13 +30,16 @@ def motion(driver: Driver, t: float) -> tuple[float, float, float]:
 
 
 def mean_rate(driver: Driver, t: float, h: float) -> float:
-    """Mean rate of a driver from time t over h (s): steps that end with it meet the prescribed values."""
+    """Return the mean rate of a driver from time t over h (s): steps with this rate end at the prescribed
+    value."""
     return (motion(driver, t + h)[0] - motion(driver, t)[0]) / h
 
 
 def moving(driver: Driver) -> Callable[[float], tuple[float, float, float]]:
-    """`motion` of a driver as a function of time that keeps its last result: iterations of a step and its
-    rows ask for the same time again and again."""
+    """Return `motion` of a driver as a function of time that stores its last result.
+
+    The iterations and the rows of a step ask for the motion at equal times.
+    """
     kept: tuple[float, tuple[float, float, float]] = (math.nan, (0.0, 0.0, 0.0))
 
     def at(t: float) -> tuple[float, float, float]:
@@ -49,7 +52,8 @@ def moving(driver: Driver) -> Callable[[float], tuple[float, float, float]]:
 
 
 def stated_rate(scene: Scene) -> float:
-    """The fastest rate (rad/s) that a scene states: of its duration, drivers, springs and velocities."""
+    """Return the fastest rate (rad/s) in the scene's data: of its duration, drivers, springs and
+    velocities."""
     rates = [1 / scene.duration]
     for driver in scene.driver:
         rates += [abs(motion(driver, t)[1]) for t in np.linspace(0, scene.duration, 101)]
@@ -67,13 +71,13 @@ def stated_rate(scene: Scene) -> float:
 
 
 def _middle_moment(inertia: Sequence[float] | Sequence[Sequence[float]]) -> float:
-    """The middle principal moment; the least one is next to zero for thin rods."""
+    """Return the middle principal moment; the least one is nearly zero for thin rods."""
     matrix = np.array(inertia)
     return float(np.linalg.eigvalsh(np.diag(matrix) if matrix.ndim == 1 else matrix)[1])
 
 
 def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Sequence[int] = SCOUT) -> float:
-    """The fastest angular velocity (rad/s) of a coarse run, or `stated_rate` where that is faster.
+    """Return the fastest angular velocity (rad/s) in a coarse run, or `stated_rate` if that is larger.
 
     ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to
     try in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next.

@@ -1,4 +1,4 @@
-"""Engines that step by themselves: their steps for a scene, and runs from sample to sample."""
+"""Steps of engines with their own integrators: step lengths for a scene, and runs from sample to sample."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from crosscheck.judge.constraints import scene_length
 from mbref.scene import Moment, Scene
 from mbref.trajectory import Outcome, Trajectory
 
-ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step
+ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad; rotation in a step, for each setting
 MOST_STEPS = 250_000
-SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
+SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 ARM = 0.1  # half the distance of the two points that close a hinge / scene's length
 
 
 class Simulation(Protocol):
-    """One simulation of a scene at a setting."""
+    """Interface of a simulation of a scene at a setting."""
 
     counts: Counts
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1 (s); raises Failed."""
+        """Move the state from t0 to t1 (s); raises Failed."""
 
     def sample(self, t: float) -> Sample:
-        """The scene's bodies at the state."""
+        """Return the scene's bodies at the present state."""
 
 
 class Stepper(Protocol):
-    """An engine with a scene's tree."""
+    """Interface of an engine that has the tree of a scene."""
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s) from time t."""
+        """Take ``count`` steps of length h (s) from time t."""
 
     def motion(self) -> LinkMotion:
-        """The motion of the links, without accelerations where the engine has none."""
+        """Return the motion of the links, without accelerations if the engine gives none."""
 
 
 class FixedSteps:
@@ -53,7 +53,7 @@ class FixedSteps:
         self.counts = Counts()
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1; raises Failed."""
+        """Move the state from t0 to t1; raises Failed."""
         n = step_count(t0, t1, self.longest)
         self.stepper.step(t0, (t1 - t0) / n, n)
         self.counts.steps += n
@@ -63,15 +63,15 @@ class FixedSteps:
             raise Failed(Outcome.NOT_FINITE, t0, message)
 
     def sample(self, t: float) -> Sample:
-        """Poses and velocities."""
+        """Return poses and velocities."""
         return sample_of(self.scene, self.tree, self.stepper.motion(), None)
 
 
 def simulated(
     engine: Engine, scene: Scene, times: np.ndarray, setting: Setting, make: Callable[[], Simulation]
 ) -> Trajectory:
-    """The trajectory of a simulation that ``make`` constructs; raises ValueError for a family that the engine
-    does not have."""
+    """Return the trajectory of the simulation that ``make`` constructs; raises ValueError for an unknown
+    family."""
     if setting.family not in engine.families:
         raise ValueError(f"{engine.name} has no family {setting.family!r}")
     start = time.process_time()
@@ -88,7 +88,7 @@ def simulated(
 
 
 def scouted_rate(engine: Engine, scene: Scene, family: str, **options: Any) -> float:
-    """The fastest angular velocity (rad/s) of a scene by a coarse run of an engine."""
+    """Return the fastest angular velocity (rad/s) of a scene in a coarse run of an engine."""
 
     def coarse(step: float) -> Trajectory:
         times = np.linspace(0, scene.duration, SCOUT_SAMPLES)
@@ -98,8 +98,12 @@ def scouted_rate(engine: Engine, scene: Scene, family: str, **options: Any) -> f
 
 
 def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 0) -> list[float]:
-    """Steps (s), coarse to fine, that turn by ANGLES at a rate (rad/s) and by ``finer`` more, each a third of
-    the one before, as far as they are not too many; the engine's own ``default`` among them."""
+    """Return steps (s), coarse to fine, in which a body turns by ANGLES at a rate (rad/s), and ``finer``
+    further ones.
+
+    Each further step is a third of the previous one. The engine's own ``default`` is included, and steps that
+    are too many are left out.
+    """
     angles = [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))]
     found = [float(f"{angle / rate:.2g}") for angle in angles]
     kept = [h for h in found if scene.duration / h <= MOST_STEPS] or found[:1]
@@ -107,13 +111,13 @@ def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 
 
 
 def is_constant(scene: Scene) -> bool:
-    """Whether the loads on the links never change: moments are constant in the world."""
+    """Return whether the loads on the links never change: moments are constant in world axes."""
     return all(isinstance(load, Moment) for load in scene.load)
 
 
 def held_points(scene: Scene, closure: Closure) -> Sequence[np.ndarray]:
-    """Points (world at t = 0) that hold a closure where they coincide: one of a spherical joint, two on the
-    axis of a hinge, three, not in a line, of a weld."""
+    """Return points (world at t = 0) whose coincidence closes a loop: one for a spherical joint, two on the
+    axis of a hinge, three points not on a line for a weld."""
     if closure.kind == "point":
         return [closure.anchor]
     arm = ARM * scene_length(scene)

@@ -17,10 +17,11 @@ from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
 
 
 class Forces:
-    """The forces of a scene on its bodies, and the mass matrix; masses of 1 and no forces without masses.
+    """Forces of a scene on its bodies, and the mass matrix; without masses all masses are 1 and there are no
+    forces.
 
-    A torsion spring counts turns: its angle is the one nearest to an estimate its user keeps, whose rate is
-    given by ``turning``.
+    The angle of a torsion spring counts turns: it is the angle nearest to an estimate of the caller.
+    ``turning`` returns its rate.
     """
 
     def __init__(self, scene: Scene):
@@ -54,15 +55,15 @@ class Forces:
         return self.scene.body_index(name), place[:, None]
 
     def _hinge(self, name: str) -> tuple[tuple[int, ...], list[np.ndarray]]:
-        """Bodies of a joint, and the axes (3, 3, columns) of its frame on either."""
+        """Return the bodies of a joint, and the axes (3, 3, columns) of its frame on each."""
         joint = self.scene.joint_named(name)
         frame = joint_frame(joint.directions[0]).T
         axes = [in_body(self.scene, body, frame).T for body in joint.bodies]
         return tuple(self.scene.body_index(body) for body in joint.bodies), axes
 
     def __call__(self, f: Frames, omega: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """Generalised forces (…, 6 nb) with angular velocities ``omega`` (…, nb, 3) in body axes and the
-        torsion springs' estimated ``angles`` (…, springs)."""
+        """Return generalised forces (…, 6 nb) for angular velocities ``omega`` (…, nb, 3) in body axes and
+        estimated ``angles`` (…, springs) of the torsion springs."""
         total = np.zeros((*f.r.shape[:-3], self.nb + 1, 6, 1))
         total[..., : self.nb, :3, :] += self.weight
         momentum = np.einsum("bij,...bj->...bi", self.inertia, omega)
@@ -83,13 +84,13 @@ class Forces:
         return total[..., : self.nb, :, 0].reshape(*total.shape[:-3], 6 * self.nb)
 
     def angle(self, f: Frames, k: int) -> np.ndarray:
-        """Angle (…,) of the joint of torsion spring k, up to turns."""
+        """Return the angle (…,) of the joint of torsion spring k, up to full turns."""
         _, (i, j), (on_i, on_j) = self.twists[k]
         turned = np.swapaxes(f.a[..., i, :, :] @ on_i, -1, -2) @ f.a[..., j, :, :] @ on_j
         return np.arctan2(turned[..., 1, 0], turned[..., 0, 0])
 
     def turning(self, f: Frames) -> np.ndarray:
-        """Rates (…, springs) of the angles."""
+        """Return the rates (…, springs) of the angles."""
         rates = np.zeros((*f.r.shape[:-3], len(self.twists)))
         for k, (_, (i, j), (on_i, _)) in enumerate(self.twists):
             axis = f.a[..., i, :, :] @ on_i
@@ -101,7 +102,7 @@ class Forces:
 
 
 def _near(angle: np.ndarray, estimate: np.ndarray) -> np.ndarray:
-    """The angle (…,), known up to turns, nearest to the estimate."""
+    """Return the angle (…,), known up to full turns, that is nearest to the estimate."""
     return angle + 2 * np.pi * np.round((estimate - angle) / (2 * np.pi))
 
 
@@ -110,7 +111,7 @@ def _to_body(f: Frames, body: int, vector: np.ndarray) -> np.ndarray:
 
 
 def _pull(f: Frames, end: tuple[int, np.ndarray], force: np.ndarray, total: np.ndarray) -> None:
-    """Adds a world force (…, 3, 1) at a body-fixed point."""
+    """Add a world force (…, 3, 1) at a body-fixed point."""
     body, place = end
     local = _to_body(f, body, force)
     total[..., body, :3, :] += force
@@ -118,7 +119,7 @@ def _pull(f: Frames, end: tuple[int, np.ndarray], force: np.ndarray, total: np.n
 
 
 def _tension(f: Frames, spring: Spring, ends: list[tuple[int, np.ndarray]]) -> np.ndarray:
-    """World force (…, 3, 1) of a spring on its first body."""
+    """Return the world force (…, 3, 1) of a spring on its first body."""
     p, q = (f.r[..., b, :, :] + f.a[..., b, :, :] @ s for b, s in ends)
     u, v = (f.v[..., b, :, :] + f.a1[..., b, :, :] @ s for b, s in ends)
     length = np.sqrt(np.sum((q - p) ** 2, axis=-2, keepdims=True))

@@ -1,4 +1,4 @@
-"""Initial joint velocities of a tree: they give the bodies the scene's consistent velocities."""
+"""Initial joint velocities of a tree that give the bodies the scene's consistent velocities."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 
 def lacks_mass(scene: Scene) -> Cannot | None:
-    """The refusal of a scene without masses whose drivers leave some of the motion open; None of others."""
+    """Return the refusal of a scene without masses whose drivers do not determine the whole motion; None for
+    all others."""
     if scene.has_mass() or not may_move_freely(scene):
         return None
     without = ", ".join(body.name for body in scene.body if body.mass is None)
@@ -25,16 +26,16 @@ def lacks_mass(scene: Scene) -> Cannot | None:
 
 
 def may_move_freely(scene: Scene) -> bool:
-    """Whether joints and drivers leave some of the motion open at t = 0."""
+    """Return whether joints and drivers leave a degree of freedom at t = 0."""
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     return bool(np.linalg.matrix_rank(rows, RANK_TOLERANCE) < 6 * len(scene.body))
 
 
 def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:
-    """Joint velocities (nv,) at t = 0, in the order of the tree's links.
+    """Return joint velocities (nv,) at t = 0, in the order of the tree's links.
 
-    The bodies move with `constraints.initial_twists`, ghosts with their bodies, rods without spin about
-    their own axes.  Raises SceneError where those velocities contradict the joints.
+    The bodies move with `constraints.initial_twists`, parts of split bodies with their bodies, and rods do
+    not spin about their own axes. Raises SceneError if the given velocities contradict the joints.
     """
     if tree.nv == 0:
         return np.zeros(0)
@@ -57,8 +58,8 @@ def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:
 
 
 def twist_maps(tree: Tree) -> np.ndarray:
-    """(links, 6, nv): velocity of each link's frame and angular velocity (world) at t = 0, of the joint
-    velocities."""
+    """Return (links, 6, nv): velocity of each link's frame and angular velocity (world) at t = 0 for unit
+    joint velocities."""
     maps = np.zeros((len(tree.links), 6, tree.nv))
     for k, link in enumerate(tree.links):
         if link.parent != GROUND_LINK:
@@ -68,13 +69,13 @@ def twist_maps(tree: Tree) -> np.ndarray:
 
 
 def _at(twist_map: np.ndarray, link: Link, point: np.ndarray) -> np.ndarray:
-    """(6, nv): the twist of a link at a point (world) instead of at its frame."""
+    """Return (6, nv): the twist of a link at a point (world) instead of at its frame."""
     linear, angular = twist_map[:3], twist_map[3:]
     return np.vstack([linear - cross_matrix(point - link.position) @ angular, angular])
 
 
 def _joint_map(link: Link) -> np.ndarray:
-    """(6, freedoms): the twist of the link's frame of its own joint's velocities."""
+    """Return (6, freedoms): the twist of the link's frame for unit velocities of its own joint."""
     turning = np.vstack([-cross_matrix(link.position - link.anchor), np.eye(3)])
     sliding = np.vstack([np.eye(3), np.zeros((3, 3))])
     of_kind: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -87,7 +88,7 @@ def _joint_map(link: Link) -> np.ndarray:
 
 
 def _velocity(scene: Scene, twists: np.ndarray, body: int, point: np.ndarray) -> np.ndarray:
-    """Velocity (3,) of a point (world) of a body; of the ground for -1."""
+    """Return the velocity (3,) of a point (world) of a body; zero for the ground (-1)."""
     if body < 0:
         return np.zeros(3)
     arm = point - np.array(scene.body[body].position)

@@ -1,8 +1,9 @@
-"""Coordinates of a tree for the integrators outside engines: one number of a slide or turn, quaternions else.
+"""Coordinates of a tree for integrators outside engines: one number for a slide or turn, quaternions for all
+other rotations.
 
-Positions q start at zero, with unit quaternions; velocities v are the tree's.  Angular velocities of balls
-and the twists (v, ω) of free links are relative to the parent, in the axes of the parent or of the child, as
-the engine has them.
+Positions q start at zero, with unit quaternions; velocities v are the tree's. Angular velocities of balls and
+the twists (v, ω) of free links are relative to the parent, in the axes of the parent or of the child, as the
+engine defines them.
 """
 
 from __future__ import annotations
@@ -19,9 +20,12 @@ UNIT = np.array([1.0, 0.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class JointCoordinates:
-    """``single`` (n,) are the velocities of slides and turns, and ``single_q`` their positions;
-    ``quaternions`` and ``places`` have pairs of the first position and the first velocity of a quaternion or
-    a free link's displacement.  ``in_child`` says in whose axes velocities are."""
+    """Indices of a tree's coordinates.
+
+    ``single`` (n,) are the velocities of slides and turns, and ``single_q`` their positions. ``quaternions``
+    and ``places`` contain pairs of the first position and the first velocity of a quaternion or a free link's
+    displacement. ``in_child`` is True if velocities are in the axes of the child.
+    """
 
     nv: int
     nq: int
@@ -32,20 +36,20 @@ class JointCoordinates:
     in_child: bool
 
     def start(self) -> np.ndarray:
-        """The positions (nq,) at t = 0."""
+        """Return the positions (nq,) at t = 0."""
         q = np.zeros(self.nq)
         for iq, _ in self.quaternions:
             q[iq : iq + 4] = UNIT
         return q
 
     def of_velocities(self, q: np.ndarray) -> np.ndarray:
-        """Coordinates (nv,) by the velocity they belong to; zero where a joint has no single angle."""
+        """Return coordinates (nv,) in the order of the velocities; zero for joints without a single angle."""
         found = np.zeros(self.nv)
         found[self.single] = q[self.single_q]
         return found
 
     def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Rates (nq,) of the positions."""
+        """Return the rates (nq,) of the positions."""
         out = np.empty(self.nq)
         out[self.single_q] = v[self.single]
         for iq, iv in self.quaternions:
@@ -58,7 +62,7 @@ class JointCoordinates:
         return out
 
     def normalised(self, q: np.ndarray) -> np.ndarray:
-        """The positions with unit quaternions."""
+        """Return the positions with quaternions of unit length."""
         if not self.quaternions:
             return q
         q = q.copy()
@@ -67,7 +71,7 @@ class JointCoordinates:
         return q
 
     def moved(self, q: np.ndarray, step: np.ndarray) -> np.ndarray:
-        """The positions after a small step (nv,), in the directions of the velocities."""
+        """Return the positions after a small step (nv,) along the velocities."""
         out = q + self.rates(q, step)
         for iq, iv in self.quaternions:
             turn, unit = rotations.from_vector(step[iv : iv + 3]), _unit(q[iq : iq + 4])
@@ -78,7 +82,7 @@ class JointCoordinates:
 
 
 def joint_coordinates(tree: Tree, in_child: bool) -> JointCoordinates:
-    """The coordinates of a tree."""
+    """Return the coordinates of a tree."""
     nq = nv = 0
     single, quaternions, places = [], [], []
     for link in tree.links:
@@ -99,7 +103,7 @@ def joint_coordinates(tree: Tree, in_child: bool) -> JointCoordinates:
 
 
 def rotation_vector(quaternion: np.ndarray) -> np.ndarray:
-    """Axis times angle (3,), rad, of a unit quaternion."""
+    """Return axis times angle (3,), rad, of a unit quaternion."""
     size = np.linalg.norm(quaternion[1:])
     return quaternion[1:] * (2 * np.arctan2(size, quaternion[0]) / size if size > 0 else 2.0)
 

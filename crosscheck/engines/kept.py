@@ -1,6 +1,6 @@
-"""Files made once and kept in the user's cache folder, such as compiled libraries.
+"""Files made once and stored in the user's cache folder, such as compiled libraries.
 
-A file's name is a hash of its origin and a hash of its bytes, so that a damaged one is made anew.
+A file's name contains a hash of its origin and a hash of its bytes, so that a damaged file is made again.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-MOST = 64e6  # bytes of a folder; the oldest files beyond them are removed
+MOST = 64e6  # bytes of a folder; beyond them the oldest files are removed
 
 
 def hashed(*parts: str) -> str:
-    """The hash of an origin's parts."""
+    """Return the hash of an origin's parts."""
     return _hash("\n".join(parts).encode())
 
 
 def kept(name: str, origin: str, suffix: str) -> Path | None:
-    """Return the file of an origin in a folder of the cache, named after its content."""
+    """Return the file of an origin in a folder of the cache; its name contains the hash of its content."""
     for path in sorted(_folder(name).glob(f"{origin}-*{suffix}")):
         with contextlib.suppress(OSError):
             if path.stem.partition("-")[2] == _hash(path.read_bytes()):
@@ -30,7 +30,8 @@ def kept(name: str, origin: str, suffix: str) -> Path | None:
 
 
 def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
-    """Puts the file that ``make`` writes, whole, into the cache; into a temporary folder where that fails."""
+    """Store the file that ``make`` writes in the cache, or in a temporary folder if that fails; no reader
+    sees a part of it."""
     folder = _folder(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -51,7 +52,7 @@ def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> P
 
 
 def made_once(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
-    """The file of an origin in a folder of the cache, which ``make`` writes where there is none."""
+    """Return the file of an origin in a folder of the cache; ``make`` writes it if it is missing."""
     return kept(name, origin, suffix) or keep(name, origin, suffix, make)
 
 
@@ -65,7 +66,7 @@ def _hash(content: bytes) -> str:
 
 
 def _remove_oldest(folder: Path, suffix: str) -> None:
-    """Other processes may remove the same ones."""
+    """Remove the oldest files; other processes may remove them at the same time."""
     with contextlib.suppress(OSError):
         paths = sorted(folder.glob(f"*{suffix}"), key=lambda path: path.stat().st_mtime)
         left = sum(path.stat().st_size for path in paths)

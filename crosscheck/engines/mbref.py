@@ -1,5 +1,5 @@
-"""mbref as an engine: a family is a method, `taylor` also with generated code, swept over the relative
-tolerance."""
+"""Adapter of mbref: a family is a method, `taylor` also with generated code, at several relative
+tolerances."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
 class Mbref(Engine):
-    """The reference implementation; ``settings`` sweeps the relative tolerance of each method."""
+    """The reference implementation; ``settings`` has several relative tolerances for each method."""
 
     name = "mbref"
     package = "mbref"
@@ -65,7 +65,7 @@ class Mbref(Engine):
 
     @functools.cached_property
     def supports(self) -> Supports:  # type: ignore[override]  # naming the engine imports nothing
-        """mbref has equations for every joint in its table, and for every load of a scene file."""
+        """Return the supported features: every joint of mbref's table, and every load of a scene file."""
         from mbref.equations.joints import JOINTS
 
         both = ("angle", "displacement")
@@ -140,7 +140,7 @@ class Mbref(Engine):
             prepare(_method(family))
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
-        """Return the call of ``mbref.simulate``; none for generated code, which needs Limits."""
+        """Return the call of ``mbref.simulate``; empty for generated code, which needs ``Limits``."""
         if setting.family.endswith(GENERATED) or BRANCHES in setting.options:
             return ""
         tolerance = f", rtol={setting.options['rtol']!r}" if "rtol" in setting.options else ""
@@ -154,7 +154,8 @@ class Mbref(Engine):
 
 
 def _methods(scene: Scene) -> Sequence[str]:
-    """The methods that serve a scene, its default method first, then that with generated code."""
+    """Return the methods that can run a scene: its default method, then the one with generated code, then all
+    others."""
     from mbref.method import default_method
 
     if _has_singular_mass(scene):
@@ -164,7 +165,7 @@ def _methods(scene: Scene) -> Sequence[str]:
 
 
 def _has_singular_mass(scene: Scene) -> bool:
-    """Whether a body lacks a moment of inertia: most formulations invert the mass matrix."""
+    """Return whether a body lacks a moment of inertia: most formulations invert the mass matrix."""
     given = [np.array(body.inertia, dtype=float) for body in scene.body if body.inertia is not None]
     moments = [np.linalg.eigvalsh(np.diag(i) if i.ndim == 1 else i) for i in given]
     return any(m[0] <= ROUNDING * max(m[-1], np.finfo(float).tiny) for m in moments)

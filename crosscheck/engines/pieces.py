@@ -1,6 +1,7 @@
 """A tree as bodies with joints of one elementary motion each, for engines without joints of several freedoms.
 
-Between the joints of a chain are bodies of next to no mass: engines warn of none, or divide by it.
+Auxiliary bodies between the joints of a chain have negligible mass, but not zero: engines would warn, or
+divide by it.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ O = np.zeros(3)
 
 @dataclass(frozen=True)
 class Piece:
-    """A body whose frame sits at ``origin`` with world-aligned axes at t = 0, and the joint at ``anchor``
-    that carries it, fixed where ``mobility`` is None; places are in the world.
+    """A body with a frame at ``origin``, with world axes at t = 0, and the joint at ``anchor`` that carries
+    it.
 
-    ``link`` is the tree's link or -1 of a body in a chain, ``parent`` the index of a piece or -1 of the
-    ground, ``velocity`` the first velocity of the tree.  The centre of mass is at ``offset`` from the origin.
+    The joint is fixed if ``mobility`` is None. Points are in the world.
+
+    ``link`` is the tree's link, or -1 for an auxiliary body. ``parent`` is the index of a piece, or -1 for
+    the ground. ``velocity`` is the index of the joint's first velocity in the tree.  The centre of mass is at
+    ``offset`` from the origin.
     """
 
     link: int
@@ -44,8 +48,10 @@ class Piece:
 
 
 def pieces(tree: Tree, negligible: float) -> list[Piece]:
-    """The pieces of a tree, parents first and depth first; bodies in chains have the part ``negligible`` of
-    the mass and inertia of the link behind them."""
+    """Return the pieces of a tree, parents first and depth first.
+
+    Auxiliary bodies have the fraction ``negligible`` of mass and inertia of the link that follows them.
+    """
     found: list[Piece] = []
     last = {GROUND_LINK: -1}
     for k, link in enumerate(tree.links):
@@ -64,5 +70,5 @@ def pieces(tree: Tree, negligible: float) -> list[Piece]:
 
 
 def origin(of: list[Piece], piece: int) -> np.ndarray:
-    """Origin (3,) of a piece's frame, world at t = 0; of the ground's for -1."""
+    """Return the origin (3,) of a piece's frame, world at t = 0; of the ground's frame for -1."""
     return of[piece].origin if piece >= 0 else O

@@ -1,9 +1,9 @@
-"""A planar mechanism with the fewest joint coordinates: joints that allow more than its motion are exchanged.
+"""A planar mechanism with the fewest joint coordinates: joints that allow more than planar motion are
+replaced.
 
-A universal joint whose motion stays in a plane is a hinge there, and a hinge that closes a planar loop need
-only be a point.  A scene is rewritten where its joints leave as many velocities as the joints of the
-rewritten
-one: the motions that the latter allows are then all that it has.
+In a planar motion a universal joint acts as a hinge, and a hinge that closes a loop can be replaced by a
+point. A scene is replaced only if its joints and the new joints leave equally many velocities, so that both
+allow equal motions.
 """
 
 from __future__ import annotations
@@ -25,17 +25,17 @@ from mbref.scene import (
     Universal,
 )
 
-PARALLEL = 1e-12  # sine of an angle between axes that counts as none
-AT_REST = 1e-12  # m/s and rad/s out of the plane, of those within
+PARALLEL = 1e-12  # sine of an angle between axes; smaller angles count as zero
+AT_REST = 1e-12  # velocity out of the plane / velocity within it; smaller ones count as zero
 
 
 def planar_scene(scene: Scene) -> Scene:
-    """The scene with the fewest coordinates in its plane; the scene itself where none has fewer."""
+    """Return the scene with the fewest coordinates in its plane; the scene itself if no other has fewer."""
     normals = [joint.directions[0] for joint in scene.joint if isinstance(joint, Revolute)]
     if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
         return scene
     found = [scene]
-    for kept in ((Spherical,), ()):  # a cut spherical joint is already a point closure
+    for kept in ((Spherical,), ()):  # a cut spherical joint closes a loop by a point without replacement
         joints = [joint if isinstance(joint, kept) else _hinged(joint, normal) for joint in scene.joint]
         if all(joint is not None for joint in joints):
             found.append(_closed_by_points(scene.with_(joint=joints)))
@@ -44,7 +44,7 @@ def planar_scene(scene: Scene) -> Scene:
 
 
 def _starts_within(scene: Scene, normal: np.ndarray) -> bool:
-    """Whether no body leaves the plane or tilts out of it at t = 0."""
+    """Return whether no body has a velocity out of the plane at t = 0."""
     linear, angular = initial_twists(scene)
     size = max(abs(linear).max(), abs(angular).max())
     out = max(abs(linear @ normal).max(), abs(np.cross(angular, normal)).max())
@@ -52,7 +52,7 @@ def _starts_within(scene: Scene, normal: np.ndarray) -> bool:
 
 
 def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
-    """The joint with the freedom that it has in the plane; None where it is not known to have any."""
+    """Return the joint with the freedom that it has in the plane; None if that is unknown."""
     axes = [unit(np.array(axis)) for axis in joint.directions]
     across = [bool(np.linalg.norm(np.cross(axis, normal)) < PARALLEL) for axis in axes]
     along = [bool(abs(axis @ normal) < PARALLEL) for axis in axes]
@@ -71,7 +71,7 @@ def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
 
 
 def _closed_by_points(scene: Scene) -> Scene:
-    """The scene whose cut hinges are points."""
+    """Return the scene whose cut hinges are replaced by points."""
     acting = {driver.joint for driver in scene.driver}
     acting |= {load.joint for load in scene.load if isinstance(load, TorsionSpring)}
     acting |= {name for coupling in scene.coupling for name in coupling.joints}
@@ -87,7 +87,7 @@ def _closed_by_points(scene: Scene) -> Scene:
 
 
 def _freedoms(scene: Scene) -> int:
-    """The number of velocities that the joints leave at t = 0, drivers aside."""
+    """Return the number of independent velocities that the joints, without drivers, leave at t = 0."""
     free = scene.with_(driver=())
     rows, _ = jacobian(free, 0.0, *initial_poses(free))
     return 6 * len(scene.body) - int(np.linalg.matrix_rank(rows, RANK_TOLERANCE))

@@ -1,4 +1,4 @@
-"""Stepping an engine from sample to sample: the samples of a run, and the integrators run outside engines."""
+"""Stepping of an engine from sample to sample: the samples of a run, and integrators of crosscheck."""
 
 from __future__ import annotations
 
@@ -24,17 +24,18 @@ WIDTHS = {
 }
 MAX_STEPS = 10**6  # steps in one sample interval; a run with more steps is stopped
 
-UNKNOWN = np.zeros((0, 3))  # accelerations of an engine that gives none
+UNKNOWN = np.zeros((0, 3))  # stands for accelerations that an engine does not give
 
 STRETCH = 1.01  # factor by which a step may be extended to end at a sample
-JUMPS = np.linspace(1.0, 4.0, 16)  # shortest steps, tried where the shortest one fails
+JUMPS = np.linspace(1.0, 4.0, 16)  # multiples of the shortest step that are tried if the shortest one fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
-Settle = Callable[[float, np.ndarray], np.ndarray]  # (t, accepted state) -> corrected state
+# function of (t, accepted state) that returns the corrected state
+Settle = Callable[[float, np.ndarray], np.ndarray]
 
 
 class Failed(Exception):
-    """A run the engine could not finish: its outcome, the time reached and one sentence."""
+    """A run that the engine could not finish: its outcome, the time reached and one sentence."""
 
     def __init__(self, outcome: Outcome, t: float, message: str):
         super().__init__(message)
@@ -53,8 +54,10 @@ class Counts:
 
 @dataclass(frozen=True)
 class Sample:
-    """The scene's bodies at one time, as a Trajectory has them: (nb, 3), orientations (nb, 4); accelerations
-    are UNKNOWN where the engine has none."""
+    """State of the scene's bodies at one time, as in a Trajectory: (nb, 3), orientations (nb, 4).
+
+    Accelerations are UNKNOWN if the engine gives none.
+    """
 
     position: np.ndarray
     orientation: np.ndarray
@@ -74,7 +77,7 @@ def run_through(
     build_seconds: float,
     labels: dict[str, Any],
 ) -> Trajectory:
-    """Advances from sample to sample; the trajectory, complete or as far as it got.
+    """Advance from sample to sample; returns the trajectory, complete or up to the time that was reached.
 
     ``labels`` are the trajectory's engine, version, method and settings.
     """
@@ -120,7 +123,7 @@ def _finite(sample: Sample) -> bool:
 
 
 def _stacked(samples: list[Sample], name: str, bodies: int, width: int) -> Any:
-    """The samples' arrays of a name (k, bodies, width); None where the engine gives none."""
+    """Return the samples' arrays of a name (k, bodies, width); None if the engine gives none."""
     if samples and getattr(samples[0], name) is UNKNOWN:
         return None
     return np.array([getattr(s, name) for s in samples], dtype=float).reshape(len(samples), bodies, width)
@@ -133,14 +136,15 @@ def _by_joint(reactions: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray] |
 
 
 def step_count(t0: float, t1: float, step: float) -> int:
-    """Number of equal steps, none longer than ``step``, from t0 to t1."""
+    """Return the number of equal steps between t0 and t1, none longer than ``step``."""
     return max(1, math.ceil((t1 - t0) / step * (1 - 1e-9)))
 
 
 def rk4(
     rhs: Rhs, settle: Settle, y: np.ndarray, t0: float, t1: float, step: float, counts: Counts
 ) -> np.ndarray:
-    """The state at t1 by the classical Runge-Kutta method, in equal steps no longer than ``step`` (s)."""
+    """Return the state at t1 by the classical Runge-Kutta method, in equal steps no longer than ``step``
+    (s)."""
     n = step_count(t0, t1, step)
     h = (t1 - t0) / n
     for i in range(n):
@@ -159,11 +163,12 @@ def rk4(
 
 @dataclass
 class Adaptive:
-    """DOP853 from sample to sample, every accepted state settled; keeps its step length between samples.
+    """DOP853 from sample to sample; every accepted state is projected, and the step length is kept between
+    samples.
 
-    Near a singular position the accelerations are noise, and ever shorter steps would integrate the noise
-    instead of passing it.  So ``min_step`` is the shortest: where it fails too, some longer steps are
-    tried, and the one with the least error estimate is taken whatever that is.
+    Near a singular position the accelerations are dominated by noise, and shorter steps would integrate the
+    noise instead of crossing the position. So ``min_step`` is the shortest step. If it fails, some longer
+    steps are tried, and the one with the least error estimate is accepted.
     """
 
     rhs: Rhs
@@ -172,10 +177,10 @@ class Adaptive:
     min_step: float  # s
     max_step: float  # s
     counts: Counts
-    step: float = 0.0  # s, tried next
+    step: float = 0.0  # s; length of the next step
 
     def advance(self, y: np.ndarray, t0: float, t1: float) -> np.ndarray:
-        """The state at t1; raises Failed where the motion stops being finite or does not end."""
+        """Return the state at t1; raises Failed if the motion is not finite or takes too many steps."""
         t, f = t0, self._evaluate(t0, y)
         self.step = self.step or self.min_step
         for _ in range(MAX_STEPS):
@@ -198,7 +203,7 @@ class Adaptive:
     def _jump(
         self, t: float, y: np.ndarray, f: np.ndarray, t1: float
     ) -> tuple[float, np.ndarray, np.ndarray, float]:
-        """The step, of the shortest and some longer ones, whose error estimate is the least."""
+        """Return the step with the least error estimate among the shortest and some longer ones."""
         lengths = {min(factor * self.min_step, t1 - t) for factor in JUMPS}
         attempts = [(h, *self._attempt(t, y, f, h)) for h in sorted(lengths)]
         self.counts.rejected += len(attempts)
@@ -216,7 +221,8 @@ class Adaptive:
     def _attempt(
         self, t: float, y: np.ndarray, f: np.ndarray, h: float
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """New state, settled, its slope, and the error estimate over the tolerance, of a step of h."""
+        """Return the projected new state, its slope, and the error estimate over the tolerance, for a step of
+        h."""
         k = np.empty((len(DOP853.C) + 1, len(y)))
         k[0] = f
         for i in range(1, len(DOP853.C)):
@@ -234,8 +240,11 @@ class Adaptive:
     def _settled(
         self, settle: Settle, t: float, y: np.ndarray, slope: np.ndarray, weight: np.ndarray, error: float
     ) -> tuple[np.ndarray, np.ndarray, float]:
-        """The settled state and its slope. The slope before counts as another estimate of the error: where
-        the little that settling changes turns it into another, a step would go on from noise."""
+        """Return the projected state, its slope and the error estimate.
+
+        The slope before the projection is a second estimate of the error: if the small projection changes the
+        slope by much, the next step would start from noise.
+        """
         try:
             settled = settle(t, y)
         except Failed:
@@ -246,7 +255,8 @@ class Adaptive:
 
 
 def _growth(error: float) -> float:
-    """Factor of the step length after an error estimate (in tolerances) of an eighth-order step."""
+    """Return the factor for the next step length, from an error estimate (over the tolerance) of an
+    eighth-order step."""
     if not math.isfinite(error):
         return 0.2
     return min(10.0, max(0.2, 0.9 * error ** (-1 / 8))) if error else 10.0

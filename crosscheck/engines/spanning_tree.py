@@ -38,17 +38,21 @@ COORDINATES = {FREE: 6, SLIDE: 1, TURN: 1, BALL_JOINT: 3}
 
 @dataclass(frozen=True)
 class Mobility:
-    """One elementary motion of a link relative to its parent: a slide along or a turn about ``axis`` (3,),
-    the free rotation of a ball, or the displacement and rotation of a free link."""
+    """One elementary motion of a link relative to its parent.
+
+    It is a slide along or a turn about ``axis`` (3,), the free rotation of a ball, or the displacement and
+    rotation of a free link.
+    """
 
     kind: str
     axis: np.ndarray
 
 
 def mobilities(facts: JointFacts, axes: np.ndarray) -> tuple[Mobility, ...]:
-    """The chain of elementary motions that a joint leaves free, slides first; ``axes`` (n, 3) are its own.
+    """Return the chain of elementary motions that a joint leaves free, slides first; ``axes`` (n, 3) are the
+    joint's axes.
 
-    A link that carries the line of an inline joint has the ball first, about the point of its parent.
+    If a link carries the line of an inline joint, the ball is first, about the point of its parent.
     """
     free = [n for n in range(3) if n not in facts.forbidden_translations]
     slides = [Mobility(SLIDE, joint_frame(axes[0])[:, n] if n < 2 else axes[0]) for n in free]
@@ -61,11 +65,11 @@ def mobilities(facts: JointFacts, axes: np.ndarray) -> tuple[Mobility, ...]:
 class Link:
     """A rigid piece of the tree and the joint that carries it.
 
-    Its frame sits at ``position`` (world) with world-aligned axes at t = 0; ``offset`` leads from there
-    to its centre of mass, about which ``inertia`` (3, 3) is taken.  ``kind`` is the scene's joint type or
-    ``"free"``, ``mobilities`` are the elementary motions that it leaves free; ``axes`` (n, 3) are unit
-    vectors, from the parent's side to the child's, such that positive coordinates move the joint's second
-    body relative to its first.
+    Its frame is at ``position`` (world), with world axes at t = 0. ``offset`` is the vector from there to its
+    centre of mass, to which ``inertia`` (3, 3) refers.  ``kind`` is the scene's joint type or ``"free"``,
+    ``mobilities`` are the elementary motions that it leaves free; ``axes`` (n, 3) are unit vectors, from the
+    parent's side to the child's, such that positive coordinates move the joint's second body relative to its
+    first.
     """
 
     body: int  # index in scene.body; -1 for the rod of a distance joint
@@ -80,45 +84,48 @@ class Link:
     anchor: np.ndarray = field(default_factory=lambda: np.zeros(3))
     axes: np.ndarray = field(default_factory=lambda: NO_AXES)
     ghost: bool = False
-    ends: tuple[tuple[int, np.ndarray], ...] = ()  # of a rod: bodies and anchors (world)
+    ends: tuple[tuple[int, np.ndarray], ...] = ()  # for a rod: bodies and anchors (world)
 
     @property
     def freedoms(self) -> int:
-        """Number of joint coordinates (velocities)."""
+        """Return the number of joint coordinates (velocities)."""
         return sum(COORDINATES[mobility.kind] for mobility in self.mobilities)
 
 
 @dataclass(frozen=True)
 class Closure:
-    """A loop closure: a ``point`` that two links share, a ``weld`` of a link and its ghost, or the type of a
-    joint that the engine closes by itself."""
+    """A loop closure: a ``point`` shared by two links, a ``weld`` of the two parts of a split body, or the
+    type of a joint that the engine closes by itself."""
 
     kind: str
     joint: int
-    links: tuple[int, int]  # the joint's first and second body's; of a weld: the body's link and the ghost
+    # links of the joint's first and second body; of a weld: the body's link and its ghost
+    links: tuple[int, int]
     anchor: np.ndarray
 
 
 @dataclass(frozen=True)
 class Tree:
-    """Links in depth-first order (parents first), closures, and where the scene's parts went."""
+    """Links in depth-first order (parents first), closures, and the links of the scene's bodies and
+    joints."""
 
     links: tuple[Link, ...]
     closures: tuple[Closure, ...]
-    own: tuple[int, ...]  # the link of each of the scene's bodies
-    starts: tuple[int, ...]  # first joint velocity of each link
+    own: tuple[int, ...]  # link of each body of the scene
+    starts: tuple[int, ...]  # index of the first joint velocity of each link
 
     @property
     def nv(self) -> int:
-        """Number of joint velocities."""
+        """Return the number of joint velocities."""
         return sum(link.freedoms for link in self.links)
 
     def link_of(self, body: int) -> int:
-        """The link of a scene's body; the ground's for -1."""
+        """Return the link of a scene's body; the ground's for -1."""
         return self.own[body] if body >= 0 else GROUND_LINK
 
     def coordinate(self, scene: Scene, joint: str, kind: Coordinate | None = None) -> int:
-        """Index of a joint's velocity, of its angle or displacement; by default of the driven coordinate."""
+        """Return the index of a joint's velocity, for its angle or displacement; by default for the driven
+        coordinate."""
         index = [j.name for j in scene.joint].index(joint)
         link = next(k for k, item in enumerate(self.links) if item.joint == index)
         found = self.links[link]
@@ -140,9 +147,9 @@ class _Edge:
 
 
 def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
-    """The scene as links and closures; bodies without mass (kinematics) count 1 kg and 1 kg m².
+    """Return the scene as links and closures; bodies without mass (kinematics) have 1 kg and 1 kg m².
 
-    ``closes`` are the types of joints that the engine closes by itself, without a ghost.
+    ``closes`` are the types of joints that the engine closes by itself, without splitting a body.
     """
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
@@ -173,19 +180,20 @@ def _body_link(index: int, body: Body) -> Link:
 
 
 def _axes(joint: Joint) -> np.ndarray:
-    """Unit axes (n, 3) of a joint, first body's first."""
+    """Return the unit axes (n, 3) of a joint, the first body's first."""
     return np.array([unit(axis) for axis in joint.directions]).reshape(-1, 3)
 
 
 def effective_mass(link: Link, point: np.ndarray) -> float:
-    """The smallest mass (kg) a free link shows to a force at a point (world), over all directions."""
+    """Return the smallest effective mass (kg) of a free link for a force at a point (world), over all
+    directions."""
     arm = cross_matrix(point - link.position - link.offset)
     mobility = np.eye(3) / link.mass - arm @ np.linalg.pinv(link.inertia, hermitian=True) @ arm
     return 1 / np.linalg.eigvalsh(mobility)[-1]
 
 
 def _without_point_mass(link: Link, point: np.ndarray, mass: float) -> Link:
-    """A link after a point mass at a point (world) was taken out of it."""
+    """Return a link after a point mass at a point (world) was removed from it."""
     rest = link.mass - mass
     arm = point - link.position
     offset = (link.mass * link.offset - mass * arm) / rest
@@ -195,7 +203,7 @@ def _without_point_mass(link: Link, point: np.ndarray, mass: float) -> Link:
 
 
 def _rod(nodes: list[Link], joint: int, pair: tuple[int, int], anchors: np.ndarray) -> list[_Edge]:
-    """Adds the rod of a distance joint to the nodes; its two edges."""
+    """Add the rod of a distance joint to the nodes; returns its two edges."""
     ends = [(b, anchor) for b, anchor in zip(pair, anchors, strict=True) if b >= 0]
     mass = ROD_SHARE * min(effective_mass(nodes[b], anchor) for b, anchor in ends)
     for b, anchor in ends:
@@ -212,8 +220,8 @@ def _rod(nodes: list[Link], joint: int, pair: tuple[int, int], anchors: np.ndarr
 
 
 def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
-    """Edges of a maximum-weight spanning forest, ground included, and the edges cut."""
-    group = list(range(count + 1))  # the ground, -1, is the last entry
+    """Return the edges of a maximum-weight spanning forest, ground included, and the cut edges."""
+    group = list(range(count + 1))  # the last entry is the ground, -1
     kept: list[_Edge] = []
     cut: list[_Edge] = []
     for edge in sorted(edges, key=lambda edge: -edge.weight):
@@ -226,7 +234,8 @@ def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
 def _cut_open(
     nodes: list[Link], kept: list[_Edge], cut: list[_Edge], closes: Collection[str]
 ) -> list[Closure]:
-    """Closures of the cut edges; adds the ghosts to the nodes and their joints to the kept edges."""
+    """Return the closures of the cut edges; adds the ghosts to the nodes and their joints to the kept
+    edges."""
     closures: list[Closure] = []
     ghosts: dict[int, list[int]] = {}
     for edge in cut:
@@ -249,7 +258,8 @@ def _cut_open(
 
 
 def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure], bodies: int) -> Tree:
-    """Numbers the nodes depth first from the ground; a part nothing ties to it begins with a free link."""
+    """Number the nodes depth first from the ground; a part without connection to the ground begins with a
+    free link."""
     number: dict[int, int] = {GROUND_LINK: GROUND_LINK}
     links: list[Link] = []
 

@@ -1,13 +1,13 @@
-"""An engine's own terms of the equations of motion of a tree, in crosscheck's integrator.
+"""Integration by crosscheck of the equations of motion whose terms an engine computes.
 
-The engine gives the mass matrix M, the bias h of gravity and gyration, and of every link its pose, Jacobian
-and the acceleration at zero v'.  Closures and drivers are rows J v' = γ added here, loads are wrenches on the
-links, and
+The engine gives the mass matrix M, the bias force h of gravity and velocities, and for every link its pose,
+Jacobian and acceleration at v' = 0. Closures and drivers are additional rows J v' = γ, loads are wrenches on
+the links, and
 
     M v' + h = τ + Jᵀ λ
 
-is solved by least squares weighted by the mass, so that redundant rows do no harm.  States are integrated by
-DOP853 and projected onto the closures after every step, by the least kinetic energy.
+is solved by least squares weighted with the mass matrix, so that redundant rows are allowed.  States are
+integrated by DOP853 and projected onto the closures after every step, by the least kinetic energy.
 """
 
 from __future__ import annotations
@@ -36,17 +36,21 @@ FAMILY = "terms"
 ABOUT = "the engine's mass matrix, bias and Jacobians; DOP853, closures solved and projected by crosscheck"
 RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest step
-TURN_PER_STEP = 0.25  # rad a driver may move within one step: closures can fold in between
-PROJECTIONS = 10  # Newton iterations at most; two are usual
-CLOSED = 1e-13  # m and rad, where a projection ends
-CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
+# rad; a driver moves by at most this in one step, since closures may change branch within larger ones
+TURN_PER_STEP = 0.25
+PROJECTIONS = 10  # largest number of Newton iterations; two are usual
+CLOSED = 1e-13  # m and rad; residual at which a projection ends
+CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
+REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
 
 
 class Terms(NamedTuple):
-    """An engine's terms at a state, velocities in the tree's order; of every link the rotation since t = 0
-    (n, 3, 3) and position (n, 3) of its frame in the world, the Jacobian (n, 6, nv) of its velocity and
-    angular velocity, and its accelerations (n, 6) at v' = 0."""
+    """An engine's terms at a state, velocities in the tree's order.
+
+    For every link they contain the rotation since t = 0 (n, 3, 3) and position (n, 3) of its frame in the
+    world, the Jacobian (n, 6, nv) of its velocity and angular velocity, and its accelerations (n, 6) at v' =
+    0.
+    """
 
     mass: np.ndarray
     bias: np.ndarray
@@ -57,26 +61,26 @@ class Terms(NamedTuple):
 
 
 class Mechanism(Protocol):
-    """A scene's tree in an engine."""
+    """Interface of a scene's tree in an engine."""
 
     scene: Scene
     tree: Tree
     coordinates: JointCoordinates
 
     def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The engine's terms at positions (nq,) and velocities (nv,)."""
+        """Return the engine's terms at positions (nq,) and velocities (nv,)."""
 
 
 def sweep(rate: float) -> list[Setting]:
-    """Settings by relative tolerance for a scene that turns at a rate (rad/s)."""
+    """Return settings by relative tolerance for a scene that turns at a rate (rad/s)."""
     shortest = float(f"{LEAST_TURN / rate:.2g}")
     return [Setting(FAMILY, {"rtol": rtol, "min_step": shortest}) for rtol in RTOLS]
 
 
 @dataclass(frozen=True)
 class _Rows:
-    """Closures at a state: residuals (m,), m and rad, Jacobian (m, nv), accelerations (m,) at v' = 0, and the
-    places (world) of the closures' second anchors."""
+    """Closures at a state: residuals (m,), m and rad, Jacobian (m, nv), accelerations (m,) at v' = 0, and
+    positions (world) of the closures' second anchors."""
 
     residual: np.ndarray
     jacobian: np.ndarray
@@ -126,11 +130,12 @@ class Simulation:
         return found._replace(mass=found.mass + self.rotors)
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1; raises Failed."""
+        """Move the state from t0 to t1; raises Failed."""
         self.y = self.integrator.advance(self.y, t0, t1)
 
     def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions and velocities of a state; driven ones as prescribed at t, quaternions of length 1."""
+        """Return positions and velocities of a state; driven ones as prescribed at t, quaternions of length
+        1."""
         q, v = self.at.normalised(y[: self.at.nq]), y[self.at.nq :]
         if self.driven:
             q, v = q.copy(), v.copy()
@@ -139,7 +144,7 @@ class Simulation:
         return q, v
 
     def rates(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Rates (nq + nv,) of a state."""
+        """Return the rates (nq + nv,) of a state."""
         q, v = self.split(t, y)
         return np.concatenate([self.at.rates(q, v), self.accelerations(t, q, v)[0]])
 
@@ -163,7 +168,8 @@ class Simulation:
         return a, multipliers, self._accelerated(terms, motion_now, a), rows
 
     def settled(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The state nearest to y, by kinetic energy, that satisfies closures and drivers; raises Failed."""
+        """Return the state nearest to y, by kinetic energy, that satisfies closures and drivers; raises
+        Failed."""
         q, v = self.split(t, y)
         if not (self.tree.closures or self.scene.coupling):
             return np.concatenate([q, v])
@@ -180,13 +186,13 @@ class Simulation:
         return np.concatenate([q, v - self._least(t, root, rows.jacobian, rows.jacobian @ v)])
 
     def sample(self, t: float) -> Sample:
-        """Poses, velocities, accelerations and reactions."""
+        """Return poses, velocities, accelerations and reactions."""
         q, v = self.split(t, self.y)
         _, multipliers, moved, rows = self.accelerations(t, q, v)
         return sample_of(self.scene, self.tree, moved, self._closing(multipliers, rows))
 
     def _closing(self, multipliers: np.ndarray, rows: _Rows) -> list[np.ndarray]:
-        """Per closure, the wrench on its second link about the world's origin."""
+        """Return, for each closure, the wrench on its second link about the world's origin."""
         found, start = [], 0
         for closure, place in zip(self.tree.closures, rows.places, strict=True):
             force = multipliers[start : start + 3]
@@ -225,7 +231,7 @@ class Simulation:
         )
 
     def _forces(self, terms: Terms, of: LinkMotion) -> np.ndarray:
-        """Generalised forces (nv,) of the loads."""
+        """Return generalised forces (nv,) of the loads."""
         tau = np.zeros(self.at.nv)
         for link, force, moment in applied(self.scene, self.tree, of):
             tau += terms.jacobian[link].T @ np.concatenate([force, moment])
@@ -256,7 +262,8 @@ class Simulation:
     def _end(
         self, terms: Terms, v: np.ndarray, link: int, anchor: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Place (3,) of a point of a link, its Jacobian (6, nv), and its accelerations (6,) at v' = 0."""
+        """Return the position (3,) of a point of a link, its Jacobian (6, nv), and its accelerations (6,) at
+        v' = 0."""
         if link == GROUND_LINK:
             return anchor, np.zeros((6, self.at.nv)), np.zeros(6)
         arm = terms.rotation[link] @ (anchor - self.tree.links[link].position)
@@ -267,7 +274,7 @@ class Simulation:
         return terms.position[link] + arm, jacobian, drift
 
     def _root(self, t: float, terms: Terms) -> np.ndarray:
-        """The lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
+        """Return the lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
         mass = terms.mass[np.ix_(self.free, self.free)]
         if not np.isfinite(mass).all():
             raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
@@ -279,7 +286,8 @@ class Simulation:
         return solve_triangular(root, jacobian[:, self.free].T, lower=True).T
 
     def _least(self, t: float, root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-        """The change (nv,) of least kinetic energy, zero in driven coordinates, that rows want."""
+        """Return the change (nv,) of least kinetic energy, zero in driven coordinates, for which the rows
+        have the wanted values."""
         spread, change = self._spread(t, root, jacobian), np.zeros(self.at.nv)
         least = np.linalg.lstsq(spread, wanted, rcond=REDUNDANT)[0]
         change[self.free] = solve_triangular(root, least, lower=True, trans="T")

@@ -1,7 +1,8 @@
 """Joint reactions of a tree by Newton-Euler recursion, from an engine's accelerations and closure forces.
 
-Wrenches are (force, moment about the world's origin), world axes.  Between redundant joints the reaction
-is the engine's choice; a ghost's joint carries the reaction of the joint that was cut.
+Wrenches are (force, moment about the world's origin), world axes.  In redundant joints the reaction depends
+on the engine. If a body was split at a cut joint, the joint of its second part has the reaction of the cut
+joint.
 """
 
 from __future__ import annotations
@@ -24,8 +25,8 @@ ZERO = np.zeros(3)
 class LinkMotion:
     """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); the rest (n, 3).
 
-    Accelerations are UNKNOWN where the engine has none;
-    ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful where a joint has one angle.
+    Accelerations are UNKNOWN if the engine gives none;
+    ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful if a joint has a single angle.
     """
 
     rotation: np.ndarray
@@ -39,13 +40,15 @@ class LinkMotion:
 
 
 def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> np.ndarray:
-    """(6,): a force at a point and a moment."""
+    """Return the wrench (6,) of a force at a point and a moment."""
     return np.concatenate([force, moment + cross(point, force)])
 
 
 def sample_of(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray] | None) -> Sample:
-    """The scene's bodies and joints in a motion of the links; without reactions where ``closing`` is None or
-    the scene has no masses."""
+    """Return the scene's bodies and joints for a motion of the links.
+
+    There are no reactions if ``closing`` is None or the scene has no masses.
+    """
     own = list(tree.own)
     start = np.array([body.orientation for body in scene.body])
     weighed = closing is not None and scene.has_mass()
@@ -61,7 +64,8 @@ def sample_of(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np
 
 
 def applied(scene: Scene, tree: Tree, motion: LinkMotion) -> list[tuple[int, np.ndarray, np.ndarray]]:
-    """The links that loads act on, each with a force and a moment about the origin of its frame, world."""
+    """Return the links on which loads act, each with a force and a moment about the origin of its frame,
+    world."""
     loads = scene.load if scene.has_mass() else ()
     found = [pair for load in loads for pair in _applied(scene, tree, motion, load)]
     return [
@@ -74,9 +78,9 @@ def applied(scene: Scene, tree: Tree, motion: LinkMotion) -> list[tuple[int, np.
 def joint_reactions(
     scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]
 ) -> dict[str, np.ndarray]:
-    """Force and moment (6,) on each joint's second body at the anchor on that body, world axes.
+    """Return force and moment (6,) on each joint's second body at the anchor on that body, world axes.
 
-    ``closing`` has, per closure of the tree, the wrench on its second link.
+    ``closing`` has, for each closure of the tree, the wrench on its second link.
     """
     carried = _carried(scene, tree, motion, closing)
     by_joint = {c.joint: w for c, w in zip(tree.closures, closing, strict=True) if c.kind == "point"}
@@ -92,9 +96,9 @@ def joint_reactions(
 
 
 def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """The wrench on every link through the joint that carries it."""
+    """Return the wrench on every link through the joint that carries it."""
     needed = [_inertial(scene, tree, motion, k) for k in range(len(tree.links))]
-    needed.append(np.zeros(6))  # the ground's, index -1
+    needed.append(np.zeros(6))  # the last entry, index -1, is the ground's
     for load in scene.load:
         for link, applied in _applied(scene, tree, motion, load):
             needed[link] = needed[link] - applied
@@ -109,7 +113,7 @@ def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.
 
 
 def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarray:
-    """The wrench that accelerates a link, its weight taken off."""
+    """Return the wrench that accelerates a link, without its weight."""
     link, rotation, omega = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
     arm = rotation @ link.offset
     angular = motion.angular_acceleration[k]
@@ -126,7 +130,8 @@ def _arm(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> n
 def _point(
     tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Present position and velocity of a point of a link (of the ground), given in the world at t = 0."""
+    """Return present position and velocity of a point of a link (or of the ground), given in the world at t =
+    0."""
     if link == GROUND_LINK:
         return np.array(point), ZERO
     arm = _arm(tree, motion, link, point)
@@ -134,7 +139,7 @@ def _point(
 
 
 def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[tuple[int, np.ndarray]]:
-    """The links that a load acts on, each with the wrench on it."""
+    """Return the links on which a load acts, each with the wrench on it."""
     if isinstance(load, Moment):
         return [(tree.link_of(scene.body_index(load.body)), np.array([*ZERO, *load.moment]))]
     if isinstance(load, Force):
@@ -167,7 +172,8 @@ def _twisted(
 def _at_second_anchor(
     scene: Scene, tree: Tree, motion: LinkMotion, j: int, on_second: np.ndarray
 ) -> np.ndarray:
-    """A joint's wrench moved to the anchor on the second body; a rod's end mass given back to the body."""
+    """Return a joint's wrench at the anchor on the second body; the end mass of a rod counts as part of the
+    body."""
     joint = scene.joint[j]
     link = tree.link_of(scene.body_index(joint.bodies[1]))
     anchor, _ = _point(tree, motion, link, joint.anchor_pair[1])

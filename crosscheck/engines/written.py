@@ -1,4 +1,4 @@
-"""Python code of settings: an object that writes down the assignments that a function makes to it."""
+"""Python code of settings, from an object that records the assignments that a function makes to it."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from typing import Any
 
 
 class Written:
-    """A name in code; attributes are names too, and every value that is assigned to one becomes a statement.
+    """A name in generated code. Its attributes are names, too, and every assignment to an attribute becomes a
+    statement.
 
-    A function that sets up an engine's settings writes its own code when it is given this object.
+    A function that sets an engine's options writes its own code if it receives this object in place of the
+    options.
     """
 
     _name: str

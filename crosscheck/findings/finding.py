@@ -1,6 +1,6 @@
-"""A finding: what an engine does wrong, the proof of it, and whether the installed version still does it.
+"""A finding: an error of an engine, its proof, and whether the installed version still has it.
 
-The proof is a script that needs the engine alone, or a scene that is run at a setting and judged by its
+The proof is a script that needs the engine alone, or a scene that runs at a setting and is judged by its
 truth.
 """
 
@@ -32,7 +32,7 @@ TIME_LIMIT = 900.0  # s; some engines compile their code first
 
 
 class Status(enum.Enum):
-    """Whether the installed version does what a finding says."""
+    """Result of a proof: whether the installed version still has the error."""
 
     PRESENT = "present"
     GONE = "gone"
@@ -41,7 +41,7 @@ class Status(enum.Enum):
 
 
 class Answer(NamedTuple):
-    """The status with the version asked, and the number measured or the reason."""
+    """Status with the tested version, and the measured number or the reason."""
 
     status: Status
     version: str
@@ -51,11 +51,12 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """``does`` and ``right`` are sentences: what the engine does, and what is right by whose truth.
+    """``does`` is a sentence on what the engine does. ``right`` is a sentence on what is right, and how that
+    is known.
 
-    A finding is present where the number that its proof measures, in ``unit``, is above ``wrong_above``, or
-    where the process of its ``script`` is ended by a signal if ``crashes``.  ``measured`` was the number at
-    ``version`` of ``package``.
+    The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``. If
+    ``crashes`` is set, it has the error if a signal ends the process of its ``script``.  ``measured`` was the
+    number at ``version`` of ``package``.
     """
 
     name: str
@@ -117,10 +118,10 @@ class Finding:
         return Answer(found, version, measured, f"{measured:.3g} {self.unit}".strip())
 
     def command(self) -> str:
-        """The command that runs the proof again."""
+        """Return the command that runs the proof again."""
         return f"crosscheck findings --recheck {self.name}"
 
 
 def findings() -> Sequence[Finding]:
-    """The stored findings."""
+    """Return the stored findings."""
     return [Finding(**entry) for entry in tomllib.loads((FOLDER / "findings.toml").read_text())["finding"]]

@@ -1,1 +1,2 @@
-"""The judge: residuals, loads, energy, metrics and truth from poses alone, without engine or model."""
+"""The judge computes residuals, loads, energy, metrics and truths from poses alone. It uses no engine and no
+code of mbref's methods."""

@@ -1,7 +1,8 @@
-"""Joint equations of a scene from poses: residuals at three levels, Jacobian, initial velocities.
+"""Joint equations of a scene, evaluated from poses: residuals at three levels, Jacobian, initial velocities.
 
-Plain numpy and formulas of its own (see joint_residuals.py), so that a trajectory can be judged without the
-model that produced it.  Arrays may have any leading shape (…): one pose, or the samples of a trajectory.
+The formulas (see joint_residuals.py) are independent of mbref's and use numpy only, so that a trajectory is
+judged without the model that produced it.  Arrays may have any leading shape (…): one pose, or the samples of
+a trajectory.
 """
 
 from __future__ import annotations
@@ -28,10 +29,11 @@ Residuals = dict[str, np.ndarray]
 
 
 def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray) -> Residuals:
-    """Position residuals (…, rows) by joint name, m and rad, of positions (…, nb, 3) and unit
-    quaternions (…, nb, 4) at times t (…); a driver's residual stands last under its joint.
+    """Return position residuals (…, rows) by joint name, m and rad, for positions (…, nb, 3) and unit
+    quaternions (…, nb, 4) at times t (…). A driver's residual is the last one of its joint.
 
-    Couplings are left out: one pose does not say how often a joint has turned (see ``coupling_gaps``)."""
+    Couplings are left out, since one pose does not determine the number of full turns (see
+    ``coupling_gaps``)."""
     pose = with_ground(position, orientation)
     return {
         joint.name: joint_residuals.position_rows(joint, np.asarray(t, float), *pose)
@@ -47,9 +49,11 @@ def closure_rates(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> Residuals:
-    """Velocity residuals (…, rows), m/s and rad/s, of world velocities (…, nb, 3): the forbidden
-    components of the frames' relative twist; on closed poses the time derivative of `closure`.  The couplings
-    follow the joints, by name."""
+    """Return velocity residuals (…, rows), m/s and rad/s, for world velocities (…, nb, 3).
+
+    They are the forbidden components of the relative twist of the joint frames. If the pose satisfies the
+    joints, they are the time derivative of `closure`. Couplings follow the joints, by name.
+    """
     motion = (*with_ground(position, orientation), grounded(velocity), grounded(angular_velocity))
     found = {
         joint.name: joint_residuals.velocity_rows(joint, np.asarray(t, float), *motion)
@@ -68,7 +72,7 @@ def closure_accelerations(
     acceleration: np.ndarray,
     angular_acceleration: np.ndarray,
 ) -> Residuals:
-    """Acceleration residuals (…, rows), m/s² and rad/s²: the time derivative of `closure_rates`."""
+    """Return acceleration residuals (…, rows), m/s² and rad/s²: the time derivative of `closure_rates`."""
     rates = (velocity, angular_velocity, acceleration, angular_acceleration)
     motion = (*with_ground(position, orientation), *map(grounded, rates))
     found = {
@@ -85,14 +89,18 @@ def coupling_gaps(
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> Residuals:
-    """Position residuals (k, 1) of couplings by name, q₂ - ratio q₁ in m or rad, of trajectory arrays
-    (k, nb, ·); NaN from where the samples are too far apart to count turns."""
+    """Return position residuals (k, 1) of couplings by name, q₂ - ratio q₁ in m or rad, for trajectory arrays
+    (k, nb, ·).
+
+    They are NaN from the first sample on at which the samples are too far apart to count turns.
+    """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
     return _coupled(scene, lambda joint: coordinates(joint, *motion))
 
 
 def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Residuals:
-    """q₂ - ratio q₁ (…, 1) of each coupling, from both coordinates of a joint (…, 2), or their rates."""
+    """Return q₂ - ratio q₁ (…, 1) of each coupling, from both coordinates (…, 2) of every joint, or from
+    their rates."""
     joints = {joint.name: joint for joint in joint_residuals.joint_frames(scene)}
     found: Residuals = {}
     for coupling in scene.coupling:
@@ -105,7 +113,7 @@ def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Res
 
 
 def length_rows(scene: Scene) -> dict[str, np.ndarray]:
-    """Masks (rows,) of the residuals by name of the joint or coupling: True for lengths (m), False for
+    """Return masks (rows,) of the residuals by name of joint or coupling: True for lengths (m), False for
     angles (rad)."""
     found = {joint.name: joint_residuals.are_lengths(joint) for joint in joint_residuals.joint_frames(scene)}
     ends = {coupling.name: scene.coupled(coupling)[1][1] for coupling in scene.coupling}
@@ -119,10 +127,10 @@ def joint_coordinates(
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """(k, 2) angle (rad) and displacement (m) since t = 0 of every joint with a coordinate, by name.
+    """Return angle (rad) and displacement (m) since t = 0 (k, 2) of every joint with a coordinate, by name.
 
-    Trajectory arrays (k, nb, ·).  The angle counts turns; it is NaN from where the samples are too far
-    apart to tell them.
+    Arguments are trajectory arrays (k, nb, ·). The angle counts full turns. It is NaN from the first sample
+    on at which the samples are too far apart to count them.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
     with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
@@ -138,7 +146,8 @@ def joint_rates(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> dict[str, np.ndarray]:
-    """(…, 2) rates of angle (rad/s) and displacement (m/s) of every joint with a coordinate, by name."""
+    """Return rates of angle (rad/s) and displacement (m/s) (…, 2) of every joint with a coordinate, by
+    name."""
     motion = (*with_ground(position, orientation), grounded(velocity), grounded(angular_velocity))
     joints = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
     return {joint.name: coordinate_rates(joint, *motion) for joint in joints}
@@ -147,8 +156,8 @@ def joint_rates(
 def jacobian(
     scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(J, b) with J x = b at velocity level: J (rows, 6 nb), b (rows,), the joints' rows in their order, then
-    the couplings'.
+    """Return (J, b) of the velocity equations J x = b: J (rows, 6 nb), b (rows,), first the joints' rows in
+    their order, then the couplings'.
 
     x holds (velocity of the centre of mass, angular velocity), world, body after body; `position` (nb, 3)
     and `orientation` (nb, 4) are one pose.
@@ -162,17 +171,17 @@ def jacobian(
 
 
 def initial_poses(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (nb, 3) and orientations (nb, 4) the scene gives at t = 0."""
+    """Return the positions (nb, 3) and orientations (nb, 4) of the scene at t = 0."""
     return np.array([b.position for b in scene.body]), np.array([b.orientation for b in scene.body])
 
 
 def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Velocities and angular velocities (nb, 3), world, at t = 0 that obey joints and drivers.
+    """Return velocities and angular velocities (nb, 3), world, at t = 0 that satisfy joints and drivers.
 
-    Among those, the nearest to the velocities the scene gives (least squares, angular ones times the
-    scene's length); velocities left free have the least mass-weighted norm (unit masses where the scene
-    has none).  Raises SceneError naming the joint when given velocities contradict the joints by more than
-    5 % of the velocities' scale, or drivers by more than 0.1 %.
+    They are the nearest to the given velocities in the sense of least squares, with angular velocities
+    multiplied by the scene's length. Velocities that are still free have the least mass-weighted norm (unit
+    masses if the scene has none).  Raises SceneError naming the joint when given velocities contradict the
+    joints by more than 5 % of the velocities' scale, or drivers by more than 0.1 %.
     """
     pose = initial_poses(scene)
     scale = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
@@ -195,9 +204,12 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def scene_length(scene: Scene) -> float:
-    """Characteristic length (m): the largest distance between two of the joint anchors and centres of
-    mass at t = 0; where these coincide, the way of a body in flight or a radius of gyration, if larger,
-    and 1 without both."""
+    """Return the characteristic length (m): the largest distance between two joint anchors or centres of mass
+    at t = 0.
+
+    If these coincide, it is the distance that a free body travels or a radius of gyration, whichever is
+    larger, and 1 if both vanish.
+    """
     points = [body.position for body in scene.body]
     for joint in scene.joint:
         points += joint.anchor_pair
@@ -206,7 +218,7 @@ def scene_length(scene: Scene) -> float:
 
 
 def _of_one_point(scene: Scene) -> float:
-    """Largest way (m) that a body without joints goes, or radius of gyration."""
+    """Return the largest distance (m) that a body without joints travels, or its radius of gyration."""
     speeds = [np.linalg.norm(body.velocity or 0.0) for body in scene.body]
     way = max(speeds) * scene.duration + np.linalg.norm(scene.gravity) * scene.duration**2 / 2
     if not scene.has_mass():
@@ -216,13 +228,14 @@ def _of_one_point(scene: Scene) -> float:
 
 
 def inertia_matrices(scene: Scene) -> np.ndarray:
-    """Inertia (nb, 3, 3) about the centres of mass along the body axes, kg m²; the scene has masses."""
+    """Return the inertia matrices (nb, 3, 3) about the centres of mass along the body axes, kg m²; the scene
+    must have masses."""
     given = [np.array(body.inertia) for body in scene.body]
     return np.array([np.diag(i) if i.ndim == 1 else i for i in given])
 
 
 def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mask (6 nb,) of the given velocity components, and their values divided by `scale`."""
+    """Return the mask (6 nb,) of the given velocity components, and their values divided by `scale`."""
     rows = [(*(b.velocity or (np.nan,) * 3), *(b.angular_velocity or (np.nan,) * 3)) for b in scene.body]
     values = np.array(rows, dtype=float).ravel()
     given = ~np.isnan(values)
@@ -230,14 +243,15 @@ def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Least-squares solution of least norm, and a basis (n, k) of the null space."""
+    """Return the least-squares solution of least norm, and a basis (n, k) of the null space."""
     u, s, vt = np.linalg.svd(matrix, full_matrices=True)
     rank = int(np.sum(s > RANK * max(s.max(initial=0.0), 1e-300)))
     return vt[:rank].T @ ((u[:, :rank].T @ rhs) / s[:rank]), vt[rank:].T
 
 
 def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray, most: float) -> None:
-    """SceneError naming the joint with the largest residual, if that is above ``most`` of the velocities."""
+    """Raise SceneError for the joint with the largest residual if that exceeds the fraction ``most`` of the
+    velocities."""
     names = [name for name, rows in length_rows(scene).items() for _ in rows]
     scale = np.abs(x).max(initial=0.0)
     if names and np.abs(residual).max() > most * scale:
@@ -249,7 +263,7 @@ def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray, most: f
 
 
 def _place(scene: Scene, name: str) -> str:
-    """The path of a joint or a coupling."""
+    """Return the path of a joint or a coupling in the scene."""
     for key, entries in (("joint", scene.joint), ("coupling", scene.coupling)):
         names = [entry.name for entry in entries]
         if name in names:
@@ -258,7 +272,7 @@ def _place(scene: Scene, name: str) -> str:
 
 
 def _root_of_mass(scene: Scene) -> np.ndarray:
-    """W (·, 6 nb) with WᵀW the mass matrix of the twists at t = 0; the identity without masses."""
+    """Return W (·, 6 nb) with WᵀW the mass matrix of the twists at t = 0; the identity without masses."""
     n = 6 * len(scene.body)
     root = np.eye(n)
     if scene.has_mass():

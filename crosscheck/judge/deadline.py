@@ -1,7 +1,7 @@
-"""A limit of CPU time for the calling thread, asked wherever the judge computes for long.
+"""A limit of CPU time for the calling thread, checked in all long computations of the judge.
 
-``within(seconds)`` sets the limit, ``ask()`` raises TimeIsUp once it has passed.  Long work asks in its
-innermost loop of more than a few array operations, so that no caller hands a deadline down.
+``within(seconds)`` sets the limit, and ``ask()`` raises TimeIsUp after it. Long computations call ``ask`` in
+their inner loops, so that no function needs an argument for the limit.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ _given_up = threading.Event()
 
 
 class TimeIsUp(ArithmeticError):
-    """The CPU time that the work was given has passed."""
+    """The CPU time for the work has passed."""
 
     def __init__(self) -> None:
         super().__init__("the time for it was up")
 
 
 class GivenUp(Exception):
-    """The work was not finished, because its result is no longer wanted."""
+    """The work was cancelled, because its result is no longer needed."""
 
 
 class _Limit(threading.local):
-    """The thread's CPU time (s) at which its work ends."""
+    """The CPU time (s) of the thread at which its work ends."""
 
     end = float("inf")
 
@@ -36,7 +36,8 @@ _limit = _Limit()
 
 @contextmanager
 def within(seconds: float) -> Iterator[None]:
-    """Limit the CPU time (s) of the calling thread in the block; an outer limit that ends sooner stays."""
+    """Limit the CPU time (s) of the calling thread in the ``with`` block; an outer limit that ends sooner
+    stays valid."""
     before = _limit.end
     _limit.end = min(before, time.thread_time() + seconds)
     try:
@@ -46,7 +47,7 @@ def within(seconds: float) -> Iterator[None]:
 
 
 def ask() -> None:
-    """Raise TimeIsUp past the calling thread's limit, and GivenUp where no thread's result is wanted."""
+    """Raise TimeIsUp after the calling thread's limit, and GivenUp if all work was cancelled."""
     if _given_up.is_set():
         raise GivenUp("the computation was cancelled")
     if time.thread_time() > _limit.end:
@@ -55,7 +56,8 @@ def ask() -> None:
 
 @contextmanager
 def given_up() -> Iterator[None]:
-    """End the work of other threads by GivenUp until the block is left: an interrupt does not wait for it."""
+    """Cancel the work of other threads while the ``with`` block runs, so that an interrupt does not wait for
+    it."""
     _given_up.set()
     try:
         yield

@@ -1,8 +1,8 @@
 """Energy balance of a trajectory: kinetic energy and the potentials of gravity and loads over its samples.
 
-Every conservative load has a potential, so that energy minus work is one sum that stays constant.  A
-constant moment has one on a body whose joints keep it turning about a fixed direction parallel to the
-moment; elsewhere its work is the integral of the power through the samples (cubic spline).
+Every conservative load has a potential, so that energy minus work is one sum that stays constant.  A constant
+moment has a potential if joints let its body turn only about a fixed direction parallel to the moment.
+Otherwise its work is the integral of the power over the samples (cubic spline).
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from mbref.trajectory import Trajectory
 
 
 def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
-    """Drift (k,) of energy minus work since t = 0, J divided by the largest energy seen.
+    """Return the drift (k,) of energy minus work since t = 0, divided by the largest energy of the motion.
 
-    None when a driver or a damper does work, when the scene has no masses, when the samples are too far
-    apart to count a body's turns, or when nothing ever has energy beyond rounding; infinite when a state is
-    not finite.
+    None if a driver or a damper does work, if the scene has no masses, if the samples are too far apart to
+    count a body's turns, or if all energies are at rounding level. The drift is infinite if a state is not
+    finite.
     """
     balance = _balance(scene, trajectory)
     if balance is None:
@@ -36,14 +36,17 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
 
 
 def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
-    """Drift (k,) of energy minus work since t = 0 in J; None and infinite where `energy_series` is, but a
-    number at rest."""
+    """Return the drift (k,) of energy minus work since t = 0 in J.
+
+    It is None and infinite as in `energy_series`, but a number if all energies are at rounding level.
+    """
     balance = _balance(scene, trajectory)
     return None if balance is None else balance[0]
 
 
 def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
-    """Drift (k,) in J, and the largest energy seen (J); None where there is no balance."""
+    """Return the drift (k,) in J, and the largest energy of the motion (J); None if there is no energy
+    balance."""
     damped = any(load.is_damped for load in scene.load)
     if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
         return None
@@ -57,8 +60,11 @@ def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] |
 
 
 def _possible(scene: Scene, trajectory: Trajectory) -> float:
-    """The energy (J) of the weight and the loads over the scene's length and of the masses that cross it in
-    the motion's time: what rounding of places and velocities is measured by."""
+    """Return the energy (J) that weight and loads have over the scene's length, plus the kinetic energy of
+    crossing it in the motion's time.
+
+    It is the scale for rounding errors of positions and velocities.
+    """
     length, mass = constraints.scene_length(scene), sum(body.mass or 0.0 for body in scene.body)
     time = float(trajectory.times[-1]) or scene.duration
     forces = mass * float(np.linalg.norm(scene.gravity))
@@ -73,7 +79,7 @@ def kinetic_energy(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> np.ndarray:
-    """Kinetic energy (k,) of bodies and armatures, J, from trajectory arrays (k, nb, ·)."""
+    """Return the kinetic energy (k,) of bodies and armatures, J, from trajectory arrays (k, nb, ·)."""
     mass = np.array([body.mass for body in scene.body])
     inertia = world_inertia(scene, rotations.to_matrix(orientation))
     turning = np.einsum("kbi,kbij,kbj->k", angular_velocity, inertia, angular_velocity)
@@ -87,7 +93,8 @@ def kinetic_energy(
 
 
 def potential_energy(scene: Scene, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Potential energy (k,) in J of gravity (zero at the origin) and springs, of poses (k, nb, ·)."""
+    """Return the potential energy (k,) in J of gravity (zero at the origin) and springs, at poses (k, nb,
+    ·)."""
     mass = np.array([body.mass for body in scene.body])
     energy = -(position @ np.array(scene.gravity)) @ mass
     for load in scene.load:
@@ -108,7 +115,7 @@ def _initial(scene: Scene) -> tuple[np.ndarray, ...]:
 
 
 def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarray]:
-    """Growth (k,) of each potential since t = 0."""
+    """Return the increase (k,) of each potential since t = 0."""
     position, orientation, _, angular_velocity = _motion(trajectory)
     start = (a[None] for a in constraints.initial_poses(scene))
     yield potential_energy(scene, position, orientation) - potential_energy(scene, *start)
@@ -152,7 +159,7 @@ def _work_of_moment(scene: Scene, load: Moment, trajectory: Trajectory) -> np.nd
 
 
 def _turning_about(scene: Scene, direction: np.ndarray) -> set[str]:
-    """Bodies that joints to the ground allow no rotation but about a direction."""
+    """Return the bodies whose joints to the ground allow rotation only about the given direction."""
     reached, grew = {GROUND}, True
     while grew:
         links = [set(joint.bodies) for joint in scene.joint if _keeps(joint, direction)]
@@ -163,7 +170,7 @@ def _turning_about(scene: Scene, direction: np.ndarray) -> set[str]:
 
 
 def _keeps(joint: Joint, direction: np.ndarray) -> bool:
-    """Whether a joint allows no relative rotation but about a direction (3,), a unit vector."""
+    """Return whether a joint allows relative rotation only about a direction (3,), a unit vector."""
     if not joint.facts.free_rotations:
         return True
     if joint.facts.free_rotations > 1:

@@ -1,8 +1,8 @@
 """Motion of any scene by Gauss's principle with the judge's own equations, integrated at 1e-10 by SciPy.
 
-It is the exact motion of the suite's scenes that belong to no family of a truth.  Its error is what the
-integrations at two tolerances differ by, and what is left of the joint residuals.  The rank of the joints'
-rows is that at the start: rows that are redundant stay so, however far the samples of a step drift apart.
+The conformance suite uses it as the exact motion of scenes without a truth. Its error follows from the
+difference of integrations at two tolerances, and from the joint residuals. The rank of the joints' rows is
+the rank at the start, because rows that are redundant there stay redundant.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from mbref.trajectory import Outcome, Trajectory
 
 NAME = "Gauss's principle"
 RTOL = 1e-10
-NO_AXIS = np.zeros(3)  # torsion springs are added here, about their joints' axes in the world
+NO_AXIS = np.zeros(3)  # torsion springs are added later, about their joints' axes in the world
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 @functools.lru_cache(maxsize=128)
 def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> Trajectory:
-    """Poses, velocities and accelerations at times (s), increasing.
+    """Return poses, velocities and accelerations at increasing times (s).
 
-    Raises RuntimeError when the integration ends before, as at a singular position.
+    Raises RuntimeError if the integration ends early, as at a singular position.
     """
     velocity, spin = initial_twists(scene)
     position = np.array([body.position for body in scene.body])
@@ -58,9 +58,12 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
 
 
 def accelerations(scene: Scene, t: float, state: State, rank: int | None = None) -> np.ndarray:
-    """Accelerations and angular accelerations (nb, 6), world, at a state (position (nb, 3), unit orientation
-    (nb, 4), velocity, spin (nb, 3), angles of the torsion springs): of all that joints and drivers allow,
-    the nearest in the mass metric to those without joints.  ``rank`` of the rows, if it is known."""
+    """Return accelerations and angular accelerations (nb, 6), world, at a state.
+
+    The state is position (nb, 3), unit orientation (nb, 4), velocity, spin (nb, 3), and angles of the torsion
+    springs. Among all accelerations that joints and drivers allow, the result is the nearest to the
+    unconstrained ones in the mass metric. ``rank`` is the rank of the rows if it is known.
+    """
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     force = applied(scene, state)
@@ -83,7 +86,7 @@ def accelerations(scene: Scene, t: float, state: State, rank: int | None = None)
 
 
 def _with_armatures(scene: Scene, t: float, state: State, rank: int | None) -> np.ndarray:
-    """``accelerations`` where armatures couple the bodies in the mass matrix."""
+    """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix."""
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     armatures = reflected(scene, position, orientation, velocity, spin)
@@ -104,7 +107,8 @@ def _with_armatures(scene: Scene, t: float, state: State, rank: int | None) -> n
 
 
 def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarray:
-    """The least solution (n,) of a matrix (m, n) of known rank, else of singular values beyond RANK."""
+    """Return the least-norm solution (n,) for a matrix (m, n) of known rank, otherwise with singular values
+    above RANK."""
     if not (np.isfinite(matrix).all() and np.isfinite(wanted).all()):
         return np.full(matrix.shape[1], np.nan)  # not finite, so that the integrator rejects the step
     u, s, vt = np.linalg.svd(matrix, full_matrices=False)
@@ -113,7 +117,8 @@ def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarr
 
 
 def applied(scene: Scene, state: State) -> np.ndarray:
-    """Forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic moments."""
+    """Return forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic
+    moments."""
     position, orientation, velocity, spin, angles = state
     turn = rotations.to_matrix(orientation)
     still = np.zeros((1, len(position)))
@@ -125,13 +130,13 @@ def applied(scene: Scene, state: State) -> np.ndarray:
 
 
 def power(scene: Scene, state: State) -> float:
-    """Power (W) of gravity and loads on a state."""
+    """Return the power (W) of gravity and loads at a state."""
     twist = np.hstack([state[2], state[3]])
-    return float(np.sum(applied(scene, state) * twist))  # gyroscopic moments have none
+    return float(np.sum(applied(scene, state) * twist))  # gyroscopic moments have no power
 
 
 def kinetic(scene: Scene, state: State) -> float:
-    """Kinetic energy (J) of a state."""
+    """Return the kinetic energy (J) of a state."""
     return float(kinetic_energy(scene, *(part[None] for part in state[:4]))[0])
 
 
@@ -140,7 +145,7 @@ def _springs(scene: Scene) -> list[TorsionSpring]:
 
 
 def _axes(scene: Scene, orientation: np.ndarray) -> np.ndarray:
-    """World axes (springs, 3) of the torsion springs' joints, carried by the first bodies."""
+    """Return the world axes (springs, 3) of the torsion springs' joints, which the first bodies carry."""
     found = np.zeros((len(_springs(scene)), 3))
     for k, load in enumerate(_springs(scene)):
         joint: Any = next(j for j in scene.joint if j.name == load.joint)
@@ -153,7 +158,7 @@ def _axes(scene: Scene, orientation: np.ndarray) -> np.ndarray:
 
 
 def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """Rates (springs,) of the torsion springs' angles."""
+    """Return the rates (springs,) of the torsion springs' angles."""
     spins = np.vstack([spin, np.zeros(3)])
     pairs = [next(j.bodies for j in scene.joint if j.name == load.joint) for load in _springs(scene)]
     parting = [spins[scene.body_index(b)] - spins[scene.body_index(a)] for a, b in pairs]
@@ -161,8 +166,8 @@ def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.
 
 
 def _torsion(scene: Scene, orientation: np.ndarray, spin: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Moments (nb, 3), world, of the torsion springs."""
-    moment = np.zeros((len(scene.body) + 1, 3))  # the ground's last
+    """Return the moments (nb, 3), world, of the torsion springs."""
+    moment = np.zeros((len(scene.body) + 1, 3))  # the last entry is the ground's
     found = zip(
         _springs(scene),
         _axes(scene, orientation),

@@ -1,4 +1,5 @@
-"""Gauss's principle: initial accelerations by the judge's own equations; distance from singular positions."""
+"""Gauss's principle: initial accelerations by the judge's own equations, and the distance from singular
+positions."""
 
 from __future__ import annotations
 
@@ -19,16 +20,20 @@ from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
-CONTINUES = 1e-8  # fraction of the accelerations: a larger residual means an infinitesimal mobility
-NO_AXIS = np.zeros(3)  # no shared axis of turning: torsion springs are added here
+# relative residual of the accelerations; a larger one means that the mobility is infinitesimal only
+CONTINUES = 1e-8
+NO_AXIS = np.zeros(3)  # there is no common axis of turning: torsion springs are added here
 
 
 def gauss(scene: Scene) -> np.ndarray:
-    """Accelerations at t = 0 as `stacked`: of all that joints and drivers allow, the ones that minimise
-    ½ aᵀ M a - aᵀ f.  The scene has masses; moments of inertia may be zero where joints leave no such
-    turn."""
+    """Return accelerations at t = 0 in the form of `stacked`.
+
+    Among all accelerations that joints and drivers allow, they minimise ½ aᵀ M a - aᵀ f. The scene must have
+    masses. A moment of inertia may be zero if joints prevent the rotation.
+    """
     mass, force = _unbound(scene)
-    weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))  # of `stacked`
+    # weights of the entries of `stacked`
+    weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     rows = jacobian(scene, 0.0, *initial_poses(scene))[0]
     found = of_least_constraint(mass, force, rows, bias(scene), weights)
     return np.concatenate(np.hsplit(found.reshape(-1, 6), 2))
@@ -37,9 +42,10 @@ def gauss(scene: Scene) -> np.ndarray:
 def of_least_constraint(
     mass: np.ndarray, force: np.ndarray, rows: np.ndarray, coasting: np.ndarray, weights: np.ndarray
 ) -> np.ndarray:
-    """Accelerations a / weights (n,) that minimise ½ aᵀ M a - aᵀ f among those with J a = -coasting.
+    """Return accelerations a / weights (n,) that minimise ½ aᵀ M a - aᵀ f subject to J a = -coasting.
 
-    From M (n, n), f (n,), rows J (m, n) and the residuals (m,) of bodies that coast."""
+    Arguments are M (n, n), f (n,), rows J (m, n) and the acceleration residuals (m,) of bodies without
+    acceleration."""
     rows, mass, force = rows * weights, mass * weights * weights[:, None], force * weights
     _, s, vt = np.linalg.svd(rows, full_matrices=True)
     free = vt[int((s > RANK * s.max(initial=0.0)).sum()) :].T
@@ -50,7 +56,8 @@ def of_least_constraint(
 
 
 def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Mass matrix M (6 nb, 6 nb) of the twists at t = 0, and the forces f (6 nb,) of loads and gyration."""
+    """Return the mass matrix M (6 nb, 6 nb) of the twists at t = 0, and the forces f (6 nb,) of loads and
+    gyroscopic moments."""
     position, orientation = initial_poses(scene)
     velocity, angular_velocity = initial_twists(scene)
     turn = rotations.to_matrix(orientation)
@@ -69,8 +76,8 @@ def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:
-    """Moments (nb, 3), world, of the torsion springs at t = 0, where their angles are zero."""
-    moment = np.zeros((len(scene.body) + 1, 3))  # the ground's last
+    """Return the moments (nb, 3), world, of the torsion springs at t = 0, when their angles are zero."""
+    moment = np.zeros((len(scene.body) + 1, 3))  # the last entry is the ground's
     turning = np.vstack([angular_velocity, np.zeros(3)])
     for load in scene.load:
         if isinstance(load, TorsionSpring):
@@ -98,12 +105,13 @@ def rank_of(values: np.ndarray) -> int:
 
 
 def rank(scene: Scene) -> int:
-    """Rank of the rows of joints and drivers at t = 0."""
+    """Return the rank of the rows of joints and drivers at t = 0."""
     return rank_of(singular_values(scene)) if scene.joint else 0
 
 
 def bias(scene: Scene) -> np.ndarray:
-    """Acceleration residuals (rows,) of the bodies coasting: J a must be minus these."""
+    """Return the acceleration residuals (rows,) of bodies without acceleration; J a must equal their
+    negative."""
     pose, rates = initial_poses(scene), initial_twists(scene)
     still = np.zeros_like(pose[0])
     rows = closure_accelerations(scene, 0.0, *pose, *rates, still, still)
@@ -111,8 +119,11 @@ def bias(scene: Scene) -> np.ndarray:
 
 
 def goes_on(scene: Scene, within: float = CONTINUES) -> bool:
-    """Whether accelerations exist that keep the velocities on the joints, ``within`` a part of the least that
-    the joints ask for: no mobility of the instant."""
+    """Return whether accelerations exist that keep the velocities consistent with the joints.
+
+    Otherwise the mobility is infinitesimal only. ``within`` is the allowed residual relative to the least
+    accelerations that the joints require.
+    """
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     coasting = bias(scene)
     left = rows @ np.linalg.lstsq(rows, coasting, rcond=RANK)[0] - coasting if len(rows) else coasting
@@ -120,9 +131,9 @@ def goes_on(scene: Scene, within: float = CONTINUES) -> bool:
 
 
 def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
-    """Accelerations at a sample, and angular ones times the scene's length (2 nb, 3), m/s², world.
+    """Return accelerations at a sample, and angular ones times the scene's length (2 nb, 3), m/s², world.
 
-    Raises ValueError when the run has none.
+    Raises ValueError if the run has none.
     """
     if run.acceleration is None or run.angular_acceleration is None:
         raise ValueError(f"{run.engine} reports no accelerations")

@@ -1,4 +1,5 @@
-"""Joint coordinates from poses: the angle about and the displacement along a joint's axis; their armatures.
+"""Joint coordinates from poses: the angle about and the displacement along a joint's axis. Armatures of these
+coordinates.
 
 Coordinates are of the second body relative to the first, zero at t = 0.  Arrays have any leading shape (…),
 and the ground as their last body.
@@ -28,7 +29,7 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.scene_joints import ANGLE, DISPLACEMENT
 
-COORDINATES = (ANGLE, DISPLACEMENT)  # the columns of joint coordinates
+COORDINATES = (ANGLE, DISPLACEMENT)  # columns of joint coordinates
 
 
 def coordinate_rates(
@@ -38,7 +39,7 @@ def coordinate_rates(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> np.ndarray:
-    """(…, 2) rates of angle and displacement along the axis, as the first body sees them."""
+    """Return the rates (…, 2) of angle and displacement along the axis, seen from the first body."""
     arms, offset, frames = in_world(joint, position, orientation)
     dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     linear, angular = relative_twist(frames, offset, dv, w)
@@ -54,7 +55,7 @@ def coordinate_accelerations(
     acceleration: np.ndarray,
     angular_acceleration: np.ndarray,
 ) -> np.ndarray:
-    """(…, 2) time derivatives of ``coordinate_rates``."""
+    """Return the time derivatives (…, 2) of ``coordinate_rates``."""
     arms, offset, frames = in_world(joint, position, orientation)
     dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     da, dw = anchor_acceleration(joint, arms, w, acceleration, angular_acceleration)
@@ -69,7 +70,8 @@ def coordinates(
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> np.ndarray:
-    """(k, 2) unwrapped angle about the axis and displacement along it since t = 0, over k samples."""
+    """Return the unwrapped angle about the axis and the displacement along it (k, 2) since t = 0, over k
+    samples."""
     _, offset, frames = in_world(joint, position, orientation)
     turned = twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
     w = [angular_velocity[..., b, :] for b in joint.bodies]
@@ -78,10 +80,11 @@ def coordinates(
 
 
 def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
-    """Angles (k,), known up to turns and zero at t = 0, with their turns counted by the rates (k,).
+    """Return angles (k,) with full turns counted by means of the rates (k,); the given angles are known up to
+    full turns and zero at t = 0.
 
-    Between samples the change nearest to the trapezoid of the rates is taken; NaN from where the rates
-    near a sample differ so much that this does not tell the turn.
+    Between samples the change nearest to the trapezoidal rule is chosen. The result is NaN from the first
+    sample on at which the rates differ too much for this choice.
     """
     before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
     expected = step * (rate + before) / 2
@@ -93,7 +96,8 @@ def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarra
 
 
 def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """(2, 6 nb): the rates of a joint's angle and displacement per twist of the bodies (see ``jacobian``)."""
+    """Return (2, 6 nb): the rates of a joint's angle and displacement for unit twists of the bodies (see
+    ``jacobian``)."""
     n = 6 * len(scene.body)
     joint = next(joint for joint in joint_frames(scene) if joint.name == name)
     r, p = (np.broadcast_to(a, (n, *a.shape)) for a in with_ground(position, orientation))
@@ -103,9 +107,11 @@ def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientati
 
 @dataclass(frozen=True)
 class Reflected:
-    """The coordinates of a pose that have an armature: its sizes (c,), kg m² or kg; J (c, 6 nb), with J times
-    the twists (velocity and angular velocity, world, body after body) the coordinates' rates; the part
-    ``drift`` (c,) of their second rates that accelerations of the bodies do not cause."""
+    """Coordinates with armatures at a pose: their sizes (c,), kg m² or kg, and their Jacobian J (c, 6 nb).
+
+    J times the twists (velocity and angular velocity, world, body after body) gives the coordinates' rates.
+    ``drift`` (c,) is the part of their second derivatives that does not depend on accelerations.
+    """
 
     joints: tuple[str, ...]
     inertia: np.ndarray
@@ -114,12 +120,12 @@ class Reflected:
 
     @property
     def mass(self) -> np.ndarray:
-        """The armatures' part (6 nb, 6 nb) of the mass matrix of the twists."""
+        """Return the armatures' part (6 nb, 6 nb) of the mass matrix of the twists."""
         return np.asarray(self.jacobian.T @ (self.inertia[:, None] * self.jacobian))
 
     @property
     def force(self) -> np.ndarray:
-        """The armatures' force (6 nb,) on bodies without accelerations."""
+        """Return the armatures' force (6 nb,) on bodies without accelerations."""
         return np.asarray(-self.jacobian.T @ (self.inertia * self.drift))
 
 
@@ -130,7 +136,7 @@ def reflected(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> Reflected:
-    """The armatures of a scene at one pose and its twists, arrays (nb, ·)."""
+    """Return the armatures of a scene at one pose and its twists, arrays (nb, ·)."""
     geared = [joint for joint in scene.joint if joint.reflected_inertia]
     names = tuple(joint.name for joint in geared)
     frames = {joint.name: joint for joint in joint_frames(scene)}

@@ -1,8 +1,9 @@
-"""Reactions compared where they are unique; what redundant joints share out is each engine's choice.
+"""Comparison of joint reactions in their unique components; how redundant joints share loads depends on the
+engine.
 
-The multipliers of redundant rows are determined up to the left null space of the Jacobian.  Seen at a
-joint, that is a subspace of wrenches: components across it are unique and must agree between engines,
-components in it need not.  The resultant of all joints on a body is always unique.
+The multipliers of redundant rows are determined up to the left null space of the Jacobian.  At a joint this
+gives a subspace of wrenches. Components orthogonal to the subspace are unique and must agree between engines,
+components in it need not agree.  The resultant of all joints on a body is always unique.
 """
 
 from __future__ import annotations
@@ -25,15 +26,18 @@ from mbref.scene import GROUND, Joint, Scene
 from mbref.scene_joints import Coordinate
 from mbref.trajectory import Trajectory
 
-LEAST = 1e-3  # m/s²: forces that accelerate the masses by less count as none
+LEAST = 1e-3  # m/s²; forces that would accelerate the masses by less count as zero
 SAMPLES = 11  # number of compared samples, spread over the trajectory
 
 
 @dataclass(frozen=True)
 class Reaction:
-    """One joint's reactions in two runs: ``shared`` dimensions of the wrench that redundancy leaves open,
-    and the largest differences across (``unique``) and in (``chosen``) them, relative to the largest
-    reaction of the first run; moments count divided by the scene's length."""
+    """Reactions of one joint in two runs.
+
+    ``shared`` is the number of dimensions of the wrench that redundancy leaves undetermined. ``unique`` and
+    ``chosen`` are the largest differences orthogonal to these dimensions and in them, relative to the largest
+    reaction of the first run. Moments are divided by the scene's length.
+    """
 
     shared: int
     unique: float
@@ -42,7 +46,7 @@ class Reaction:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Reactions by joint, and the largest difference of the joints' resultants on a body."""
+    """Comparison by joint, and the largest difference of the resultant of all joints on a body."""
 
     joints: Mapping[str, Reaction]
     resultant: float
@@ -51,11 +55,12 @@ class Comparison:
 def shared_wrenches(
     scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray, rank: float = RANK
 ) -> dict[str, np.ndarray]:
-    """By joint, an orthonormal basis (6, k) of the wrenches (force, moment over the scene's length; world,
-    on the second body at its anchor) that redundancy leaves open; k = 0 where the reaction is unique.
+    """Return for each joint an orthonormal basis (6, k) of the wrenches that redundancy leaves undetermined;
+    k = 0 if the reaction is unique. A wrench is a force and a moment over the scene's length, in world axes,
+    on the second body at its anchor.
 
-    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s), which satisfies the joints
-    so well that singular values below ``rank`` times the largest are zeros.
+    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s). It must satisfy the joints so
+    accurately that singular values below ``rank`` times the largest count as zero.
     """
     rows, _ = jacobian(scene, t, position, orientation)
     units, found = np.repeat([1.0, scene_length(scene)], 3), {}
@@ -71,8 +76,11 @@ def shared_wrenches(
 def of_multipliers(
     scene: Scene, rows: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> Iterator[tuple[Joint, np.ndarray]]:
-    """Every joint with the wrenches (6, rows) on its second body, at its anchor, of unit multipliers of all
-    rows of `jacobian`; a coupling acts along the coordinates of both its joints."""
+    """Return for every joint the wrenches (6, rows) on its second body, at its anchor, of unit multipliers of
+    all rows of `jacobian`.
+
+    A coupling acts along the coordinates of both its joints.
+    """
     start = 0
     for joint in scene.joint:
         stop = start + len(length_rows(scene)[joint.name])
@@ -92,23 +100,22 @@ def of_multipliers(
 def along_coordinate(
     scene: Scene, joint: Joint, coordinate: Coordinate, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """The wrench (6,) on a joint's second body of a unit force or moment along its coordinate."""
+    """Return the wrench (6,) on a joint's second body of a unit force or moment along its coordinate."""
     row = coordinate_jacobian(scene, joint.name, position, orientation)[COORDINATES.index(coordinate)]
     return on_second(scene, joint, row[None], position, orientation)[:, 0]
 
 
 def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
-    """Reactions of a reference and of a run of a scene at some common samples; both have the same times.
+    """Compare the reactions of a reference and of a run at some samples; both have equal sample times.
 
-    Differences count relative to the reference's largest reaction, so that absurd answers show as large
-    numbers.
-    Raises ValueError when one has no reactions or their times differ.
+    Differences are relative to the reference's largest reaction, so that implausible reactions give large
+    numbers. Raises ValueError when one has no reactions or their times differ.
     """
     samples = min(len(first.times), len(second.times))
     if first.reactions is None or second.reactions is None:
         raise ValueError("a run without reactions has none to compare")
     if not samples or not np.array_equal(first.times[:samples], second.times[:samples]):
-        raise ValueError("runs are compared at common times")
+        raise ValueError("runs are compared at common sample times")
     chosen = np.unique(np.linspace(0, samples - 1, min(samples, SAMPLES)).round().astype(int))
     scale = largest_reaction(scene, first)
     tables = [_at_sample(scene, first, second, int(k), scale) for k in chosen]
@@ -120,8 +127,8 @@ def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
 
 
 def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> dict[str, dict[str, float]]:
-    """By joint with a choice, the size (N, moments over the scene's length) of every run's component in
-    the shared wrenches at a sample: the engines' choices."""
+    """Return for each joint with undetermined components the size (N, moments over the scene's length) of
+    every run's component in these directions at a sample."""
     pose = next(iter(runs.values()))
     shared = shared_wrenches(scene, pose.times[sample], pose.position[sample], pose.orientation[sample])
     units = np.repeat([1.0, scene_length(scene)], 3)
@@ -137,7 +144,7 @@ def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> d
 
 
 def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
-    """Force and moment about the centre of mass (nb, 6), world, of all joints on every body."""
+    """Return force and moment about the centre of mass (nb, 6), world, of all joints on every body."""
     position, orientation = run.position[sample], run.orientation[sample]
     total = np.zeros((len(scene.body), 6))
     for joint in scene.joint:
@@ -152,7 +159,7 @@ def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
 
 
 def largest_reaction(scene: Scene, run: Trajectory) -> float:
-    """The largest reaction of a run, N; no less than what moves the masses by LEAST."""
+    """Return the largest reaction of a run, N; at least the force that accelerates the masses by LEAST."""
     units = np.repeat([1.0, scene_length(scene)], 3)
     sizes = [
         float(np.linalg.norm(wrench / units, axis=-1).max()) for wrench in (run.reactions or {}).values()
@@ -163,7 +170,7 @@ def largest_reaction(scene: Scene, run: Trajectory) -> float:
 def _at_sample(
     scene: Scene, first: Trajectory, second: Trajectory, k: int, scale: float
 ) -> tuple[dict[str, tuple[int, float, float]], float]:
-    """(shared, unique, chosen) by joint and the difference of resultants, at one sample."""
+    """Return (shared, unique, chosen) by joint and the difference of resultants, at one sample."""
     assert first.reactions is not None and second.reactions is not None
     units = np.repeat([1.0, scene_length(scene)], 3)
     shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
@@ -179,7 +186,8 @@ def _at_sample(
 def on_second(
     scene: Scene, joint: Joint, rows: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """(6, rows): wrench on the second body at its anchor of unit multipliers of its rows (rows, 6 nb)."""
+    """Return (6, rows): wrench on the second body at its anchor for unit multipliers of its rows (rows, 6
+    nb)."""
     first, second = (scene.body_index(name) for name in joint.bodies)
     b, sign = (second, 1.0) if second >= 0 else (first, -1.0)
     wrench = sign * rows[:, 6 * b : 6 * b + 6].T
@@ -188,12 +196,13 @@ def on_second(
 
 
 def _anchor(scene: Scene, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """The anchor (3,) on the second body, world."""
+    """Return the anchor (3,) on the second body, world."""
     body, local = attachment(scene, joint.bodies[1], joint.anchor_pair[1])
     return local if body < 0 else position[body] + rotations.rotate(orientation[body], local)
 
 
 def _span(vectors: np.ndarray, least: float) -> np.ndarray:
-    """Orthonormal basis (6, k) of the span of columns (6, n); those below 1e3 ``least`` do not count."""
+    """Return an orthonormal basis (6, k) of the span of columns (6, n); columns below 1e3 ``least`` are
+    ignored."""
     u, s, _ = np.linalg.svd(vectors, full_matrices=False)
     return u[:, s > 1e3 * least]

@@ -24,7 +24,8 @@ Z = np.array([0.0, 0.0, 1.0])
 
 @dataclass(frozen=True)
 class JointFrames:
-    """A joint packed for arrays: facts, body indices (-1 ground), frames on the bodies, and driver."""
+    """Data of a joint for array computations: its facts, body indices (-1: ground), frames on the bodies, and
+    driver."""
 
     name: str
     facts: JointFacts
@@ -36,23 +37,23 @@ class JointFrames:
 
     @property
     def keeps_distance(self) -> bool:
-        """Whether the origins of the two frames keep their distance."""
+        """Return whether the origins of the two frames keep their distance."""
         return self.facts.condition == "constant distance"
 
     @property
     def keeps_axes_perpendicular(self) -> bool:
-        """Whether the third axes of the two frames stay perpendicular."""
+        """Return whether the third axes of the two frames stay perpendicular."""
         return self.facts.condition == "perpendicular axes"
 
     @property
     def slides(self) -> bool:
-        """Whether a driver prescribes the displacement, not the angle."""
+        """Return whether a driver prescribes the displacement instead of the angle."""
         return self.facts.driven == "displacement"
 
 
 @functools.lru_cache(maxsize=64)
 def joint_frames(scene: Scene) -> tuple[JointFrames, ...]:
-    """The frames of the joints of a scene, in its order."""
+    """Return the frames of the joints of a scene, in its order."""
     drivers = {driver.joint: driver for driver in scene.driver}
     return tuple(_packed(scene, joint, drivers.get(joint.name)) for joint in scene.joint)
 
@@ -73,13 +74,13 @@ def _packed(scene: Scene, joint: Joint, driver: Driver | None) -> JointFrames:
 
 
 def _third_axes(joint: Joint) -> Sequence[Sequence[float]]:
-    """The third axis (world) of the frame on the first and on the second body."""
+    """Return the third axis (world) of the frame on the first and on the second body."""
     axes = joint.directions or ((0.0, 0.0, 1.0),)
     return (axes[0], axes[-1])
 
 
 def _frame(axis: Sequence[float]) -> np.ndarray:
-    """Quaternion of a frame whose third axis is along `axis`."""
+    """Return the quaternion of a frame whose third axis is along `axis`."""
     z = np.array(axis, dtype=float) / np.linalg.norm(axis)
     x = cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
@@ -87,7 +88,7 @@ def _frame(axis: Sequence[float]) -> np.ndarray:
 
 
 def driver_value(driver: Driver, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-    """Value of a driver, or its first or second time derivative, at times t (…)."""
+    """Return the value of a driver, or its first or second time derivative, at times t (…)."""
     t = np.asarray(t, dtype=float)
     polynomial = np.polynomial.Polynomial(driver.polynomial)
     total = np.asarray((polynomial.deriv(derivative) if derivative else polynomial)(t)) + np.zeros_like(t)
@@ -99,7 +100,7 @@ def driver_value(driver: Driver, t: np.ndarray | float, derivative: int = 0) -> 
 
 
 def are_lengths(joint: JointFrames) -> np.ndarray:
-    """Mask (rows,) of a joint's residuals: True for lengths (m), False for angles (rad)."""
+    """Return the mask (rows,) of a joint's residuals: True for lengths (m), False for angles (rad)."""
     facts = joint.facts
     if joint.keeps_distance:
         return np.array([True])
@@ -111,7 +112,7 @@ def are_lengths(joint: JointFrames) -> np.ndarray:
 def position_rows(
     joint: JointFrames, t: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """Residuals (…, rows), m and rad, of positions (…, nb + 1, 3) and quaternions (…, nb + 1, 4)."""
+    """Return residuals (…, rows), m and rad, for positions (…, nb + 1, 3) and quaternions (…, nb + 1, 4)."""
     _, offset, frames = in_world(joint, position, orientation)
     if joint.keeps_distance:
         return np.linalg.norm(offset, axis=-1, keepdims=True) - joint.length
@@ -136,7 +137,8 @@ def velocity_rows(
     velocity: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> np.ndarray:
-    """Forbidden components (…, rows) of the frames' relative twist, of world velocities (…, nb + 1, 3)."""
+    """Return the forbidden components (…, rows) of the frames' relative twist, for world velocities (…, nb +
+    1, 3)."""
     arms, offset, frames = in_world(joint, position, orientation)
     dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     if joint.keeps_distance:
@@ -148,7 +150,7 @@ def velocity_rows(
 def relative_twist(
     frames: list[np.ndarray], offset: np.ndarray, dv: np.ndarray, w: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Velocity and angular velocity (…, 3) of the second frame as the first one sees them."""
+    """Return velocity and angular velocity (…, 3) of the second frame, seen from the first one."""
     return resolve(frames[0], dv - cross(w[0], offset)), resolve(frames[0], w[1] - w[0])
 
 
@@ -162,7 +164,7 @@ def acceleration_rows(
     acceleration: np.ndarray,
     angular_acceleration: np.ndarray,
 ) -> np.ndarray:
-    """Time derivative (…, rows) of `velocity_rows`, of world accelerations (…, nb + 1, 3)."""
+    """Return the time derivative (…, rows) of `velocity_rows`, for world accelerations (…, nb + 1, 3)."""
     arms, offset, frames = in_world(joint, position, orientation)
     dv, w = anchor_velocity(joint, arms, velocity, angular_velocity)
     da, dw = anchor_acceleration(joint, arms, w, acceleration, angular_acceleration)
@@ -181,21 +183,23 @@ def relative_acceleration(
     w: list[np.ndarray],
     dw: list[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Time derivatives (…, 3) of ``relative_twist``, of the rates at which the origins part."""
+    """Return the time derivatives (…, 3) of ``relative_twist``; ``parting`` is the relative acceleration of
+    the origins."""
     dv, da = parting
     seen = da - cross(dw[0], offset) - 2 * cross(w[0], dv) + cross(w[0], cross(w[0], offset))
     return resolve(frames[0], seen), resolve(frames[0], dw[1] - dw[0] - cross(w[0], w[1]))
 
 
 def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Angles (…) brought to [-π, π] by turns."""
+    """Return angles (…) shifted by full turns into [-π, π]."""
     return angle - 2 * np.pi * np.round(angle / (2 * np.pi))
 
 
 def in_world(
     joint: JointFrames, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[list[np.ndarray], np.ndarray, list[np.ndarray]]:
-    """Arms from the centres to the origins (…, 3), offset between the origins, frame quaternions."""
+    """Return vectors from the centres to the origins (…, 3), the vector between the origins, and frame
+    quaternions."""
     p = [orientation[..., b, :] for b in joint.bodies]
     arms = [rotations.rotate(p[k], joint.points[k]) for k in (0, 1)]
     offset = difference(position[..., b, :] + arms[k] for k, b in enumerate(joint.bodies))
@@ -235,7 +239,8 @@ def _rows(
     t: np.ndarray,
     derivative: int,
 ) -> np.ndarray:
-    """Rows of a rate: forbidden translations, forbidden rotations (or the universal's), then the driver."""
+    """Return the rows of a rate: forbidden translations, forbidden rotations (or the universal joint's row),
+    then the driver."""
     facts = joint.facts
     rows = [linear[..., list(facts.forbidden_translations)], angular[..., list(facts.forbidden_rotations)]]
     rows += crossing
@@ -246,7 +251,8 @@ def _rows(
 
 
 def _crossing(frames: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
-    """Unit normal of a universal's two axes, the sine of the angle between them, and the axes (world)."""
+    """Return the unit normal of a universal joint's two axes, the sine of the angle between them, and the
+    axes (world)."""
     axes = [rotations.rotate(frame, Z) for frame in frames]
     normal = cross(axes[1], axes[0])
     size = np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -261,7 +267,7 @@ def _crossing_acceleration(frames: list[np.ndarray], w: list[np.ndarray], dw: li
 
 
 def resolve(frame: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """World vectors (…, 3) in the axes of frames (…, 4)."""
+    """Return world vectors (…, 3) in the axes of frames (…, 4)."""
     return rotations.rotate(rotations.conjugate(frame), vector)
 
 
@@ -276,28 +282,30 @@ def difference(pair: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def _rotation_vector(q: np.ndarray) -> np.ndarray:
-    """Rotation vectors (…, 3), length ≤ π, of unit quaternions."""
+    """Return rotation vectors (…, 3), length ≤ π, of unit quaternions."""
     q = np.where(q[..., :1] < 0, -q, q)
     size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
     return 2 * np.arctan2(size, q[..., :1]) * q[..., 1:] / np.where(size > 0, size, 1)
 
 
 def _tilt(q: np.ndarray) -> np.ndarray:
-    """First two components (…, 2) of the shortest rotation vector from one third axis to the other."""
+    """Return the first two components (…, 2) of the shortest rotation vector from one third axis to the
+    other."""
     x, y, z = np.moveaxis(rotations.to_matrix(q)[..., 2], -1, 0)
     sine = np.hypot(x, y)
     size = np.where(sine > 0, sine, 1)
-    unit = np.stack([np.where(sine > 0, -y / size, 1.0), x / size], axis=-1)  # any direction when opposite
+    # any direction if the axes are opposite
+    unit = np.stack([np.where(sine > 0, -y / size, 1.0), x / size], axis=-1)
     return unit * np.arctan2(sine, z)[..., None]
 
 
 def twist(q: np.ndarray) -> np.ndarray:
-    """Angle about the third axis, up to turns."""
+    """Return the angle about the third axis, up to full turns."""
     return 2 * np.arctan2(q[..., 3], q[..., 0])
 
 
 def with_ground(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions and normalised quaternions with the ground appended."""
+    """Return positions and normalised quaternions with the ground appended."""
     p = np.asarray(orientation, dtype=float)
     ground = np.broadcast_to([1.0, 0.0, 0.0, 0.0], p[..., :1, :].shape)
     return grounded(position), np.concatenate(
@@ -306,6 +314,6 @@ def with_ground(position: np.ndarray, orientation: np.ndarray) -> tuple[np.ndarr
 
 
 def grounded(array: np.ndarray) -> np.ndarray:
-    """(…, nb + 1, 3): a row of zeros for the ground appended, so that index -1 is the ground."""
+    """Return (…, nb + 1, 3): a row of zeros for the ground is appended, so that index -1 is the ground."""
     array = np.asarray(array, dtype=float)
     return np.concatenate([array, np.zeros_like(array[..., :1, :])], axis=-2)

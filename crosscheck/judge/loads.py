@@ -1,6 +1,6 @@
-"""The forces and moments of a scene's gravity and loads on its bodies, from poses and velocities.
+"""Forces and moments of a scene's gravity and loads on its bodies, from poses and velocities.
 
-Arrays keep the precision they come in (double, or extended for the truths); samples lead: (k, nb, ·).
+Arrays keep their precision (double, or extended for the truths); the first index is the sample: (k, nb, ·).
 """
 
 from __future__ import annotations
@@ -17,9 +17,12 @@ from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
 
 @dataclass(frozen=True)
 class Motion:
-    """Poses and velocities in the world: position, velocity, angular_velocity (k, nb, 3),
-    rotation matrices (k, nb, 3, 3), and turn (k, nb): the angle each body has turned since t = 0 about
-    the axis the motion's family shares, NaN where it has no such angle."""
+    """Poses and velocities in the world: position, velocity, angular_velocity (k, nb, 3), rotation matrices
+    (k, nb, 3, 3), and turn (k, nb).
+
+    ``turn`` is the angle of each body since t = 0 about the common axis of the family of motions, NaN without
+    such an angle.
+    """
 
     position: np.ndarray
     rotation: np.ndarray
@@ -29,9 +32,9 @@ class Motion:
 
 
 def wrenches(scene: Scene, motion: Motion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force and moment about the centre of mass (k, nb, 3), world, on every body, gravity included.
+    """Return force and moment about the centre of mass (k, nb, 3), world, on every body, gravity included.
 
-    ``axis`` (3,) is the unit vector the turns of the motion are about.
+    ``axis`` (3,) is the unit vector of the rotation axis of ``motion.turn``.
     """
     mass = np.array([body.mass for body in scene.body])
     force = motion.position * 0 + mass[:, None] * np.array(scene.gravity)
@@ -42,7 +45,8 @@ def wrenches(scene: Scene, motion: Motion, axis: np.ndarray) -> tuple[np.ndarray
 
 
 def attachment(scene: Scene, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:
-    """Index of a body (-1 ground) and the point, given in the world at t = 0, in its frame."""
+    """Return the index of a body (-1: ground), and a point given in the world at t = 0 in the body's
+    frame."""
     if name == GROUND:
         return -1, np.array(point)
     body = scene.body[scene.body_index(name)]
@@ -105,7 +109,7 @@ ACTIONS: dict[type, Callable[..., None]] = {
 
 
 def _point(motion: Motion, body: int, local: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """World position and velocity (k, 3) of a body-fixed point."""
+    """Return world position and velocity (k, 3) of a body-fixed point."""
     if body < 0:
         return np.broadcast_to(local, motion.position[:, 0].shape), np.zeros_like(motion.position[:, 0])
     arm = motion.rotation[:, body] @ local
@@ -120,15 +124,16 @@ def _push(body: int, arm: np.ndarray, push: np.ndarray, force: np.ndarray, momen
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector products (…, 3)."""
+    """Return vector products (…, 3)."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
 def world_inertia(scene: Scene, rotation: np.ndarray) -> np.ndarray:
-    """Inertia (…, nb, 3, 3) about the centres of mass along world axes, of rotations (…, nb, 3, 3)."""
+    """Return inertia matrices (…, nb, 3, 3) about the centres of mass along world axes, for rotations (…, nb,
+    3, 3)."""
     return rotation @ inertia_matrices(scene) @ np.swapaxes(rotation, -1, -2)
 
 
 def initial_rotations(scene: Scene) -> np.ndarray:
-    """Rotation matrices (nb, 3, 3), body to world, at t = 0."""
+    """Return rotation matrices (nb, 3, 3), body to world, at t = 0."""
     return rotations.to_matrix(initial_poses(scene)[1])

@@ -1,7 +1,7 @@
-"""Metrics: one number of a run each, from its scene, its trajectory and the exact motion alone.
+"""Metrics: each is one number of a run, computed from its scene, its trajectory and the exact motion.
 
-Errors are taken at the samples that the run reached and at which the truth is known, so that a failed run is
-judged up to where it got.
+Errors are measured at the samples that the run reached and at which the truth is known, so that a failed run
+is judged up to its end.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-MANY = 50  # bodies; for more bodies `crosscheck.judge.joint_reactions` compares the reactions
+MANY = 50  # bodies; the comparison of reactions is left out for more, because it would take too long
 
 
 @dataclass(frozen=True)
 class Metric:
-    """``function(scene, trajectory, exact)`` gives a number, or None where the metric says nothing.
+    """A metric; ``function(scene, trajectory, exact)`` returns its value, or None if it is not defined.
 
     ``exact`` is the truth's trajectory at the same times or at the first of them, or None.  Numbers are never
     NaN; a trajectory that is not finite has infinite errors.
@@ -74,8 +74,10 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
-    """The truth at a trajectory's times, or at the first of them where it is known no further; None without
-    truth, and where it is known at the start alone."""
+    """Return the truth at a trajectory's times, or at the first of them if it is known no further.
+
+    None without a truth, or if it is known at the start only.
+    """
     try:
         return None if truth is None else truth.poses(trajectory.times)
     except NoSolution as end:
@@ -84,7 +86,7 @@ def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | No
 
 
 def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
-    """The trajectory with its bodies in the order of the scene; ValueError when they are others."""
+    """Return the trajectory with its bodies in the order of the scene; raises ValueError for other bodies."""
     names = tuple(body.name for body in scene.body)
     if trajectory.bodies == names:
         return trajectory
@@ -97,18 +99,19 @@ def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
 
 
 def position_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
-    """Largest distance (k,) of a body's centre from its true place, divided by the scene's length."""
+    """Return the largest distance (k,) of a body's centre from its true position, divided by the scene's
+    length."""
     distance = np.linalg.norm(trajectory.position - exact.position, axis=-1)
     return distance.max(axis=-1) / constraints.scene_length(scene)
 
 
 def rotation_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
-    """Largest geodesic angle (k,) between a body's orientation and its true one, rad."""
+    """Return the largest geodesic angle (k,) between a body's orientation and its true one, rad."""
     return rotations.angle_between(trajectory.orientation, exact.orientation).max(axis=-1)
 
 
 def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
-    """The larger (k,) of relative position error and rotation error."""
+    """Return the larger (k,) of relative position error and rotation error."""
     return np.maximum(
         position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)
     )
@@ -116,19 +119,20 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
 
 @overload
 def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray:
-    """At position and velocity level there is always a residual."""
+    """Return the residuals at position or velocity level, which always exist."""
 
 
 @overload
 def violation_series(scene: Scene, trajectory: Trajectory, level: int) -> np.ndarray | None:
-    """At any level, as below."""
+    """Return the residuals at any level."""
 
 
 def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np.ndarray | None:
-    """Largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level; lengths are
-    divided by the scene's, so that the unit is rad, rad/s, rad/s². None when accelerations are missing.
+    """Return the largest joint residual (k,) at position (0), velocity (1) or acceleration (2) level. Lengths
+    are divided by the scene's length, so that the unit is rad, rad/s, rad/s². None if accelerations are
+    missing.
 
-    At position level couplings count as long as the samples say how often their joints have turned."""
+    At position level couplings are included as long as full turns of their joints can be counted."""
     pose = (trajectory.times, trajectory.position, trajectory.orientation)
     rates = (trajectory.velocity, trajectory.angular_velocity)
     if level == 0:
@@ -167,14 +171,14 @@ def _energy(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> f
 
 
 def _correct_digits(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-    """-log10 of the error; the error counts as no less than the rounding unit."""
+    """Return -log10 of the error; the error counts as at least the rounding unit."""
     error = _error(scene, trajectory, exact)
     return None if error is None or math.isinf(error) else -math.log10(max(error, ROUNDING))
 
 
 def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
-    """Largest error of a velocity, or of an angular velocity times the scene's length, relative to the
-    largest true one."""
+    """Return the largest error of a velocity, or of an angular velocity times the scene's length, relative to
+    the largest true one."""
     if exact is None or not len(trajectory.times):
         return None
     trajectory, length = _known(trajectory, exact), constraints.scene_length(scene)
@@ -209,13 +213,13 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
 
 
 def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
-    """The trajectory at the samples of the truth."""
+    """Return the trajectory at the samples of the truth."""
     count = len(exact.times)
     return trajectory if count == len(trajectory.times) else _at(trajectory, np.arange(count))
 
 
 def _at(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
-    """The trajectory at some of its samples (n,)."""
+    """Return the trajectory at some of its samples (n,)."""
     keys = (
         "times",
         "position",
@@ -247,8 +251,10 @@ METRICS: dict[str, Metric] = {
 
 
 def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> float | None:
-    """Slope of log error over log step in the longest range of at least three neighbouring step sizes
-    that lies on a rising line; None where there is none, as on a floor of rounding.
+    """Return the slope of log error over log step in the longest range of at least three neighbouring steps
+    that is nearly straight.
+
+    None if there is none, for example at the rounding level.
     """
     table = np.array([(s, e) for s, e in zip(steps, errors, strict=True) if 0 < e < math.inf]).reshape(-1, 2)
     x, y = np.log10(table[np.argsort(table[:, 0])]).T
@@ -263,9 +269,10 @@ def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> flo
 
 
 def cost_at_error(costs: Sequence[float], errors: Sequence[float], level: float) -> float | None:
-    """Cost of reaching an error: log-log interpolation between the runs no other run beats in both.
+    """Return the cost of reaching an error by log-log interpolation between the best runs (no other run is
+    both cheaper and more accurate).
 
-    The cheapest run's cost when that is already as good; None when no run reaches the level.
+    It is the cheapest run's cost if that reaches the level, None if no run does.
     """
     best: list[tuple[float, float]] = []
     for cost, error in sorted(zip(costs, errors, strict=True)):

@@ -1,9 +1,9 @@
-"""Model identity: do two engines simulate the same mechanism? Asked before their speeds are compared.
+"""Check that two engines simulate equal mechanisms, made before their speeds are compared.
 
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
-masses, inertias, axes and loads are the same.  Differences are relative to the largest value, and to none
-less than a part of what gravity, loads, drivers and velocities of the scene can cause: where these balance,
-accelerations are rounding.
+masses, inertias, axes and loads are the same.  Differences are relative to the largest value, or to a
+fraction of what gravity, loads, drivers and velocities of the scene can cause if that is larger:
+accelerations that balance to zero are rounding.
 """
 
 from __future__ import annotations
@@ -32,13 +32,14 @@ from mbref import rotations
 from mbref.scene import Force, Load, Moment, Scene, Spring, TorsionSpring
 from mbref.trajectory import Trajectory
 
-ALONG = 6  # samples of a run at which its accelerations are compared
-DRIVEN_SAMPLES = 101  # samples of a driver's motion, to find its largest acceleration
+ALONG = 6  # number of samples at which the accelerations of a run are compared
+DRIVEN_SAMPLES = 101  # samples of a driver's motion among which its largest acceleration is found
 
 
 @dataclass(frozen=True)
 class Difference:
-    """The first field in which two engines' models differ, by how much of its scale, and the allowance."""
+    """The first quantity in which two engines' models differ: the relative difference, and the allowed
+    one."""
 
     field: str
     engines: tuple[str, str]
@@ -51,12 +52,12 @@ class Difference:
 
 
 def gate_times(scene: Scene) -> np.ndarray:
-    """The times (2,) to run every engine for, s: the start, and a thousandth of the scene's duration."""
+    """Return the times (2,) s of the short runs: the start, and a thousandth of the scene's duration."""
     return np.array([0.0, GATE_TIME * scene.duration])
 
 
 def gate(scene: Scene, trajectories: Sequence[Trajectory]) -> Difference | None:
-    """The first difference between the first trajectory and another, or None when all agree.
+    """Return the first difference between the first trajectory and another one, or None if all agree.
 
     Trajectories are runs at `gate_times`; put the truth's first when there is one.
     """
@@ -64,7 +65,8 @@ def gate(scene: Scene, trajectories: Sequence[Trajectory]) -> Difference | None:
 
 
 def differences(scene: Scene, trajectories: Sequence[Trajectory]) -> dict[str, Difference]:
-    """By engine, the first field in which its trajectory differs from the first one; as `gate`."""
+    """Return for each engine the first difference of its trajectory from the first trajectory, as in
+    `gate`."""
     reference, *others = (in_scene_order(scene, trajectory) for trajectory in trajectories)
     found: dict[str, Difference] = {}
     for other in others:
@@ -76,10 +78,10 @@ def differences(scene: Scene, trajectories: Sequence[Trajectory]) -> dict[str, D
 
 
 def along(scene: Scene, run: Trajectory) -> Difference | None:
-    """The first difference of the accelerations that a run reports from those that the judge's own equations
-    give at the run's own states, at some samples; None without accelerations or masses.
+    """Return the first difference between a run's accelerations and the accelerations by the judge's
+    equations at the run's own states. Some samples are compared. None without accelerations or masses.
 
-    The run is so compared with the mechanism and not with a motion: errors of an integration do not count.
+    Errors of the integration have no influence, since the run is not compared with a motion.
     Samples next to singular positions are left out.
     """
     run, length = in_scene_order(scene, run), scene_length(scene)
@@ -122,7 +124,7 @@ def acceleration_scale(scene: Scene) -> float:
 
 
 def _force(scene: Scene, load: Load, length: float, speed: float) -> float:
-    """The size (N) of a load at the start; moments count over the scene's length."""
+    """Return the size (N) of a load at the start; moments are divided by the scene's length."""
     if isinstance(load, Force):
         return math.hypot(*load.force)
     if isinstance(load, Moment):
@@ -134,13 +136,13 @@ def _force(scene: Scene, load: Load, length: float, speed: float) -> float:
 
 
 def _initial_speed(scene: Scene) -> float:
-    """The largest initial velocity (m/s), or angular velocity times the scene's length."""
+    """Return the largest initial velocity (m/s), or angular velocity times the scene's length."""
     velocity, angular_velocity = initial_twists(scene)
     return max(_size(velocity), scene_length(scene) * _size(angular_velocity))
 
 
 def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
-    """The chosen samples that are not at or next to a pose at which the rank of the joints' rows drops."""
+    """Return the chosen samples without those near a pose at which the rank of the joints' rows drops."""
     if not scene.joint:
         return list(chosen)
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
@@ -152,7 +154,8 @@ def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
 
 
 def _differences(scene: Scene, first: Trajectory, second: Trajectory) -> Iterator[tuple[str, float, float]]:
-    """(field, difference relative to its scale, allowance), in the order in which causes come first."""
+    """Return (quantity, difference relative to its scale, allowed difference), causes before their
+    effects."""
     missing = abs(len(first.times) - len(second.times)) + abs(2 - len(first.times))
     yield "samples reached", float(missing), 0.0
     length = scene_length(scene)
@@ -214,7 +217,7 @@ def _energy(scene: Scene, trajectory: Trajectory) -> float:
 
 
 def _energy_unit(scene: Scene) -> float:
-    """An energy (J) of the scene's size: all its mass at one length per duration, or moved by its length
-    against gravity."""
+    """Return an energy (J) of the scene's size: all masses at a speed of one length per duration, or lifted
+    by the length."""
     mass, length = sum(body.mass or 0.0 for body in scene.body), scene_length(scene)
     return mass * max((length / scene.duration) ** 2, math.hypot(*scene.gravity) * length)

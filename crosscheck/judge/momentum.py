@@ -1,4 +1,5 @@
-"""Momentum balance of a trajectory: what joints and loads between bodies leave unchanged.
+"""Momentum balance of a trajectory: joints and loads between bodies change neither momentum nor angular
+momentum.
 
 Without a joint or spring to the ground, P(t) = P(0) + (Σ m g + Σ F) t, and about the centre of mass of all
 bodies, where gravity has no moment, L(t) = L(0) + Σ M t with constant moments M and no forces at points.
@@ -18,10 +19,10 @@ from mbref.trajectory import Trajectory
 
 
 def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
-    """Drift (k,) since t = 0 of the momentum less the impulse of gravity and loads, over Σ m |v|; or of the
-    moment of momentum, over that times the scene's length plus Σ |J ω|, where that is larger.
+    """Return the drift (k,) since t = 0 of the momentum minus the impulse of gravity and loads, over Σ m |v|.
 
-    None where a joint or a spring is fixed to the ground, without masses, or where nothing moves.
+    The drift of the angular momentum, over that times the scene's length plus Σ |J ω|, is returned if it is
+    larger. None if a joint or a spring is fixed to the ground, without masses, or if nothing moves.
     """
     if not scene.has_mass() or any(GROUND in item.bodies for item in _links(scene)):
         return None
@@ -35,7 +36,7 @@ def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     if not along + turning:
         return None
     if any(isinstance(load, Force) for load in scene.load):
-        angular = 0 * angular  # the moment of a force follows the point it acts at
+        angular = 0 * angular  # the moment of a force changes as its point of attack moves
     by_length = turning + along * constraints.scene_length(scene)
     drifts = np.linalg.norm(linear, axis=1) / (along or np.inf), np.linalg.norm(angular, axis=1) / by_length
     return np.maximum(*drifts)
@@ -54,14 +55,14 @@ def _masses(scene: Scene) -> np.ndarray:
 
 
 def _own(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """J ω (k, nb, 3) of each body about its own centre of mass, world."""
+    """Return J ω (k, nb, 3) of each body about its own centre of mass, world."""
     return np.einsum("kbij,kbj->kbi", world_inertia(scene, rotations.to_matrix(orientation)), spin)
 
 
 def _momenta(
     scene: Scene, position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, spin: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Momentum and moment of momentum (k, 3) about the centre of mass of all bodies."""
+    """Return momentum and angular momentum (k, 3) about the centre of mass of all bodies."""
     share = _masses(scene) / _masses(scene).sum()
     momentum = _masses(scene)[:, None] * velocity
     arms = position - np.einsum("b,kbi->ki", share, position)[:, None]
@@ -72,19 +73,19 @@ def _momenta(
 def _sizes(
     scene: Scene, position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, spin: np.ndarray
 ) -> tuple[float, float]:
-    """The largest Σ m |v| and Σ |J ω| of the samples."""
+    """Return the largest Σ m |v| and Σ |J ω| of the samples."""
     along = np.linalg.norm(velocity, axis=-1) @ _masses(scene)
     turning = np.linalg.norm(_own(scene, orientation, spin), axis=-1).sum(axis=1)
     return float(along.max(initial=0.0)), float(turning.max(initial=0.0))
 
 
 def _push(scene: Scene) -> np.ndarray:
-    """Gravity and forces (3,), N."""
+    """Return gravity and forces (3,), N."""
     forces = [np.array(load.force) for load in scene.load if isinstance(load, Force)]
     return _masses(scene).sum() * np.array(scene.gravity) + sum(forces, np.zeros(3))
 
 
 def _turning_push(scene: Scene) -> np.ndarray:
-    """Constant moments (3,), N m."""
+    """Return the constant moments (3,), N m."""
     moments = [np.array(load.moment) for load in scene.load if isinstance(load, Moment)]
     return sum(moments, np.zeros(3))

@@ -1,4 +1,5 @@
-"""Digits of a run's numbers: those that single precision leaves, and noise between neighbouring samples."""
+"""Digits of a run's numbers: single precision is detected, and noise between neighbouring samples is
+measured."""
 
 from __future__ import annotations
 
@@ -11,26 +12,29 @@ from crosscheck.judge.constraints import scene_length
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-SIMPLE = 12  # bits of the significand: shorter numbers, such as halves and eighths, are no evidence
-SMALL = 2.0**-12  # fraction of the scale: smaller numbers may have lost bits by cancellation
+SIMPLE = 12  # bits of the significand; shorter numbers, such as halves and eighths, do not show the precision
+SMALL = 2.0**-12  # fraction of the scale; smaller numbers may have lost bits by cancellation
 STATES = ("position", "orientation", "velocity", "angular_velocity")
 PUSHES = ("acceleration", "angular_acceleration")
-EVIDENCE = 4  # numbers of an item that are neither; a double is a float32 by chance once in 2²⁹
-LEAST = 1e-300  # N, where nothing has mass
+EVIDENCE = 4  # least count of numbers that show the precision; a double is a float32 by chance once in 2²⁹
+LEAST = 1e-300  # N; scale of forces if nothing has mass
 ORDER = 6  # order of the differences that remove a smooth motion
 WEIGHTS = np.array([(-1.0) ** k * comb(ORDER, k) for k in range(ORDER + 1)])
-Series = tuple[str, np.ndarray, np.ndarray]  # the item, its numbers (k, w), and the scales of those (w,)
+Series = tuple[str, np.ndarray, np.ndarray]  # item, its numbers (k, w), and the scales (w,) of these numbers
 
 
 def single_precision(scene: Scene, run: Trajectory) -> list[str]:
-    """Items of a run whose varying numbers are all of single precision: states and accelerations of a body,
-    reactions of a joint.  Numbers that are constant, simple or small are no evidence."""
+    """Return the items of a run whose varying numbers are all of single precision.
+
+    Items are states and accelerations of a body, and reactions of a joint. Constant, simple or small numbers
+    are ignored.
+    """
     items = [*_of_bodies(scene, run), *_of_joints(scene, run)]
     return [name for name, series, scale in items if _is_single(series / scale, series)]
 
 
 def not_finite(run: Trajectory) -> list[str]:
-    """Arrays of a run that hold a number which is not finite."""
+    """Return the names of a run's arrays that contain a number which is not finite."""
     arrays = {name: getattr(run, name) for name in (*STATES, *PUSHES)}
     arrays |= {f"reaction in {joint}": wrench for joint, wrench in (run.reactions or {}).items()}
     return [name for name, array in arrays.items() if array is not None and not np.isfinite(array).all()]
@@ -63,7 +67,8 @@ def _of_joints(scene: Scene, run: Trajectory) -> Iterator[Series]:
 
 
 def _acceleration(scene: Scene, run: Trajectory) -> float:
-    """Largest acceleration of a motion; no less than gravity, and than its rates make of the length."""
+    """Return the largest acceleration of a motion; at least gravity, and at least the scene's length times
+    the rate squared."""
     found = 0.0 if run.acceleration is None else float(np.abs(run.acceleration).max(initial=0.0))
     return max(
         found, float(np.linalg.norm(scene.gravity)), scene_length(scene) * motion_rate(scene, run) ** 2
@@ -71,7 +76,7 @@ def _acceleration(scene: Scene, run: Trajectory) -> float:
 
 
 def _is_single(relative: np.ndarray, series: np.ndarray) -> bool:
-    """Whether the numbers of a series (k, w), given relative to their scales too, are float32."""
+    """Return whether the numbers of a series (k, w), also relative to their scales, are float32."""
     telling = (np.ptp(series, axis=0) > 0) & (np.abs(relative) > SMALL)
     significands = np.frexp(series[telling])[0] * 2.0**SIMPLE
     numbers = significands[significands != np.round(significands)]
@@ -79,9 +84,12 @@ def _is_single(relative: np.ndarray, series: np.ndarray) -> bool:
 
 
 def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
-    """Largest noise of positions, orientations, velocities and angular velocities at evenly spaced times
-    (k > 6) so near that sixth differences leave nothing of the motion, and whose it is: lengths over the
-    scene's, rates over the largest of the motion."""
+    """Return the largest noise of positions, orientations, velocities and angular velocities, and the body
+    that has it.
+
+    The k > 6 samples are equally spaced and so near that sixth differences of the motion vanish. Lengths are
+    relative to the scene's length, rates to the largest rate of the motion.
+    """
     length = scene_length(scene)
     rate = motion_rate(scene, run)
     first = run.orientation[:1]
@@ -96,7 +104,7 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
 
 
 def motion_rate(scene: Scene, run: Trajectory) -> float:
-    """Largest rate (1/s) of a motion: of its turning, or of its speed over the scene's length; no less than
+    """Return the largest rate (1/s) of a motion: angular velocity, or speed over the scene's length; at least
     one over the scene's duration."""
     moved = np.linalg.norm(run.velocity, axis=-1).max() / scene_length(scene)
     turned = np.linalg.norm(run.angular_velocity, axis=-1).max()
@@ -104,6 +112,6 @@ def motion_rate(scene: Scene, run: Trajectory) -> float:
 
 
 def _noise(series: np.ndarray) -> float:
-    """Largest sixth difference of series (k, …), over the sixth difference of noise of size one."""
+    """Return the largest sixth difference of series (k, …), divided by the sixth difference of unit noise."""
     left = [np.tensordot(WEIGHTS, series[k : k + ORDER + 1], 1) for k in range(len(series) - ORDER)]
     return float(np.abs(left).max() / np.linalg.norm(WEIGHTS))

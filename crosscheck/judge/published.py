@@ -1,8 +1,9 @@
-"""Published hard problems: the values printed for them, how errors are measured, what is accepted, and where.
+"""Published benchmark problems: their printed values, their error measures, the accepted errors, and the
+sources.
 
 The printed values are data to be checked, not truths: `benchmarks/errata.py` prints how far each is from the
-reference.  An observation is one number of a motion at one time.  Problems without published acceptance are
-accepted at OURS, a level of this project.
+reference.  An observation is one number of a motion at one time. If a problem has no published accepted
+error, this project's level OURS applies.
 """
 
 from __future__ import annotations
@@ -23,14 +24,17 @@ from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
 
 Observe = Callable[[Scene, Motion | Trajectory], dict[str, float]]
-OURS = 1e-6  # acceptance, in the unit of the measure, where none is published
+OURS = 1e-6  # accepted error, in the unit of the measure, if none is published
 
 
 @dataclass(frozen=True)
 class Published:
-    """One problem: the scene's name, printed values by name at ``time`` (s) and how they are read off a
-    motion sampled on ``times``, the ``measure`` of error and its words with the level of ``acceptance``, and
-    the ``source``."""
+    """One benchmark problem.
+
+    It has the scene's name, printed values by name at ``time`` (s), and the function that computes these
+    values from a motion sampled at ``times``. ``measure`` computes the error, ``words`` describes it,
+    ``acceptance`` is the accepted error, and ``source`` the publication.
+    """
 
     scene: str
     time: float
@@ -44,21 +48,22 @@ class Published:
 
     @property
     def level(self) -> str:
-        """The acceptance in words."""
+        """Return the accepted error in words."""
         return f"{self.acceptance:g}" + (", ours: none is published" if self.acceptance == OURS else "")
 
     def times(self) -> np.ndarray:
-        """Sample times (samples,), close enough to count the turns of joints."""
+        """Return sample times (samples,), dense enough to count the turns of joints."""
         return np.linspace(0.0, self.time, self.samples)
 
     def deviations(self, motion: Motion) -> dict[str, float]:
-        """Printed value less the motion's, by name, of a motion sampled on `times` to the end."""
+        """Return for each name the printed value minus the value of a motion sampled at `times` to the
+        end."""
         found = self.observe(find_scene(self.scene), motion)
         return {name: value - found[name] for name, value in self.values.items()}
 
 
 def _squeezer(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
-    """The seven angles of the test set and their rates, from the hinges' angles."""
+    """Return the seven angles of the test set and their rates, from the hinges' angles."""
     position, orientation = doubles(motion.position), doubles(motion.orientation)
     spin = doubles(motion.angular_velocity)
     angles = constraints.joint_coordinates(scene, motion.times, position, orientation, spin)
@@ -99,13 +104,13 @@ STARTS = {
 
 
 def _top_of_first_upright(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
-    """The top is twice as far from the pivot as the centre of mass."""
+    """Return the position of the top, which is twice as far from the pivot as the centre of mass."""
     (x, y, _), (vx, vy, _) = 2 * doubles(motion.position[-1, 0]), 2 * doubles(motion.velocity[-1, 0])
     return {"x": x, "y": y, "x'": vx, "y'": vy}
 
 
 def _slider(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
-    """Height of the slider's centre, and its rate."""
+    """Return the height of the slider's centre, and its rate."""
     slider = scene.body_index("slider")
     place, rate = (float(doubles(a[-1, slider, 2])) for a in (motion.position, motion.velocity))
     return {"s": place, "s'": rate}
@@ -116,13 +121,13 @@ def _nothing(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
 
 
 def _first_top(motion: Trajectory) -> np.ndarray:
-    """Place and velocity (k, 4) in the plane of the top of the first upright."""
+    """Return position and velocity (k, 4) in the plane of the top of the first upright."""
     return np.asarray(2 * np.hstack([motion.position[:, 0, :2], motion.velocity[:, 0, :2]]))
 
 
 ANGLES = ("beta", "Theta", "gamma", "Phi", "delta", "Omega", "epsilon")
 ENERGY = "largest |E(t) - E(0)| (J)"
-PLACE = "largest error of the slider's place (m)"
+PLACE = "largest error of the slider's position (m)"
 IFTOMM = (
     "M. González et al., Multibody System Dynamics 16, 2006, and the IFToMM library of benchmark problems"
 )
@@ -145,7 +150,7 @@ PUBLISHED: dict[str, Published] = {
         401,
         {"x": 0.3284573768, "y": 0.9445187937, "x'": 1.423050003, "y'": -0.4948670827},
         _top_of_first_upright,
-        "largest relative error of place and velocity of the first top",
+        "largest relative error of position and velocity of the first top",
         measures.relative_to_each(_first_top),
         1e-3,
         "values: Exudyn, test model fourBarMechanismIftomm, step 0.125 ms; problem: " + IFTOMM,
@@ -186,7 +191,7 @@ PUBLISHED: dict[str, Published] = {
         401,
         {"s": 0.6196290867, "s'": -0.7476025026},
         _slider,
-        "root of the mean square error of the slider's place (m)",
+        "root of the mean square error of the slider's position (m)",
         measures.mean_square_distance("slider"),
         OURS,
         "values: Exudyn 1.13.6 runs its example stiffFlyballGovernorKT, step 0.5 ms; problem: " + IFTOMM,
@@ -203,7 +208,7 @@ PUBLISHED: dict[str, Published] = {
         401,
         {},
         _nothing,
-        "relative error of the centre's place",
+        "relative error of the centre's position",
         measures.relative_distance("top"),
         OURS,
         "O. Brüls, A. Cardona, M. Arnold, Mechanism and Machine Theory 48, 2012, 121-137",
@@ -236,7 +241,7 @@ PUBLISHED: dict[str, Published] = {
         401,
         {},
         _nothing,
-        "largest error of the block's place (m)",
+        "largest error of the block's position (m)",
         measures.distance("block"),
         OURS,
         "two hinges of one axis, whose reactions are not unique",
@@ -245,7 +250,7 @@ PUBLISHED: dict[str, Published] = {
 
 
 def problem_of(scene: Scene) -> Published | None:
-    """The problem whose scene this is, for any duration; None of other scenes."""
+    """Return the problem to which a scene belongs, for any duration; None for other scenes."""
     _, problem = BY_SCENE.get(scene.name, ("", None))
     same = problem is not None and canonical(scene) == canonical(find_scene(problem.scene))
     return problem if same else None

@@ -1,7 +1,7 @@
 """Measures of the error of published problems: energy, the place of a body, invariants of a linkage.
 
-A measure takes the scene, a trajectory and the exact motion at the same times or at the first of them; it is
-None where it says nothing, as where it needs the exact motion and there is none.
+A measure is a function of the scene, a trajectory and the exact motion at equal times, or at the first of
+them. It returns None if it is not defined, for example without the exact motion that it needs.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 Measure = Callable[[Scene, Trajectory, Trajectory | None], float | None]
-NEAR_ZERO = 1e-3  # smallest denominator of relative errors in A02, as the problem defines it
+NEAR_ZERO = 1e-3  # smallest denominator of relative errors in problem A02, by its definition
 
 
 def energy(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
-    """Largest |E(t) - E(0)|, J."""
+    """Return the largest |E(t) - E(0)|, J."""
     drift = energy_drift(scene, motion)
     return None if drift is None or not drift.size else float(drift.max())
 
 
 def relative_to_each(observe: Callable[[Trajectory], np.ndarray]) -> Measure:
-    """Largest relative error of observed numbers (k, n); of those near zero, relative to NEAR_ZERO."""
+    """Return the largest relative error of observed numbers (k, n); near zero it is relative to NEAR_ZERO."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         if exact is None:
@@ -41,7 +41,8 @@ def relative_to_each(observe: Callable[[Trajectory], np.ndarray]) -> Measure:
 def relative_at_the_end(
     observe: Callable[[Scene, Trajectory], Mapping[str, float]], names: Sequence[str]
 ) -> Measure:
-    """Largest relative error of some observed numbers at the last sample; None where it is not reached."""
+    """Return the largest relative error of some observed numbers at the last sample; None if the run ends
+    before."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         if exact is None or not len(exact.times) or len(exact.times) < len(motion.times):
@@ -53,7 +54,7 @@ def relative_at_the_end(
 
 
 def distance(body: str) -> Measure:
-    """Largest distance of a body's centre from its true place, m."""
+    """Return the largest distance of a body's centre from its true position, m."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         off = _off(scene, body, motion, exact)
@@ -63,7 +64,8 @@ def distance(body: str) -> Measure:
 
 
 def relative_distance(body: str) -> Measure:
-    """Largest distance of a body's centre from its true place, relative to that place's from the origin."""
+    """Return the largest distance of a body's centre from its true position, relative to the distance of that
+    position from the origin."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         off = _off(scene, body, motion, exact)
@@ -76,7 +78,7 @@ def relative_distance(body: str) -> Measure:
 
 
 def mean_square_distance(body: str) -> Measure:
-    """Root of the mean square distance of a body's centre from its true place, m."""
+    """Return the root mean square distance of a body's centre from its true position, m."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         off = _off(scene, body, motion, exact)
@@ -86,7 +88,8 @@ def mean_square_distance(body: str) -> Measure:
 
 
 def opposite_hinges(pairs: Sequence[tuple[str, str]]) -> Measure:
-    """Largest sum of the angles, counted from the start, of hinges that turn oppositely, rad."""
+    """Return the largest sum of the angles, counted from the start, of hinges that turn in opposite
+    directions, rad."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         state = motion.position, motion.orientation, motion.angular_velocity
@@ -98,7 +101,8 @@ def opposite_hinges(pairs: Sequence[tuple[str, str]]) -> Measure:
 
 
 def guided(body: str) -> Measure:
-    """Largest distance (m) of a body's centre from the vertical through its start, or tilt (rad) of it."""
+    """Return the largest distance (m) of a body's centre from the vertical through its start, or its tilt
+    (rad)."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         b = scene.body_index(body)
@@ -111,7 +115,7 @@ def guided(body: str) -> Measure:
 
 
 def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory | None) -> np.ndarray | None:
-    """Distances (k,) of a body's centre from its true place, m."""
+    """Return the distances (k,) of a body's centre from its true position, m."""
     if exact is None:
         return None
     b, k = scene.body_index(body), len(exact.times)

@@ -14,17 +14,20 @@ Part = tuple[float, str]
 
 
 def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory, rank: float = RANK) -> Part:
-    """The larger of both differences, each relative to the largest expected one, and its name; of a scene
-    and two runs of the same sample times.  Quantities that one of the runs does not give are not
-    compared.  ``rank`` is the one of `shared_wrenches`."""
+    """Return the larger of the relative differences of accelerations and of reactions, and its name.
+
+    Each is relative to the largest expected value. Both runs have equal sample times. Quantities that one of
+    the runs does not give are not compared. ``rank`` is the argument of `shared_wrenches`.
+    """
     accelerations = accelerations_apart(scene, expected, found), "accelerations"
     return max(accelerations, _reactions(scene, expected, found, rank))
 
 
 def accelerations_apart(scene: Scene, expected: Trajectory, found: Trajectory) -> float:
-    """Difference of accelerations, relative to the largest expected one, 0 where a run gives none.
+    """Return the difference of accelerations, relative to the largest expected one; 0 if a run gives none.
 
-    Angular accelerations count times the scene's length, and none less than its length in its time.
+    Angular accelerations are multiplied by the scene's length. The scale is at least the scene's length over
+    its duration squared.
     """
     length, parts = scene_length(scene), []
     for name, unit in (("acceleration", 1.0), ("angular_acceleration", length)):
@@ -38,8 +41,11 @@ def accelerations_apart(scene: Scene, expected: Trajectory, found: Trajectory) -
 
 
 def _reactions(scene: Scene, expected: Trajectory, found: Trajectory, rank: float) -> Part:
-    """At the last sample, of the joints that both runs have, across what redundancy leaves open; moments
-    count over the scene's length."""
+    """Return the difference of reactions at the last sample, for joints of both runs, in their unique
+    components.
+
+    Moments are divided by the scene's length.
+    """
     first, second = expected.reactions or {}, found.reactions or {}
     common = [name for name in first if name in second]
     if not common or not scene.has_mass():

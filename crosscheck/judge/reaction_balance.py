@@ -1,4 +1,4 @@
-"""Joint reactions of the exact motion and of a run: they move the bodies, and do no work."""
+"""Joint reactions of the exact motion and of a run: they cause the accelerations, and do no work."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ from mbref import rotations
 from mbref.scene import Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
-ABSURD = 10.0  # multiples of the largest exact force beyond which a reaction is no answer
+ABSURD = 10.0  # multiple of the largest exact force above which a reaction is implausible
 
 
 def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
-    """The exact motion with the reactions that move it (least squares of the joints' rows): their unique
-    parts are exact, and what redundancy leaves open is of least norm in the rows' own units.
+    """Return the exact motion with the reactions that cause it (least squares of the joints' rows). Their
+    unique components are exact, and undetermined components have the least norm in the rows' own units.
 
     Raises ValueError when the motion has no accelerations.
     """
@@ -47,7 +47,8 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
 
 
 def _of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """The rows (c, 6 nb) of coordinates q with an armature I at a sample, and their forces -I q'' (c,)."""
+    """Return the rows (c, 6 nb) of coordinates q with an armature I at a sample, and their forces -I q''
+    (c,)."""
     assert exact.acceleration is not None and exact.angular_acceleration is not None
     state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
     found = reflected(scene, *state)
@@ -56,8 +57,10 @@ def _of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, 
 
 
 def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
-    """Sentences on reactions of a run that exceed the largest exact force ABSURD times, moments divided by
-    the scene's length; ``exact`` has reactions."""
+    """Return sentences on reactions of a run that exceed ABSURD times the largest exact force.
+
+    Moments are divided by the scene's length; ``exact`` has reactions.
+    """
     units = np.repeat([1.0, scene_length(scene)], 3)
     sizes = {
         name: float(np.linalg.norm(w / units, axis=-1).max(initial=0.0))
@@ -75,8 +78,11 @@ def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
 
 
 def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
-    """Largest part of the largest force (moments over the scene's length) by which the joints' resultants
-    on a body miss mass times exact acceleration less the loads."""
+    """Return the largest error of the force balance on a body, relative to the largest force.
+
+    The joints' resultant is compared with mass times exact acceleration minus the loads. Moments are divided
+    by the scene's length.
+    """
     units = np.repeat([1.0, scene_length(scene)], 3)
     wanted = demanded(scene, exact) / units
     found = np.array([resultants(scene, run, k) for k in range(len(run.times))]) / units
@@ -84,7 +90,8 @@ def balance(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
 
 
 def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
-    """Forces and moments about the centres (k, nb, 6), world, that the joints must give for the motion.
+    """Return forces and moments about the centres of mass (k, nb, 6), world, that the joints must exert for
+    the motion.
 
     Raises ValueError when the motion has no accelerations.
     """
@@ -105,7 +112,8 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
 
 
 def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
-    """Largest part of the largest force by which a reaction is not of its joint's and driver's rows."""
+    """Return the largest component of a reaction along a motion that its joint and driver allow, relative to
+    the largest force."""
     length = scene_length(scene)
     wanted = demanded(scene, exact) / np.repeat([1.0, length], 3)
     units = np.repeat([1.0, length], 3)

@@ -1,7 +1,9 @@
-"""The limit h → 0 of fixed-step runs by Richardson's extrapolation: bias apart from discretisation.
+"""Limit h → 0 of fixed-step runs by Richardson's extrapolation, which separates bias from discretisation
+error.
 
-Three runs x(h) = x₀ + c hᵖ give order, limit and the finest run's distance from it without any truth; the
-limit's own error against a truth remains at any step, such as the error of a soft constraint.
+Three runs x(h) = x₀ + c hᵖ give order, limit and the finest run's distance from the limit without any truth.
+The limit's own error against a truth is the bias. It remains at any step, such as the error of a soft
+constraint.
 """
 
 from __future__ import annotations
@@ -22,8 +24,8 @@ HIGHEST_ORDER = 12.0
 
 @dataclass(frozen=True)
 class Limit:
-    """``motion`` is the extrapolated one (poses alone are meaningful), ``discretisation`` how far the finest
-    run is from it, ``order`` the order of the runs' differences."""
+    """Extrapolated ``motion`` (only its poses are meaningful), distance ``discretisation`` of the finest run
+    from it, and ``order`` of the runs' differences."""
 
     motion: Trajectory
     order: float
@@ -31,10 +33,10 @@ class Limit:
 
 
 def limit(scene: Scene, steps: Sequence[float], runs: Sequence[Trajectory]) -> Limit | None:
-    """The limit of completed runs with the same samples, of which the three of least step are used.
+    """Return the limit of completed runs with equal samples; the three with the smallest steps are used.
 
-    None with fewer than three, and where their differences do not shrink as a power of the step between
-    LEAST_ORDER and HIGHEST_ORDER: then they are not in an asymptotic range.
+    None for fewer than three runs, and if their differences do not decrease as a power of the step between
+    LEAST_ORDER and HIGHEST_ORDER. The runs are then outside the asymptotic range.
     """
     finest = sorted(zip(steps, runs, strict=True), key=lambda pair: pair[0])[2::-1]
     if len(finest) < 3:
@@ -56,7 +58,7 @@ def limit(scene: Scene, steps: Sequence[float], runs: Sequence[Trajectory]) -> L
 
 
 def _order(steps: tuple[float, float, float], apart: Sequence[float]) -> float | None:
-    """p with (h₁ᵖ - h₂ᵖ) / (h₂ᵖ - h₃ᵖ) the ratio of the differences."""
+    """Return p such that (h₁ᵖ - h₂ᵖ) / (h₂ᵖ - h₃ᵖ) equals the ratio of the differences."""
     if not (np.isfinite(apart).all() and min(apart) > 0):
         return None
     a, b = steps[0] / steps[1], steps[2] / steps[1]
@@ -70,7 +72,7 @@ def _order(steps: tuple[float, float, float], apart: Sequence[float]) -> float |
 
 
 def _beyond(last: np.ndarray, before: np.ndarray, weight: float) -> np.ndarray:
-    """Unit quaternions last + weight (last - before), the signs made equal first."""
+    """Return unit quaternions last + weight (last - before), after their signs are made equal."""
     same = np.where(np.sum(last * before, axis=-1, keepdims=True) < 0, -before, before)
     found = last + weight * (last - same)
     return found / np.linalg.norm(found, axis=-1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Terms of the equations of motion at a state by the judge's own equations, each of which can be left out."""
+"""Terms of the equations of motion at a state by the judge's equations, each of which can be left out."""
 
 from __future__ import annotations
 
@@ -40,14 +40,15 @@ class Terms(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """Terms with one of them changed: the part of an engine where it belongs, and what was changed."""
+    """Terms with one of them changed: the part of an engine that computes this term, and the change."""
 
     part: str
     change: str
     terms: Terms
 
 
-PARTS = ("mass matrix", "gravity", "velocity terms", "loads", "constraints", "drivers")  # by dependence
+# in order of dependence
+PARTS = ("mass matrix", "gravity", "velocity terms", "loads", "constraints", "drivers")
 
 
 def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
@@ -102,7 +103,7 @@ CHANGES = {"{} left out": 0.0, "{} of opposite sign": -1.0, "{} counted twice": 
 
 
 def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
-    """The state at a sample, with the angles of the torsion springs."""
+    """Return the state at a sample, with the angles of the torsion springs."""
     place = motion.position[sample], motion.orientation[sample]
     whole = motion.times, motion.position, motion.orientation, motion.angular_velocity
     coordinates = joint_coordinates(scene, *whole)
@@ -118,14 +119,14 @@ def _residuals(
     velocity: np.ndarray,
     spin: np.ndarray,
 ) -> np.ndarray:
-    """Acceleration residuals (m,) of bodies that coast."""
+    """Return the acceleration residuals (m,) of bodies without acceleration."""
     still = np.zeros_like(position)
     found = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
     return np.concatenate([np.zeros(0), *found.values()])
 
 
 def _forces(scene: Scene, state: State) -> dict[str, np.ndarray]:
-    """Forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper."""
+    """Return forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper."""
     bare = scene.with_(load=[], gravity=(0.0, 0.0, 0.0))
     plain = (*state[:4], np.zeros(0))
     gyroscopic = applied(bare, plain).ravel()
@@ -145,8 +146,8 @@ def _forces(scene: Scene, state: State) -> dict[str, np.ndarray]:
 
 
 def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = None) -> np.ndarray:
-    """The mass matrix (6 nb, 6 nb) with inertias (nb, 3, 3) along world axes, by default turned with the
-    bodies."""
+    """Return the mass matrix (6 nb, 6 nb) for inertias (nb, 3, 3) along world axes; by default they are
+    rotated with the bodies."""
     if inertia is None:
         turn = rotations.to_matrix(orientation)
         inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
@@ -158,7 +159,7 @@ def _mass(scene: Scene, orientation: np.ndarray, inertia: np.ndarray | None = No
 
 
 def _other_masses(scene: Scene, orientation: np.ndarray, terms: Terms) -> Iterator[Variant]:
-    """Mass matrices with inertias along other axes, and without products of inertia."""
+    """Return mass matrices for inertias along other axes, and for inertias without products of inertia."""
     own, turn = inertia_matrices(scene), rotations.to_matrix(orientation)
     diagonal = np.array([np.diag(np.diag(matrix)) for matrix in own])
     back = np.swapaxes(turn, 1, 2)

@@ -1,4 +1,4 @@
-"""Every tolerance of the judge in one place, each with the reason for it; fixed before results are seen."""
+"""Tolerances of the judge, each with its reason; they are not adapted to results."""
 
 from __future__ import annotations
 

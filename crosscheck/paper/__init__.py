@@ -1,1 +1,1 @@
-"""The paper's tables and figures as data, and the runs that make them again with one set of settings."""
+"""The paper's tables and figures as data, and the runs that repeat them with one set of settings."""

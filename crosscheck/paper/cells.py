@@ -17,7 +17,7 @@ CLOSE = 0.002
 
 @dataclass(frozen=True)
 class Cell:
-    """One outcome the paper prints: ``end`` (s) and ``letter``, or None and "" for convergence."""
+    """One outcome that the paper prints: ``end`` (s) and ``letter``, or None and "" if the run completes."""
 
     table: str
     row: str
@@ -38,7 +38,8 @@ class Match(enum.Enum):
 
 
 def match(cell: Cell, outcome: Outcome, t_end: float) -> Match:
-    """SAME: outcome and end time; OTHER_TIME: the same footnote at another time; else DIFFERENT."""
+    """Return SAME for equal outcome and end time, OTHER_TIME for an equal footnote at another time, otherwise
+    DIFFERENT."""
     if cell.end is None:
         return Match.SAME if outcome is Outcome.COMPLETED else Match.DIFFERENT
     if outcome.letter != cell.letter:
@@ -47,7 +48,8 @@ def match(cell: Cell, outcome: Outcome, t_end: float) -> Match:
 
 
 def _cell(table: str, row: str, column: str, text: str) -> Cell:
-    """A cell as printed: ``20`` for convergence, else seconds and letter."""
+    """Return a cell from its printed text: ``20`` for a completed run, otherwise seconds and footnote
+    letter."""
     if text == "20":
         return Cell(table, row, column, None, "")
     return Cell(table, row, column, float(text[:-1]), text[-1])
@@ -82,7 +84,7 @@ _TABLE_II = {
     "MPI (GS) + B": "0.059c",
     "MPI (GS) + CP": "20",
 }
-_TABLE_III = {  # outcome, steps a second of simulation, seconds of execution a second of simulation
+_TABLE_III = {  # outcome, steps per second of simulation, computing seconds per second of simulation
     "LM2": ("6.163c", 3303, 53.95),
     "LM2 + B": ("8.079c", 3292, 52.53),
     "LM2 + CP": ("20", 103, 36.84),
@@ -106,7 +108,7 @@ CELLS: tuple[Cell, ...] = (
     *(_cell("III", row, SPATIAL, text) for row, (text, _, _) in _TABLE_III.items()),
 )
 
-Counts = dict[str, tuple[int, float]]  # row → steps and seconds of execution, a second of simulation
+Counts = dict[str, tuple[int, float]]  # row → steps and computing seconds, per second of simulation
 COUNTS_III: Counts = {row: (steps, seconds) for row, (_, steps, seconds) in _TABLE_III.items()}
 COUNTS_IV: Counts = {
     "LM1": (2428, 30.31),

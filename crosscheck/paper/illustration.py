@@ -1,4 +1,5 @@
-"""The explanation of Table I, computed once and stored: rank, fold, and ALF's iterations near a crossing."""
+"""The explanation of Table I, computed once and stored: rank of the Jacobian, the second branch (fold), and
+ALF's iterations near a crossing."""
 
 from __future__ import annotations
 
@@ -16,8 +17,8 @@ from mbref.records import append, stored
 from mbref.scenes.four_bar import four_bar
 
 SCHEMA = 1
-TURNED = 0.1  # rad, along the fold
-LAST = 0.06  # s, of the crossings
+TURNED = 0.1  # rad; turn of the crank along the fold
+LAST = 0.06  # s; last time of the listed crossings
 STARTS = ("θ₂ = nπ", "θ₂ = π/4", "θ₂ = π/2")  # columns of Table I
 DISTANCES, GAMMA_ERRORS = (1.0, 0.3, 0.1, 0.03, 0.01, 0.001), (0.0, 1e-10, 1e-8, 1e-6)
 ANGLES = 401  # samples of one revolution
@@ -26,7 +27,7 @@ Illustration = dict[str, Any]
 
 
 def illustration(path: str | Path) -> Illustration:
-    """The record at ``path`` (JSON lines), computed and appended where it is missing.
+    """Return the record stored at ``path`` (JSON lines); it is computed and appended if it is missing.
 
     ``fold``: residual on the fold from θ₂ = 0 and π; ``crossings``: start, time (s), multiple of π, rank and
     smallest singular value of each; ``theta`` and ``smallest``: θ₂ (rad) over a revolution and the two

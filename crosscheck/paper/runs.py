@@ -1,4 +1,4 @@
-"""The runs behind the paper's tables and figures, each with a label to find its record by."""
+"""The runs of the paper's tables and figures, each with a label by which its record is found."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ SHORT = np.linspace(0.0, 0.12, 61)  # s; samples every 2 ms over two revolutions
 TURNS = np.linspace(0.0, END, 201)
 SECOND = np.linspace(0.0, 1.0, 6)
 FINE = np.linspace(0.0, END, 2001)  # s; samples every 10 ms, to show the peaks at singular positions
-SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # plotted: end time over the size of data errors
-FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # the rows of Table III that drift until they fail
+SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # rows plotted: end time over the size of data errors
+FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # rows of Table III whose constraints drift until they fail
 LASTING = ("MPI (SVD) + CP", "MPI (GS) + CP")  # the rows of Tables I and II whose runs last 20 s
 
 HEAVY, UNEQUAL, SPATIAL_DYNAMIC = "a = b", "a ≠ b", "spatial"
 TRUE_BRANCH = "taylor"
-FIGURES: Mapping[str, tuple[str, ...]] = {  # column → rows whose motion is drawn
+FIGURES: Mapping[str, tuple[str, ...]] = {  # column → rows whose motion is plotted
     "θ₂ = π/2": ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B", "MPI (GS) + CP", "MPI (SVD) + CP"),
     FIVE_BAR: ("MPI (GS)", "MPI (SVD)", "MPI (SVD) + CP"),
 }
@@ -52,18 +52,18 @@ HEAVY_SWEEP = tuple(v for v in SWEEP if v.name in ("rtol 1e-5", "smallest step 1
 [RAISED] = [v for v in SWEEP if v.name == "rank 1e-4"]
 KEPT, KEPT_RTOLS = (0.6, 0.3, 0.1, 0.03), (1e-6, 1e-7, 1e-8, 1e-9)
 ALPHAS = tuple(10.0**k for k in range(2, 13))
-DIGITS_EPSILON = 1e-14  # data error as small as rounding
+DIGITS_EPSILON = 1e-14  # tolerance ε of ALF near rounding
 EXACT, PENALTY, DUAL = "mpi-svd", "alf", "alf-dual"
 
 
 ERRORS = tuple(10.0**-k for k in range(4, 10))  # tolerances at which the growth of the violation is shown
 GAINS = (0.0, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # α = β of Baumgarte, 1/s
 GROWTH, GAIN = "growth", "gain"
-TEACHING = np.linspace(0.0, 2.0, 101)  # s, sample times of the runs in the part for teaching
+TEACHING = np.linspace(0.0, 2.0, 101)  # s, sample times of the runs for lectures
 
 
 class Label(NamedTuple):
-    """The place of a run: table, figure or sweep; its row and column; the varied setting."""
+    """Label of a run: table, figure or sweep; its row and column; the varied setting."""
 
     part: str
     row: str
@@ -82,7 +82,7 @@ Records = dict[Label, Record]
 
 
 def cases() -> Cases:
-    """Every run that the tables and figures need, except the follow-ups and the timings."""
+    """Return every run that the tables and figures need, except follow-up runs and timings."""
     return {
         **tables(),
         **drawn(),
@@ -97,24 +97,24 @@ def cases() -> Cases:
 
 
 def studies() -> Cases:
-    """The runs behind the studies of settings and methods that stand after the tables and figures."""
+    """Return the runs of the studies of settings and methods that follow the tables and figures."""
     return {**sweep(), **sized(), **settings_of_cranks(), **pairs(), **digits()}
 
 
 def tables() -> Cases:
-    """One run a cell of Tables I to III."""
+    """Return one run for each cell of Tables I to III."""
     return {Label(c.table, c.row, c.column): linkage(c.row, c.column, SAMPLES) for c in CELLS}
 
 
 def draws(cell: Cell) -> int:
-    """Number of draws of first step and data errors of a cell: 1 where they cannot matter."""
+    """Return the number of random first steps and data errors of a cell; 1 if they have no influence."""
     if cell.letter == "a" or (cell.table == "III" and cell.row not in FREE):
         return 1
     return FEW if cell.table == "III" or cell.row in LASTING else SEEDS
 
 
 def drawn() -> Cases:
-    """The cells again with other draws of first step and errors in the data."""
+    """Return the cells again with other random first steps and data errors."""
     return {
         label: case
         for cell in CELLS
@@ -123,19 +123,19 @@ def drawn() -> Cases:
 
 
 def sweep() -> Cases:
-    """The cells that fail at singular positions in the paper, one setting varied at a time."""
+    """Return the cells that fail at singular positions in the paper, with one setting varied at a time."""
     places = [(c.row, c.column) for c in CELLS if c.table != "III" and c.letter not in ("a", "")]
     return _varied("sweep", places, SWEEP)
 
 
 def sized() -> Cases:
-    """Some rows over the size of the errors in the data, several draws each."""
+    """Return some rows for several sizes of the data errors, each with several random draws."""
     places = [(row, column) for column in (*FOUR_BAR_COLUMNS, FIVE_BAR) for row in SIZED_ROWS]
     return _varied("sized", places, SIZED, SHORT[[-1]])
 
 
 def strict() -> Cases:
-    """Table III's drifting rows at the tolerances that the paper's step counts suggest."""
+    """Return Table III's drifting rows at the tolerances that the paper's numbers of steps suggest."""
     return _varied("strict", [(row + b, SPATIAL) for row in FREE for b in ("", " + B")], (STRICT,))
 
 
@@ -151,7 +151,7 @@ def _varied(
 
 
 def figures() -> Cases:
-    """Figures 4, 5, 6 and 8: the linkages, sampled every 2 ms."""
+    """Return the runs of Figures 4, 5, 6 and 8: the linkages, sampled every 2 ms."""
     return {
         Label("figures", row, column): linkage(row, column, SHORT)
         for column, rows in FIGURES.items()
@@ -160,7 +160,8 @@ def figures() -> Cases:
 
 
 def dynamic_scene(column: str) -> Scene:
-    """The mechanism of Figures 11 to 16 and Table IV: 100 N m on a crank with a flywheel, from rest."""
+    """Return the mechanism of Figures 11 to 16 and Table IV: 100 N m on a crank with a flywheel, from
+    rest."""
     if column == HEAVY:
         return SCENES["planar_slider_crank_heavy"]()
     if column == UNEQUAL:
@@ -169,7 +170,8 @@ def dynamic_scene(column: str) -> Scene:
 
 
 def dynamic() -> Cases:
-    """Figures 11 to 16 and Table IV; for a = b also finely, and by series on the smooth branch."""
+    """Return the runs of Figures 11 to 16 and Table IV; for a = b also with dense samples, and by Taylor
+    series on the smooth branch."""
     out = {
         Label("dynamic", row, column): _case(dynamic_scene(column), row, TURNS)
         for column, rows in DYNAMIC.items()
@@ -183,7 +185,7 @@ def dynamic() -> Cases:
 
 
 def settings_of_cranks() -> Cases:
-    """The planar slider-cranks of Figures 11 to 14 at other settings."""
+    """Return the runs of the planar slider-cranks of Figures 11 to 14 at other settings."""
     scene, out = dynamic_scene(HEAVY), {}
     for variant in HEAVY_SWEEP:
         for row in CROSSING:
@@ -194,12 +196,13 @@ def settings_of_cranks() -> Cases:
 
 
 def teaching_scene() -> Scene:
-    """A mechanism without redundant constraints and singular positions: the spatial slider-crank, 100 N m."""
+    """Return the spatial slider-crank under 100 N m, which has no redundant constraints and no singular
+    positions."""
     return dynamic_scene(SPATIAL_DYNAMIC)
 
 
 def growth() -> Cases:
-    """Figure 2's procedure by LM2 over the tolerance: nothing corrects the violation."""
+    """Return runs by LM2 without stabilisation at several tolerances (Figure 2's procedure)."""
     return {
         Label(GROWTH, "LM2", SPATIAL_DYNAMIC, f"{rtol:g}"): _case(
             teaching_scene(), "LM2", TEACHING, Variant(f"{rtol:g}", {"rtol": rtol, "violation": 1e9})
@@ -209,7 +212,7 @@ def growth() -> Cases:
 
 
 def gains() -> Cases:
-    """LM2 with Baumgarte's stabilisation over α = β."""
+    """Return runs by LM2 with Baumgarte's stabilisation for several α = β."""
     return {
         Label(GAIN, "LM2 + B", SPATIAL_DYNAMIC, f"{gain:g}"): _named(
             teaching_scene(), f"lm2+baumgarte[{gain:g},{gain:g}]/{settings.INTEGRATOR}", TEACHING
@@ -219,7 +222,8 @@ def gains() -> Cases:
 
 
 def kept() -> Cases:
-    """Table IV's mechanism by LM2, free and partitioned, over the tolerance and how long partitions last."""
+    """Return runs of Table IV's mechanism by LM2, with and without partitioning, over the tolerance and the
+    threshold for a new partition."""
     scene, out = dynamic_scene(SPATIAL_DYNAMIC), {}
     for rtol in KEPT_RTOLS:
         variant = Variant(f"rtol {rtol:g}", {"rtol": rtol})
@@ -230,7 +234,7 @@ def kept() -> Cases:
 
 
 def tight() -> Cases:
-    """Table IV at the tolerance near which the paper's was probably run."""
+    """Return the runs of Table IV at the tolerance that was probably used in the paper."""
     scene = dynamic_scene(SPATIAL_DYNAMIC)
     return {
         Label("tight", row, SPATIAL_DYNAMIC, TIGHT.name): _case(scene, row, TURNS, TIGHT) for row in COUNTS_IV
@@ -238,7 +242,7 @@ def tight() -> Cases:
 
 
 def pairs() -> Cases:
-    """Every formulation with every stabilisation on the driven spatial slider-crank, 20 s."""
+    """Return runs of every formulation with every stabilisation on the driven spatial slider-crank, 20 s."""
     scene, parts = settings.column_scene(SPATIAL), engine(ENGINE).family_parts()
     return {
         Label("pairs", f, s): _named(scene, f"{BASE.formulation(f)}+{s}/{settings.INTEGRATOR}", SAMPLES)
@@ -248,12 +252,13 @@ def pairs() -> Cases:
 
 
 def digits_scene() -> Scene:
-    """The moving mechanism whose accelerations at t = 0 ALF and its dual are asked for."""
+    """Return the moving mechanism on which the accelerations of ALF and its dual form at t = 0 are
+    compared."""
     return SCENES["spatial_slider_crank_gravity"]()
 
 
 def digits() -> Cases:
-    """The accelerations at t = 0 of a moving mechanism by ALF and its dual over the penalty."""
+    """Return runs for the accelerations at t = 0 by ALF and its dual form over the penalty."""
     scene, once = digits_scene(), np.zeros(1)
     out = {Label("digits", EXACT, ""): _named(scene, f"{EXACT}+none", once)}
     for alpha in ALPHAS:
@@ -264,7 +269,11 @@ def digits() -> Cases:
 
 
 def follow_ups(records: Records) -> Cases:
-    """Runs that failed before the first sample again with one shortly before the end, for the error there."""
+    """Return runs that repeat runs which failed before the first sample, with a sample shortly before the
+    end.
+
+    The error is measured at that sample.
+    """
     out = {}
     for cell in CELLS:
         record = records[Label(cell.table, cell.row, cell.column)]
@@ -275,19 +284,20 @@ def follow_ups(records: Records) -> Cases:
 
 
 def timed() -> Cases:
-    """The rows of Tables III and IV whose times are compared: one second of the former, all of the latter."""
+    """Return the rows of Tables III and IV whose times are compared: one second of Table III, all of Table
+    IV."""
     one = {Label("timed", row, SPATIAL): linkage(row, SPATIAL, SECOND) for row in COUNTS_III}
     scene = dynamic_scene(SPATIAL_DYNAMIC)
     return one | {Label("timed", row, SPATIAL_DYNAMIC): _case(scene, row, TURNS) for row in COUNTS_IV}
 
 
 def has(records: Iterable[Label], part: str) -> bool:
-    """Whether there are runs of a part."""
+    """Return whether there are records of a part."""
     return any(label.part == part for label in records)
 
 
 def found(records: Mapping[Label, Record], cell: Cell, parts: Iterable[str]) -> dict[str, Record]:
-    """The cell's records of the tables, sweeps … named in ``parts``, by variant."""
+    """Return the cell's records of the ``parts`` (tables, sweeps …), by variant."""
     wanted = {cell.table if part == "tables" else part for part in parts}
     return {
         label.variant: record
@@ -297,7 +307,7 @@ def found(records: Mapping[Label, Record], cell: Cell, parts: Iterable[str]) -> 
 
 
 def linkage(row: str, column: str, times: Iterable[float], variant: Variant = BASE) -> Case:
-    """The run of a cell of Tables I to III at the given times and settings."""
+    """Return the run of a cell of Tables I to III at the given times and settings."""
     return _case(settings.column_scene(column, variant), row, np.asarray(times), variant)
 
 

@@ -1,4 +1,4 @@
-"""One set of settings for all the paper's runs, their variations one at a time, and the paper's scenes."""
+"""Settings of the paper's runs (one set for all), variations of single settings, and the paper's scenes."""
 
 from __future__ import annotations
 
@@ -14,23 +14,26 @@ from mbref.scenes.planar_slider_crank import FLYWHEEL
 
 INTEGRATOR = "adams"
 END = 20.0  # s
-SIZE = 1e-11  # m, of the errors in the data
-SEEDS, FEW = 20, 8  # draws of a run that ends at a crossing, and of one that lasts
-FIRST = (1e-5, 1e-4)  # s, between which the first step is drawn
-SPATIAL_FLYWHEEL = 30.0  # kg m²
+SIZE = 1e-11  # m; size of the random errors in the data
+SEEDS, FEW = 20, 8  # number of random draws for a run that fails at a crossing, and for a run that lasts
+FIRST = (1e-5, 1e-4)  # s; range of the random first step
+SPATIAL_FLYWHEEL = 30.0  # kg m²; flywheel on the spatial slider-crank
 ALF: Mapping[str, float] = {"alpha": 1e4, "epsilon": 1e-11, "iterations": 20, "omega": 10, "mu": 1}
 
 
 def first_step(seed: int) -> float:
-    """The first step (s) of a draw, log-uniform between the bounds of FIRST."""
+    """Return the random first step (s) of a seed, log-uniform in the range FIRST."""
     return float(np.exp(np.random.default_rng([seed, 1]).uniform(*np.log(FIRST))))
 
 
 REASONS: Mapping[str, str] = {
-    "integrator adams": "variable-order Adams PECE after Shampine and Gordon, the usual code of the time",
+    "integrator adams": "variable-order Adams PECE after Shampine and Gordon, a common code when the "
+    "paper was written",
     "rtol = 1e-06": "local error a step, relative and absolute, in STEP's Euclidean norm",
-    f"first step {first_step(0):.2e} s": f"STEP asks its caller for one; drawn between {FIRST[0]:g} and "
-    f"{FIRST[1]:g} s, because the doublings from it decide how near to a crossing steps fall",
+    f"first step {first_step(0):.2e} s": "the integrator STEP needs a first step; it is random between "
+    f"{FIRST[0]:g} and "
+    f"{FIRST[1]:g} s, because STEP doubles it repeatedly, so that it decides how near to a crossing a step "
+    "ends",
     "smallest_step = forced_step = 3e-06": "s; a step this short is taken whatever its error estimate, so "
     "that a run goes on until its violation ends it, as the paper's do",
     "largest_step = 0.01": "s, about the paper's 103 steps a second",
@@ -42,7 +45,7 @@ REASONS: Mapping[str, str] = {
     "with the errors in the data, gaps of 1e-11 m decide the branch, which double precision does not",
     f"data errors {SIZE:g} m": "every joint anchor is displaced at random, uniformly up to this in x, y and "
     "z (section 1: input data of finite precision). Why this size: see what the settings decide",
-    "draws": f"first step and errors in the data are drawn together, by a seed; 0 in the tables, not chosen "
+    "draws": f"the seed of the random first step and data errors is 0 in the tables, not chosen "
     f"among seeds 0 to {SEEDS - 1} (0 to {FEW - 1} of runs that last), whose matches stand beside",
     "Baumgarte α = β = 5": "as printed",
     "ALF α = 1e4, ε = 1e-11, ω = 10, μ = 1, 20 iterations": "the paper gives none of them. α weights rows "
@@ -73,7 +76,7 @@ STABILISATIONS = {"": "none", "B": "baumgarte", "CP": "partitioning"}
 
 @dataclass(frozen=True)
 class Variant:
-    """The settings, or a variation of them in one point of the sweep."""
+    """One set of settings; a sweep varies one of them."""
 
     name: str = "the settings"
     limits: Mapping[str, float] = field(default_factory=dict)
@@ -83,11 +86,11 @@ class Variant:
     alf: Mapping[str, float] = field(default_factory=dict)
 
     def options(self) -> dict[str, float]:
-        """All numbers of ``mbref.simulation.simulate.Limits``."""
+        """Return all fields of ``Limits`` for these settings."""
         return {**LIMITS, "first_step": first_step(self.seed), **self.limits}
 
     def formulation(self, name: str) -> str:
-        """mbref's formulation with the options of these settings."""
+        """Return mbref's formulation with the options of these settings."""
         options = ",".join(f"{k}={v:g}" for k, v in {**ALF, **self.alf}.items())
         return f"{name}[{options}]" if name[:3] == "alf" else name
 
@@ -119,19 +122,20 @@ TIGHT = Variant("rtol 1e-9", {"rtol": 1e-9})
 
 
 def method(row: str, variant: Variant = BASE) -> str:
-    """mbref's name of a row of the tables."""
+    """Return mbref's name of the method in a row of the tables."""
     formulation, _, stabilisation = row.partition(" + ")
     name = variant.formulation(FORMULATIONS[formulation])
     return f"{name}+{STABILISATIONS[stabilisation]}/{variant.integrator}"
 
 
 def kinematic(scene: Scene) -> Scene:
-    """The scene without masses: M = I and no forces, the paper's section 5.1."""
+    """Return the scene without masses: M = I and no forces, as in the paper's section 5.1."""
     return scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
 
 
 def imprecise(scene: Scene, size: float, seed: int) -> Scene:
-    """The scene with every joint anchor displaced by up to ``size`` (m) along x, y and z, at random."""
+    """Return the scene with a random displacement of every joint anchor, up to ``size`` (m) along x, y and
+    z."""
     drawn = np.random.default_rng(seed).uniform(-size, size, (len(scene.joint), 3))
     return scene.with_(
         joint=tuple(
@@ -148,7 +152,7 @@ def _anchor(joint: Joint) -> tuple[float, float, float]:
 
 
 def heavy_crank(scene: Scene, axis: int, inertia: float = FLYWHEEL) -> Scene:
-    """The scene with a disc of ``inertia`` (kg m²) about a body axis on its crank, for 20 s."""
+    """Return the scene with a disc of ``inertia`` (kg m²) about a body axis on its crank, for 20 s."""
     crank = scene.body[0]
     disc = [inertia if k == axis else inertia / 2 for k in range(3)]
     total = tuple((np.array(crank.inertia) + disc).tolist())
@@ -157,7 +161,7 @@ def heavy_crank(scene: Scene, axis: int, inertia: float = FLYWHEEL) -> Scene:
 
 
 def column_scene(column: str, variant: Variant = BASE) -> Scene:
-    """The mechanism of a column of Tables I to III, with the errors in its data."""
+    """Return the mechanism of a column of Tables I to III, with the errors in its data."""
     name = "spatial_slider_crank_driven" if column.startswith("spatial") else LINKAGES[column][0]
     return imprecise(kinematic(SCENES[name]()), variant.size, variant.seed)
 

@@ -1,4 +1,5 @@
-"""The rhombus's singular positions: rank along the motion, the fold branch, and the convergence of ALF.
+"""The singular positions of the four-bar with equal links (rhombus): rank along the motion, the second branch
+(fold), and the convergence of ALF.
 
 Everything follows from the judge's joint equations and the exact motion, in plain numpy.
 """
@@ -18,11 +19,12 @@ from mbref.scene import Scene
 from mbref.scenes.four_bar import LENGTH, four_bar
 from mbref.scenes.links import CRANK_RATE, about_z
 
-MOST = 10_000  # iterations counted
+MOST = 10_000  # largest number of iterations
 
 
 def scaled_singular_values(scene: Scene, times: np.ndarray) -> np.ndarray:
-    """Singular values (k, n) of the scaled constraint Jacobian along the exact motion at times (k,), s.
+    """Return the singular values (k, n) of the scaled constraint Jacobian along the exact motion at times
+    (k,), s.
 
     Angular columns are divided by the scene's length and rows brought to unit length.  Raises ValueError
     for a scene without a known exact motion.
@@ -45,12 +47,13 @@ def _of_unit_length(rows: np.ndarray) -> np.ndarray:
 
 
 def rank(values: np.ndarray) -> int:
-    """Number of singular values (n,) that are not zero."""
+    """Return the number of singular values (n,) that are not zero."""
     return int(np.sum(values > RANK * values.max()))
 
 
 def fold_residual(theta: float, turned: float) -> float:
-    """Largest residual (m or rad) of the driven rhombus that leaves θ₂ = theta (0 or π) on its fold.
+    """Return the largest residual (m or rad) of the driven rhombus if it leaves θ₂ = theta (0 or π) along the
+    fold.
 
     The crank has been driven by ``turned`` (rad) further.  At π the coupler turns with the crank about A and
     the rocker rests; at 0 crank and rocker lie on the ground and on B = D only coupler and rocker could
@@ -75,20 +78,21 @@ def _along(angle: float) -> np.ndarray:
 
 
 def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
-    """Times (s) up to ``last`` at which θ₂ = theta0 - 124.8 t is a multiple k of π, and k."""
+    """Return the times (s) up to ``last`` at which θ₂ = theta0 - 124.8 t is a multiple k of π, and k."""
     first = math.floor(theta0 / math.pi + 1e-9)
     out = [((theta0 - k * math.pi) / CRANK_RATE, k) for k in range(first, first - 1000, -1)]
     return [(t, k) for t, k in out if t <= last]
 
 
 def crossing_distance(theta0: float, time: float) -> float:
-    """Distance (rad) of θ₂ = theta0 - 124.8 t at ``time`` (s) from the nearest multiple of π."""
+    """Return the distance (rad) of θ₂ = theta0 - 124.8 t at ``time`` (s) from the nearest multiple of π."""
     turns = (theta0 - CRANK_RATE * time) / math.pi
     return abs(turns - round(turns)) * math.pi
 
 
 def alf_iterations(distance: float, error: float) -> int:
-    """Iterations that ALF, as set for the tables, takes at θ₂ = distance (rad); MOST if more are needed.
+    """Return the number of ALF's iterations at θ₂ = distance (rad), at the settings of the tables; MOST if
+    more are needed.
 
     Without masses M = I, and (I + α DᵀD) q̈ ← q̈ + α Dᵀ γ from q̈ = 0 (Eqs. 17 to 20), where D is the
     constraint Jacobian with rows of unit length and Φ = Φ' = 0.  γ is off by ``error`` of its size in the
@@ -103,7 +107,8 @@ def alf_iterations(distance: float, error: float) -> int:
 
 
 def _iterations(d: np.ndarray, gamma: np.ndarray, alpha: float, epsilon: float) -> int:
-    """Iterations until the change is ≤ ``epsilon`` of the larger of 1 and the acceleration (Eq. 20)."""
+    """Return the number of iterations until the change is ≤ ``epsilon`` times the larger of 1 and the
+    acceleration (Eq. 20)."""
     inverse = np.linalg.inv(np.eye(d.shape[1]) + alpha * d.T @ d)
     step, acceleration = alpha * d.T @ gamma, np.zeros(d.shape[1])
     for k in range(1, MOST):
@@ -115,5 +120,5 @@ def _iterations(d: np.ndarray, gamma: np.ndarray, alpha: float, epsilon: float) 
 
 
 def turns(k: int) -> str:
-    """k π as written."""
+    """Return the text of k π."""
     return {0: "0", 1: "π", -1: "-π"}.get(k, f"{k}π")

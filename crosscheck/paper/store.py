@@ -1,4 +1,4 @@
-"""The records of the paper's runs: made with limits and names, thinned for figures, found by label."""
+"""Records of the paper's runs: made with time limits and names, reduced for figures, found by label."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 DRAWN_PARTS = ("figures", "dynamic", "peaks")  # parts whose motions are plotted
-PLACES = 6  # significant digits of a motion that is drawn
+PLACES = 6  # significant digits of a plotted motion
 FILE = "paper.jsonl"
-INDEX = "paper-runs.json"  # label → key of the record, beside the records
+INDEX = "paper-runs.json"  # label → key of the record, in a file next to the records
 
 
 def run(path: str | Path, chosen: Cases, progress: Shown) -> Records:
-    """Records of the cases, stored at ``path`` as they end and taken from there where they are known.
+    """Return records of the cases, stored at ``path`` as their runs end; stored records are not repeated.
 
-    Every run has a limit of CPU time, and the progress names it by its label.
+    Every run has a limit of CPU time, and the progress shows its label.
     """
     labels = {id(case): label for label, case in chosen.items()}
 
@@ -36,8 +36,11 @@ def run(path: str | Path, chosen: Cases, progress: Shown) -> Records:
 
 
 def drawable(label: Label, scene: Scene, record: Record) -> Record:
-    """The record with the motion that figures draw, in PLACES digits, and its ``violation`` (k,) of positions
-    at the samples, taken before; without motion where no figure draws it."""
+    """Return the record with the motion that figures plot, in PLACES digits, and its ``violation`` (k,) of
+    positions at the samples.
+
+    The violation is computed from all digits. Records that no figure plots lose their motion.
+    """
     if label.part == "digits":  # accelerations are compared digit by digit
         return record
     drawn = label.part in DRAWN_PARTS
@@ -62,20 +65,21 @@ def _violation(scene: Scene, record: Record) -> list[float]:
 
 
 def _short(values: Any) -> Any:
-    """Nested lists of numbers in PLACES significant digits."""
+    """Return nested lists of numbers rounded to PLACES significant digits."""
     if isinstance(values, list):
         return [_short(value) for value in values]
     return float(f"{values:.{PLACES}g}")
 
 
 def index(path: str | Path, chosen: Cases) -> None:
-    """Write the keys of the cases by label beside their records, so that these are rendered on their own."""
+    """Write the keys of the cases by label next to their records, so that a page can be rendered from these
+    alone."""
     known = {json.dumps(label, ensure_ascii=False): key(case) for label, case in chosen.items()}
     Path(path).with_name(INDEX).write_text(json.dumps(known, indent=0, ensure_ascii=False) + "\n")
 
 
 def indexed(folder: Path) -> Records:
-    """Records of a folder by label; raises FileNotFoundError where it has none."""
+    """Return the records of a folder by label; raises FileNotFoundError if it has none."""
     known = looked_at(folder / FILE)
     keys = json.loads((folder / INDEX).read_text())
     return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}

@@ -1,7 +1,7 @@
-"""An engine's answer to a run: a Trajectory of the bodies asked for, at the times asked for.
+"""Validation of an engine's result: a Trajectory of the requested bodies at the requested times.
 
-Checked in the child, so that a malformed answer is the outcome of its run; a child answers with Python's and
-numpy's own types alone.
+The child process validates, so that a malformed result becomes the outcome of its run. A child returns only
+Python's and numpy's own types.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from mbref.trajectory import Cost, Outcome, Trajectory
 WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 OPTIONAL = {"acceleration": 3, "angular_acceleration": 3}
 CLOCK = time.get_clock_info("process_time").resolution
-LEAST = CLOCK if CLOCK < 1e-6 else 0.0  # s of a run; by a coarse clock a short run takes none
+LEAST = CLOCK if CLOCK < 1e-6 else 0.0  # s; least CPU time of a run, 0 if the clock is coarse
 UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length
 
 
 class MalformedAnswer(Exception):
-    """An engine returned no trajectory of the run; the sentence says why."""
+    """The engine did not return a valid trajectory of the run; the message is the reason."""
 
 
 def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
-    """The engine's answer to ``run(scene, times, …)`` as a Trajectory of plain numbers.
+    """Return the engine's result of ``run(scene, times, …)`` as a Trajectory of plain numbers.
 
-    Raises MalformedAnswer where it is no Trajectory, has other bodies, other or too few samples, arrays of
-    another shape or fields of another type, is of another scene or of no version, or took no time.
+    Raises MalformedAnswer if it is no Trajectory, has other bodies, other or too few samples, arrays of
+    another shape or fields of another type, belongs to another scene, has no version, or took no time.
     """
     if not isinstance(answer, Trajectory):
         raise MalformedAnswer(f"the engine returned {type(answer).__name__}, not a Trajectory")
@@ -70,7 +70,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
 
 
 def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """Return the engine's run, `well_formed`, labelled by engine, version and options; raises
+    """Return the engine's run, checked by `well_formed`, with engine, version and options; raises
     MalformedAnswer."""
     answer = well_formed(simulator.run(scene, times, setting), scene, times)
     named = {"engine": simulator.name, "version": str(simulator.version())}
@@ -84,7 +84,8 @@ def answered(simulator: Engine, scene: Scene, times: np.ndarray, setting: Settin
 
 
 def _times(answer: Trajectory, times: np.ndarray) -> np.ndarray:
-    """The times reached (k,): the first of those asked for, all of them where the run completed."""
+    """Return the reached times (k,): the first of the requested times, or all of them if the run
+    completed."""
     reached = _array("times", answer.times, None)
     if reached.ndim != 1 or reached.size > times.size or not np.array_equal(reached, times[: reached.size]):
         raise MalformedAnswer("times: are not the first of the requested times")
@@ -116,7 +117,7 @@ def _reactions(value: Any, scene: Scene, reached: int) -> dict[str, np.ndarray] 
 
 
 def _settings(value: Any) -> dict[str, Any]:
-    """Return the settings as JSON reads them, with plain numbers in place of numpy's."""
+    """Return the settings as JSON reads them, with numpy's numbers replaced by Python's."""
     try:
         return json.loads(json.dumps(dict(value), default=lambda number: number.item()))
     except (TypeError, ValueError, AttributeError):

@@ -1,10 +1,10 @@
-"""A child process that makes one call after another; a crash, a hang and an interrupt end only the child.
+"""A child process that makes calls one after another; a crash, a hang or an interrupt ends only the child.
 
-It works in a temporary directory for each call, everything printed is captured at file-descriptor level,
-and numerical libraries get one thread.  It ends when its parent does.
+Each call works in a temporary directory. Everything printed is captured at file-descriptor level, and
+numerical libraries get one thread. The child ends when its parent ends.
 
-Calls and answers are pickled: a child is trusted, with the engine in it, as any package that is installed is.
-What protects is meant against accidents, not against an engine that means harm.
+Calls and results are pickled. An engine in the child is trusted, like any installed package: the child
+process protects against accidents, not against malicious code.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ import psutil
 from mbref.trajectory import Outcome
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
-INTERVAL = 0.2  # s, at which the CPU time of a child is read
-LOADED = 10.0  # wall time / CPU limit that a call may take on a busy machine
+INTERVAL = 0.2  # s, between two readings of a child's CPU time
+LOADED = 10.0  # largest wall time of a call on a busy machine / its limit of CPU time
 ORPHAN_SECONDS = 10.0  # s after which a child ends itself if its parent has died
-ENDING_SECONDS = 10.0  # s that a child without connection has to end with its own exit status
+ENDING_SECONDS = 10.0  # s that a child without connection has to end by itself
 TAIL = 4000  # last bytes of the output, searched for the last printed line
 PRINTED = 200  # characters of the last printed line that a message quotes
 
@@ -49,7 +49,7 @@ class ChildFailed(Exception):
 
 
 class Observation(NamedTuple):
-    """Outcome of a call: its value, the printed text, and the files left in its working directory."""
+    """Result of a call: its value, the printed text, and the files left in its working directory."""
 
     value: Any
     printed: str
@@ -57,7 +57,7 @@ class Observation(NamedTuple):
 
 
 class Child:
-    """The child process; its owner closes it."""
+    """A child process; its owner must call ``close``."""
 
     def __init__(self) -> None:
         self.ready: Observation | None = None  # result of preparing the engine, for copies of the process
@@ -77,16 +77,17 @@ class Child:
 
     @property
     def is_alive(self) -> bool:
-        """Whether the process has not ended."""
+        """Return whether the process is running."""
         return self._process.poll() is None
 
     def call(
         self, function: Function, arguments: Arguments, time_limit: float, in_copy: bool = False
     ) -> Observation:
-        """``function(*arguments)`` in the child, or in a copy of it that leaves nothing to later calls,
-        within ``time_limit`` (s of CPU time or of waiting).
+        """Call ``function(*arguments)`` in the child, or in a copy of it that leaves nothing behind, within
+        ``time_limit`` (s).
 
-        Raises ChildFailed; the child has then ended, as after an interrupt.
+        The limit applies to CPU time and to time of waiting. Raises ChildFailed; the child has then ended, as
+        after an interrupt.
         """
         try:
             return self._called((function, arguments, in_copy), time_limit)
@@ -95,15 +96,16 @@ class Child:
             raise
 
     def last_printed(self) -> str:
-        """The last line that the present call has printed so far."""
+        """Return the last line that the present call has printed so far."""
         size = os.fstat(self._printed.fileno()).st_size
-        text = os.pread(self._printed.fileno(), TAIL, max(0, size - TAIL))  # moves no place that both share
+        # does not move the file position that both processes share
+        text = os.pread(self._printed.fileno(), TAIL, max(0, size - TAIL))
         return _last_line(text.decode(errors="replace"))
 
     def kill(self) -> None:
-        """End the process and what it started; a call under way fails."""
+        """End the process and its child processes; a running call fails."""
         if self.is_alive:
-            with contextlib.suppress(ProcessLookupError):  # the process has just ended
+            with contextlib.suppress(ProcessLookupError):  # the process may have ended just now
                 os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait()
 
@@ -116,7 +118,7 @@ class Child:
 
     def _called(self, asked: tuple[Function, Arguments, bool], time_limit: float) -> Observation:
         self._copies = asked[-1]
-        self._printed.seek(0)  # the child writes at this place too: it shares the open file
+        self._printed.seek(0)  # the child writes at this position, too, because it shares the open file
         self._printed.truncate()
         with tempfile.TemporaryDirectory(prefix="crosscheck-", ignore_cleanup_errors=True) as folder:
             self._ask((folder, LOADED * time_limit + ORPHAN_SECONDS, *asked), time_limit)
@@ -127,15 +129,19 @@ class Child:
         return Observation(value, self._said(), tuple(files))
 
     def _ask(self, job: tuple[Any, ...], time_limit: float) -> None:
-        """Send the job and wait until there is something to receive."""
-        with contextlib.suppress(BrokenPipeError):  # the child has hung up: receiving says so
+        """Send the job and wait for a result or the time limit."""
+        # the child has closed the connection; receiving reports it
+        with contextlib.suppress(BrokenPipeError):
             self._channel.send(job)
         if not self._has_answer(time_limit):
             raise self._failure(Outcome.TIMED_OUT, f"no result after {time_limit:g} s")
 
     def _has_answer(self, time_limit: float) -> bool:
-        """Whether something can be received before the child has used its time: CPU time, and wall time while
-        it uses no CPU time; on a loaded machine at most LOADED times the limit of wall time."""
+        """Return whether a result can be received before the child has used up its time.
+
+        The limit applies to CPU time, and to wall time while the child uses no CPU time. On a busy machine
+        wall time may be LOADED times the limit.
+        """
         began, used, cpu = time.monotonic(), 0.0, self._cpu_seconds()
         while (left := time_limit - used) > 0:
             interval = min(left, INTERVAL)
@@ -147,8 +153,8 @@ class Child:
         return False
 
     def _cpu_seconds(self) -> float:
-        """Return CPU seconds of the process and the copy that calls for it, without their children; 0
-        once it has ended."""
+        """Return CPU seconds of the process and of the copy that makes the call, without their children; 0
+        after the end."""
         try:
             process = psutil.Process(self._process.pid)
             copies = process.children() if self._copies else []
@@ -162,7 +168,7 @@ class Child:
             return pickle.loads(self._channel.recv_bytes())
         except (EOFError, ConnectionError):
             raise self._failure(Outcome.CRASHED, f"the process {self._ending()}") from None
-        except Exception as error:  # whatever unpickling what an engine made may raise
+        except Exception as error:  # unpickling an engine's result can raise any exception
             raise self._failure(Outcome.CRASHED, f"its answer cannot be read: {error}") from None
 
     def _ending(self) -> str:
@@ -180,7 +186,7 @@ class Child:
         return self._printed.read().decode(errors="replace")
 
     def _failure(self, outcome: Outcome, sentence: str) -> ChildFailed:
-        """The sentence, with the last line printed."""
+        """Return the failure with the sentence and the last printed line."""
         last = _last_line(self._said())
         return ChildFailed(outcome, sentence + (f"; last printed: {last[:PRINTED]}" if last else ""))
 
@@ -190,12 +196,13 @@ def _last_line(text: str) -> str:
 
 
 def stop_all() -> None:
-    """Kill every child of this process; the calls under way fail."""
+    """Kill every child of this process; running calls fail."""
     for child in tuple(_alive):
         child.kill()
 
 
 def _environment() -> dict[str, str]:
-    """The child finds every package this process finds, and computes with one thread."""
+    """Return the environment of the child: it finds all packages of this process, and computes with one
+    thread."""
     path = os.pathsep.join(os.path.abspath(entry) for entry in sys.path)
     return {**os.environ, "PYTHONPATH": path, **dict.fromkeys(ONE_THREAD, "1")}

@@ -1,7 +1,7 @@
-"""Runs in child processes with a time limit: whatever an engine does, a Trajectory comes back.
+"""Runs in child processes with a time limit; every run returns a Trajectory, whatever the engine does.
 
-Starting a child takes seconds, so it serves the runs of one engine, one after another.  A run that does not
-complete ends it, and the next has a fresh one.
+Starting a child takes seconds, so a child serves successive runs of one engine. A run that does not complete
+ends its child, and the next run gets a new one.
 """
 
 from __future__ import annotations
@@ -22,12 +22,13 @@ from crosscheck.processes.child import Child, ChildFailed, Observation
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-MOST_IDLE = 8  # children that wait for a run: one of every engine, so that scouting has started them
-COPIES = sys.platform == "linux"  # elsewhere a forked process may miss what libraries of the system began
-NO_ENGINE = ""  # served by a child that computes for the judge
-READY_SECONDS = 600.0  # s for imports and compilation, before the time of a run begins
+MOST_IDLE = 8  # idle children: about one for every engine
+# on other systems a forked process may lack threads of the system's libraries
+COPIES = sys.platform == "linux"
+NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
+READY_SECONDS = 600.0  # s for imports and compilation, before the time limit of a run applies
 
-_idle: list[tuple[str, Child]] = []  # idle children and their engines, the last used one at the end
+_idle: list[tuple[str, Child]] = []  # idle children with their engines, the latest one at the end
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # keyed by engine
 _asked: set[str] = set()  # engines that have answered a question
@@ -38,12 +39,11 @@ _prepared: set[tuple[str, str]] = set()  # engines and families that a child has
 def run_isolated(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Trajectory:
-    """The engine's trajectory at ``times`` (k,), computed in a child process.
+    """Return the engine's trajectory at ``times`` (k,), computed in a child process.
 
-    ``engine_name`` is a known engine or ``module:attribute``; ``time_limit`` is CPU time (s) of the
-    run, or of waiting, without imports and compiling.  A crash, a hang, an exception and a missing package
-    are outcomes CRASHED or TIMED_OUT of a trajectory without states.  Raises LookupError for an unknown
-    engine.
+    ``engine_name`` is a known engine or ``module:attribute``. ``time_limit`` is CPU time (s) of the run, or
+    of waiting, without imports and compilation. A crash, a hang, an exception or a missing package gives a
+    trajectory without states and with outcome CRASHED or TIMED_OUT. Raises LookupError for an unknown engine.
     """
     _check(engine_name)
     with _in_use(engine_name) as child:
@@ -56,15 +56,18 @@ def run_isolated(
 def run_in_turn(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Trajectory:
-    """`run_isolated` in a child that serves on after a run that ended early: for many short runs of an engine
-    that ends by itself and leaves nothing behind."""
+    """Run like `run_isolated`, in a child that continues to serve after failed runs.
+
+    This suits many short runs of an engine that ends by itself and leaves nothing behind.
+    """
     _check(engine_name)
     with _in_use(engine_name) as child:
         return _observed(child, engine_name, scene, times, setting, time_limit).value
 
 
 def apart(function: Callable[..., Any], arguments: tuple[Any, ...], time_limit: float) -> Any:
-    """``function(*arguments)`` in a child process, within CPU time (s); raises ChildFailed."""
+    """Return ``function(*arguments)``, computed in a child process within CPU time (s); raises
+    ChildFailed."""
     with _in_use(NO_ENGINE) as child:
         return child.call(function, arguments, time_limit).value
 
@@ -72,10 +75,11 @@ def apart(function: Callable[..., Any], arguments: tuple[Any, ...], time_limit: 
 def observe(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Observation:
-    """`run_isolated` in a process of its own, with what it printed from its start on and the files that the
-    run left; both empty when the run gave no result, as its message then quotes the printed text.
+    """Run like `run_isolated` in a process of its own, and return also what was printed and the files that
+    the run left.
 
-    The process is new, or a copy of one that has done nothing but make the engine ready.
+    Both are empty if the run gave no result, since its message then quotes the printed text. The process is
+    new, or a copy of one that has only prepared the engine.
     """
     _check(engine_name)
     if COPIES:
@@ -97,17 +101,19 @@ def _observed_in_copy(
 def capabilities(
     engine_name: str, scene: Scene, time_limit: float
 ) -> tuple[str, Cannot | None, list[Setting]]:
-    """An engine's version, what it cannot do with a scene, and else its settings, found out in a child.
+    """Return an engine's version, its refusal of a scene or None, and otherwise its settings, all found out
+    in a child process.
 
-    Raises ChildFailed when that fails, LookupError for an unknown engine.
+    Raises ChildFailed if that fails, LookupError for an unknown engine.
     """
     return ask(engine_name, serve.capabilities, (scene,), time_limit)
 
 
 def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], time_limit: float) -> Any:
-    """``question(engine_name, *about)`` in a child that has served the engine before, or a new one.
+    """Return ``question(engine_name, *about)``, called in a child that has served the engine before, or in a
+    new one.
 
-    Raises ChildFailed when that fails, LookupError for an unknown engine.
+    Raises ChildFailed if that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
     with _in_use(engine_name) as child, _starts(child), _alone_at_first(engine_name):
@@ -117,7 +123,7 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
 def time_interleaved(
     scene: Scene, times: np.ndarray, jobs: Sequence[serve.Job], repeats: int, time_limit: float
 ) -> list[list[float]]:
-    """CPU seconds of stepping of every job, one list of ``repeats`` each, for speed comparisons.
+    """Return CPU seconds of stepping for speed comparisons: for every job a list of ``repeats`` times.
 
     The jobs (engine name, setting) take turns in one child process after a warm-up round, so that
     all see the same machine.  A run that does not complete has NaN.  ``time_limit`` (s) is for all.
@@ -130,7 +136,7 @@ def time_interleaved(
 
 
 def end_idle() -> None:
-    """End the children that wait for a run."""
+    """End the idle children."""
     with _lending:
         idle = [child for _, child in _idle]
         _idle.clear()
@@ -169,7 +175,10 @@ def _observed(
 
 
 def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
-    """The engine's version; what is compiled once a machine is not compiled by two children at a time."""
+    """Return the engine's version after preparing the engine.
+
+    A lock keeps two children from compiling the same code.
+    """
     arguments = serve.get_ready, (engine_name, [family]), READY_SECONDS
     with _starts(child):
         if (engine_name, family) in _prepared:
@@ -194,7 +203,7 @@ def _alone_at_first(engine_name: str) -> Iterator[None]:
 
 @contextmanager
 def _starts(child: Child) -> Iterator[None]:
-    """Count a child as starting in the block."""
+    """Count a child as starting while the ``with`` block runs."""
     _starting[get_ident()] = child
     try:
         yield
@@ -203,13 +212,13 @@ def _starts(child: Child) -> Iterator[None]:
 
 
 def starting() -> dict[int, str]:
-    """Return the last line that each engine printed while it starts, by the thread that waits for it."""
+    """Return, for each thread that waits for a starting engine, the last line that the engine printed."""
     return {thread: child.last_printed() or "starting" for thread, child in _starting.copy().items()}
 
 
 @contextmanager
 def _in_use(engine_name: str) -> Iterator[Child]:
-    """A child that waits for a run of the engine, or a new one."""
+    """Return an idle child of the engine, or a new one."""
     with _lending:
         known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
         if known:
@@ -222,7 +231,7 @@ def _in_use(engine_name: str) -> Iterator[Child]:
 
 
 def _put_back(engine_name: str, child: Child) -> None:
-    """Let the child wait for another run, if it lives, and at most MOST_IDLE children do so."""
+    """Keep the child for another run if it is alive and fewer than MOST_IDLE children are idle."""
     with _lending:
         _idle.append((engine_name, child))
         waiting = [entry for entry in _idle if entry[1].is_alive][-MOST_IDLE:]

@@ -1,4 +1,5 @@
-"""The child process: it serves call after call, each in a directory of its own, until its parent hangs up.
+"""The program of a child process: it makes calls, each in a directory of its own, until its parent closes the
+connection.
 
 ``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  It is sent
 (directory, seconds after which it ends itself in case the parent has died, function, arguments, whether a
@@ -32,20 +33,20 @@ Capabilities = tuple[str, Cannot | None, list[Setting]]
 
 
 def get_ready(engine_name: str, families: Sequence[str]) -> str:
-    """Import and compile what an engine needs once; returns its version, empty without its package."""
+    """Import and compile what an engine needs once; returns its version, empty if its package is missing."""
     simulator = engine(engine_name)
     try:
         version = simulator.version()
-    except ImportError:  # reported by the run
+    except ImportError:  # the run reports the missing package
         return ""
     simulator.prepare(families)
     return str(version)
 
 
 def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-    """One run; a missing package is a failed trajectory that says what to install.
+    """Return one run; a missing package gives a failed trajectory whose message says what to install.
 
-    Raises MalformedAnswer where what the engine returns is no trajectory of this run.
+    Raises MalformedAnswer if the engine returns no trajectory of this run.
     """
     simulator = engine(engine_name)
     try:
@@ -57,7 +58,8 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
 
 
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:
-    """The engine's version, why it cannot run the scene or None, and its settings where it can."""
+    """Return the engine's version, the reason why it cannot run the scene or None, and its settings if it
+    can."""
     simulator = engine(engine_name)
     version, cannot = simulator.version(), simulator.cannot(scene)
     return version, cannot, [] if cannot else list(simulator.settings(scene))
@@ -69,7 +71,7 @@ def offered(engine_name: str, scene: Scene, family: str) -> Capabilities:
 
 
 def offers_of(simulator: Engine, scene: Scene, family: str) -> Capabilities:
-    """An engine's version, the reason of a refusal, and else the settings of a family, or of its best."""
+    """Return an engine's version, its refusal or None, and the settings of a family or of its best family."""
     if cannot := simulator.cannot(scene):
         return simulator.version(), cannot, []
     settings = simulator.settings_of(scene, family) if family else simulator.best_settings(scene)
@@ -84,18 +86,18 @@ def refused(engine_name: str, scene: Scene, family: str) -> Cannot | None:
 
 
 def refusal_of(simulator: Engine, scene: Scene, family: str) -> Cannot | None:
-    """Why an engine cannot run a scene at settings of a family, or None."""
+    """Return the reason why an engine cannot run a scene at settings of a family, or None."""
     return simulator.cannot(scene) or (None if simulator.serves(scene, family) else _unserved(family))
 
 
 def _unserved(family: str) -> Cannot:
-    return Cannot(Owner.MODEL, f"{family} does not serve this scene")
+    return Cannot(Owner.MODEL, f"{family} has no settings for this scene")
 
 
 def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int) -> list[list[float]]:
-    """``cost.seconds`` of every repeat of every job, round-robin after a warm-up round.
+    """Return ``cost.seconds`` for every repeat of every job, round-robin after a warm-up round.
 
-    NaN where a run did not complete: the time of a part is not the time of the whole.
+    A run that did not complete has NaN, since the time of a part is not the time of the whole.
     """
     simulators = [(engine(name), setting) for name, setting in jobs]
 
@@ -111,7 +113,7 @@ def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeat
 def failed(
     engine_name: str, version: str, scene: Scene, setting: Setting, outcome: Outcome, message: str
 ) -> Trajectory:
-    """The trajectory of a run that gave no state."""
+    """Return the trajectory of a run that gave no state."""
     return Trajectory.failed(
         scene=scene.name,
         engine=engine_name,
@@ -125,7 +127,7 @@ def failed(
 
 
 def main() -> None:
-    """Serve the parent at the other end of standard input, which engines see empty."""
+    """Make the calls that the parent sends over standard input, which is empty for the engines."""
     channel: Connection[Any, Any] = Connection(os.dup(0))
     with open(os.devnull) as nothing:
         os.dup2(nothing.fileno(), 0)
@@ -140,7 +142,7 @@ def main() -> None:
 
 
 def _answer_within(last_resort: float, function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
-    """The pickled answer; the process ends itself after ``last_resort`` (s)."""
+    """Return the pickled result; the process ends itself after ``last_resort`` (s)."""
     faulthandler.dump_traceback_later(last_resort, exit=True)
     answer = _answer(function, arguments)
     faulthandler.cancel_dump_traceback_later()
@@ -148,7 +150,7 @@ def _answer_within(last_resort: float, function: Callable[..., Any], arguments: 
 
 
 def _answer_of_copy(last_resort: float, function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
-    """The pickled answer of a forked copy; where that gives none, this process ends as the copy did."""
+    """Return the pickled result of a forked copy; if the copy crashes, this process ends in the same way."""
     ours, theirs = Pipe(duplex=False)
     if not (copy := os.fork()):
         ours.close()
@@ -163,23 +165,23 @@ def _answer_of_copy(last_resort: float, function: Callable[..., Any], arguments:
 
 
 def _end_as(status: int) -> NoReturn:
-    """End this process by a signal, where the exit status is minus its number, or with the status."""
+    """End this process by a signal if the exit status is its negative number, otherwise with the status."""
     if status < 0:
         os.kill(os.getpid(), -status)
     os._exit(max(status, 0))
 
 
 def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
-    """The pickled answer; warnings and printed text of the call are not left to the next one."""
+    """Return the pickled result; warnings and printed text of the call do not affect the next one."""
     try:
         with warnings.catch_warnings():  # reset the filter, so that each call warns again
             return pickle.dumps((True, function(*arguments)))
-    except Exception as error:  # the parent turns the sentence into an Outcome
+    except Exception as error:  # the parent turns the message into an Outcome
         return pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))
     finally:
         sys.stdout.flush()
         sys.stderr.flush()
-        ctypes.CDLL(None).fflush(None)  # the output of compiled code
+        ctypes.CDLL(None).fflush(None)  # prints the buffered output of compiled code
 
 
 if __name__ == "__main__":

@@ -1,1 +1,2 @@
-"""Motions recorded by any tool: read from a table, compared with the reference by column, explained."""
+"""Motions recorded by any tool: read from a table, compared with the reference column by column, and
+explained."""

@@ -1,4 +1,4 @@
-"""Explanations of a difference by another scene: gravity, damping of a joint, mass of a body."""
+"""Explanations of a difference by another scene: changed gravity, damping of a joint, or mass of a body."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from crosscheck.recorded.explanations import Columns, Difference, with_signs
 from mbref.scene import Scene, SceneError, TorsionSpring
 
 ITERATIONS = 5
-PROMISING = 0.7  # fraction of the difference left by a linear fit: above it no further fit is tried
+# fraction of the difference left after a linear fit: above it the change is not fitted further
+PROMISING = 0.7
 RTOL = 1e-9
 KNOWN_GRAVITY = {9.80665: "9.80665", 9.81: "9.81", 9.8: "9.8", 10.0: "10"}
 
 
 @dataclass(frozen=True)
 class Change:
-    """A scene with one changed number: ``of(value)`` makes it, ``small`` is a first value, 0 is no change."""
+    """A scene with one changed number: ``of(value)`` returns it, ``small`` is a first value, 0 means no
+    change."""
 
     of: Callable[[float], Scene]
     small: float
@@ -30,7 +32,8 @@ class Change:
 
 
 def changed(scene: Scene, difference: Difference, seconds: float) -> Iterator[tuple[str, int, Columns]]:
-    """(sentence, numbers fitted, predicted columns) of the changes tried in so many CPU seconds."""
+    """Return (sentence, number of fitted parameters, predicted columns) of the changes tried within CPU
+    seconds."""
     began = time.thread_time()
     for change in changes(scene):
         if time.thread_time() - began > seconds:
@@ -41,7 +44,7 @@ def changed(scene: Scene, difference: Difference, seconds: float) -> Iterator[tu
 
 
 def changes(scene: Scene) -> Iterator[Change]:
-    """Gravity, damping of every hinge, mass of every body."""
+    """Return the possible changes: gravity, damping of every hinge, mass of every body."""
     size = float(np.linalg.norm(scene.gravity))
     if size:
         yield Change(
@@ -90,7 +93,8 @@ def _scaled(body, factor: float):  # type: ignore[no-untyped-def]
 
 
 def _fitted(change: Change, d: Difference) -> tuple[float, Columns] | None:
-    """The number and the columns that fit best, by secants; None where the change leads elsewhere."""
+    """Return the number and the columns that fit best, by the secant method; None if the change does not
+    reduce the difference."""
     value, columns = change.small, _moved(change, change.small, d)
     exact = _stacked(d, d.exact)
     wanted = _stacked(d, d.recorded) - exact
@@ -116,7 +120,7 @@ def _fitted(change: Change, d: Difference) -> tuple[float, Columns] | None:
 
 
 def _moved(change: Change, value: float, d: Difference) -> Columns | None:
-    """Columns of the changed scene; None where it cannot be moved."""
+    """Return the columns of the changed scene; None if it cannot be simulated."""
     try:
         scene = change.of(value)
         motion = gauss_motion(scene, tuple(d.times.tolist()), RTOL)

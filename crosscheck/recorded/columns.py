@@ -43,13 +43,13 @@ VECTORS = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "angular
 
 
 def kind_of(column: str) -> str:
-    """The quantity of a column: position of ``rod.position.x``, angle of ``A.angle``."""
+    """Return the quantity of a column: position for ``rod.position.x``, angle for ``A.angle``."""
     parts = column.split(".")
     return next((part for part in reversed(parts) if part in SI), "")
 
 
 def names(scene: Scene) -> list[str]:
-    """The columns that a motion of the scene can have, without time."""
+    """Return the names of all columns that a motion of the scene can have, without time."""
     found = [
         f"{body.name}.{kind}.{axis}" for body in scene.body for kind, axes in VECTORS.items() for axis in axes
     ]
@@ -58,7 +58,7 @@ def names(scene: Scene) -> list[str]:
 
 
 def values(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
-    """Every column (k,) of a motion, in SI units."""
+    """Return every column (k,) of a motion, in SI units."""
     found: dict[str, np.ndarray] = {}
     for b, body in enumerate(scene.body):
         for kind, axes in VECTORS.items():
@@ -74,14 +74,15 @@ def values(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _continuous(quaternions: np.ndarray) -> np.ndarray:
-    """Quaternions (k, 4) of one sign along the motion."""
+    """Return quaternions (k, 4) with signs that are continuous along the motion."""
     turns = np.einsum("ki,ki->k", quaternions[1:], quaternions[:-1]) < 0
     signs = np.where(np.cumsum(turns) % 2 == 1, -1.0, 1.0)
     return np.concatenate([quaternions[:1], signs[:, None] * quaternions[1:]])
 
 
 def scales(scene: Scene, motion: Trajectory) -> dict[str, float]:
-    """A size of each quantity in the motion, by which errors of different quantities are compared."""
+    """Return the size of each quantity in the motion, by which errors of different quantities are
+    compared."""
     length = scene_length(scene)
     speed = float(np.linalg.norm(motion.velocity, axis=-1).max(initial=0.0))
     turning = float(np.linalg.norm(motion.angular_velocity, axis=-1).max(initial=0.0))

@@ -1,4 +1,4 @@
-"""The exact motion at any times with the bound on its error, and the same as a table."""
+"""The exact motion at any times with the bound on its error, as an object and as a table."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ from mbref.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class Exact:
-    """The motion at the times (k,) that are known, the bound (k,) on its error, and why later ones are not.
+    """The exact motion at the times (k,) at which it is known, the bound (k,) on its error, and the reason
+    for its end.
 
     The bound is a distance over the scene's length, or an angle (rad).
     """
@@ -30,7 +31,8 @@ class Exact:
 
 
 def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS) -> Exact:
-    """The exact motion at increasing times (s): a closed form, or the reference in so many CPU seconds."""
+    """Return the exact motion at increasing times (s): a closed form, or the reference computed within CPU
+    seconds."""
     times = np.asarray(times, dtype=float)
     family, reason = closed_form(scene), ""
     if family is not None:

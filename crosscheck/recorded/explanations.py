@@ -1,4 +1,5 @@
-"""Explanations of a difference from the exact motion, each tested by the fit that remains."""
+"""Explanations of a difference from the exact motion, each tested by the difference that remains after a
+fit."""
 
 from __future__ import annotations
 
@@ -12,8 +13,9 @@ from crosscheck.recorded.columns import VECTORS, kind_of
 from mbref import rotations
 
 Columns = Mapping[str, np.ndarray]
-EXACTLY = 1e-6  # fraction of the difference: a smaller remainder is rounding
-ALIKE = 20.0  # fits within this factor of the best count as equal, and the simplest of them comes first
+EXACTLY = 1e-6  # fraction of the difference: a smaller remainder counts as zero
+# explanations whose fits are within this factor of the best count as equal, and the simplest comes first
+ALIKE = 20.0
 SHOWN = 3
 FACTORS = {
     1e3: "in mm, not m",
@@ -25,12 +27,14 @@ FACTORS = {
     30 / np.pi: "in revolutions a minute, not rad/s",
     -1.0: "of opposite sign",
 }
-SHIFTS = np.linspace(-0.1, 0.1, 41)  # of the duration: shifts in time from which the best is refined
+# fractions of the duration: shifts in time from which the best is refined
+SHIFTS = np.linspace(-0.1, 0.1, 41)
 
 
 @dataclass(frozen=True)
 class Explanation:
-    """A sentence, the part (0 to 1) of the difference that remains with it, and how many numbers it fits."""
+    """An explanation: a sentence, the fraction (0 to 1) of the difference that remains, and the number of
+    fitted parameters."""
 
     sentence: str
     remains: float
@@ -39,7 +43,8 @@ class Explanation:
 
 @dataclass(frozen=True)
 class Difference:
-    """Recorded and exact columns (k,) at times (k,), the scale of each, and exact columns at any time."""
+    """Recorded and exact columns (k,) at times (k,), with the scale of each, and exact columns at any
+    time."""
 
     times: np.ndarray
     recorded: Columns
@@ -48,7 +53,7 @@ class Difference:
     later: Callable[[np.ndarray], Columns]
 
     def size(self, predicted: Columns) -> float:
-        """Root of the mean square of recorded less predicted columns, over their scales."""
+        """Return the root mean square of recorded minus predicted columns, each relative to its scale."""
         signed = with_signs(self.recorded, {**self.exact, **predicted})
         parts = [
             np.mean(((self.recorded[name] - signed[name]) / self.scale[name]) ** 2) for name in self.recorded
@@ -57,23 +62,24 @@ class Difference:
 
     @property
     def bodies(self) -> list[str]:
-        """The bodies with columns."""
+        """Return the bodies that have columns."""
         found = [n.rpartition(".")[0].rpartition(".")[0] for n in self.recorded if kind_of(n) in VECTORS]
         return list(dict.fromkeys(found))
 
     def vector(self, body: str, kind: str, of: Columns) -> np.ndarray | None:
-        """Components (k, 3 or 4) of a body's quantity; None where a column is missing."""
+        """Return the components (k, 3 or 4) of a body's quantity; None if a column is missing."""
         names = vector_names(body, kind)
         return np.array([of[n] for n in names]).T if all(n in self.recorded for n in names) else None
 
 
 def vector_names(body: str, kind: str) -> list[str]:
-    """The columns of a quantity of a body."""
+    """Return the names of the columns of a body's quantity."""
     return [f"{body}.{kind}.{axis}" for axis in VECTORS[kind]]
 
 
 def with_signs(recorded: Columns, predicted: Columns) -> Columns:
-    """Predicted columns with each quaternion's sign, which has no meaning, nearest to the recorded one."""
+    """Return predicted columns in which each quaternion has the sign nearer to the recorded one; the sign has
+    no meaning."""
     found = dict(predicted)
     for body in {n[: -len(".orientation.w")] for n in recorded if n.endswith(".orientation.w")}:
         names = vector_names(body, "orientation")
@@ -86,7 +92,8 @@ def with_signs(recorded: Columns, predicted: Columns) -> Columns:
 def ranked(
     difference: Difference, more: Iterator[tuple[str, int, Columns]], noise: float
 ) -> list[Explanation]:
-    """The best explanations: the simplest of those that fit about as well as the best, then others by fit.
+    """Return the best explanations: first the simplest of those that fit nearly equally well, then all others
+    by fit.
 
     ``noise`` is the size of a difference that means nothing.
     """
@@ -105,13 +112,15 @@ def ranked(
 
 
 def simple(difference: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """(sentence, numbers fitted, predicted columns) of explanations by the recorded columns alone."""
+    """Return (sentence, number of fitted parameters, predicted columns) for explanations that need no further
+    simulation."""
     for family in (_factors, _offsets, _shifts, _axes, _quaternions, _frames, _points, _interpolations):
         yield from family(difference)
 
 
 def _scopes(d: Difference) -> Iterator[tuple[str, list[str]]]:
-    """Sets of columns with a name: of a quantity, of a quantity of a body, and single ones; each set once."""
+    """Return named sets of columns: of a quantity, of a quantity of a body, and single columns; each set
+    once."""
     seen: set[tuple[str, ...]] = set()
     names = list(d.recorded)
     scopes = [(f"all columns of {k}", [n for n in names if kind_of(n) == k]) for k in map(kind_of, names)]
@@ -147,7 +156,7 @@ def _offsets(d: Difference) -> Iterator[tuple[str, int, Columns]]:
 
 
 def _shifts(d: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """All columns later by a time, at the samples that the exact motion then has."""
+    """Return all columns shifted by a time, at the samples that the exact motion then has."""
     from scipy.optimize import minimize_scalar
 
     end = float(d.times[-1])
@@ -171,7 +180,8 @@ def _later(d: Difference, shift: float) -> Columns:
 
 
 def _axes(d: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """Components exchanged or reversed, of one quantity of a body, of a body, or of all bodies."""
+    """Return columns with components exchanged or reversed: of one quantity of a body, of a body, or of all
+    bodies."""
     vectors = [
         (b, k)
         for b in d.bodies
@@ -185,7 +195,7 @@ def _axes(d: Difference) -> Iterator[tuple[str, int, Columns]]:
         for order in itertools.permutations(range(3)) if chosen else ():
             for signs in itertools.product((1, -1), repeat=3):
                 if order == (0, 1, 2) and signs.count(-1) != 2:
-                    continue  # the same, one sign, or all: factors
+                    continue  # single components and equal signs are covered by the factors
                 read = ", ".join(
                     f"{'-' if s < 0 else ''}{'xyz'[o]}" for s, o in zip(signs, order, strict=True)
                 )
@@ -214,7 +224,8 @@ def _quaternions(d: Difference) -> Iterator[tuple[str, int, Columns]]:
 
 
 def _frames(d: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """The world turned and moved: the rotation and translation that fit the positions best."""
+    """Return the columns for another world frame: the rotation and translation that fit the positions
+    best."""
     pairs = [(d.vector(b, "position", d.recorded), d.vector(b, "position", d.exact)) for b in d.bodies]
     known = [(r, e) for r, e in pairs if r is not None and e is not None]
     if not known:
@@ -238,7 +249,8 @@ def _frames(d: Difference) -> Iterator[tuple[str, int, Columns]]:
 
 
 def _points(d: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """Another point than the centre of mass, and other body axes, of every body."""
+    """Return the columns for another body-fixed point than the centre of mass, and for other body axes, of
+    every body."""
     for body in d.bodies:
         yield from _other_axes(d, body)
         q, p, r = d.vector(body, "orientation", d.exact), None, None
@@ -271,7 +283,7 @@ def _other_axes(d: Difference, body: str) -> Iterator[tuple[str, int, Columns]]:
 
 
 def _interpolations(d: Difference) -> Iterator[tuple[str, int, Columns]]:
-    """All columns interpolated from every m-th sample, by straight lines or by the value before."""
+    """Return all columns interpolated from every m-th sample, linearly or by the previous value."""
     for m in range(2, max(2, min(50, len(d.times) // 3))):
         nodes = np.arange(0, len(d.times), m)
         if nodes[-1] != len(d.times) - 1:
@@ -281,4 +293,4 @@ def _interpolations(d: Difference) -> Iterator[tuple[str, int, Columns]]:
         yield f"all columns: straight lines between samples {spacing:.6g} s apart", 2, lines
         before = nodes[np.searchsorted(nodes, np.arange(len(d.times)), side="right") - 1]
         steps = {n: d.exact[n][before] for n in d.recorded}
-        yield f"all columns: values held for {spacing:.6g} s", 2, steps
+        yield f"all columns: each value is repeated for {spacing:.6g} s", 2, steps

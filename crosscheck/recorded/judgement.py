@@ -1,4 +1,5 @@
-"""A recorded motion against the exact one: the error of each column, when it begins, and what explains it."""
+"""Comparison of a recorded motion with the exact one: the error of each column, its begin, and likely
+causes."""
 
 from __future__ import annotations
 
@@ -18,14 +19,15 @@ from crosscheck.recorded.explanations import Difference, Explanation, ranked, wi
 from crosscheck.recorded.reading import Recording, read
 from mbref.scene import Scene, SceneError
 
-BEGINS = 0.01  # fraction of the largest error that marks the begin of an error
-DENSE = 400  # further times at which the exact motion is known, for shifts in time
-TRIED = 20.0  # CPU seconds for motions of changed scenes
+BEGINS = 0.01  # fraction of the largest error at which an error is said to begin
+DENSE = 400  # number of further times at which the exact motion is computed, for shifts in time
+TRIED = 20.0  # CPU seconds for the simulation of changed scenes
 
 
 @dataclass(frozen=True)
 class ColumnError:
-    """The largest error of a column, the bound below which it means nothing, and when (s) it begins."""
+    """Largest error of a column, the bound below which an error means nothing, and the time (s) at which it
+    begins."""
 
     name: str
     largest: float
@@ -34,13 +36,13 @@ class ColumnError:
 
     @property
     def is_right(self) -> bool:
-        """Whether the error is within the bound of the reference and the last digit of the table."""
+        """Return whether the error is within the bound of the reference plus the last digit of the table."""
         return self.largest <= self.bound
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """Errors by column, explanations with the best first, and why the exact motion ends early, if it does."""
+    """Errors by column, explanations with the best first, and the reason if the exact motion ends early."""
 
     columns: tuple[ColumnError, ...]
     explanations: tuple[Explanation, ...]
@@ -49,11 +51,11 @@ class Judgement:
 
     @property
     def is_right(self) -> bool:
-        """Whether every column is right within its bound."""
+        """Return whether every column is right within its bound."""
         return all(column.is_right for column in self.columns)
 
     def to_record(self) -> dict[str, Any]:
-        """The judgement as numbers, lists and text, for JSON."""
+        """Return the judgement as numbers, lists and text, for JSON."""
         return {
             "right": self.is_right,
             "until": self.until,
@@ -94,7 +96,8 @@ def judge_motion(
 
 
 def _with_dense(times: np.ndarray) -> np.ndarray:
-    """Times (k,) and further ones from 0 to their end, none nearer to a given one than a tenth of a step."""
+    """Return times (k,) and further ones from 0 to their end, none nearer to a given one than a tenth of a
+    step."""
     dense = np.linspace(0.0, times[-1], DENSE + 1)
     after = np.minimum(np.searchsorted(times, dense), len(times) - 1)
     nearest = np.minimum(np.abs(times[after] - dense), np.abs(times[np.maximum(after - 1, 0)] - dense))

@@ -1,4 +1,5 @@
-"""Tables of other tools as columns in SI units: any separator, units, order of columns and quaternions."""
+"""Reads tables of other tools as columns in SI units, with any separator, units, and order of columns and
+quaternions."""
 
 from __future__ import annotations
 
@@ -14,22 +15,22 @@ import numpy as np
 from crosscheck.recorded.columns import SI, UNITS, kind_of, names
 from mbref.scene import Scene, SceneError
 
-SHORT = {  # last part of a header → column
+SHORT = {  # last part of a header → column of the scene
     **{a: f"position.{a}" for a in "xyz"},
     **{f"v{a}": f"velocity.{a}" for a in "xyz"},
     **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"},
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
 ORDERS = ("wxyz", "xyzw")
-LATE = 50.0  # multiple of the scene's duration: later times are in another unit
+LATE = 50.0  # multiples of the scene's duration: later times are probably in another unit
 
 
 @dataclass(frozen=True)
 class Recording:
     """Columns (k,) of a recorded motion at times (k,), SI units.
 
-    ``resolution`` has the last printed digit of each column, in its SI unit; ``ignored`` the headers that are
-    no column of the scene.
+    ``resolution`` is the last printed digit of each column, in its SI unit. ``ignored`` lists headers that
+    are no column of the scene.
     """
 
     times: np.ndarray
@@ -41,11 +42,11 @@ class Recording:
 def read(
     path: Path, scene: Scene, columns: Mapping[str, str], units: Sequence[str] = (), order: str = "wxyz"
 ) -> Recording:
-    """The recording in a table.
+    """Return the motion recorded in a table.
 
-    ``columns`` maps a column of the scene, or ``time``, to ``number`` (from 1) or header of the table, with
-    ``:unit`` behind where its unit is no SI unit.  ``units`` hold for all columns of their quantity.  Raises
-    SceneError for an unknown column or unit, or rows without numbers; OSError.
+    ``columns`` maps a column of the scene, or ``time``, to the number (from 1) or header of a column in the
+    table. The suffix ``:unit`` names a unit that is not SI.  ``units`` hold for all columns of their
+    quantity.  Raises SceneError for an unknown column or unit, or rows without numbers; OSError.
     """
     headers, cells = _cells(path)
     chosen, given = _chosen(scene, headers, columns, path)
@@ -64,7 +65,7 @@ def read(
 
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
-    """Headers and cells of a table; a line that begins with a number is the first row."""
+    """Return headers and cells of a table; the first line that begins with a number is the first row."""
     text = path.read_text(encoding="utf-8-sig", errors="replace")
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     first = next((k for k, line in enumerate(lines) if re.match(r"[-+.]?\d", line)), len(lines))
@@ -81,7 +82,7 @@ def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
 
 
 def _split(line: str, separator: str | None) -> list[str]:
-    """Cells of a line, without quotes; cells between blanks where there is no separator."""
+    """Return the cells of a line without quotes; cells are separated by blanks if there is no separator."""
     cells = next(csv.reader([line], delimiter=separator)) if separator else line.split()
     return [cell.strip().strip("\"'") for cell in cells]
 
@@ -89,7 +90,7 @@ def _split(line: str, separator: str | None) -> list[str]:
 def _chosen(
     scene: Scene, headers: list[str], columns: Mapping[str, str], path: Path
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Number of the table's column of each column, and its unit where one is given."""
+    """Return for each column of the scene the number of the table's column, and its unit if one is given."""
     known, chosen, units = ["time", *names(scene)], {}, {}
     for k, header in enumerate(headers):
         name, unit = _recognised(header, known)
@@ -111,7 +112,8 @@ def _chosen(
 
 
 def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
-    """Column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty where it is none."""
+    """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if it is no
+    column."""
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/]*)\s*[\])]?)?\s*", header)
     text, unit = (match[1], match[2] or "") if match else (header, "")
     if text.lower() in ("t", "time"):
@@ -133,7 +135,7 @@ def _place(where: str, headers: Sequence[str], name: str) -> int:
 
 
 def _factor(name: str, own: str, units: Sequence[str]) -> float:
-    """Factor to SI: of the column's own unit, or of the unit given for its quantity."""
+    """Return the factor to SI, from the column's own unit or from the unit given for its quantity."""
     dimension = SI["time" if name == "time" else kind_of(name)]
     if own and own not in UNITS:
         raise SceneError([f"column {name}: unknown unit {own!r}; known: {', '.join(filter(None, UNITS))}"])
@@ -145,7 +147,7 @@ def _factor(name: str, own: str, units: Sequence[str]) -> float:
 
 
 def _dimension(unit: str) -> str:
-    """The SI unit of a unit's quantity."""
+    """Return the SI unit of a unit's quantity."""
     for si, known in (
         ("s", ("s", "ms", "min")),
         ("m", ("m", "mm", "cm", "um", "in", "ft")),
@@ -172,7 +174,7 @@ def _numbers(rows: Sequence[Sequence[str]], count: int, path: Path) -> np.ndarra
 
 
 def _last_digit(cells: Sequence[str], numbers: np.ndarray) -> float:
-    """The coarsest last digit of a column, where it is written with fewer than 15 digits."""
+    """Return the coarsest last digit of a column if it is written with fewer than 15 digits."""
     digits = [re.sub(r"[eE].*", "", cell).replace(".", "").lstrip("+-0") for cell in cells]
     most = max(map(len, digits))
     size = float(np.abs(numbers).max(initial=0.0))
@@ -197,7 +199,7 @@ def _checked_times(times: np.ndarray, scene: Scene, path: Path) -> np.ndarray:
 
 
 def _reordered(columns: dict[str, np.ndarray], order: str) -> dict[str, np.ndarray]:
-    """Quaternion columns named w, x, y, z by place, of a table that has them in another order."""
+    """Return columns in which the quaternion components are named by their place in the table's order."""
     if order not in ORDERS:
         raise SceneError([f"--quaternion: must be one of {', '.join(ORDERS)}, got {order!r}"])
     rename = dict(zip(ORDERS[0], order, strict=True))

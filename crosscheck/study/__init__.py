@@ -1,4 +1,4 @@
-"""A study: the grid scene × engine × setting, run in child processes, as raw records."""
+"""A study runs every scene in every engine at every setting, in child processes, and stores raw records."""
 
 from crosscheck.study.grid import Case, Record, Unable, default_cases, study
 

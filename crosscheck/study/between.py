@@ -1,5 +1,7 @@
-"""Settings between two of a family, and coarser than its coarsest: the numbers in which they differ are
-continued by geometric means and ratios."""
+"""Settings between two neighbours of a family, and coarser than its coarsest setting.
+
+The options in which the settings differ are interpolated by geometric means and extrapolated by equal ratios.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +11,29 @@ from collections.abc import Callable
 from crosscheck.engine import Setting
 from crosscheck.study.grid import Record
 
-STEP = "step"  # the option of fixed steps, s; the others that vary are tolerances
-MOST_COARSER = 8  # settings coarser than a family's own that are tried
+STEP = "step"  # name of the option for fixed steps, s; all other options that vary are tolerances
+MOST_COARSER = 8  # largest number of tried settings that are coarser than a family's own
 LOOSEST = 0.5  # largest tolerance that is tried
 DIGITS = 3  # significant digits of the tried options
-STILL_CHEAPER = 0.97  # fraction of the next finer setting's work: a coarser setting must cost less
+# fraction of the next finer setting's work: a coarser setting that needs more gains nothing
+STILL_CHEAPER = 0.97
 
 
 def between(coarse: Setting, fine: Setting) -> Setting | None:
-    """The setting half way between two of a family; None where they are too near or differ in no number."""
+    """Return the setting half way between two settings of a family.
+
+    None if they are too near to each other or differ in no number.
+    """
     found = _changed(coarse, fine, lambda a, b: math.sqrt(a * b))
     return None if found in (coarse, fine) else found
 
 
 def coarser(coarsest: Setting, next_finer: Setting, longest: float) -> Setting | None:
-    """The setting that lies beyond the coarsest of a family by as much as the next finer lies below it.
+    """Return the setting that is coarser than the coarsest one by the ratio between the coarsest and the next
+    finer.
 
-    None where they differ in no number that grows, as steps and tolerances do, and beyond the ``longest``
-    step (s) and the LOOSEST tolerance.
+    None if no step or tolerance grows from the finer to the coarser, or if the result exceeds the ``longest``
+    step (s) or the LOOSEST tolerance.
     """
     found = _changed(coarsest, next_finer, lambda a, b: a * a / b)
     if found is None or found == coarsest:
@@ -38,8 +45,10 @@ def coarser(coarsest: Setting, next_finer: Setting, longest: float) -> Setting |
 
 
 def work(record: Record) -> float:
-    """The number of right-hand sides of a run, else of its steps, else its CPU seconds: the part of its cost
-    that does not depend on the machine, where it has one."""
+    """Return the work of a run: its right-hand sides, otherwise its steps, otherwise its CPU seconds.
+
+    The first two do not depend on the machine.
+    """
     cost = record["cost"]
     return float(cost.get("rhs") or cost.get("steps") or cost["seconds"])
 

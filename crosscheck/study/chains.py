@@ -1,4 +1,5 @@
-"""Runs of several engines at a time, the runs of each engine one after another, measured separately."""
+"""Parallel runs of several engines. The runs of one engine follow each other; metrics are computed in
+parallel."""
 
 from __future__ import annotations
 
@@ -17,20 +18,21 @@ Call = tuple[Future[Record], Callable[[Case], Trajectory], Case]
 
 
 class Chains(ThreadPoolExecutor):
-    """Threads, one a core, each of which stays with an engine as long as that has runs left.
+    """Executor with one thread for each core; a thread runs the cases of one engine as long as there are any.
 
-    One child process serves an engine, and a run is over before the next of its family begins.  Records are
-    made by ``measure`` in a thread of its own, which may wait for a truth while runs go on.
+    One child process serves an engine, and the next run of a family begins after the end of the previous one.
+    A further thread calls ``measure``, which makes the record and may wait for a truth while runs continue.
     """
 
     def __init__(self, measure: Measure) -> None:
         super().__init__(os.cpu_count())
         self._measure, self._measuring = measure, ThreadPoolExecutor(1)
-        self._calls: dict[str, deque[Call]] = {}  # keyed by engine, as long as a thread stays with it
+        # waiting calls of each engine; an entry exists as long as a thread serves the engine
+        self._calls: dict[str, deque[Call]] = {}
         self._changing = Lock()
 
     def submit(self, run: Callable[..., Any], case: Any, /) -> Future[Any]:  # type: ignore[override]
-        """The future record of ``run(case)``, a trajectory."""
+        """Return the future of the record that is made from the trajectory ``run(case)``."""
         future: Future[Any] = Future()
         with self._changing:
             is_new = case.engine not in self._calls
@@ -40,7 +42,7 @@ class Chains(ThreadPoolExecutor):
         return future
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the threads once their calls are done."""
+        """End the threads after their calls."""
         super().shutdown(wait, cancel_futures=cancel_futures)
         self._measuring.shutdown(wait, cancel_futures=cancel_futures)
 
@@ -63,7 +65,8 @@ class Chains(ThreadPoolExecutor):
 
 
 def _reported(future: Future[Record], function: Callable[..., Any], *arguments: Any) -> Any:
-    """Return the function's value; None if it raises, which the future then raises for its owner."""
+    """Return the function's value; an exception is also stored in the future, which raises it in the
+    caller."""
     try:
         return function(*arguments)
     except BaseException as error:

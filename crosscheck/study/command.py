@@ -1,4 +1,4 @@
-"""The command line that makes a record again: its scene, engine, family, options and sample times."""
+"""The command line that repeats the run of a record: its scene, engine, family, options and sample times."""
 
 from __future__ import annotations
 
@@ -34,7 +34,11 @@ def command(record: Record, scene: str) -> str:
 
 
 def parsed_option(text: str) -> tuple[str, Any]:
-    """(name, value) of ``name=value``, the value as JSON or else as the text; ValueError without ``=``."""
+    """Return (name, value) of the text ``name=value``; the value is read as JSON, otherwise it is the text
+    itself.
+
+    Raises ValueError if ``=`` is missing.
+    """
     name, equals, value = text.partition("=")
     if not (name and equals):
         raise ValueError(f"must be name=value, got {text!r}")

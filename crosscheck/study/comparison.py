@@ -1,5 +1,7 @@
-"""The records of a comparison: runs are made where they are missing, beside the truths, and stored as they
-end."""
+"""Collection of the records of a comparison: missing runs are made while the truths are computed.
+
+Every record is stored as its run ends.
+"""
 
 from __future__ import annotations
 
@@ -29,15 +31,18 @@ from crosscheck.study.verdict import Grade, grade
 from mbref.records import append, stored
 from mbref.scene import Scene
 
-Notice = Callable[[str], None]  # takes one sentence for the user
+Notice = Callable[[str], None]  # a function that shows one sentence to the user
 Truths = Future[list[Record]]
 Made = tuple[Sequence[Family], dict[str, Record]]  # families, coarse to fine, and records by key
 
 
 class Collection(NamedTuple):
-    """Records of a comparison: its scenes, its timed runs, the short runs that compare mechanisms, the truths
-    (`study.truths`), and those shown moving (`study.pictures`): of each scene the run of largest error, and
-    the runs along the branches of its singular positions."""
+    """Records of a comparison: scenes, timed runs, short runs that compare mechanisms, and truths
+    (`study.truths`).
+
+    `study.pictures` adds runs to be animated: for each scene the run of largest error, and runs along the
+    branches of its singular positions.
+    """
 
     scenes: Sequence[Scene]
     records: Sequence[Record]
@@ -48,9 +53,12 @@ class Collection(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """The sample times (k,) of every scene, the CPU seconds a reference may take, the folder that keeps the
-    records, and whether only a few settings are run (`study.ladder`) and only short runs timed again; whether
-    their families were named, so that no others are tried where those do not serve."""
+    """Request of a comparison: sample times (k,) of every scene, CPU seconds for a reference, and the folder
+    for records.
+
+    Further fields choose few settings (`study.ladder`), the timing of short runs only, and whether the user
+    named families. Named families are not replaced by others if they cannot run a scene.
+    """
 
     times: Sequence[np.ndarray]
     reference_time: float
@@ -67,10 +75,10 @@ def collected(
     plan: Callable[[], Sequence[Case]],
     notice: Notice,
 ) -> Collection:
-    """The records of the cases that ``plan`` chooses, once the engines' settings are known, and what belongs
-    to them.
+    """Return the records of the cases that ``plan`` chooses after the engines' settings are known, with all
+    further records of the comparison.
 
-    The truths are computed beside the search for settings and the runs.
+    The truths are computed in parallel with the runs.
     """
     if wanted.out is not None:
         _save(scenes, wanted.out / "scenes")
@@ -87,7 +95,7 @@ def collected(
 
 
 def scouted(scenes: Sequence[Scene], engines: Sequence[str]) -> None:
-    """Find out the engines' settings for the scenes, with progress."""
+    """Find out the engines' settings for the scenes, with a progress bar."""
     if total := unasked(engines, scenes):
         with counted("looking for settings", total) as advance:
             scout(engines, scenes, advance)
@@ -115,8 +123,10 @@ def _measured(
 
 
 def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> list[Family]:
-    """The families that were not run of every engine that is not right on a scene by those that were: only
-    then it is known whether the engine completes no run, or is inaccurate."""
+    """Return cases of further families for engines without a right run on a scene.
+
+    Only then it is known whether the engine completes no run or is inaccurate.
+    """
     found: list[Family] = []
     by_pair: dict[tuple[str, str], list[Family]] = {}
     for group in groups:
@@ -136,22 +146,24 @@ def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> 
 
 
 def _few(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:
-    """Run the coarsest and the middle setting of each family, coarser ones that serve, then the finest
-    affordable."""
+    """Run the coarsest and the middle setting of each family, then useful coarser settings and the finest
+    affordable one."""
     begun = _made("running", [*(case for group in groups for case in first(group)), *gates], path)
     fine = [case for group in groups for case in finest(group, begun)]
     return _with_coarser(groups, begun | _made("running at finer settings", fine, path), path)
 
 
 def _all(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> Made:
-    """Every setting of every family, and coarser ones that serve."""
+    """Run every setting of every family, and useful coarser settings."""
     cases = [case for group in groups for case in group]
     return _with_coarser(groups, _made("running", [*cases, *gates], path), path)
 
 
 def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Path | None) -> Made:
-    """The families continued to the coarsest setting that reaches the first error level, so that no family is
-    judged by a sweep that begins too fine."""
+    """Extend each family to the coarsest setting that reaches the first error level.
+
+    Without it a family whose sweep begins too fine would seem too expensive.
+    """
     for _ in range(MOST_COARSER):
         added = [beyond(group, records) for group in groups]
         if not any(added):
@@ -162,8 +174,10 @@ def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Pa
 
 
 def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Record]:
-    """Records by key; the first engine, which compiles when it is new, and the last ones, which take the
-    longest, begin."""
+    """Return records by key.
+
+    The first engine starts first, since a new one compiles, and then the last ones, which take longest.
+    """
     if not cases:
         return {}
     first_engine = cases[0].engine
@@ -183,7 +197,7 @@ def _engines(cases: Sequence[Case]) -> list[str]:
 
 
 def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
-    """The record of every scene's truth at the times of its runs."""
+    """Return the record of every scene's truth at the sample times of its runs."""
     path = _file(wanted, "truths.jsonl")
     done, found = stored(path), []
     for scene, times in zip(scenes, wanted.times, strict=True):
@@ -198,7 +212,7 @@ def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
 def _pictures(
     runs: Sequence[pictures.Run], truths: Sequence[Record], out: Path | None
 ) -> tuple[list[Record], list[Record]]:
-    """The runs that are shown moving; none where no report is made."""
+    """Return the runs to be animated; none if no report is made."""
     if out is None:
         return [], []
     worst = pictures.worst_runs(runs, truths, out / "motions.jsonl")

@@ -1,4 +1,4 @@
-"""Two sets of records: the runs that both have, and what changed between them beyond noise."""
+"""Comparison of two sets of records: their common runs, and the changes that exceed noise."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from crosscheck.study.wording import runs
 from mbref.records import looked_at
 from mbref.scene import Scene, SceneError
 
-ERROR_RATIO = 2.0  # ratio of errors: larger than the scatter by rounding, above NOISE
-NOISE = 1e-12  # errors below it are rounding
-EARLIER = 0.1  # fraction of the end time: a larger change of a failed run's end is reported
+ERROR_RATIO = 2.0  # larger ratios of errors are changes; rounding scatters errors above NOISE by less
+NOISE = 1e-12  # smaller errors are rounding errors
+EARLIER = 0.1  # fraction of the end time: a failed run whose end moves by more is reported as changed
 MEASURES = {
     "velocities": "velocity_error",
     "closure": "violation_position",
@@ -24,14 +24,16 @@ MEASURES = {
     "reactions": "reaction_error",
 }
 """Metrics that are compared where the error did not change."""
-MEASURE_NOISE = 1e-11  # noise of METRICS: smaller values are not compared
-TIME_RATIO, SINGLE_RATIO = 1.5, 2.0  # ratios of times: interleaved repeats, single runs
+MEASURE_NOISE = 1e-11  # smaller values of METRICS are rounding errors and not compared
+# larger ratios of times are changes: of interleaved repeats, of single runs
+TIME_RATIO, SINGLE_RATIO = 1.5, 2.0
 
 Identity = tuple[str, str, str, str, str]  # scene, engine, family, options, sample times
 
 
 class Change(NamedTuple):
-    """A run of both sets, or of one (the other None), and sentences on what changed; empty: nothing."""
+    """A run that is in both sets or in one (the missing record is None), and sentences on changes; no
+    sentence means no change."""
 
     identity: Identity
     old: Record | None
@@ -40,8 +42,10 @@ class Change(NamedTuple):
 
 
 def load(path: str | Path) -> dict[Identity, Record]:
-    """The runs of a record file or of a report's folder, with their interleaved times; ValueError for a file
-    that holds none."""
+    """Return the runs of a record file or a report's folder, with their interleaved times.
+
+    Raises ValueError for a file without records.
+    """
     file = Path(path) / "records.jsonl" if Path(path).is_dir() else Path(path)
     if not file.exists():
         raise ValueError(f"{file}: no such file")
@@ -59,7 +63,8 @@ def load(path: str | Path) -> dict[Identity, Record]:
 
 
 def _of_the_report(file: Path, records: Sequence[Record]) -> Sequence[Record]:
-    """The records of the mechanisms that the scenes of a report's folder have now; all where it has none."""
+    """Return the records whose mechanisms equal the present scenes of the report's folder; all records if the
+    folder has no scenes."""
     paths = sorted((file.parent / "scenes").glob("*.toml"))
     try:
         return of_scenes(records, [Scene.from_file(path) for path in paths]) if paths else records
@@ -68,7 +73,7 @@ def _of_the_report(file: Path, records: Sequence[Record]) -> Sequence[Record]:
 
 
 def identity(record: Record) -> Identity:
-    """The request by which runs of two sets are matched; the version of the engine is no part of it."""
+    """Return the request by which runs of two sets are matched; it does not contain the engine's version."""
     asked = record["asked"]
     when = {name: asked[name] for name in ("samples", "times", "end") if name in asked}
     return (
@@ -81,8 +86,10 @@ def identity(record: Record) -> Identity:
 
 
 def changes(old: Mapping[Identity, Record], new: Mapping[Identity, Record]) -> list[Change]:
-    """Every run of either set, in the order of the new one and then of the old; runs of different mechanisms
-    are each of one set alone."""
+    """Return every run of both sets, in the order of the new set and then of the old one.
+
+    A run whose mechanism changed counts as two runs, each in one set only.
+    """
     return [
         Change(name, before, after, list(_sentences(before, after)))
         for name in dict.fromkeys([*new, *old])
@@ -95,14 +102,14 @@ def _paired(old: Record | None, new: Record | None) -> Sequence[tuple[Record | N
 
 
 def _is_other_mechanism(old: Record | None, new: Record | None) -> bool:
-    """Whether both records name their mechanisms, and not the same."""
+    """Return whether both records name their mechanisms, and these differ."""
     if old is None or new is None:
         return False
     return len({old.get("mechanism"), new.get("mechanism")} - {None}) > 1
 
 
 def circumstances(old: Mapping[Identity, Record], new: Mapping[Identity, Record]) -> list[str]:
-    """Sentences on versions, machines and mechanisms that differ between the sets."""
+    """Return sentences on versions, machines and mechanisms that differ between the sets."""
     before, after = (_circumstances(records) for records in (old, new))
     names = dict.fromkeys([*before, *after])
     both = [(old[name], new[name]) for name in new if name in old]
@@ -158,7 +165,7 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
 
 
 def _measures(old: Mapping[str, float | None], new: Mapping[str, float | None]) -> Iterator[str]:
-    """The measures of a motion beside its error that both runs have and that changed."""
+    """Return sentences on changed metrics, apart from the error, that both runs have."""
     for name, metric in MEASURES.items():
         before, after = old.get(metric), new.get(metric)
         if before is None or after is None:
@@ -168,7 +175,7 @@ def _measures(old: Mapping[str, float | None], new: Mapping[str, float | None]) 
 
 
 def _is_changed(old: float, new: float, ratio: float, noise: float) -> bool:
-    """Whether two numbers, raised to the noise, differ by more than a factor."""
+    """Return whether two numbers differ by more than a factor; numbers below the noise count as the noise."""
     if not (math.isfinite(old) and math.isfinite(new)):
         return math.isfinite(old) != math.isfinite(new)
     low, high = sorted((max(old, noise), max(new, noise)))

@@ -1,4 +1,4 @@
-"""Fair comparison of speed: the same mechanism in every engine, and timing in turns."""
+"""Fair comparison of speed: a check that all engines simulate the same mechanism, and interleaved timing."""
 
 from __future__ import annotations
 
@@ -34,15 +34,19 @@ def _called_from_python(found: Sequence[Setting]) -> Sequence[Setting]:
 
 
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
-    """The first field in which the records of `identity_cases` differ from the truth where there is one, else
-    from the first of them, as a sentence; None when all agree. Runs that did not complete say nothing."""
+    """Return a sentence on the first quantity in which the records of `identity_cases` differ; None if all
+    agree.
+
+    They are compared with the truth, or with the first record if there is no truth. Runs that did not
+    complete are ignored.
+    """
     return next(iter(model_differences(scene, records, reference_time).values()), None)
 
 
 def model_differences(
     scene: Scene, records: Sequence[Record], reference_time: float = SECONDS
 ) -> dict[str, str]:
-    """By engine the sentence on the first such field."""
+    """Return for each engine that differs the sentence on its first different quantity."""
     truth = truth_for(scene, reference_time)
     try:
         exact = [] if truth is None else [truth.poses(gate_times(scene))]
@@ -55,8 +59,11 @@ def model_differences(
 
 
 def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]:
-    """Return by engine that is wrong at its best setting the difference of its accelerations from the
-    scene's at equal states; an engine with a wrong run without any difference is left out."""
+    """Return for each engine with wrong motions how its accelerations differ from the scene's at equal
+    states.
+
+    Engines with wrong motions but right accelerations are left out.
+    """
     found = {}
     for least in least_errors(records):
         if grade(least.best) is not Grade.WRONG:
@@ -75,11 +82,12 @@ def _motion(scene: Scene, record: Record) -> Trajectory:
 def timed(
     cases: Sequence[Case], records: Sequence[Record], repeats: int, notice: Callable[[str], None]
 ) -> list[Record]:
-    """The records with the ``cost.seconds`` of interleaved runs: their minimum, and ``timing``
-    with their median and number.
+    """Return the records with ``cost.seconds`` replaced by the minimum over interleaved runs; ``timing`` has
+    their median and number.
 
-    The completed runs of a scene take turns in one process, so that all see the same machine.  A scene
-    whose timing process fails keeps the seconds of its isolated runs, which a ``notice`` says.
+    The completed runs of a scene take turns in one process, so that all see the same machine.  If the timing
+    process of a scene fails, its records keep the seconds of their isolated runs, and a ``notice`` reports
+    it.
     """
     done = list(records)
     for scene in {case.scene.name: case.scene for case in cases}.values():
@@ -103,7 +111,8 @@ def _seconds(scene: Scene, cases: Sequence[Case], repeats: int) -> list[list[flo
 
 
 def _with_cost(record: Record, seconds: Sequence[float]) -> Record:
-    """NaN repeats are runs that this time did not complete; a record of those alone keeps its cost."""
+    """Return the record with new times (s); NaN entries are repeats that did not complete. Without any number
+    the record keeps its cost."""
     finite = [s for s in seconds if math.isfinite(s)]
     if not finite:
         return record

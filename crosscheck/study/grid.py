@@ -1,4 +1,5 @@
-"""The grid (scene × engine × setting) → raw records, one JSON line each; an interrupted study resumes."""
+"""Run a grid of scenes, engines and settings; each raw record is one JSON line, and an interrupted study
+resumes."""
 
 from __future__ import annotations
 
@@ -37,11 +38,12 @@ from mbref.trajectory import Outcome, Trajectory
 SCHEMA = 1
 SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
-MEASURED = 2.0  # CPU time for the metrics / time limit of the case
+MEASURED = 2.0  # limit of the CPU time for the metrics, as a multiple of the time limit of the case
 PACKAGES = ("numpy", "scipy", "numba")
 
 Record = dict[str, Any]
-Progress = Callable[[int, int, Record], None]  # cases done, cases in all, the record just done
+# function of (number of finished cases, number of cases, newest record)
+Progress = Callable[[int, int, Record], None]
 
 
 class Case(NamedTuple):
@@ -152,7 +154,7 @@ def study(
 
 
 def known(cases: Sequence[Case], records_path: str | Path | None) -> dict[str, Record]:
-    """Records of a file that answer the cases, by their keys: those that ``study`` does not run again."""
+    """Return the stored records of the cases by key; ``study`` does not repeat these runs."""
     records = stored(records_path)
     limits = {key(case): case.time_limit for case in cases}
     return {k: records[k] for k in limits if k in records and not _worth_repeating(records[k], limits[k])}
@@ -173,16 +175,15 @@ def key(case: Case) -> str:
 
 
 def run_case(case: Case) -> Record:
-    """The raw record of one run, its metrics included."""
+    """Return the raw record of one run, metrics included."""
     return record_of(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
 
 
 def run_in_turn(case: Case) -> Record:
-    """Run a case in a child that serves many short runs of an engine, also after a run that ended early.
+    """Run a case in a child process that serves many short runs of an engine, also after a run that failed.
 
-    Another child measures, so that no truth holds up this process.
-
-    Measuring ends at MEASURED times the case's limits; the record then has no error.
+    Another child process computes the metrics, so that this process does not wait for a truth. Computing
+    metrics ends after MEASURED times the case's limits; the record then has no error.
     """
     run = pool.run_in_turn(case.engine, case.scene, case.times, case.setting, case.time_limit)
     try:
@@ -193,12 +194,12 @@ def run_in_turn(case: Case) -> Record:
 
 
 def run_here(case: Case) -> Record:
-    """Run a case like ``run_case`` in the calling process, without its time limit and its protection."""
+    """Run a case in the calling process, without time limit and without protection against crashes."""
     return record_of(case, run_once(case.engine, case.scene, case.times, case.setting))
 
 
 def record_of(case: Case, trajectory: Trajectory) -> Record:
-    """The record of a case and its run: what was asked for, what came, its metrics, and what made it."""
+    """Return the record of a case and its run: request, result, metrics, and versions and machine."""
     return {
         "schema": SCHEMA,
         "key": key(case),
@@ -216,23 +217,22 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
 
 
 def shown_name(engine_name: str) -> str:
-    """Return the name by which an engine is shown: its object's, if it was asked for as
-    ``module:attribute``."""
+    """Return the displayed name of an engine: for ``module:attribute`` the name of the object."""
     try:
         return engine(engine_name).name if ":" in engine_name else engine_name
-    except Exception:  # each run reports the failed import as its outcome
+    except Exception:  # the run itself reports the failed import as its outcome
         return engine_name
 
 
 def made_by() -> dict[str, Any]:
-    """The origin of a record: versions, commit, date (UTC) and machine."""
+    """Return the origin of a record: versions, commit, date (UTC) and machine."""
     date = datetime.now(UTC).isoformat(timespec="seconds")
     return {"versions": versions(), "commit": commit(), "date": date, "machine": machine()}
 
 
 def _asked(case: Case) -> dict[str, Any]:
-    """The request: engine, options, end of the scene, and how many equally spaced samples there are up to it,
-    else all their times."""
+    """Return the request: engine, options, end time, and the number of equally spaced samples, otherwise all
+    sample times."""
     end, times = case.scene.duration, np.asarray(case.times, dtype=float)
     even = len(times) > 1 and np.array_equal(times, np.linspace(0.0, end, len(times)))
     when = {"samples": len(times)} if even else {"times": times.tolist()}
@@ -241,7 +241,8 @@ def _asked(case: Case) -> dict[str, Any]:
 
 @functools.cache
 def commit() -> str | None:
-    """The commit of the checkout that this code is in, ``+`` where it has been changed; None outside one."""
+    """Return the commit of the checkout that contains this code, with ``+`` after changes; None outside a
+    checkout."""
     root = Path(__file__).parents[2]
     if not (root / ".git").exists():
         return None
@@ -261,21 +262,22 @@ def _git(root: Path, *arguments: str) -> str | None:
 
 @functools.cache
 def versions() -> dict[str, str | None]:
-    """Versions of Python and of the packages that results depend on; None when not installed."""
+    """Return the versions of Python and of the packages on which results depend; None for missing
+    packages."""
     installed = {name: _installed(name) for name in PACKAGES}
     return {"python": platform.python_version(), "mbref": mbref.__version__, **installed}
 
 
 @functools.cache
 def machine() -> dict[str, str | int | None]:
-    """Processor, number of cores and operating system."""
+    """Return a description of the machine: processor, number of cores and operating system."""
     return {"cpu": _processor(), "cores": os.cpu_count(), "system": platform.platform()}
 
 
 def _run_all(
     cases: Sequence[Case], executor: Executor | None, run: Callable[[Case], Any]
 ) -> Generator[Record, None, None]:
-    """Records as their runs end; when the caller stops early, so do the runs."""
+    """Yield records as their runs end; a caller that stops early stops all runs."""
     if executor is None:
         with contextlib.ExitStack() as stack:
             stack.callback(end_idle)
@@ -290,7 +292,7 @@ def _run_all(
             future.cancel()
         with given_up():
             while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
-                stop_all()  # again and again: a run may have been about to start
+                stop_all()  # repeated, since a run may start between two calls
         raise
 
 

@@ -1,4 +1,5 @@
-"""Runs of which none holds the others up: behind one that ran out of time, finer settings are not started."""
+"""Runs without waiting for hopeless settings: after a run that ran out of time, finer settings of its family
+are not started."""
 
 from __future__ import annotations
 
@@ -11,17 +12,17 @@ NOT_STARTED = "not started: a coarser setting of the family reached the time lim
 
 
 class Hurried:
-    """``run_case`` for cases that come coarse to fine in each family."""
+    """Replacement of ``run_case`` for cases that come coarse to fine in each family."""
 
     def __init__(self) -> None:
         self._slow: set[tuple[str, str, str]] = set()
 
     def __call__(self, case: Case) -> Record:
-        """The record of a case; TIMED_OUT without a run where a coarser one was."""
+        """Return the record of a case; TIMED_OUT without a run if a coarser setting ran out of time."""
         return record_of(case, self.trajectory(case))
 
     def trajectory(self, case: Case) -> Trajectory:
-        """The trajectory of that record."""
+        """Return the trajectory of a case; TIMED_OUT without a run if a coarser setting ran out of time."""
         family = case.scene.name, case.engine, case.setting.family
         if family in self._slow:
             return failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)

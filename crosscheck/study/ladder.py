@@ -1,6 +1,9 @@
-"""Which settings of a family are run: at quick depth the coarsest, the middle one and the finest that is
-affordable by what those two cost; at any depth coarser ones, as long as these still reach the first error
-level."""
+"""Selection of the settings of a family that run.
+
+At quick depth these are the coarsest, the middle one and the finest affordable one. Affordable means that the
+two others predict a short run. At any depth coarser settings are added as long as they reach the first error
+level.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,14 @@ from crosscheck.study.between import STILL_CHEAPER, coarser, work
 from crosscheck.study.grid import Case, Record, key
 from crosscheck.study.record_view import error, is_completed
 
-AFFORDABLE = 3.0  # CPU seconds of stepping that the finest run is expected to take at most
-SCALING = "step"  # the option of fixed steps, to which the cost is inversely proportional
+AFFORDABLE = 3.0  # most CPU seconds of stepping that are expected of the finest run
+SCALING = "step"  # name of the option for fixed steps: the cost is inversely proportional to it
 
 Family = Sequence[Case]  # the settings of one engine and family on one scene, coarse to fine
 
 
 def families(cases: Sequence[Case]) -> list[Family]:
-    """The cases by scene, engine and family."""
+    """Return the cases grouped by scene, engine and family."""
     found: dict[tuple[str, str, str], list[Case]] = {}
     for case in cases:
         found.setdefault((case.scene.name, case.engine, case.setting.family), []).append(case)
@@ -26,21 +29,24 @@ def families(cases: Sequence[Case]) -> list[Family]:
 
 
 def first(family: Family) -> list[Case]:
-    """The coarsest setting and the middle one."""
+    """Return the coarsest and the middle setting of a family."""
     return [family[i] for i in dict.fromkeys((0, _middle(family)))]
 
 
 def finest(family: Family, records: Mapping[str, Record]) -> list[Case]:
-    """The finest setting beyond the middle one that is affordable by the records of ``first``, in a list;
-    empty where there is none."""
+    """Return a list with the finest affordable setting beyond the middle one, by the records of ``first``;
+    empty if there is none."""
     costs = [_cost(records[key(case)]) for case in (family[0], family[_middle(family)])]
     beyond = range(len(family) - 1, _middle(family), -1)
     return [family[i] for i in beyond if _expected(family, costs, i) <= AFFORDABLE][:1]
 
 
 def beyond(family: Family, records: Mapping[str, Record]) -> list[Case]:
-    """The setting coarser than the coarsest one that was run, in a list; empty where that misses the first of
-    ERROR_LEVELS, fails, costs no less than the next finer one that was run, or has no neighbour."""
+    """Return a list with the setting next coarser than the coarsest one that ran.
+
+    It is empty if the coarsest run failed, misses the first of ERROR_LEVELS or costs no less than the next
+    finer one, or if no coarser setting exists.
+    """
     run = [case for case in family if key(case) in records][:2]
     if len(run) < 2 or family[0] != run[0]:
         return []
@@ -58,15 +64,18 @@ def _middle(family: Family) -> int:
 
 
 def _cost(record: Record) -> float | None:
-    """CPU seconds of stepping of a completed run; infinite where the time was up."""
+    """Return the CPU seconds of stepping of a completed run; infinite if it ran out of time."""
     if record["outcome"] == "TIMED_OUT":
         return float("inf")
     return float(record["cost"]["seconds"]) if is_completed(record) else None
 
 
 def _expected(family: Family, costs: Sequence[float | None], i: int) -> float:
-    """CPU seconds expected of setting i: by the step from the middle run, else by the growth so far for each
-    setting; 0 if neither run has a cost, so that the run itself decides."""
+    """Return the expected CPU seconds of setting i.
+
+    With fixed steps the middle run is scaled by the step. Otherwise the growth between the two runs is
+    continued for each further setting. The result is 0 if neither run has a cost, so that the setting runs.
+    """
     coarse, middle = costs
     known = middle if middle is not None else coarse
     if known is None:

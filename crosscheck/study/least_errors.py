@@ -1,4 +1,4 @@
-"""The least error of every engine on every scene, with its setting and its cost."""
+"""Least error of every engine on every scene, with its setting and its cost."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from mbref.scene import Scene
 
 HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
 
-FINEST = 3  # settings of a family that are run to find its least error
-TIME_LIMIT = 240.0  # s
+FINEST = 3  # number of the finest settings of each family that are run
+TIME_LIMIT = 240.0  # CPU seconds of a run
 
 
 def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
-    """The finest settings of every family of the engines that can run the scene."""
+    """Return the finest settings of every family of each engine that can run the scene."""
     families = defaultdict(list)
     for case in default_cases(scene, engines, time_limit=TIME_LIMIT)[0]:
         families[case.engine, case.setting.family].append(case)
@@ -27,8 +27,10 @@ def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
 
 @dataclass(frozen=True)
 class LeastError:
-    """An engine on a scene: of every family the completed run of least error, else the one that got
-    furthest; ``records`` are all its runs."""
+    """Best runs of an engine on a scene, one for each family; ``records`` are all its runs.
+
+    The best run is the completed run of least error, otherwise the run that ended last.
+    """
 
     scene: str
     engine: str
@@ -42,15 +44,15 @@ class LeastError:
 
     @property
     def is_reached(self) -> bool:
-        """Whether a run completed within FLOOR."""
+        """Return whether a completed run has an error of at most FLOOR."""
         return _reaches(self.best)
 
     def share(self) -> str:
-        """The number of families within FLOOR, of all."""
+        """Return the number of families whose error is at most FLOOR, of how many families."""
         return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
 
     def row(self) -> tuple[str, ...]:
-        """Cells under HEADER."""
+        """Return the cells of a table row under HEADER."""
         best = self.best
         within = [name for name, record in self.families.items() if _reaches(record)]
         others = [f"{name} {_said(r)}" for name, r in self.families.items() if not _reaches(r)]
@@ -67,7 +69,7 @@ class LeastError:
 
 
 def least_errors(records: Sequence[Record]) -> list[LeastError]:
-    """One least a scene and engine, in the order of the records."""
+    """Return one LeastError for each scene and engine, in the order of the records."""
     found = []
     for scene, group in by_scene(records).items():
         for engine in dict.fromkeys(record["engine"] for record in group):
@@ -89,5 +91,5 @@ def _reaches(record: Record) -> bool:
 
 
 def _said(record: Record) -> str:
-    """The error, or how and when the run ended."""
+    """Return the error as text, or how and when the run ended."""
     return error_text(record) if is_completed(record) else ended(record)

@@ -1,4 +1,4 @@
-"""Motions that a report shows moving: runs at the instants of a picture, to the digits of a screen."""
+"""Runs whose motions a report animates: sampled at the times of the frames and rounded for the screen."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from crosscheck.study.grid import Case, Record, run_case, study
 from crosscheck.study.record_view import error, is_completed
 from mbref.trajectory import Crossing
 
-DIGITS = 6  # digits of a position / mechanism's size: finer than the pixels of a picture
-FRAMES = 75  # instants of the motion on a branch
-MOST = 2  # singular positions of a scene whose branches are shown
-DROPPED = ("reactions", "open_reactions")  # fields of a record that no picture shows
+DIGITS = 6  # decimal digits kept of a position, relative to the size of the mechanism: finer than a pixel
+FRAMES = 75  # frames of the motion on a branch
+MOST = 2  # largest number of singular positions of a scene whose branches are shown
+DROPPED = ("reactions", "open_reactions")  # fields of a record that no picture needs
 POSES = ("position", "orientation")
 
 Run = tuple[Case, Record]
@@ -45,8 +45,8 @@ def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
 
 
 def shown(crossings: Sequence[Mapping[str, Any]]) -> list[int]:
-    """Return numbers, from 1, of the singular positions that are shown; positions with several branches
-    come first."""
+    """Return the numbers, from 1, of the singular positions to be shown; positions with several branches come
+    first."""
     several = [number for number, crossing in enumerate(crossings, 1) if len(crossing["velocity"]) > 1]
     return (several or [1])[:MOST]
 
@@ -61,13 +61,13 @@ def _along_branches(case: Case, record: Record) -> Iterator[Case]:
 
 
 def _pictured(case: Case) -> Record:
-    """The record of a run without what no picture shows."""
+    """Return the record of a run without the fields that no picture needs."""
     record = {name: value for name, value in run_case(case).items() if name not in DROPPED}
     return {**record, "bodies": shortened(record["bodies"])}
 
 
 def shortened(bodies: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, list[list[float]]]]:
-    """The bodies' poses, their numbers rounded to DIGITS of the largest of their kind."""
+    """Return the bodies' poses rounded to DIGITS digits of the largest number of each kind."""
     largest = {key: max(np.abs(body[key]).max(initial=0.0) for body in bodies.values()) for key in POSES}
     return {name: {key: _rounded(body[key], largest[key]) for key in POSES} for name, body in bodies.items()}
 

@@ -1,4 +1,4 @@
-"""The progress of a study on standard error: a bar with the time left, or plain lines."""
+"""Progress of a study on standard error: a bar with the remaining time, or plain lines without a terminal."""
 
 from __future__ import annotations
 
@@ -24,15 +24,16 @@ from rich.text import Text
 from crosscheck.processes.pool import starting
 from crosscheck.study.grid import Record
 
-PARTS = 10  # lines of a progress that no terminal shows
-QUIET = 20.0  # s without a line, after which one names the work under way
-LOOKED = 0.5  # s after which that is looked at again
+PARTS = 10  # number of lines that show a progress without a terminal
+QUIET = 20.0  # seconds without a printed line, after which a line names the running work
+LOOKED = 0.5  # seconds between two checks for QUIET
 HUNDREDTHS = 100  # number of progress reports for one motion
-Show = Callable[[int, int, str], None]  # done, in all, what was done last
+Show = Callable[[int, int, str], None]  # function of (finished runs, all runs, name of the last one)
 
 
 class Shown(Protocol):
-    """A progress: called with the runs done, those in all and the record made last."""
+    """Progress callback of a study: called with the number of finished runs, of all runs, and the latest
+    record."""
 
     under_way: UnderWay
 
@@ -41,14 +42,18 @@ class Shown(Protocol):
 
 
 class UnderWay:
-    """The work under way by name, each with the time (s) since it began, and what engines print while they
-    are made ready, such as that kernels are compiled; several threads may work."""
+    """Work that is running, by name, with its start time (s), and the output of engines that are being
+    prepared.
+
+    Several threads may work.
+    """
 
     def __init__(self) -> None:
         self._began: dict[int, tuple[str, float]] = {}  # keyed by thread
 
     def named(self, run: Callable[[Any], Any], name: Callable[[Any], str]) -> Callable[[Any], Any]:
-        """The function, whose calls are under way by the name of what they are given."""
+        """Return the function such that each of its calls is listed as running work under ``name`` of its
+        argument."""
 
         def called(given: Any) -> Any:
             self._began[threading.get_ident()] = name(given), time.monotonic()
@@ -70,7 +75,8 @@ class UnderWay:
 
 @contextmanager
 def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
-    """Progress from 0 to ``total``; yields a function that moves it one on and names what is done."""
+    """Show progress from 0 to ``total``; yields a function that advances it by one and names the finished
+    work."""
     with _display(what, total) as (show, _):
         done = 0
 
@@ -84,14 +90,17 @@ def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def shown(what: str, total: int) -> Iterator[Shown]:
-    """Progress from 0 to ``total`` while the context lasts; yields what ``study`` takes as ``progress``, with
-    the work ``under_way``, which it names."""
+    """Show progress from 0 to ``total`` within a ``with`` block; yields the ``progress`` callback of
+    ``study``.
+
+    The progress names the work ``under_way``.
+    """
     with _display(what, total) as (show, under_way):
         yield _OfRecords(show, under_way)
 
 
 class _OfRecords:
-    """Shows records by scene, engine, family and outcome."""
+    """Progress that shows each record by scene, engine, family and outcome."""
 
     def __init__(self, show: Show, under_way: UnderWay):
         self._show, self.under_way = show, under_way
@@ -103,8 +112,8 @@ class _OfRecords:
 
 @contextmanager
 def followed(what: str, end: float) -> Iterator[Callable[[float], None]]:
-    """Progress of a motion from t = 0 to ``end`` (s), in hundredths; yields a function that takes the time
-    reached."""
+    """Show the progress of a motion from t = 0 to ``end`` (s) in hundredths; yields a function of the reached
+    time."""
     with _display(what, HUNDREDTHS) as (show, _):
 
         def reached(t: float) -> None:
@@ -116,7 +125,8 @@ def followed(what: str, end: float) -> Iterator[Callable[[float], None]]:
 
 @contextmanager
 def _display(what: str, total: int) -> Iterator[tuple[Show, UnderWay]]:
-    """A bar on a terminal, else a line of text for every tenth, and after QUIET seconds without one."""
+    """Show a bar on a terminal, otherwise a text line for every tenth and after QUIET seconds without a
+    line."""
     console, under_way = Console(stderr=True), UnderWay()
     if not console.is_terminal:
         with _Lines(what, total, console, under_way) as lines:
@@ -140,7 +150,7 @@ def _columns(under_way: UnderWay) -> tuple[ProgressColumn, ...]:
 
 
 class _Working(ProgressColumn):
-    """The work under way; without any, what was done last."""
+    """Column of the progress bar that names the running work, otherwise the last finished work."""
 
     max_refresh = 1.0
 
@@ -154,7 +164,7 @@ class _Working(ProgressColumn):
 
 
 class _Lines:
-    """Progress as lines, with the time left estimated from the time taken."""
+    """Progress as text lines, with the remaining time estimated from the elapsed time."""
 
     def __init__(self, what: str, total: int, console: Console, under_way: UnderWay):
         self._what, self._total, self._console, self._under_way = what, total, console, under_way
@@ -180,7 +190,7 @@ class _Lines:
         self._print(f"{left}; {last}")
 
     def _name_work(self) -> None:
-        """Print a line that names the work under way whenever none was printed for QUIET seconds."""
+        """Print a line that names the running work whenever QUIET seconds pass without a line."""
         while not self._over.wait(LOOKED):
             if time.monotonic() - self._printed >= QUIET and (working := str(self._under_way)):
                 self._print(f"; now {working}")

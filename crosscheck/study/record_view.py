@@ -1,4 +1,4 @@
-"""A record as tables and files show it: its public fields, its error, the settings that vary."""
+"""Views of a record for tables and files: its public fields, its error, and the settings that vary."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ PUBLIC = (
     "metrics",
     "cost",
 )
-SMALLEST = 1e-16  # an error of exactly zero is drawn here
-UNTIMED = 1e-6  # s; a run that reports no time is drawn no lower
+SMALLEST = 1e-16  # position of an error of exactly zero on a logarithmic axis
+UNTIMED = 1e-6  # s; lower end of the axis of times, also for runs that report no time
 
 
 def public(record: Record) -> Record:
-    """The fields of a record that ``--json`` prints, ``timing`` too where the run was timed; numbers that
-    are not finite become null."""
+    """Return the fields of a record that ``--json`` prints; ``timing`` only if the run was timed. Numbers
+    that are not finite become null."""
     return {name: _finite(record[name]) for name in (*PUBLIC, "timing") if name in record}
 
 
@@ -45,7 +45,7 @@ def _finite(value: Any) -> Any:
 
 
 def is_completed(record: Record) -> bool:
-    """Whether the run reached its end time."""
+    """Return whether the run reached its end time."""
     return record["outcome"] == Outcome.COMPLETED.label
 
 
@@ -57,7 +57,7 @@ def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record
 
 
 def ended(record: Record) -> str:
-    """``completed``, or how and when the run ended; no time where it was ended from outside."""
+    """Return ``completed``, or how and when the run ended; without a time if a limit or a crash ended it."""
     said = record["outcome"].lower().replace("_", " ")
     if is_completed(record) or record["outcome"] in (Outcome.TIMED_OUT.label, Outcome.CRASHED.label):
         return str(said)
@@ -65,7 +65,7 @@ def ended(record: Record) -> str:
 
 
 def by_scene(records: Sequence[Record]) -> dict[str, list[Record]]:
-    """Records grouped by the scene's name, in their order."""
+    """Return the records grouped by the scene's name, in their order."""
     groups: dict[str, list[Record]] = {}
     for record in records:
         groups.setdefault(record["scene"], []).append(record)
@@ -73,24 +73,25 @@ def by_scene(records: Sequence[Record]) -> dict[str, list[Record]]:
 
 
 def error(record: Record) -> float:
-    """The error of a record; infinite where there is none to compare with."""
+    """Return the error of a record; infinite if there is no truth."""
     value = record["metrics"].get("error")
     return math.inf if value is None or math.isnan(value) else value
 
 
 def error_bound(record: Record) -> float:
-    """The bound on the truth's own error; 0 without one."""
+    """Return the bound on the truth's own error; 0 without one."""
     return record["metrics"].get("error_bound") or 0.0
 
 
 def drawn(record: Record, seconds: float) -> tuple[float, float]:
-    """The error of a record, no lower than it is known, and its time (s), as drawn on logarithmic axes."""
+    """Return error and time (s) of a record for logarithmic axes; the error is at least the truth's own
+    bound."""
     return max(error(record), error_bound(record), SMALLEST), max(seconds, UNTIMED)
 
 
 def error_text(record: Record) -> str:
-    """The error of a record as shown: ``< 3e-12`` below what the truth may be off itself, – without one and
-    for a run that never moved."""
+    """Return the error as text: ``< 3e-12`` if it is below the truth's own bound, – without an error and for
+    a run that ended at its start."""
     value, bound = error(record), error_bound(record)
     if not math.isfinite(value) or never_moved(record):
         return "–"
@@ -98,7 +99,7 @@ def error_text(record: Record) -> str:
 
 
 def is_judged(record: Record) -> bool:
-    """Whether the error of a record is of all that the run reached; True where it reached nothing."""
+    """Return whether the error of a record covers all times that the run reached; True if it reached none."""
     metrics = record["metrics"]
     if never_moved(record) or not record["times"]:
         return True
@@ -106,18 +107,21 @@ def is_judged(record: Record) -> bool:
 
 
 def never_moved(record: Record) -> bool:
-    """Whether a run ended at its start, so that its numbers say nothing about the motion."""
+    """Return whether a run ended at its start, so that its numbers contain no information about the
+    motion."""
     return not is_completed(record) and record["t_end"] <= 0
 
 
 def engine_and_family(record: Record) -> tuple[str, str]:
-    """Engine and family."""
+    """Return engine and family of a record."""
     return record["engine"], record["family"]
 
 
 def varied_settings(record: Record, records: Sequence[Record]) -> str:
-    """The settings in which a record differs from others of its family, as printed (``rtol=1e-06``);
-    those asked for when it is alone."""
+    """Return the settings in which a record differs from others of its family, such as ``rtol=1e-06``.
+
+    All requested settings are returned if it is the only record of its family.
+    """
     own = record["settings"]
     settings = [r["settings"] for r in records if engine_and_family(r) == engine_and_family(record)]
     names = [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
@@ -127,7 +131,7 @@ def varied_settings(record: Record, records: Sequence[Record]) -> str:
 
 
 def with_time(record: Record, known: dict[str, dict[str, Any]]) -> Record:
-    """The record with the time that is known by its key, if there is one."""
+    """Return the record with the time that ``known`` contains for its key, if any."""
     if record["key"] not in known:
         return record
     entry = known[record["key"]]

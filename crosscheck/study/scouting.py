@@ -1,4 +1,4 @@
-"""The settings of engines for scenes, found out once: engines try a scene out for them."""
+"""Settings of the engines for scenes. An engine may run a scene to find them, so each pair is asked once."""
 
 from __future__ import annotations
 
@@ -34,9 +34,10 @@ def _any_duration(scene: Scene) -> Scene:
 
 
 def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[str], None]) -> None:
-    """Find out the offers in child processes, one a core; ``advance`` receives each pair that is done.
+    """Ask each engine for its settings for each scene, in one child process for each core; ``advance``
+    receives each finished pair.
 
-    An engine that crashes or hangs over a scene is counted as refusing it, with the reason.
+    An engine that crashes or hangs on a scene counts as refusing it, with the reason.
     """
     pairs = [(name, scene) for scene in scenes for name in engines if (name, scene) not in _found]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
@@ -57,13 +58,14 @@ def offer(engine_name: str, scene: Scene) -> Offer:
 
 
 def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
-    """An engine's settings for a scene, coarse to fine in each family; none where it cannot run it."""
+    """Return an engine's settings for a scene, coarse to fine in each family; none if it cannot run the
+    scene."""
     found = offer(engine_name, scene)
     return () if isinstance(found, Cannot) else found
 
 
 def unasked(engines: Sequence[str], scenes: Sequence[Scene]) -> int:
-    """The number of pairs that ``scout`` would ask."""
+    """Return the number of pairs (engine, scene) that ``scout`` has not asked yet."""
     return sum((name, scene) not in _found for scene in scenes for name in engines)
 
 

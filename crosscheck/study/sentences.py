@@ -1,4 +1,5 @@
-"""The verdict in words: who is right, how fast, and where each breaks, computed from records."""
+"""The verdict in words: which engines are right, how fast they are, and where each fails, computed from
+records."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ TIMED_OUT = "TIMED_OUT"
 
 
 class Verdict(NamedTuple):
-    """Sentences; ``headline`` is the shortest of them."""
+    """Sentences of a verdict; ``headline`` is the shortest one."""
 
     headline: str
     right: str
@@ -42,8 +43,10 @@ class Verdict(NamedTuple):
 
 
 def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
-    """The verdict on one scene or several, of the same engines where they can run them; where there is no
-    truth and their mechanisms have a ``difference``, times are not compared."""
+    """Return the verdict on one or several scenes.
+
+    Times are not compared if there is no truth and the engines' mechanisms have a ``difference``.
+    """
     times = f"Times are not compared, the engines simulate different mechanisms: {difference}."
     return Verdict(
         headline=" ".join([headline(groups), *free_falls(groups)]),
@@ -56,7 +59,8 @@ def verdict(groups: Sequence[Judged], difference: str | None = None) -> Verdict:
 
 
 def headline(groups: Sequence[Judged]) -> str:
-    """Who is right at best and at the defaults, in one line, and of how much of the motions that is known."""
+    """Return one line: engines that are right at their best settings and at their defaults, and how much of
+    the motions is known."""
     reported = [group for group in groups if group.is_judged]
     others = not_judged(groups)
     if not reported and others:
@@ -81,7 +85,7 @@ def headline(groups: Sequence[Judged]) -> str:
 
 
 def not_judged(groups: Sequence[Judged]) -> str:
-    """The engines that simulate another mechanism than a scene, as a clause; empty without any."""
+    """Return a clause on the engines whose mechanism differs from a scene; empty if there are none."""
     found = list(dict.fromkeys(name for group in groups for name in group.differences))
     if not found:
         return ""
@@ -92,7 +96,7 @@ def not_judged(groups: Sequence[Judged]) -> str:
 
 
 def _reasons(groups: Sequence[Judged]) -> list[str]:
-    """A sentence on each engine that is not judged."""
+    """Return a sentence on each engine that is not judged."""
     return [
         f"{title(name)} is not judged{'' if len(groups) == 1 else f' on {group.scene.name}'}, because the "
         f"adapter or the scene differs: {difference}."
@@ -102,7 +106,8 @@ def _reasons(groups: Sequence[Judged]) -> list[str]:
 
 
 def right(groups: Sequence[Judged]) -> str:
-    """Errors of the engines at their best settings; without a truth, how far they agree."""
+    """Return sentences on the errors at the best settings; without a truth, on the differences between
+    engines."""
     reported = [group for group in groups if group.is_judged]
     if not reported:
         alike = [group for group in groups if not group.differences]
@@ -127,7 +132,7 @@ def right(groups: Sequence[Judged]) -> str:
 
 
 def breaks(groups: Sequence[Judged]) -> str:
-    """Defaults that fail or are wrong, and the scenes they do it on."""
+    """Return sentences on defaults that fail or are wrong, with the scenes."""
     failed, wrong = (_where(groups, bad) for bad in (Grade.FAILED, Grade.WRONG))
     sentences = [_failed(groups, name, scenes) for name, scenes in _merged(failed).items()]
     sentences += [_wrong(name, scenes, groups) for name, scenes in wrong.items()]
@@ -137,7 +142,7 @@ def breaks(groups: Sequence[Judged]) -> str:
 
 
 def _no_bad_defaults(groups: Sequence[Judged]) -> str:
-    """The defaults where none is known to fail or to be wrong."""
+    """Return the sentence on the defaults if none is known to fail or to be wrong."""
     found = _worst(groups, Judged.defaults)
     if not found:
         return "No setting is a library's default."
@@ -149,7 +154,7 @@ def _no_bad_defaults(groups: Sequence[Judged]) -> str:
 
 
 def _agreement(group: Judged) -> str:
-    """The engines that agree best, and how far each other is from them."""
+    """Return sentences on the two engines that agree best, and on the distance of all others from them."""
     apart = group.agreement()
     if not apart:
         return f"{group.scene.name}: no two engines completed the motion, so nothing can be compared."
@@ -161,7 +166,7 @@ def _agreement(group: Judged) -> str:
 
 
 def _less_than_right(groups: Sequence[Judged], name: str) -> str:
-    """One engine that is not right everywhere: its worst scene."""
+    """Return the sentence on an engine that is not right on all scenes: its worst scene."""
     found = {g.scene.name: g.best()[name] for g in groups if name in g.best()}
     graded = {scene: grade(record) for scene, record in found.items()}
     lost = [scene for scene, verdict in graded.items() if verdict is Grade.FAILED]
@@ -175,14 +180,15 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
 
 
 def _of_those_that_end(groups: Sequence[Judged], scene: str, name: str) -> str:
-    """The time limit, where it ended settings of an engine that might be better than the best."""
+    """Return a clause on the time limit if it ended settings that might be better than the best completed
+    one."""
     records = next(g.records for g in groups if g.scene.name == scene)
     limits = {r["time_limit"] for r in records if r["engine"] == name and r["outcome"] == TIMED_OUT}
     return f" of the settings that end within {max(limits):g} s" if limits else ""
 
 
 def _where(groups: Sequence[Judged], bad: Grade) -> dict[str, list[Judged]]:
-    """The scenes on which the defaults of an engine have a grade."""
+    """Return for each grade the scenes on which an engine's defaults have it."""
     found: dict[str, list[Judged]] = {}
     for group in groups:
         for name, record in group.defaults().items():
@@ -192,7 +198,7 @@ def _where(groups: Sequence[Judged], bad: Grade) -> dict[str, list[Judged]]:
 
 
 def _merged(found: Mapping[str, list[Judged]]) -> dict[tuple[str, ...], list[Judged]]:
-    """Engines that do the same on the same scenes, together."""
+    """Return one sentence for all engines whose defaults fail in an equal way on equal scenes."""
     scenes = {name: tuple(g.scene.name for g in groups) for name, groups in found.items()}
     return {
         tuple(n for n in found if scenes[n] == key): found[next(n for n in found if scenes[n] == key)]
@@ -225,7 +231,7 @@ def _wrong(name: str, scenes: Sequence[Judged], groups: Sequence[Judged]) -> str
 
 
 def _other_failures(groups: Sequence[Judged]) -> str:
-    """Runs at other settings than defaults that failed or were wrong, counted."""
+    """Return a sentence that counts failed and wrong runs at settings other than the defaults."""
     runs = [r for group in groups for r in group.comparable if r["family"] != "defaults"]
     bad = {verdict: [r for r in runs if grade(r) is verdict] for verdict in (Grade.FAILED, Grade.WRONG)}
     verbs = {Grade.FAILED: "", Grade.WRONG: f"{is_or_are(bad[Grade.WRONG])} "}
@@ -255,7 +261,7 @@ def _defaults_in_short(groups: Sequence[Judged]) -> str:
 
 
 def _worst(groups: Sequence[Judged], records: Callable[[Judged], Mapping[str, Record]]) -> dict[str, Grade]:
-    """The worst grade of every engine over the scenes it has records of."""
+    """Return the worst grade of each engine over the scenes of which it has records."""
     order = list(Grade)
     found: dict[str, Grade] = {}
     for group in groups:
@@ -275,14 +281,15 @@ def _end(record: Record) -> str:
 
 
 def _place(scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
-    """`` on`` the scenes; nothing where there is but one."""
+    """Return the text ``on …`` with the names of the scenes; empty if the comparison has one scene only."""
     if len(groups) == 1:
         return ""
     return f" on {names(scenes)}" if len(scenes) < len(groups) else _on(groups)
 
 
 def _on(groups: Sequence[Judged], engines: Sequence[str] = ()) -> str:
-    """`` on all 5 scenes``, or of the engines named that not all can run; nothing of a single scene."""
+    """Return the text ``on all 5 scenes``, or the scenes that the named engines can run; empty for one
+    scene."""
     count = len(groups)
     if any(name not in group.engines() for name in engines for group in groups):
         return " on the scenes they can run" if len(engines) > 1 else " on the scenes it can run"
@@ -290,7 +297,7 @@ def _on(groups: Sequence[Judged], engines: Sequence[str] = ()) -> str:
 
 
 def _where_known(groups: Sequence[Judged], reported: Sequence[Judged], good: Sequence[str]) -> str:
-    """The scenes that a headline is of."""
+    """Return the clause that names the scenes to which a headline applies."""
     if len(reported) < len(groups):
         return f" on {names(reported)}, whose {'motion is' if len(reported) == 1 else 'motions are'} known"
     return _on(groups, good) if good else ""

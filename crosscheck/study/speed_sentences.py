@@ -1,4 +1,4 @@
-"""Sentences on speed: the times in which engines reach an error, and whose integrators do."""
+"""Sentences on speed: the times in which engines reach an error, and who provides their integrators."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ TITLES = {
     "ondsel": "OndselSolver",
     "casadi": "CasADi",
 }
-LEVEL = ERROR_LEVELS[1]  # the error at which speeds are compared in words
+LEVEL = ERROR_LEVELS[1]  # largest error of the runs whose speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
 COMPILED = ", compiled"  # suffix of families that call an engine's library without Python
@@ -32,7 +32,7 @@ WITHOUT_PYTHON = (
 
 
 def title(engine: str) -> str:
-    """An engine's name as its makers write it."""
+    """Return an engine's name as its authors write it."""
     return TITLES.get(engine, engine)
 
 
@@ -42,8 +42,8 @@ def engines_of(groups: Sequence[Judged]) -> list[str]:
 
 
 def fast(groups: Sequence[Judged]) -> str:
-    """Times of stepping that reach LEVEL, as multiples of the fastest engine's, and the integrators that are
-    crosscheck's."""
+    """Return sentences on the stepping times that reach LEVEL, as multiples of the fastest, and on
+    integrators of crosscheck."""
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
     if not any(group.is_judged for group in groups):
@@ -59,7 +59,8 @@ def fast(groups: Sequence[Judged]) -> str:
 
 
 def _integrated(groups: Sequence[Judged]) -> str:
-    """The engines whose fastest runs crosscheck integrates, with the time of the engine's own integrators."""
+    """Return clauses on engines whose fastest runs crosscheck integrates, with the time of their own
+    integrators."""
     found: dict[str, dict[str, None]] = {}
     for group in groups:
         for name, (_, record) in group.fastest(LEVEL).items():
@@ -84,7 +85,8 @@ def _by_crosscheck(groups: Sequence[Judged], name: str, families: Sequence[str])
 
 
 def is_integrated_here(record: Record) -> bool:
-    """Whether crosscheck integrates the runs of a record's family, with the engine's accelerations."""
+    """Return whether crosscheck integrates the runs of a record's family, using the engine's
+    accelerations."""
     try:
         return record["family"] in engine(record["asked"]["engine"]).integrated_here
     except LookupError:
@@ -92,7 +94,7 @@ def is_integrated_here(record: Record) -> bool:
 
 
 def _has_compiled(groups: Sequence[Judged]) -> bool:
-    """Whether a family calls an engine's library without Python."""
+    """Return whether a family calls an engine's library without Python."""
     return any(record["family"].endswith(COMPILED) for group in groups for record in group.records)
 
 
@@ -107,8 +109,8 @@ def _fast_on_one(costs: Mapping[str, float], aided: Collection[str]) -> str:
 
 
 def _whose(name: str, aided: Collection[str]) -> str:
-    """The engine at the beginning of a sentence on its fastest runs, and whether crosscheck integrates
-    them."""
+    """Return the engine as the subject of a sentence, with the note that crosscheck integrates its runs if it
+    does."""
     return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
 
 

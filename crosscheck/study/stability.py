@@ -1,4 +1,5 @@
-"""Stability ladders: one difficulty of a mechanism grows rung by rung, and each method and engine is run.
+"""Stability ladders: a difficulty of a mechanism, such as a mass ratio, grows rung by rung. Each method and
+engine runs on each rung.
 
 The exact motion of every rung is known in closed form.  Methods of mbref run at one tolerance, engines at a
 fine setting of the family that suits singular positions best.
@@ -24,9 +25,9 @@ from mbref.scenes.links import CRANK_RATE
 from mbref.scenes.planar_slider_crank import slider_crank
 
 RTOL = 1e-9
-MOST_STEPS = 200_000  # steps of a run for every 30 s of limit
+MOST_STEPS = 200_000  # allowed steps of a run for every 30 s of its time limit
 SAMPLES = 21
-TIME_LIMIT = 20.0  # s of a run
+TIME_LIMIT = 20.0  # CPU seconds of a run
 METHODS = (
     "alf-dual+projection",
     "taylor",
@@ -42,11 +43,12 @@ RANK_TOLERANCE = "rank_tolerance"  # the ladder whose difficulty is an option of
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
 MBREF = "mbref"
 
-Rung = tuple[float, Scene]  # the difficulty and the scene, whose duration is the run's
+Rung = tuple[float, Scene]  # difficulty and scene; the run ends at the scene's duration
 
 
 class Ladder(NamedTuple):
-    """A difficulty that grows: its name, a sentence, the axis' label, and the rungs from easy to hard."""
+    """A difficulty that grows: its name, a sentence, the label of its axis, and the rungs from easy to
+    hard."""
 
     name: str
     words: str
@@ -55,64 +57,65 @@ class Ladder(NamedTuple):
 
 
 def scene_name(ladder: str, difficulty: float) -> str:
-    """Return the name of a rung's scene, which gives its place in the records: ``gap[1e-05]``."""
+    """Return the name of a rung's scene, such as ``gap[1e-05]``, by which its records are found."""
     return f"{ladder}[{difficulty:g}]"
 
 
 def place(name: str) -> tuple[str, float]:
-    """Ladder and difficulty of a rung's scene."""
+    """Return ladder and difficulty from the name of a rung's scene."""
     ladder, _, difficulty = name.removesuffix("]").partition("[")
     return ladder, float(difficulty)
 
 
 def ladders() -> tuple[Ladder, ...]:
-    """All ladders."""
+    """Return all ladders."""
     return (
         Ladder(
             "start",
-            "A driven rhombus begins so far before its flat position.",
+            "A driven rhombus begins at a given distance before its flat position.",
             "distance, rad",
             [(d, four_bar(math.pi + d, "start").with_(duration=0.05)) for d in powers(-1, -14, 9)],
         ),
         Ladder(
             "turning_back",
-            "A rhombus swings up to so far below its flat position, and back.",
+            "A rhombus swings up, turns back at a given distance below its flat position, and falls.",
             "distance, rad",
             [(d, four_bar_gravity(-d, "turning_back").with_(duration=1.5)) for d in powers(-1, -9, 9)],
         ),
         Ladder(
             "gap",
-            "The rod of a slider-crank is so much longer than its crank: branches miss each other.",
+            "The rod of a slider-crank is longer than its crank by a small gap, which separates the two "
+            "branches.",
             "gap, m",
             [(g, _gap(g)) for g in powers(-1, -13, 9)],
         ),
         Ladder(
             "mass_ratio",
-            "The slider of a slider-crank is so many times as heavy as its crank.",
+            "The slider of a slider-crank is heavier than its crank by a given ratio.",
             "ratio",
             [(r, _heavy_slider(r)) for r in powers(0, 12, 9)],
         ),
         Ladder(
             "length_ratio",
-            "The rod of a slider-crank is so many times as long as its crank.",
+            "The rod of a slider-crank is longer than its crank by a given ratio.",
             "ratio",
             [(r, _long_rod(r)) for r in (1.5, *powers(1, 6, 6))],
         ),
         Ladder(
             "units",
-            "A slider-crank of so many units of length, the same motion by Froude's scaling.",
+            "A slider-crank is scaled by a unit of length; Froude's scaling keeps the motion similar.",
             "unit",
             [(s, _scaled(s)) for s in powers(-6, 4, 9)],
         ),
         Ladder(
             "speed",
-            "The crank of a rhombus is driven so fast, for two turns.",
+            "The crank of a rhombus is driven at a given speed for two turns.",
             "rad/s",
             [(w, _driven_at(w)) for w in powers(-6, 7, 9)],
         ),
         Ladder(
             "stiffness",
-            "A spring of such stiffness holds the slider of a slider-crank, for two periods.",
+            "A spring of given stiffness acts on the slider of a slider-crank for two periods.",
             "N/m",
             [(k, _sprung(k)) for k in powers(0, 12, 9)],
         ),
@@ -147,7 +150,7 @@ def ladders() -> tuple[Ladder, ...]:
 
 
 def powers(first: float, last: float, count: int) -> Iterator[float]:
-    """Powers of ten between two exponents."""
+    """Return ``count`` powers of ten between two exponents."""
     return (float(f"{10**e:.0e}") for e in np.linspace(first, last, count))
 
 
@@ -160,7 +163,8 @@ def _turning() -> Scene:
 
 
 def _missing(violation: float) -> Scene:
-    """The turning slider-crank with every velocity given, the slider's off along its guide."""
+    """Return the turning slider-crank with all velocities given; the slider's velocity along its guide is
+    wrong by ``violation``."""
     scene = _turning().with_(duration=0.5)
     start = cast(Truth, closed_form(scene)).poses(np.zeros(1))
     velocities, spins = start.velocity[0].copy(), start.angular_velocity[0]
@@ -175,7 +179,7 @@ def _missing(violation: float) -> Scene:
 def _heavy_slider(ratio: float) -> Scene:
     scene = slider_crank(0.304, 0.4048, 0.3, "mass_ratio", rate=30.0)
     crank, rod, slider = scene.body
-    mass = ratio * 0.304  # kg, of the crank
+    mass = ratio * 0.304  # kg; 0.304 kg is the mass of the crank
     heavy = slider.model_copy(update={"mass": mass, "inertia": (1e-2 * mass,) * 3})
     return scene.with_(body=(crank, rod, heavy), duration=0.5)
 
@@ -194,7 +198,7 @@ def _door(tilt: float) -> Scene:
 
 
 def _scaled(unit: float) -> Scene:
-    """The turning slider-crank with lengths times s, times times √s, its masses as they are."""
+    """Return the turning slider-crank with lengths times ``unit``, times √unit, and unchanged masses."""
     scene, time = _turning(), math.sqrt(unit)
     moved = slider_crank(0.304 * unit, 0.4048 * unit, 0.3, "units", rate=30.0 / time)
     bodies = tuple(
@@ -220,7 +224,8 @@ def _driven_at(rate: float) -> Scene:
 
 
 def _sprung(stiffness: float) -> Scene:
-    """From rest, the spring a tenth longer than it would be; the slider is by far the heaviest part."""
+    """Return a slider-crank that starts at rest with a spring stretched by a tenth; the slider has nearly all
+    of the mass."""
     scene = slider_crank(0.304, 0.4048, 0.3, "stiffness")
     at = scene.body[2].position
     spring = Spring(
@@ -233,7 +238,7 @@ def _sprung(stiffness: float) -> Scene:
 
 
 def scenes() -> list[Scene]:
-    """The scene of every rung, named by its place."""
+    """Return the scene of every rung by its name."""
     return [
         scene.with_(name=scene_name(ladder.name, difficulty))
         for ladder in ladders()
@@ -242,7 +247,7 @@ def scenes() -> list[Scene]:
 
 
 def cases(engines: Sequence[str]) -> list[Case]:
-    """Return every rung by mbref's methods, and by the engines that can run it."""
+    """Return runs of every rung by mbref's methods, and by the engines that can run it."""
     return [
         Case(scene, np.linspace(0.0, scene.duration, SAMPLES), name, setting, TIME_LIMIT)
         for scene in scenes()
@@ -269,7 +274,8 @@ def _options(scene: Scene) -> dict[str, float]:
 
 
 def run(path: str | Path, engines: Sequence[str]) -> list[Record]:
-    """The record of every run, stored at ``path`` as it ends and taken from there where it is known."""
+    """Return the record of every rung, stored at ``path`` as its run ends; stored records are not
+    repeated."""
     able, rungs = [name for name in FAMILIES if name in engines], scenes()
     with counted("finding out settings", unasked(able, rungs)) as advance:
         scout(able, rungs, advance)

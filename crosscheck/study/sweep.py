@@ -1,4 +1,4 @@
-"""The runs of a report: the whole sweep, or the quick one."""
+"""Runs of a report: all settings of all engines on all scenes, or the quick selection."""
 
 from __future__ import annotations
 
@@ -22,29 +22,30 @@ QUICK_SCENES = {  # name → end time (s)
 QUICK_FAMILIES = (AS_IN_FILE, "defaults", "tuned", "forward, compiled", "newton, compiled")  # else: the first
 MOST_FAMILIES, MOST_SETTINGS = 2, 3  # quick sweep: families of an engine, settings of a family
 QUICK_SAMPLES, SAMPLES = 31, 101
-QUICK_LIMIT, LIMIT = 5.0, 120.0  # s of a run
+QUICK_LIMIT, LIMIT = 5.0, 120.0  # CPU seconds of a run
 
-LONG, QUICK_LONG = 0.5, 0.05  # s; runs that take longer are timed by their single run
+LONG, QUICK_LONG = 0.5, 0.05  # s; longer runs are not timed again, and their single run counts
 Sweep = tuple[list[Case], list[Unable]]
 
 
 def whole_scenes() -> list[Scene]:
-    """Every built-in scene."""
+    """Return every built-in scene."""
     return [make() for make in SCENES.values()]
 
 
 def quick_scenes() -> list[Scene]:
-    """A few short ones."""
+    """Return a few built-in scenes with short durations."""
     return [SCENES[name]().with_(duration=end) for name, end in QUICK_SCENES.items()]
 
 
 def whole(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
-    """The scenes in every engine at every setting."""
+    """Return the runs of the scenes in every engine at every setting, and the refusals."""
     return _sweep(scenes, engines, SAMPLES, LIMIT)
 
 
 def quick(scenes: Sequence[Scene], engines: Sequence[str]) -> Sweep:
-    """The scenes at every setting of a few families of every engine, of which `study.ladder` takes a few."""
+    """Return runs at every setting of a few families of each engine, and the refusals; `study.ladder` selects
+    settings among them."""
     cases, unable = _sweep(scenes, engines, QUICK_SAMPLES, QUICK_LIMIT)
     return of_few_families(cases), unable
 
@@ -73,13 +74,13 @@ def thinned(cases: Sequence[Case]) -> list[Case]:
 
 
 def _of_few(cases: Sequence[Case], named: Collection[str]) -> list[Case]:
-    """The cases, of one scene and engine, of few families."""
+    """Return the cases of few families; all cases belong to one scene and engine."""
     having = list(dict.fromkeys(case.setting.family for case in cases))
     wanted = [f for f in having if f in named] or having[:MOST_FAMILIES]
     return [case for family in wanted for case in cases if case.setting.family == family]
 
 
 def spread(items: Sequence[Case], most: int) -> list[Case]:
-    """At most ``most`` of the items, equally spaced, first and last included."""
+    """Return at most ``most`` of the items, equally spaced, including the first and the last."""
     places = np.linspace(0, len(items) - 1, min(most, len(items))).round().astype(int)
     return [items[i] for i in places]

@@ -1,4 +1,4 @@
-"""Interleaved timings of the short runs that completed, stored beside their records and not repeated."""
+"""Interleaved timings of the short completed runs, stored with their records and not repeated."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbref.records import append, stored
 from mbref.trajectory import Outcome
 
 REPEATS = 5
-LONG = 0.5  # s; a run that takes longer is timed by its single run, whose noise is relatively small
+LONG = 0.5  # s; a longer run is timed by its single run, whose relative noise is small
 
 
 def with_timings(
@@ -24,7 +24,8 @@ def with_timings(
     long: float = LONG,
     repeats: int = REPEATS,
 ) -> list[Record]:
-    """The records with the times of ``path`` (JSON lines); a scene of which one is missing is timed.
+    """Return the records with the times stored at ``path`` (JSON lines); scenes with a missing time are
+    timed.
 
     Only completed runs of up to ``long`` s are timed again, in turns.
     """

@@ -1,4 +1,4 @@
-"""Sentences on how the true motions are known, how far, and to which bound."""
+"""Sentences on how and up to which time the true motions are known, and on the bounds of their errors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mbref.scene import Scene
 
 
 def truth(groups: Sequence[Judged]) -> str:
-    """The kinds of truth, the bounds on their errors, and their cost."""
+    """Return sentences on the kinds of truth, the bounds on their errors, and their cost."""
     parts = []
     closed = [g for g in groups if g.truth["kind"] not in ("", "reference")]
     if closed:
@@ -22,14 +22,17 @@ def truth(groups: Sequence[Judged]) -> str:
             f"equation, to {max(bounds):.0e}{better}."
         )
         parts += [
-            f"That of {g.scene.name} is known{_until(g.scene, g.truth)}." for g in closed if g.truth["reason"]
+            f"The motion of {g.scene.name} is known{_until(g.scene, g.truth)}."
+            for g in closed
+            if g.truth["reason"]
         ]
     parts += [_reference(group) for group in groups if group not in closed]
     return " ".join(parts)
 
 
 def unknown(scene: Scene, known: Mapping[str, Any]) -> str:
-    """From when on the true motion of a scene is not known, and why; empty where it is known to the end."""
+    """Return from which time on the true motion of a scene is unknown, with the reason; empty if it is known
+    to the end."""
     if not known["kind"]:
         return f"There is no reference for {scene.name}: {known['reason']}."
     return f"The motion of {scene.name} is known{_until(scene, known)}." if known["reason"] else ""
@@ -49,7 +52,8 @@ def _reference(group: Judged) -> str:
 
 
 def _until(scene: Scene, known: Mapping[str, Any]) -> str:
-    """Return up to which time a truth is known, and why no further; empty if it is known to the end."""
+    """Return the time up to which a truth is known, with the reason for its end; empty if it is known to the
+    end."""
     if not known["reason"]:
         return ""
     end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
@@ -57,12 +61,12 @@ def _until(scene: Scene, known: Mapping[str, Any]) -> str:
 
 
 def up_to(groups: Sequence[Judged]) -> str:
-    """Return the beginning of a sentence on how far the motions are known; empty if all are known to
-    their ends."""
+    """Return the beginning of a sentence on the time up to which the motions are known; empty if all are
+    known to their ends."""
     ends = [group.truth["until"] for group in groups if group.truth["reason"]]
     return f"Up to t = {min(ends):.4g} s" if ends else ""
 
 
 def names(groups: Sequence[Judged]) -> str:
-    """The names of the scenes, listed."""
+    """Return the names of the scenes as a list in words."""
     return listed(group.scene.name for group in groups)

@@ -1,4 +1,5 @@
-"""The truth of a scene as a record: its kind, its cost, the bound on its error, and a motion to show."""
+"""The truth of a scene as a record: its kind, its cost, the bound on its error, and a motion for the
+animation."""
 
 from __future__ import annotations
 
@@ -19,16 +20,16 @@ from crosscheck.study.pictures import shortened
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-DENSE = 600  # equal parts of a scene's duration at which its true motion is looked at
-FRAMES = 90  # instants of the motion shown, at most
-TURN = 0.35  # rad between two of them, at most, of the body that turns fastest
+DENSE = 600  # number of equal parts of the duration at whose ends the true motion is evaluated
+FRAMES = 90  # largest number of frames of the animated motion
+TURN = 0.35  # rad; largest angle by which a body turns between two frames
 
 
 def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
-    """The true motion of a scene, as far as it is known, at times (k,), and at instants that show it move.
+    """Return the record of a scene's true motion at times (k,), and at the times of animation frames.
 
-    ``kind`` is the family of the closed form, "reference", or "" where there is none; ``bound`` is on the
-    error, ``until`` (s) how far it is known and ``reason`` why no further.
+    ``kind`` is the family of the closed form, "reference", or "" if there is no truth. ``bound`` limits the
+    error. ``until`` (s) is the time up to which the motion is known, with the ``reason`` for its end.
     """
     dense = np.linspace(0.0, scene.duration, DENSE + 1)
     wanted = np.unique(np.concatenate([times, gate_times(scene), dense]))
@@ -40,20 +41,23 @@ def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Reco
 
 
 def known_at(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
-    """The truth's record at times (k,) alone, without key and scene."""
+    """Return the record of the truth at times (k,) without key and scene name."""
     family = closed_form(scene)
     return _of_family(scene, family, times) if family else _of_reference(scene, times, reference_time)
 
 
 def key(scene: Scene, times: np.ndarray) -> str:
-    """Hash of the scene and the times."""
+    """Return a hash of the scene and the times."""
     identity = ["truth", scene.to_dict(), np.asarray(times, dtype=float).tolist()]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()
 
 
 def shown(exact: Trajectory) -> np.ndarray:
-    """Which samples (n,) of a motion to show: FRAMES over all of it, or over its beginning where a body would
-    turn by more than TURN between two."""
+    """Return which samples (n,) of a motion become frames.
+
+    FRAMES cover the whole motion, or only its beginning if a body would turn by more than TURN between two
+    frames.
+    """
     speed = np.linalg.norm(exact.angular_velocity, axis=-1).max(axis=-1, initial=0.0)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(exact.times) * (speed[1:] + speed[:-1]) / 2)])
     last = int(np.searchsorted(turned, FRAMES * TURN, side="right")) - 1
@@ -102,7 +106,7 @@ def _nothing(reason: str) -> dict[str, Any]:
 
 
 def _motion(exact: Trajectory) -> dict[str, Any]:
-    """The record of the instants shown: times, and the bodies' poses."""
+    """Return the record of the frames: times, and the bodies' poses."""
     chosen = shown(exact)
     bodies = {
         name: {"position": exact.position[chosen, b], "orientation": exact.orientation[chosen, b]}

@@ -1,5 +1,8 @@
-"""The cheapest settings of an engine that reach an error: in every family the setting is bracketed by its
-coarsest one that runs, then bisected."""
+"""Search for the cheapest settings of an engine that reach an error.
+
+In every family the error is bracketed by two settings, starting from the coarsest, and the interval is
+bisected.
+"""
 
 from __future__ import annotations
 
@@ -15,14 +18,15 @@ from crosscheck.study.ladder import families
 from crosscheck.study.record_view import error, error_bound, error_text, is_completed
 from mbref.scene import Scene
 
-NEAR = 1.12  # ratio of the work of two settings between which no other is tried
-HALVINGS = 6  # most halvings of an interval of settings
+NEAR = 1.12  # ratio of the work of two settings below which no setting between them is tried
+HALVINGS = 6  # largest number of bisections in a family
 
 Run = Callable[[Sequence[Case]], list[Record]]
 
 
 class Criterion(NamedTuple):
-    """A number of a record that must not exceed a level: its name in a sentence, and its value as text."""
+    """A criterion for runs: a number of the record must not exceed a level. It has a name for sentences and a
+    text for values."""
 
     name: str
     level: float
@@ -31,7 +35,7 @@ class Criterion(NamedTuple):
 
 
 def by_error(level: float) -> Criterion:
-    """Return the criterion that a run is known to be within an error."""
+    """Return the criterion that the error of a run is at most ``level``, the bound on the truth included."""
     return Criterion(f"an error of {level:g}", level, known_error, error_text)
 
 
@@ -53,14 +57,16 @@ def closure_gap(record: Record, scene: Scene) -> float:
 
 
 def known_error(record: Record) -> float:
-    """Return the error of a record, no lower than it is known: an error below the truth's bound is no
-    evidence."""
+    """Return the error of a record or the bound on the truth's error, whichever is larger.
+
+    An error below the bound does not prove a more accurate run.
+    """
     return max(error(record), error_bound(record))
 
 
 class Tuned(NamedTuple):
-    """All records that were made, and of every family that reaches the error its cheapest run, the cheapest
-    first: their cases and records."""
+    """Result of a search: all records, and the cases and records of the cheapest run of each family that
+    reaches the error, cheapest first."""
 
     records: list[Record]
     cases: list[Case]
@@ -78,9 +84,10 @@ def tuned(
     """Find the cheapest setting of every family of one engine on one scene that reaches an error, or
     the level of another ``measure``.
 
-    The cheapest families begin.  A family is given up where it ran out of time, or costs more before it
-    reaches the error than another has needed; families ``integrated_here``, by crosscheck, end no search of
-    the engine's own.  ``advance`` takes the name of each family that is done.
+    The families with the cheapest coarsest run come first. The search in a family ends if a run is out of
+    time, or misses the error and costs more than the cheapest success so far. A success of a family
+    ``integrated_here`` (by crosscheck) does not end the search in families of the engine's own integrators.
+    ``advance`` receives the name of each finished family.
     """
     groups = families(cases)
     firsts = run([group[0] for group in groups])
@@ -102,7 +109,7 @@ Pair = tuple[Case, Record]
 
 
 class _Search:
-    """The search in one family, whose coarsest setting was run."""
+    """Search for the cheapest setting in one family, whose coarsest setting has run."""
 
     def __init__(
         self,
@@ -117,32 +124,35 @@ class _Search:
         self.made = [(settings[0], first)]
 
     def is_any_of(self, names: Collection[str]) -> bool:
-        """Whether the family has one of these names."""
+        """Return whether ``names`` contain the family's name."""
         return self.family in names
 
     def cost(self) -> float:
-        """CPU seconds of the coarsest run; infinite where it did not complete."""
+        """Return the CPU seconds of the coarsest run; infinite if it did not complete."""
         _, first = self.made[0]
         return _seconds(first) if is_completed(first) else math.inf
 
     def cheapest(self) -> list[Pair]:
-        """The run of least work that reaches the error, in a list; empty without one."""
+        """Return a list with the run of least work that reaches the error; empty without one."""
         return sorted((p for p in self.made if self._reaches(p[1])), key=lambda pair: work(pair[1]))[:1]
 
     def least(self) -> float:
-        """The CPU seconds of that run; infinite without one."""
+        """Return the CPU seconds of the cheapest run that reaches the error; infinite without one."""
         return min((_seconds(record) for _, record in self.cheapest()), default=math.inf)
 
     def carry_out(self, limit: float) -> None:
-        """Bracket the error and bisect, as long as a run that misses it costs less than ``limit`` (s)."""
+        """Bracket the error and bisect, as long as runs that miss the error cost less than ``limit`` (s)."""
         [first] = self.made
         bracket = self._coarsened(first) if self._reaches(first[1]) else self._refined(first, limit)
         if bracket is not None:
             self._bisect(*bracket)
 
     def _coarsened(self, reached: Pair) -> tuple[Pair, Pair] | None:
-        """The first coarser run that misses the error and the last that reaches it; None where the coarsest
-        that gains something still reaches it."""
+        """Return the finest run that misses the error and the coarsest that reaches it, found among coarser
+        settings.
+
+        None if every coarser setting that saves work still reaches the error.
+        """
         finer = self._settings[1].setting if len(self._settings) > 1 else self._settings[0].setting
         longest = self._settings[0].scene.duration
         for _ in range(MOST_COARSER):
@@ -158,8 +168,11 @@ class _Search:
         return None
 
     def _refined(self, missed: Pair, limit: float) -> tuple[Pair, Pair] | None:
-        """The last run that misses the error and the first that reaches it; None where none of the settings
-        does, or the search is given up."""
+        """Return the last run that misses the error and the first that reaches it, found among finer
+        settings.
+
+        None if no setting reaches it or the search ends at its limit.
+        """
         for case in self._settings[1:]:
             if missed[1]["outcome"] == "TIMED_OUT" or _seconds(missed[1]) >= limit:
                 return None
@@ -186,7 +199,7 @@ class _Search:
         return case, record
 
     def _reaches(self, record: Record) -> bool:
-        """Return whether a run is known to be so near."""
+        """Return whether the run completed and its measured number is at most the level."""
         return is_completed(record) and self._measure(record) <= self._level
 
 

@@ -1,4 +1,4 @@
-"""Verdicts computed from records: each engine's grade on a scene, by its best setting and by its defaults."""
+"""Grades of engines computed from records: on each scene, at the best setting and at the defaults."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from crosscheck.study.record_view import error, is_completed
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-Fastest = tuple[float, Record]  # CPU seconds, and a record of the family
-DEFAULTS = "defaults"  # the family of an engine's settings as its library has them
+Fastest = tuple[float, Record]  # CPU seconds, and the record of a run of the fastest family
+DEFAULTS = "defaults"  # family of the settings that a library has by default
 
 
 class Grade(enum.Enum):
-    """A record's grade by its error alone; an engine's own message of success does not count."""
+    """Grade of a record by its error alone; an engine's own message of success does not count."""
 
     RIGHT = "right"
     INACCURATE = "inaccurate"
@@ -35,11 +35,12 @@ class Grade(enum.Enum):
         return self.value
 
 
-LIMITS = {Grade.RIGHT: FLOOR, Grade.INACCURATE: FALSE_SUCCESS}  # largest errors
+LIMITS = {Grade.RIGHT: FLOOR, Grade.INACCURATE: FALSE_SUCCESS}  # largest error of each grade
 
 
 def grade(record: Record) -> Grade:
-    """RIGHT up to FLOOR, INACCURATE up to FALSE_SUCCESS, else WRONG; UNJUDGED where there is no truth."""
+    """Return RIGHT for errors up to FLOOR, INACCURATE up to FALSE_SUCCESS, otherwise WRONG; UNJUDGED without
+    a truth."""
     if not is_completed(record):
         return Grade.FAILED
     if record["metrics"].get("error") is None:
@@ -51,7 +52,7 @@ def grade(record: Record) -> Grade:
 class Judged:
     """A scene, the record of its truth (`study.truths`), and the records of its runs.
 
-    ``differences`` has, by engine, how the mechanism that it simulates differs from the scene; such an
+    ``differences`` has for each engine that simulates another mechanism a sentence on how it differs; such an
     engine is not judged.
     """
 
@@ -62,12 +63,12 @@ class Judged:
 
     @property
     def redundant(self) -> int:
-        """Rows of the constraints that depend on others at the start."""
+        """Return the number of constraint rows at the start that depend on other rows."""
         return self.scene.counts().redundant
 
     @property
     def comparable(self) -> Sequence[Record]:
-        """The records of the engines that simulate this mechanism."""
+        """Return the records of the engines that simulate this mechanism."""
         return [record for record in self.records if record["engine"] not in self.differences]
 
     @property
@@ -79,15 +80,15 @@ class Judged:
         return bool(self.truth.get("kind") and runs) and not any(map(is_completed, runs))
 
     def grade(self, record: Record) -> Grade:
-        """The grade of a record; UNJUDGED where its engine simulates another mechanism."""
+        """Return the grade of a record; UNJUDGED if its engine simulates another mechanism."""
         return Grade.UNJUDGED if record["engine"] in self.differences else grade(record)
 
     def engines(self) -> dict[str, LeastError]:
-        """The families' best records by engine that is judged, in the order of the records."""
+        """Return for each judged engine the best record of each family, in the order of the records."""
         return {least.engine: least for least in least_errors(self.comparable)}
 
     def best(self) -> dict[str, Record]:
-        """Return for each engine the record of least error, otherwise the one that got furthest."""
+        """Return for each engine the record of least error, otherwise the record that ended last."""
         return {name: least.best for name, least in self.engines().items()}
 
     def defaults(self) -> dict[str, Record]:
@@ -96,12 +97,13 @@ class Judged:
         return {name: least.families[DEFAULTS] for name, least in found if DEFAULTS in least.families}
 
     def costs(self, level: float) -> dict[str, float]:
-        """CPU seconds of stepping in which an engine's best family reaches an error; only those that do."""
+        """Return for each engine the CPU seconds in which its best family reaches an error; engines that miss
+        it are left out."""
         return {name: cost for name, (cost, _) in self.fastest(level).items()}
 
     def fastest(self, level: float, without: Callable[[Record], bool] | None = None) -> dict[str, Fastest]:
-        """Return the least seconds and a record of the family; ``without`` leaves out families by their
-        records."""
+        """Return for each engine the least seconds and a record of that family; ``without`` selects records
+        whose families are left out."""
         found = {}
         for name, least in self.engines().items():
             costs = _family_costs(least, level)
@@ -118,14 +120,15 @@ class Judged:
         return {r["engine"]: r for r in reversed(by_cost)}
 
     def within(self, level: float, use: Callable[[Record], bool]) -> dict[str, Record]:
-        """Return of each engine the record to use among those that may be used: the fastest completed one
+        """Return for each engine one record among the records that ``use`` accepts: the fastest completed one
         within an error, otherwise the most accurate."""
         usable = [r for r in self.comparable if is_completed(r) and math.isfinite(error(r)) and use(r)]
         order = sorted(usable, key=lambda r: (max(error(r), level), r["cost"]["seconds"]))
         return {r["engine"]: r for r in reversed(order)}
 
     def agreement(self) -> dict[tuple[str, str], float]:
-        """Largest differences between the finest completed runs of two engines, where there is no truth."""
+        """Return for each pair of engines the largest difference between their finest completed runs; used if
+        there is no truth."""
         finest = {r["engine"]: r for r in self.comparable if is_completed(r)}
         motions = {n: Trajectory.from_record(self.scene.name, r) for n, r in finest.items()}
         names = list(motions)
@@ -138,7 +141,7 @@ class Judged:
 
 
 def _family_costs(least: LeastError, level: float) -> list[Fastest]:
-    """Return for each family that reaches an error its CPU seconds, and its record of least error."""
+    """Return for each family that reaches an error its CPU seconds and its record of least error."""
     costs = []
     for family, best in least.families.items():
         usable = [
@@ -156,8 +159,8 @@ def judged(
     records: Sequence[Record],
     differences: Mapping[str, Mapping[str, str]] | None = None,
 ) -> list[Judged]:
-    """The scenes that have records, each with its truth, its records and the ``differences`` of its engines,
-    which are given by the scene's name."""
+    """Return each scene with its truth, its records and the ``differences`` of its engines, which are keyed
+    by scene name."""
     given = differences or {}
     truth_of: dict[str, Any] = {truth["scene"]: truth for truth in truths}
     groups = [

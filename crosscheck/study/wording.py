@@ -1,4 +1,4 @@
-"""Words for numbers and lists in the sentences of a verdict."""
+"""Text of numbers and lists in the sentences of a verdict."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Iterable, Sequence
 
 
 def listed(names: Iterable[str]) -> str:
-    """``a, b and c``."""
+    """Return the names as ``a, b and c``."""
     *most, last = [*names] or [""]
     return f"{', '.join(most)} and {last}" if most else last
 
 
 def at_most(value: float, bound: float) -> str:
-    """An error rounded up to two digits, or the truth's own bound where that is larger."""
+    """Return an error rounded up to two digits, or the truth's own bound if that is larger."""
     if value < bound:
         return f"less than the truth's own bound, {bound:.0e}"
     exponent = math.floor(math.log10(value))
@@ -21,32 +21,32 @@ def at_most(value: float, bound: float) -> str:
 
 
 def runs(number: int) -> str:
-    """``1 run``, ``2 runs``."""
+    """Return ``1 run``, ``2 runs`` and so on."""
     return f"{number} run{'s' if number != 1 else ''}"
 
 
 def uncapitalised(sentence: str) -> str:
-    """A sentence as the end of another; a name that begins with a capital is left."""
+    """Return a sentence with a small first letter, for use within another one; names keep their capitals."""
     return sentence[0].lower() + sentence[1:] if sentence.startswith(("All ", "Both ", "No ")) else sentence
 
 
 def is_or_are(names: Sequence[object]) -> str:
-    """``is`` of one, ``are`` of several."""
+    """Return ``is`` for one name, ``are`` for several."""
     return "is" if len(names) == 1 else "are"
 
 
 def its_or_their(names: Sequence[str]) -> str:
-    """``its`` of one, ``their`` of several."""
+    """Return ``its`` for one name, ``their`` for several."""
     return "its" if len(names) == 1 else "their"
 
 
 def agree(names: Sequence[str]) -> str:
-    """``agrees`` of one, ``agree`` of several."""
+    """Return ``agrees`` for one name, ``agree`` for several."""
     return "agrees" if len(names) == 1 else "agree"
 
 
 def seconds(value: float) -> str:
-    """A time with the unit that suits it."""
+    """Return a time in s, ms or µs."""
     for unit, scale in (("s", 1.0), ("ms", 1e-3)):
         if value >= scale:
             return f"{value / scale:.3g} {unit}"
@@ -54,11 +54,11 @@ def seconds(value: float) -> str:
 
 
 def multiple(ratio: float) -> str:
-    """``3.2 times`` or ``140 times``."""
+    """Return a ratio as ``3.2 times`` or ``140 times``."""
     return f"{ratio:.1f} times" if ratio < 9.95 else f"{ratio:.0f} times"
 
 
 def span(least: float, most: float) -> str:
-    """``3.2 to 140 times``, or one multiple where both are the same."""
+    """Return two ratios as ``3.2 to 140 times``, or as one multiple if they are equal."""
     low, high = multiple(least), multiple(most)
     return low if low == high else f"{low.removesuffix(' times')} to {high}"

@@ -1,4 +1,4 @@
-"""One section a file; `render` takes runs and gives blocks, and never simulates."""
+"""Sections of the report, one in each file. `render` takes runs and returns blocks; it never simulates."""
 
 from __future__ import annotations
 
@@ -51,15 +51,16 @@ CLOSING: Mapping[str, Chapter] = {
     "provenance": provenance.render,
     "records": records.render,
 }
-CONFORMANCE = "conformance"  # the section that is rendered from verified engines
-NOTHING = "These scenes have nothing that the sections asked for would show."
+CONFORMANCE = "conformance"  # name of the section that is rendered from the verdicts of `crosscheck verify`
+NOTHING = "The requested sections have nothing to show for these scenes."
 NAMES = (*OPENING, *OF_A_SCENE, CONFORMANCE, *CLOSING)
 
 
 def blocks(
     groups: Sequence[SceneRuns], names: Collection[str] = NAMES, verified: Sequence[conformance.Verified] = ()
 ) -> list[Block]:
-    """The blocks of the named sections, scene by scene between opening and closing chapters."""
+    """Return the blocks of the named sections: opening chapters, then the chapters of each scene, then
+    closing chapters."""
     out = [block for name, render in OPENING.items() if name in names for block in render(groups)]
     parts = [render for name, render in OF_A_SCENE.items() if name in names]
     for group in groups if parts else ():

@@ -1,4 +1,5 @@
-"""Initial accelerations of the engines compared with Gauss's principle; distance to singularity."""
+"""Section: initial accelerations of the engines compared with Gauss's principle, and the distance to
+singularity."""
 
 from __future__ import annotations
 
@@ -13,8 +14,8 @@ HEADER = ("Engine", "Family", "Difference")
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Compare accelerations at t = 0 of each family's best run with Gauss's principle; empty for a scene
-    without masses."""
+    """Return the comparison of accelerations at t = 0 of each family's best run with Gauss's principle; empty
+    for a scene without masses."""
     if not scene_runs.scene.has_mass():
         return []
     exact = gauss(scene_runs.scene)
@@ -38,5 +39,5 @@ def _distance(scene_runs: SceneRuns) -> str:
     values = singular_values(scene_runs.scene)
     above = values[values > RANK * values[0]]
     return (
-        f"Distance to singularity (least singular value of the scaled Jacobian above rank): {above[-1]:.1e}."
+        f"Distance to singularity (smallest nonzero singular value of the scaled Jacobian): {above[-1]:.1e}."
     )

@@ -1,7 +1,8 @@
-"""Conformance: cards of the suite against engines, violations explained, and the defects that prove cards.
+"""Section: results of the conformance checks for each engine, violations with their causes, and the planted
+defects that the checks detect.
 
-Rendered from what ``crosscheck verify ENGINE --json`` prints: verdicts on the suite's mechanisms, of an
-engine or one of its families, and, with ``--mechanisms``, counts on drawn mechanisms.
+The section is rendered from the output of ``crosscheck verify ENGINE --json``: verdicts on the suite's
+mechanisms, of an engine or one of its families, and, with ``--mechanisms``, counts on random mechanisms.
 """
 
 from __future__ import annotations
@@ -14,28 +15,28 @@ from crosscheck.conformance.suite import CANNOT, FAIL, MARKS, OUTSIDE, PASS, abo
 from crosscheck.study.speed_sentences import title
 from reports.blocks import Block, Heading, Table, Text
 
-Verified = Mapping[str, Any]  # an engine, its version and its verdicts
+Verified = Mapping[str, Any]  # an engine, its version and its verdicts, as stored in JSON
 
 CAPTION = (
-    "Cards of the conformance suite: the number of the suite's mechanisms on which an engine passes (✓) and "
-    "fails (✗); –: the engine runs none of the mechanisms, ○: the card applies to none of them. "
-    "Defects: the number of planted defects of an example engine that the card detects."
+    "Checks of the conformance suite: the number of the suite's mechanisms on which an engine passes (✓) and "
+    "fails (✗); –: the engine runs none of the mechanisms, ○: the check applies to none of them. "
+    "Defects: the number of planted defects of an example engine that the check detects."
 )
 FAMILIES = (
-    "Formulations and stabilisations of mbref on six moving mechanisms: the number of verdicts. A method "
-    "is not asked about mechanisms that it does not claim to handle, such as redundant ones."
+    "Formulations and stabilisations of mbref on six moving mechanisms: the number of verdicts. Mechanisms "
+    "that a method does not support, such as redundant ones for some methods, are not counted."
 )
 DRAWN = (
-    "Cards on random mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
-    "floating ones, rotors, and ones without masses. Shown is on how many a card holds, of how many it was "
+    "Checks on random mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
+    "floating ones, rotors, and ones without masses. Shown is on how many a check holds, of how many it was "
     "decided on."
 )
-ANY_DRAWN = "drawn mechanisms"  # stands for a scene in explanations (the name in stored records)
+ANY_RANDOM = "random mechanisms"  # stands for all random mechanisms in the file of explanations
 UNEXPLAINED = "not explained yet"
 
 
 def render(verified: Sequence[Verified]) -> list[Block]:
-    """The section; nothing without verified engines."""
+    """Return the section; empty without verdicts."""
     if not verified:
         return []
     drawn = [found for found in verified if "mechanisms" in found]
@@ -43,7 +44,7 @@ def render(verified: Sequence[Verified]) -> list[Block]:
     engines = [found for found in verified if "verdicts" in found and not found.get("family")]
     blocks: list[Block] = [Heading("Conformance", 2)]
     if engines:
-        blocks += [Text(_engines(engines)), _cards(engines), *_violations(engines)]
+        blocks += [Text(_engines(engines)), _checks(engines), *_violations(engines)]
     if families:
         blocks += [Heading("Methods of mbref"), _families(families)]
     if drawn:
@@ -52,37 +53,39 @@ def render(verified: Sequence[Verified]) -> list[Block]:
 
 
 def _families(verified: Sequence[Verified]) -> Table:
-    """One row for each family: the counts, and what is violated with its cause."""
+    """Return a table with one row for each family: counts of verdicts, and violated checks with their
+    causes."""
     rows = []
     for found in verified:
         counts = [
             str(sum(v["status"] == s for v in found["verdicts"])) for s in (PASS, FAIL, CANNOT, OUTSIDE)
         ]
         failed = [v for v in found["verdicts"] if v["status"] == FAIL]
-        cards = dict.fromkeys(v["card"] for v in failed)
+        checks = dict.fromkeys(v["card"] for v in failed)
         scenes = dict.fromkeys(v["scene"] for v in failed)
-        where = f"{', '.join(cards)} on {', '.join(scenes)}" if failed else "none"
+        where = f"{', '.join(checks)} on {', '.join(scenes)}" if failed else "none"
         rows.append((found["family"], *counts, where, _cause(found["family"], failed)))
     header = ("Method", "Holds", "Violated", "Cannot", "Outside", "Violations", "Cause and remedy")
     return Table(FAMILIES, header, rows, frozenset({1, 2, 3, 4}))
 
 
 def _cause(family: str, failed: Sequence[Mapping[str, Any]]) -> str:
-    """The sentences on a family's violations."""
+    """Return the sentences on the causes of a family's violations."""
     causes = [explanations().get((f"mbref {family}", v["property"], v["scene"])) for v in failed]
     sentences = dict.fromkeys(f"{known.cause} {known.remedy}" for known in causes if known)
     return " ".join([*sentences, *([UNEXPLAINED] if None in causes else [])]) or "–"
 
 
 def _drawn(verified: Sequence[Verified]) -> Table:
-    """Cards against engines: on how many drawn mechanisms the card holds, of how many it decides on."""
-    names = {name: card for found in verified for name, card in found["cards"].items()}
+    """Return the table of checks and engines on random mechanisms: on how many a check passes, of how many it
+    was decided on."""
+    names = {name: check for found in verified for name, check in found["cards"].items()}
     rows = [
-        (card["card"], card["about"], *(_share(found["cards"].get(name, {})) for found in verified))
-        for name, card in names.items()
+        (check["card"], check["about"], *(_share(found["cards"].get(name, {})) for found in verified))
+        for name, check in names.items()
     ]
     engines = (" ".join(filter(None, (title(f["engine"]), f["family"]))) for f in verified)
-    return Table(DRAWN, ("Card", "It checks", *engines), rows, frozenset(range(2, 2 + len(verified))))
+    return Table(DRAWN, ("Check", "It checks", *engines), rows, frozenset(range(2, 2 + len(verified))))
 
 
 def _share(counts: Mapping[str, Any]) -> str:
@@ -91,13 +94,13 @@ def _share(counts: Mapping[str, Any]) -> str:
 
 
 def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
-    """Violations by engine and card, with the largest number, cause and remedy."""
+    """Return the violations by engine and check, with the largest number, cause and remedy."""
     rows = []
     for found in verified:
         for name in dict.fromkeys(v["property"] for v in found["violations"]):
             here = [v for v in found["violations"] if v["property"] == name]
             worst = max(here, key=lambda v: (v["measured"] or 0.0) / (v["allowed"] or 1.0))
-            known = explanations().get((found["engine"], name, ANY_DRAWN))
+            known = explanations().get((found["engine"], name, ANY_RANDOM))
             cause, remedy = known or (worst["reason"] or UNEXPLAINED, "–")
             numbers = _number(worst["measured"]), _number(worst["allowed"])
             rows.append(
@@ -112,37 +115,42 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
                 )
             )
     if not rows:
-        return [Text("No random mechanism violates a card.")]
-    header = ("Engine", "Card", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
+        return [Text("No random mechanism violates a check.")]
+    header = ("Engine", "Check", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
     return [
-        Table("Violated cards on random mechanisms, each with its worst.", header, rows, frozenset({2, 4, 5}))
+        Table(
+            "Violated checks on random mechanisms, each with its worst violation.",
+            header,
+            rows,
+            frozenset({2, 4, 5}),
+        )
     ]
 
 
 def _engines(verified: Sequence[Verified]) -> str:
-    """The engines with their versions and the counts of their verdicts."""
+    """Return a sentence on each engine: its version and the counts of its verdicts."""
     sentences = []
     for found in verified:
         counts = {status: sum(v["status"] == status for v in found["verdicts"]) for status in MARKS}
         violated = f"{counts[FAIL]} violated" if counts[FAIL] else "none violated"
         sentences.append(
             f"{title(found['engine'])} {found['version']}: {counts[PASS]} verdicts hold, {violated}, "
-            f"{counts[CANNOT]} cannot be asked, {counts[OUTSIDE]} are outside their card's domain."
+            f"{counts[CANNOT]} cannot be asked, {counts[OUTSIDE]} are outside their check's domain."
         )
-    return f"crosscheck verify holds every engine against the same cards. {' '.join(sentences)}"
+    return f"The command crosscheck verify makes the checks of all engines. {' '.join(sentences)}"
 
 
-def _cards(verified: Sequence[Verified]) -> Table:
+def _checks(verified: Sequence[Verified]) -> Table:
     names = {v["property"]: v["card"] for found in verified for v in found["verdicts"]}
-    header = ("Card", "It checks", "Defects", *(title(found["engine"]) for found in verified))
+    header = ("Check", "It checks", "Defects", *(title(found["engine"]) for found in verified))
     rows = [
         (
-            card,
+            check,
             abouts().get(name, ""),
-            str(sum(proof.card == name for proof in proofs())),
+            str(sum(proof.check == name for proof in proofs())),
             *(_cell([v["status"] for v in found["verdicts"] if v["property"] == name]) for found in verified),
         )
-        for name, card in names.items()
+        for name, check in names.items()
     ]
     return Table(CAPTION, header, rows, frozenset({2}))
 
@@ -153,16 +161,16 @@ def _cell(statuses: Sequence[str]) -> str:
 
 
 def _violations(verified: Sequence[Verified]) -> list[Block]:
-    """Each violation with its numbers, cause and remedy."""
+    """Return the table of violations with numbers, cause and remedy."""
     rows = [
         _violation(found["engine"], v) for found in verified for v in found["verdicts"] if v["status"] == FAIL
     ]
     if not rows:
-        return [Text("No engine violates a card.")]
-    header = ("Engine", "Mechanism", "Card", "Measured", "Allowed", "Cause", "Remedy")
+        return [Text("No engine violates a check.")]
+    header = ("Engine", "Mechanism", "Check", "Measured", "Allowed", "Cause", "Remedy")
     return [
         Heading("Violations"),
-        Table("Every violated card, with its cause.", header, rows, frozenset({3, 4})),
+        Table("Every violated check, with its cause.", header, rows, frozenset({3, 4})),
     ]
 
 
@@ -178,10 +186,10 @@ def _number(value: float | None) -> str:
 
 
 def _defects() -> Table:
-    rows = [(proof.about, proof.scene, proof.card) for proof in proofs()]
+    rows = [(proof.about, proof.scene, proof.check) for proof in proofs()]
     return Table(
-        f"The {len(rows)} planted defects, each with the card that detects it.",
-        ("Defect", "Mechanism", "Card"),
+        f"The {len(rows)} planted defects, each with the check that detects it.",
+        ("Defect", "Mechanism", "Check"),
         rows,
         folded=True,
     )

@@ -1,4 +1,5 @@
-"""Order of convergence over step or tolerance, family by family, and the error that remains at h → 0."""
+"""Section: order of convergence over step or tolerance for each family, and the error that remains as h →
+0."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Curve, Run, SceneRuns, number, power
 
 STEP = "step"
-TELLING = 5.0  # multiple of the discretisation error: a lesser bias may be the extrapolation's own
+TELLING = 5.0  # ratio of bias to discretisation error; a smaller bias may be due to the extrapolation itself
 LIMITS = (
     "Scene",
     "Engine",
@@ -26,11 +27,11 @@ LIMITS = (
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """One table: engines and families down, scenes across."""
+    """Return one table with engines and families as rows and scenes as columns."""
     text = (
         "The slope of log(error) over log(setting) where at least three completed runs of a family lie on"
         " a line. Over a fixed step it is the order of the method; over a tolerance, 1 says that the "
-        "error is proportional to the tolerance. A slope near zero: the error no longer falls; an en "
+        "error is proportional to the tolerance. A slope near zero: the error no longer decreases; an en "
         "dash: no three runs lie on"
         " a line."
     )
@@ -42,7 +43,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _limits(groups: Sequence[SceneRuns]) -> list[Block]:
-    """The limits of fixed-step families as h → 0; nothing where fewer than three runs converge."""
+    """Return the limits of fixed-step families as h → 0; empty if no family has three converging runs."""
     text = (
         "Three runs whose differences shrink as a power of the step have a limit at h = 0 (Richardson), "
         "found without the truth. The distance of the finest run from the limit is its discretisation error. "
@@ -102,7 +103,7 @@ def _row(groups: Sequence[SceneRuns], curve: Curve) -> tuple[str, ...]:
 
 
 def swept_option(runs: Sequence[Run]) -> str | None:
-    """The first number among the settings that differs from run to run."""
+    """Return the first numeric option whose value differs between the runs."""
     settings = [run.record["settings"] for run in runs]
     for name in settings[0] if settings else ():
         values = [s.get(name) for s in settings]
@@ -112,7 +113,8 @@ def swept_option(runs: Sequence[Run]) -> str | None:
 
 
 def slope(group: SceneRuns, curve: Curve) -> float:
-    """The order of a family in a scene over its swept option; NaN without three runs on a line."""
+    """Return the slope of log(error) over the logarithm of the varied option; NaN without three runs on a
+    line."""
     runs = group.curves().get(curve, ())
     option = swept_option(runs)
     judged = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]

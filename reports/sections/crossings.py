@@ -1,4 +1,5 @@
-"""Singular positions that a motion passes: their times, the branches that meet there, and the one taken."""
+"""Section: singular positions that a motion passes, with their times, the branches that meet there, and the
+branch taken."""
 
 from __future__ import annotations
 
@@ -13,13 +14,13 @@ from reports import mechanisms
 from reports.blocks import Block, Heading, Moving, Table, Text
 from reports.runs import Run, SceneRuns, plain
 
-DIGITS = 12  # decimals of displayed times, s
-SHOWN = 12  # singular positions of one motion
+DIGITS = 12  # decimals of displayed times (s)
+SHOWN = 12  # largest number of singular positions of a motion in the table
 CAPTION = (
     "Positions at which the rank of the constraint Jacobian drops, passed by {label}; "
     "`mbref run --branch NUMBER=BRANCH` asks for another branch."
 )
-SMOOTH = 1  # the number of the branch that is taken unless another is asked for
+SMOOTH = 1  # number of the smooth branch, which is taken unless the user chooses another
 BESIDE = (
     "Singular position {number} at t = {time:.5g} s: {sentence}. In colour the mechanism on each branch, in "
     "grey on the smooth one, from {start:.4g} s to {end:.4g} s; the line of time has a mark at the position. "
@@ -28,7 +29,8 @@ BESIDE = (
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """The table of the run of least error that looks for singular positions; nothing where none is passed."""
+    """Return the table for the run of least error among runs that search for singular positions; empty if the
+    motion passes none."""
     run = _looked(scene_runs)
     if run is None:
         return []
@@ -55,7 +57,7 @@ def _looked(scene_runs: SceneRuns) -> Run | None:
 
 
 def _pictures(scene_runs: SceneRuns) -> Iterator[Moving]:
-    """The mechanism on every branch of each singular position that was recorded, side by side."""
+    """Return pictures of the mechanism on every recorded branch of each singular position, side by side."""
     by_number: dict[int, list[Record]] = {}
     for record in sorted(scene_runs.branches, key=_asked):
         if len(record["crossings"] or ()) >= _asked(record)[0]:
@@ -81,13 +83,13 @@ def _beside(scene_runs: SceneRuns, number: int, records: Sequence[Record]) -> Mo
 
 
 def _asked(record: Record) -> tuple[int, int]:
-    """The number of a singular position and of the branch that a run was asked to take there."""
+    """Return the number of a singular position and of the branch that a run was requested to take there."""
     [[number, branch]] = record["asked"]["options"][BRANCHES]
     return number, branch
 
 
 def _title(record: Record) -> str:
-    """The name of a branch and, where its run ended early, how."""
+    """Return the name of a branch, with the end of its run if that ended early."""
     branch = _asked(record)[1]
     name = f"Branch {branch}{', smooth' * (branch == SMOOTH)}"
     if record["outcome"] == Outcome.COMPLETED.label:
@@ -96,7 +98,8 @@ def _title(record: Record) -> str:
 
 
 def _open_reactions(run: Run) -> Iterator[str]:
-    """A sentence on the samples at which equilibrium determines less of the reactions than elsewhere."""
+    """Return a sentence on the samples at which equilibrium determines fewer components of the reactions than
+    at others."""
     marks = {joint: np.array(row) for joint, row in (run.record.get("open_reactions") or {}).items()}
     if not marks:
         return

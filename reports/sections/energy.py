@@ -1,4 +1,4 @@
-"""Energy balance over time: energy less the work of loads and drivers."""
+"""Section: energy balance over time, the energy minus the work of loads and drivers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_BALANCE = (
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Energy balance of the most accurate run of every family."""
+    """Return the plot of the energy balance for the most accurate run of every family."""
 
     def measure(run: Run) -> list[np.ndarray] | None:
         drift = energy_series(scene_runs.scene, run.trajectory)

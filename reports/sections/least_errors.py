@@ -1,4 +1,4 @@
-"""The first table: the least error of every engine on every scene, with its setting and cost."""
+"""Section: the first table, with the least error of every engine on every scene, its setting and its cost."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from crosscheck.study.least_errors import HEADER, least_errors
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import SceneRuns, short
 
-BEST = 6  # first cells of a row: the run of least error
+BEST = 6  # first cells of a row, which describe the run of least error
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """One row a scene and engine: its run of least error, and the errors of its other families."""
+    """Return one row for each scene and engine: its run of least error, and the errors of its other
+    families."""
     found = least_errors([run.record for group in groups for run in group.runs])
     text = (
         "Each engine's least error on each scene, the setting that gives it and its time of stepping; "
@@ -35,7 +36,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
         Text(text),
         Table(caption, [*header[:BEST], "Families"], rows, right=frozenset({4, 5, 6})),
         Table(
-            "The families that are within it, and the best or the end of the others.",
+            "Families within this error, and the least error or the end of all other families.",
             [*header[:2], *header[BEST:]],
             [(*row[:2], *row[BEST:]) for row in others],
             folded=True,

@@ -1,4 +1,4 @@
-"""The mechanism in motion, and its counts."""
+"""Section: the mechanism in motion, and the numbers of its coordinates and constraints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from reports.runs import Run, SceneRuns
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Counts, and the poses of the most accurate run; without any state, the counts alone."""
+    """Return the counts and the poses of the most accurate run; only the counts if no run has a state."""
     blocks: list[Block] = [Heading("The mechanism"), _counts(scene_runs)]
     shown = _most_accurate(scene_runs)
     if shown is None:

@@ -1,4 +1,4 @@
-"""Every run in one table: outcome, end time and error always together."""
+"""Section: a table of all runs with outcome, end time and error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HEADER = (
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """The table of all runs of a scene."""
+    """Return the table of all runs of a scene."""
     runs = scene_runs.runs
     caption = f"All {len(runs)} runs: outcome, end time, and error up to the end."
     rows = [_row(run, scene_runs.varied_settings(run)) for run in runs]

@@ -1,4 +1,5 @@
-"""The paper's Tables I to IV beside ours, cell by cell, with reasons for the cells that differ."""
+"""Section: the paper's Tables I to IV compared with this project's runs cell by cell, with the reasons for
+differences."""
 
 from __future__ import annotations
 
@@ -27,26 +28,25 @@ TITLES = {
     "II": "Table II: the five-bar linkage",
     "III": "Table III: the driven spatial slider-crank",
 }
-NEAR = 0.1  # rad from a multiple of π: a run that ends so near ended at that crossing
-DIGITS = 1e-3  # s, to which the paper prints end times
+NEAR = 0.1  # rad; a run ending this near to a multiple of π counts as ended at that crossing
+DIGITS = 1e-3  # s; resolution of the end times that the paper prints
 
 
 def render(records: Records, illustration: Illustration) -> list[Block]:
-    """The chapter."""
+    """Return the blocks of the chapter on the paper."""
     return [
         Heading(TITLE, 2),
         Text(
             "M. A. Neto and J. Ambrósio, Stabilization methods for the integration of DAE in the presence of "
-            "redundant constraints, Multibody System Dynamics 10 (2003) 81–105. Every table stands beside "
-            "the printed one, every figure beside its data. The command crosscheck paper runs all of it."
+            "redundant constraints, Multibody System Dynamics 10 (2003) 81–105. Every table is compared "
+            "with the printed one. The command `crosscheck paper` makes all runs of this chapter."
         ),
         Text(score(records)),
         Text(
             "Letters are the paper's footnotes: a singular matrix, b no convergence, c violation too large, "
-            "d integration failed; 20 s means to the end. Marks: = as printed, or within the ms said; "
-            "≈ the printed outcome at another time; ≠ another outcome. Error: against the true motion, up to "
-            "the last sample or near the end; a run to the end may be wrong. Draws: how many of the random "
-            "first steps and errors in the data give the printed outcome and time."
+            "d integration failed; 20 s means to the end. Marks: = as printed, or within the given ms; "
+            "≈ the printed outcome at another time; ≠ another outcome. Error: distance from the true motion. "
+            "Draws: number of random first steps and data errors with the printed outcome and time."
         ),
         *(block for name in TITLES for block in _table(name, records)),
         _settings(),
@@ -63,7 +63,7 @@ def render(records: Records, illustration: Illustration) -> list[Block]:
 
 
 def score(records: Records) -> str:
-    """The number of matching cells in the run shown, and over the draws, in sentences."""
+    """Return sentences with the number of matching cells in the displayed run and over the random draws."""
     marks = Counter(_match(cell, records) for cell in CELLS)
     matching = [len(_matching(cell, records, ("tables", "drawn"))) / draws(cell) for cell in CELLS]
     most, some = sum(m > 0.5 for m in matching), sum(m > 0 for m in matching)
@@ -78,7 +78,7 @@ def score(records: Records) -> str:
 
 
 def _inside(cell: Cell, records: Records) -> bool:
-    """Whether a cell of Table III has the paper's outcome at times before and after the paper's."""
+    """Return whether a cell of Table III has the paper's outcome before and after the paper's time."""
     if cell.table != "III" or cell.end is None:
         return False
     runs = map(Run, found(records, cell, ("tables", "drawn")).values())
@@ -96,7 +96,7 @@ def _match(cell: Cell, records: Records) -> Match:
 
 
 def _matching(cell: Cell, records: Records, parts: Sequence[str]) -> list[str]:
-    """The variants among ``parts`` of the runs with which the cell has the paper's outcome and end time."""
+    """Return the variants among ``parts`` of the runs with the paper's outcome and end time in a cell."""
     runs = {name: Run(record) for name, record in found(records, cell, parts).items()}
     return [name for name, r in runs.items() if match(cell, r.outcome, r.t_end) is Match.SAME]
 
@@ -133,7 +133,7 @@ def _parts(cell: Cell, records: Records) -> tuple[str, str, str, str]:
 
 
 def _mark(cell: Cell, run: Run) -> str:
-    """``=`` as printed, ``= within 2 ms`` where later digits differ, ``≈`` at another time, else ``≠``."""
+    """Return ``=`` as printed, ``= within 2 ms`` if later digits differ, ``≈`` at another time, or ``≠``."""
     found = match(cell, run.outcome, run.t_end)
     apart = 0.0 if cell.end is None else abs(run.t_end - cell.end)
     if found is not Match.SAME or apart < DIGITS:
@@ -142,7 +142,7 @@ def _mark(cell: Cell, run: Run) -> str:
 
 
 def ended(run: Run) -> str:
-    """End time and letter; the outcome's name where the paper has no letter for it."""
+    """Return end time and footnote letter; the outcome's name if the paper has no letter for it."""
     if run.completed:
         return "20 s"
     time = f"{run.t_end:.4f}" if 0 < run.t_end < 1 else f"{run.t_end:.4g}"
@@ -220,14 +220,14 @@ def _count_rows(part: str, column: str, paper: Counts, records: Records) -> list
 
 
 def _with_tight(rows: list[Sequence[str]], records: Records) -> list[Sequence[str]]:
-    """Table IV's rows with the ratio of steps at rtol 1e-9 behind that at the settings."""
+    """Return Table IV's rows with the ratio of steps at rtol 1e-9 after the ratio at the table's settings."""
     steps = [Run(records[Label("tight", row[0], SPATIAL_DYNAMIC, TIGHT.name)]).rate("steps") for row in rows]
     ratios = [f"{count / steps[0]:.3f}" for count in steps]
     return [(*row[:5], ratio_, *row[5:]) for row, ratio_ in zip(rows, ratios, strict=True)]
 
 
 def _kept(records: Records) -> Table:
-    """The ratio of steps of Table IV over tolerance and repartitioning."""
+    """Return the ratio of steps of Table IV as a function of tolerance and threshold for a new partition."""
     rows = []
     for rtol in KEPT_RTOLS:
         runs = {
@@ -269,9 +269,9 @@ def _reason(cell: Cell, records: Records) -> str:
     same = _matching(cell, records, ("drawn",))
     varied = _matching(cell, records, ("sweep",))
     if same:
-        parts.append(f"it has the paper's in {len(same)} of {draws(cell)} draws")
+        parts.append(f"it has the paper's outcome and end time in {len(same)} of {draws(cell)} draws")
     if varied:
-        parts.append(f"it has the paper's with: {', '.join(varied)}")
+        parts.append(f"it has them with: {', '.join(varied)}")
     times = sorted({round(Run(r).t_end, 4) for r in found(records, cell, ("drawn", "sweep")).values()})
     if times and not same and not varied:
         parts.append(
@@ -282,7 +282,7 @@ def _reason(cell: Cell, records: Records) -> str:
 
 
 def _drift(cell: Cell, run: Run, records: Records) -> str:
-    """The reason for another end time of a row of Table III: drift, or its absence."""
+    """Return the reason for another end time in a row of Table III."""
     record = records.get(Label("strict", cell.row, cell.column, STRICT.name))
     strict = None if record is None else Run(record)
     said = (
@@ -300,12 +300,12 @@ def _drift(cell: Cell, run: Run, records: Records) -> str:
 
 
 def _message(run: Run) -> list[str]:
-    """Return the run's words on an end for which the paper has no letter."""
+    """Return the run's message if the paper has no letter for its end."""
     return [] if run.completed or run.outcome.letter else [run.reason]
 
 
 def _papers_place(cell: Cell) -> list[str]:
-    """The place where the paper's run ended, if at the start or between two crossings."""
+    """Return the place where the paper's run ended, if that was at the start or between two crossings."""
     if cell.end == 0:
         return [
             "the start is a singular position too, where ours converges: the errors of its state put less "
@@ -318,7 +318,7 @@ def _papers_place(cell: Cell) -> list[str]:
 
 
 def _where(column: str, run: Run) -> str:
-    """The singular position at which a linkage's run ended."""
+    """Return the singular position at which a linkage's run ended."""
     if run.completed:
         return f"passes every crossing, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]

@@ -1,4 +1,5 @@
-"""The planar slider-cranks of the paper's Figures 11 to 14, run by run: the error of every motion."""
+"""Section: the planar slider-cranks of the paper's Figures 11 to 14 run by run, with the error of every
+motion."""
 
 from __future__ import annotations
 
@@ -13,11 +14,12 @@ from mbref.trajectory import Trajectory
 from reports.blocks import Block, Heading, Table, Text
 from reports.runs import Run, ended_briefly, number, power
 
-OFF = 0.01  # m; a body this far from the true motion is on another branch
+OFF = 0.01  # m; a body at this distance from the true motion is on another branch
 
 
 def render(records: Records) -> list[Block]:
-    """The paper's statement on these runs, ours one by one, and the reasons for differences."""
+    """Return the paper's statement on these runs, this project's runs one by one, and the reasons for
+    differences."""
     rows = [
         (column, label.row, label.variant, *_cells(column, Run(record)))
         for column in (HEAVY, UNEQUAL)
@@ -75,7 +77,7 @@ def _about(records: Records) -> str:
 
 
 def _raised(records: Records) -> str:
-    """The run with a larger rank tolerance, where the studies have it."""
+    """Return the run with a larger rank tolerance if the records contain it."""
     record = records.get(Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name))
     if record is None:
         return ""
@@ -113,7 +115,8 @@ def _true(column: str, times: tuple[float, ...]) -> Trajectory:
 
 
 def _passed(column: str, time: float) -> int | str:
-    """Singular positions θ = π/2 + kπ that the true motion has passed by a time; none when a ≠ b."""
+    """Return the number of singular positions θ = π/2 + kπ that the true motion has passed by a time; 0 if a
+    ≠ b."""
     if column != HEAVY:
         return "–"
     grid = np.linspace(0.0, time, 2001)

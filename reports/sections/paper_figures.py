@@ -1,4 +1,4 @@
-"""The paper's Figures 4, 5, 6, 8 and 11 to 16, from the records of the same methods."""
+"""Section: the paper's Figures 4, 5, 6, 8 and 11 to 16, from runs with the paper's methods."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ Named = Mapping[str, Run]
 
 
 def render(records: Records) -> list[Block]:
-    """The figures in the paper's order."""
+    """Return the figures in the paper's order."""
     four, five = _runs(records, "figures", HALF), _runs(records, "figures", FIVE_BAR)
     heavy, unequal, spatial = (_runs(records, "dynamic", c) for c in (HEAVY, UNEQUAL, SPATIAL_DYNAMIC))
     four_bar, five_bar = (linkage("MPI (GS)", column, [0.0]).scene for column in (HALF, FIVE_BAR))
@@ -105,7 +105,7 @@ def _poses(
 
 
 def plot_poses(scene: Scene, runs: Named, span: tuple[float, float] | None) -> str:
-    """Return poses of the links side by side as SVG, one panel a method, within a span of time (s)."""
+    """Return poses of the links side by side as SVG, one panel for each method, within a span of time (s)."""
     shown = {}
     for name, run in runs.items():
         low, high = span or (0.0, run.trajectory.times[-1])
@@ -126,7 +126,7 @@ def _violations(paper: int, runs: Named, what: str) -> Figure:
 
 
 def plot_violations(runs: Named) -> Drawing:
-    """Largest violation over time, logarithmic."""
+    """Return a plot of the largest violation over time, logarithmic."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     last = 0.0
     for i, (name, run) in enumerate(runs.items()):
@@ -149,13 +149,14 @@ def _rates(paper: int, runs: Named, what: str) -> Figure:
 
 
 def _along_axis(run: Run, vectors: np.ndarray) -> np.ndarray:
-    """The crank's component (k,) about its axis: the largest on average, planar z or spatial y."""
+    """Return the crank's component (k,) about its axis: z in the plane, y in space, whichever is larger on
+    average."""
     axis = int(np.argmax(np.abs(vectors[:, 0]).mean(axis=0)))
     return vectors[:, 0, axis]
 
 
 def plot_rates(runs: Named) -> Drawing:
-    """Crank angular velocity over time."""
+    """Return a plot of the crank's angular velocity over time."""
     drawing, (axes,) = figures.canvas(7.2, 3.6)
     for i, (name, run) in enumerate(runs.items()):
         motion: Trajectory = run.trajectory
@@ -180,13 +181,13 @@ def _accelerations(paper: int, runs: Named) -> Figure:
 
 
 def _crank_acceleration(run: Run) -> np.ndarray:
-    """Magnitude (k,) of the crank's angular acceleration, rad/s²."""
+    """Return the magnitude (k,) of the crank's angular acceleration, rad/s²."""
     assert run.trajectory.angular_acceleration is not None
     return np.linalg.norm(run.trajectory.angular_acceleration[:, 0], axis=-1)
 
 
 def plot_accelerations(runs: Named) -> Drawing:
-    """Magnitude of the crank's angular acceleration over time, logarithmic."""
+    """Return a plot of the magnitude of the crank's angular acceleration over time, logarithmic."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     for i, (name, run) in enumerate(runs.items()):
         values = np.maximum(_crank_acceleration(run), SMALLEST)

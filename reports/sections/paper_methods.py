@@ -1,4 +1,5 @@
-"""Beside the paper's tables: singular positions explained, every pair of methods, ALF against its dual."""
+"""Section: additions to the paper's tables: singular positions explained, every pair of methods, ALF and its
+dual form."""
 
 from __future__ import annotations
 
@@ -20,11 +21,11 @@ from reports import figures
 from reports.blocks import Block, Figure, Heading, Table, Text
 from reports.runs import Run, ended_briefly, number, power
 
-SMALLEST = 1e-17  # magnitudes below are drawn here
+SMALLEST = 1e-17  # smaller magnitudes are plotted at this value
 
 
 def explained(found: Illustration) -> list[Block]:
-    """The failure times of Table I explained by the joint equations alone."""
+    """Return the explanation of Table I's failure times by the joint equations alone."""
     return [
         Heading("Singular positions explained"),
         Text(_about(*found["fold"])),
@@ -41,7 +42,8 @@ def explained(found: Illustration) -> list[Block]:
 
 
 def _about(closed: float, opened: float) -> str:
-    """The text, from the residuals on the fold from θ₂ = 0 and from θ₂ = π."""
+    """Return the text, from the residuals of the joint equations on the second branch (the fold) from θ₂ = 0
+    and from θ₂ = π."""
     return (
         "The constraint Jacobian of the rhombus (rows of unit length, angular columns divided by the largest "
         "distance) has rank 18 along the motion and 17 at every θ₂ = kπ, where all links lie on one line and "
@@ -72,7 +74,8 @@ def _crossings(found: Sequence[Sequence[Any]]) -> Table:
 
 
 def _alf_near_a_crossing(iterations: Sequence[Sequence[int]]) -> Table:
-    """ALF's iterations near a crossing: it ends at the first one and at a singular start."""
+    """Return the table of ALF's iterations near a crossing. ALF fails at the first crossing, and at a start
+    in a singular position."""
     rows = [(f"{distance:g}", *map(_count, row)) for distance, row in zip(DISTANCES, iterations, strict=True)]
     caption = (
         "Iterations of ALF, as set for the tables, over the distance (rad) to θ₂ = 0 and over the error of γ "
@@ -89,7 +92,7 @@ def _count(iterations: int) -> str:
 
 
 def plot_values(theta: Sequence[float], smallest: Sequence[Sequence[float]]) -> Drawing:
-    """The two smallest singular values (k, 2) over θ₂ (k,), rad, of one revolution."""
+    """Return a plot of the two smallest singular values (k, 2) over θ₂ (k,), rad, for one revolution."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     for i, (name, values) in enumerate(zip(("smallest", "next"), zip(*smallest, strict=True), strict=True)):
         axes.plot(
@@ -102,7 +105,7 @@ def plot_values(theta: Sequence[float], smallest: Sequence[Sequence[float]]) -> 
 
 
 def render(records: Records) -> list[Block]:
-    """The table of pairs and the digits of ALF and its dual."""
+    """Return the table of all pairs of methods, and the accuracy of ALF and its dual form."""
     return [*_pairs(records), *_digits(records)]
 
 
@@ -125,7 +128,7 @@ def _pairs(records: Records) -> list[Block]:
 
 
 def _pair(label: Label, run: Run) -> tuple[str, ...]:
-    """A formulation's cells with a stabilisation."""
+    """Return the cells of a formulation with a stabilisation."""
     seconds = 1e3 * run.rate("seconds")
     return (
         label.row,
@@ -139,7 +142,8 @@ def _pair(label: Label, run: Run) -> tuple[str, ...]:
 
 
 def digit_errors(records: Records) -> dict[str, list[float]]:
-    """Relative error of the accelerations at t = 0 by method, over ALPHAS; NaN without convergence."""
+    """Return the relative error of the accelerations at t = 0 by method for each α in ALPHAS; NaN if not
+    converged."""
     return {
         name: [_relative_error(Run(records[Label("digits", name, f"{a:g}")])) for a in ALPHAS]
         for name in (PENALTY, DUAL)
@@ -154,7 +158,7 @@ def _relative_error(run: Run) -> float:
 
 
 def _accelerations(motion: Trajectory) -> np.ndarray:
-    """Accelerations and angular accelerations at every sample; empty where there are none."""
+    """Return accelerations and angular accelerations at every sample; empty if there are none."""
     if not len(motion.times) or motion.acceleration is None or motion.angular_acceleration is None:
         return np.zeros(0)
     return np.stack([motion.acceleration, motion.angular_acceleration])
@@ -190,7 +194,7 @@ def _ended(records: Records, name: str, alpha: float) -> str:
 
 
 def plot_digits(errors: dict[str, list[float]]) -> Drawing:
-    """Relative errors over α, both logarithmic."""
+    """Return a plot of the relative errors over α, both logarithmic."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     for i, (name, values) in enumerate(errors.items()):
         sizes = np.maximum(values, SMALLEST)

@@ -1,4 +1,4 @@
-"""Misprints of the paper, and statements that its own tables contradict."""
+"""Section: misprints of the paper, and statements that its own tables contradict."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ MISPRINTS = (
 
 
 def render() -> list[Block]:
-    """Two tables: misprints, and contradictions with the numbers of the tables."""
+    """Return two tables: misprints, and statements that contradict numbers of the tables."""
     return [
         Heading("Misprints found"),
         Table(
-            "Places of the paper that cannot be meant as printed, and their reading here.",
+            "Misprints of the paper, and how this project reads them.",
             ("Place", "Printed", "Read as"),
             MISPRINTS,
         ),
         Table(
-            "Sentences of the paper beside the numbers of its own tables.",
+            "Sentences of the paper, and the numbers of its own tables that contradict them.",
             ("Place", "Sentence", "Its tables"),
             _contradictions(),
         ),

@@ -1,4 +1,5 @@
-"""Influence of the settings on the paper's failure times: the set of times is reproducible, not each time."""
+"""Section: influence of the settings on the paper's failure times. The set of possible times is reproducible,
+but not each time."""
 
 from __future__ import annotations
 
@@ -17,12 +18,13 @@ from reports.runs import Run
 
 SHARE_TEXT = f"{100 * SHARE:g} %"
 COLUMNS = (*FOUR_BAR_COLUMNS, FIVE_BAR)
-LAST = 0.15  # s, of the figure
+LAST = 0.15  # s, length of the time axis
 SWEPT = tuple(cell for cell in CELLS if cell.table != "III" and cell.letter not in ("a", ""))
 
 
 def render(records: Records) -> list[Block]:
-    """The number of matching cells at every variant, the end times of every cell, and their distribution."""
+    """Return the number of matching cells for every variant, the end times of every cell, and their
+    distribution."""
     return [
         Heading("Influence of the settings"),
         Text(
@@ -42,7 +44,7 @@ def render(records: Records) -> list[Block]:
 
 
 def _variants(records: Records, cell: Cell) -> dict[str, Run]:
-    """Return the cell's runs by variant; runs of the tables are under ``BASE.name``."""
+    """Return the cell's runs by variant; runs of the tables have the key ``BASE.name``."""
     return {name: Run(r) for name, r in found(records, cell, ("tables", "sweep", "drawn")).items()}
 
 
@@ -115,7 +117,7 @@ def _caption() -> str:
 
 
 def plot(records: Records) -> Drawing:
-    """Histograms of end times, one panel a column."""
+    """Return histograms of end times, one panel for each column of the tables."""
     drawing, panels = figures.canvas(7.4, 7.0, len(COLUMNS))
     for axes, column in zip(panels, COLUMNS, strict=True):
         cells = [cell for cell in SWEPT if cell.column == column and "CP" not in cell.row]

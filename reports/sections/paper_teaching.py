@@ -1,4 +1,5 @@
-"""For teaching: how the violation grows, what Baumgarte's parameters change, and three remedies compared."""
+"""Section with examples for lectures: growth of the violation, Baumgarte's parameters, and three
+stabilisations compared."""
 
 from __future__ import annotations
 
@@ -18,11 +19,12 @@ REMEDIES = ("LM2", "LM2 + CP", "ALF", "ALF + CP", "MPI (SVD)", "MPI (SVD) + CP")
 
 
 def render(records: Records) -> list[Block]:
-    """Figure 2's procedure, Baumgarte's α = β, and partitioning, ALF and the pseudo-inverse side by side."""
+    """Return the growth of the violation (Figure 2's procedure), Baumgarte's α = β, and a comparison of
+    partitioning, ALF and the pseudo-inverse."""
     growth, gains = _varied(records, GROWTH), _varied(records, GAIN)
     remedies = {row: Run(records[Label("dynamic", row, SPATIAL_DYNAMIC)]) for row in REMEDIES}
     return [
-        Heading("For teaching: the violation and its remedies"),
+        Heading("For lectures: constraint violation and its remedies"),
         Text(
             "The spatial slider-crank under 100 N m, without redundant constraints and singular positions, "
             "so that only the remedies differ. Integrated as in the paper's Figure 2, accelerations obey "
@@ -50,13 +52,15 @@ def _varied(records: Records, part: str) -> dict[str, Run]:
 
 
 def violation(run: Run) -> np.ndarray:
-    """The largest violation of a position constraint (k,) at the samples, for a logarithmic axis."""
+    """Return the largest violation of a position constraint at each sample (k,), for a logarithmic axis."""
     return np.maximum(np.array(run.record["violation"], dtype=float), SMALLEST)
 
 
 def exponent(run: Run) -> float:
-    """The slope p of a violation that grows as t^p: least squares of the logarithms after a tenth of the
-    time; NaN where it is rounding."""
+    """Return the exponent p of a violation that grows as t^p; NaN if it is at rounding level.
+
+    It is a least-squares fit of the logarithms after a tenth of the time.
+    """
     t, values = np.array(run.record["times"]), violation(run)
     late = t >= TEACHING[-1] / 10
     if not late.any() or values[late].max() < 1e3 * np.finfo(float).eps:
@@ -79,7 +83,7 @@ def _grows(slopes: list[float]) -> str:
 
 
 def plot_growth(runs: dict[str, Run]) -> Drawing:
-    """Violation over time, both logarithmic, a curve a tolerance."""
+    """Return a plot of the violation over time, both logarithmic, with a curve for each tolerance."""
     drawing, (axes,) = figures.canvas(7.2, 3.8)
     for i, (name, run) in enumerate(runs.items()):
         t = np.array(run.record["times"])
@@ -119,7 +123,7 @@ def _gains(runs: dict[str, Run]) -> Table:
 
 
 def plot_gains(runs: dict[str, Run]) -> Drawing:
-    """Violation and error over α = β, all logarithmic; 0 at the left end."""
+    """Return a plot of violation and error over α = β, all logarithmic; α = 0 is at the left end."""
     drawing, (axes,) = figures.canvas(7.2, 3.4)
     gains = np.array([float(name) for name in runs])
     places = np.where(gains > 0, gains, gains[gains > 0].min() / 3)
@@ -154,7 +158,7 @@ def _remedies(runs: dict[str, Run]) -> Table:
 
 
 def plot_violations(runs: dict[str, Run]) -> Drawing:
-    """Violation over time, logarithmic, a curve a method."""
+    """Return a plot of the violation over time, logarithmic, with a curve for each method."""
     drawing, (axes,) = figures.canvas(7.2, 3.8)
     for i, (name, run) in enumerate(runs.items()):
         look = i % len(figures.COLOURS)

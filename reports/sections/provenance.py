@@ -1,4 +1,5 @@
-"""Provenance of the numbers: versions, machines, settings, seed, and the commands to make them again."""
+"""Section: origin of the numbers, with versions, machines, settings, seed, and the commands that repeat the
+runs."""
 
 from __future__ import annotations
 
@@ -9,7 +10,7 @@ from reports.runs import Curve, Run, SceneRuns, plain
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """Versions and machines of all records, the settings of every family, the commands."""
+    """Return versions and machines of all records, the settings of every family, and the commands."""
     runs = [run for group in groups for run in group.runs]
     return [
         Heading("Provenance", 2),
@@ -26,7 +27,7 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _made(runs: Sequence[Run]) -> str:
-    """The commit and the date of the code that made the records; empty without records."""
+    """Return the commit and the date of the code that made the records; empty without records."""
     commits = sorted({commit for run in runs if (commit := run.record.get("commit"))})
     dates = sorted({date[:10] for run in runs if (date := run.record.get("date"))})
     if not dates:

@@ -1,4 +1,5 @@
-"""Published problems: each engine's error in the measure of the problem, and whether it is accepted."""
+"""Section: published problems, with each engine's error in the problem's own measure, and whether it is
+accepted."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ HEADER = ("Engine", "Family", "Settings", "Error", "Accepted", "Time")
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """One table a problem; nothing where no scene is one."""
+    """Return one table for each published problem among the scenes."""
     found = [group for group in groups if problem_of(group.scene)]
     text = (
         "Problems of the literature, each with an error measure and a level of acceptance of its own; of "
@@ -49,10 +50,11 @@ def _row(group: SceneRuns, run: Run) -> tuple[str, ...]:
 
 
 def _shown(group: SceneRuns, error: float | None, run: Run) -> str:
-    """The error for a table cell: ``< 3e-12`` below what rounding and, if asked, the truth may be off."""
+    """Return the error for a table cell: ``< 3e-12`` if it is below rounding or the bound on the truth's
+    error."""
     _, problem = BY_SCENE[group.scene.name]
     asks_truth = problem.measure(group.scene, run.trajectory, None) is None
-    bound = error_bound(run.record)  # over the scene's length
+    bound = error_bound(run.record)  # relative to the scene's length
     least = max(LEAST, bound * max(1.0, scene_length(group.scene)) if asks_truth else 0.0)
     if error is None or error >= least:
         return power(math.nan if error is None else error)

@@ -1,4 +1,5 @@
-"""Joint reactions of the engines against the exact ones where unique; shares of redundant joints."""
+"""Section: joint reactions of the engines compared with the exact ones where these are unique, and how
+redundant joints share loads."""
 
 from __future__ import annotations
 
@@ -18,15 +19,18 @@ CAPTION = (
     " and, in the last row, the resultant of all joints on a body, which is always unique."
 )
 SHARES = (
-    "The engine's choice: size (N) at t = {t:.3g} s of the components that redundancy leaves open. They need "
+    "The engine's choice: size (N) at t = {t:.3g} s of the components that redundancy leaves undetermined. "
+    "They need "
     "not agree, and none of them is wrong."
 )
-UNUSED = "At t = {t:.3g} s the components that redundancy leaves open are 0 in every engine."
+UNUSED = "At t = {t:.3g} s the components that redundancy leaves undetermined are 0 in every engine."
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Tables of differences and of choices, and sentences on absurd reactions; nothing without reactions or
-    without a known motion."""
+    """Return tables of differences and of undetermined components, and sentences on implausible reactions.
+
+    The result is empty without reactions or without a known motion.
+    """
     scene = scene_runs.scene
     runs = {engine: run.trajectory for engine, run in _best(scene_runs).items()}
     found: dict[str, Comparison] = {}
@@ -44,7 +48,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 
 
 def _best(scene_runs: SceneRuns) -> dict[str, Run]:
-    """Return for each engine the completed run with reactions of least error."""
+    """Return for each engine the completed run with reactions that has the least error."""
     best: dict[str, Run] = {}
     for run in scene_runs.best().values():
         engine = run.curve[0]

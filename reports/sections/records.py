@@ -1,4 +1,4 @@
-"""The records behind the page: every run with its numbers, its makings, and the command that repeats it."""
+"""Section: the records of all runs, each with its numbers, its origin, and the command that repeats it."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ NUMBERS = {
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """One block for every family on every scene."""
+    """Return one block for every family on every scene."""
     text = (
-        "Every mark and every cell leads to the records of its runs. The commands are for the folder of this "
-        "page; each makes its run again and prints the same error."
+        "Every mark in a figure and every cell of the matrix links to the records of its runs. Run the "
+        "commands in the folder of this page; each repeats its run and prints an equal error."
     )
     found = [_record(group, curve, runs) for group in groups for curve, runs in group.curves().items()]
     return [Heading("Records", 2), Text(text), *found]
 
 
 def path(group: SceneRuns) -> str:
-    """The scene's file, seen from the page."""
+    """Return the path of the scene's file relative to the page."""
     return f"scenes/{group.scene.name}.toml"
 
 
@@ -60,7 +60,7 @@ def _card(group: SceneRuns, run: Run) -> Card:
 
 
 def _made(run: Run) -> str:
-    """The record's id, the version, commit, date and machine."""
+    """Return the record's id, version, commit, date and machine."""
     record = run.record
     facts = {
         "record": record["key"][:12],

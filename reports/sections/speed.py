@@ -1,4 +1,4 @@
-"""Speed against error: one curve per engine and family, and every failed run as a mark."""
+"""Section: computing time against error, one curve for each engine and family; failed runs are marks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Failures = Mapping[tuple[Curve, str], Sequence[Run]]
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """The plot, and the key to its failed runs."""
+    """Return the plot, and the table that explains the marks of failed runs."""
     heading = Heading("Speed against error")
     drawable = [run for run in scene_runs.completed() if math.isfinite(run.error)]
     failures = failed(scene_runs.runs)
@@ -36,7 +36,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
 
 
 def failed(runs: Sequence[Run]) -> Failures:
-    """Runs that did not complete, by curve and outcome: those with one number in the plot."""
+    """Return the failed runs by curve and outcome; runs of a group have one number in the plot."""
     groups: dict[tuple[Curve, str], list[Run]] = {}
     for run in runs:
         if not run.completed:
@@ -67,7 +67,7 @@ def _caption(scene_runs: SceneRuns, drawable: Sequence[Run]) -> str:
 
 
 def _strip(scene_runs: SceneRuns) -> str:
-    """Draw failed runs in the picture without interaction."""
+    """Draw failed runs into the picture that is not interactive."""
     if len(scene_runs.completed()) == len(scene_runs.runs):
         return ""
     return (
@@ -88,7 +88,8 @@ def _key(failures: Failures) -> Table:
 
 
 def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
-    """Error and time on logarithmic axes; failed runs numbered in a strip of their own."""
+    """Return a plot of time over error on logarithmic axes, with failed runs numbered in a strip at the
+    right."""
     figure, (main,) = figures.canvas(7.6, 4.8)
     looks = figures.looks(scene_runs.curves())
     for curve, runs in scene_runs.curves().items():
@@ -114,7 +115,7 @@ def _draw_curve(axes: Axes, curve: Curve, runs: Sequence[Run], look: figures.Loo
 
 
 def _beside(figure: Drawing, main: Axes) -> Axes:
-    """A narrow strip at the right of ``main`` with the same time axis."""
+    """Return a narrow strip at the right of ``main`` with a common time axis."""
     grid = GridSpec(1, 2, figure=figure, width_ratios=(5, 1))
     main.set_subplotspec(grid[0])
     with matplotlib.rc_context(figures.STYLE):

@@ -1,4 +1,5 @@
-"""Stability ladders as heat maps: digits that each method and engine keeps while one difficulty grows."""
+"""Section: stability ladders as heat maps, the number of correct digits of each method and engine as one
+difficulty grows."""
 
 from __future__ import annotations
 
@@ -14,9 +15,10 @@ from mbref.trajectory import Outcome
 from reports.blocks import Block, Cell, Heading, HeatMap, Table, Text
 from reports.runs import Curve
 
-ALLOWED = max(1e3 * RTOL, 1e-6)  # error of a method of mbref beyond which a completed run is a false success
+# largest error of a right run of an mbref method; a completed run with a larger error is a false success
+ALLOWED = max(1e3 * RTOL, 1e-6)
 MOST_DIGITS = 15.0
-LETTERS = {  # letters of outcomes that the paper's tables do not have
+LETTERS = {  # letters of outcomes that the paper's tables do not contain
     "SINGULAR_POSITION": "s",
     "UNDECIDED": "u",
     "LEFT_MOTION": "m",
@@ -42,7 +44,7 @@ Runs = Mapping[Curve, Mapping[float, Record]]  # by engine and family, by diffic
 
 
 def render(records: Sequence[Record]) -> list[Block]:
-    """Advice, counts of false successes, and a heat map for each ladder."""
+    """Return advice, counts of false successes, and a heat map for each ladder."""
     found = _runs(records)
     shown = [ladder for ladder in ladders() if ladder.name in found]
     maps = [_map(ladder, found[ladder.name]) for ladder in shown]
@@ -50,7 +52,7 @@ def render(records: Sequence[Record]) -> list[Block]:
 
 
 def _runs(records: Iterable[Record]) -> dict[str, Runs]:
-    """The runs of each ladder, mbref's methods first."""
+    """Return the runs of each ladder, mbref's methods first."""
     order = {method: k for k, method in enumerate(METHODS)}
     found: dict[str, dict[Curve, dict[float, Record]]] = {}
     for record in sorted(records, key=lambda r: (r["engine"] != MBREF, order.get(r["family"], 0))):
@@ -67,7 +69,8 @@ def is_false(record: Record) -> bool:
 
 
 def _counts(shown: Sequence[Ladder], found: Mapping[str, Runs]) -> Table:
-    """Right, honestly ended and falsely completed runs of every method over all ladders."""
+    """Return the numbers of right runs, of reported failures and of false successes of every method over all
+    ladders."""
     curves = dict.fromkeys(curve for runs in found.values() for curve in runs)
     rows = []
     for curve in curves:
@@ -82,7 +85,7 @@ def _counts(shown: Sequence[Ladder], found: Mapping[str, Runs]) -> Table:
 
 
 def _map(ladder: Ladder, runs: Runs) -> HeatMap:
-    """One row a method, one column a rung."""
+    """Return a heat map with one row for each method and one column for each rung."""
     difficulties = [difficulty for difficulty, _ in ladder.rungs]
     rows = {_name(curve): [_cell(row.get(d)) for d in difficulties] for curve, row in runs.items()}
     caption = f"{ladder.name.replace('_', ' ').capitalize()}. {ladder.words}"
@@ -90,12 +93,12 @@ def _map(ladder: Ladder, runs: Runs) -> HeatMap:
 
 
 def rung(difficulty: float) -> str:
-    """A difficulty below its column: 0.3, 1.5, 3e-5, 1e12."""
+    """Return a difficulty as the label of its column: 0.3, 1.5, 3e-5, 1e12."""
     return re.sub(r"e([+-])0?", lambda sign: "e" + sign[1].strip("+"), f"{difficulty:g}")
 
 
 def _cell(record: Record | None) -> Cell:
-    """Digits kept, the letter of an early end, or nothing."""
+    """Return the cell of a run: correct digits, the letter of an early end, or nothing."""
     if record is None:
         return Cell("", "")
     if not is_completed(record):
@@ -118,5 +121,5 @@ def _letter(outcome: str) -> str:
 
 
 def _digits(value: float) -> float:
-    """Digits that an error leaves, 0 where none."""
+    """Return the number of correct digits for an error; at least 0."""
     return 0.0 if not value < 1.0 else min(MOST_DIGITS, -math.log10(max(value, 10**-MOST_DIGITS)))

@@ -1,4 +1,4 @@
-"""The summary: the least error of every engine and family, and the cost of given errors."""
+"""Section: the summary, with the least error of every engine and family, and the cost of given errors."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ HEADER = (
     "Wrong or failed",
 )
 
-Costs = Mapping[Curve, Sequence[float]]  # seconds at each of LEVELS, NaN where it is not reached
+Costs = Mapping[Curve, Sequence[float]]  # seconds for each error of LEVELS; NaN if it is not reached
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """One table a scene."""
+    """Return one table for each scene."""
     runs = [run for group in groups for run in group.runs]
     completed = sum(run.completed for run in runs)
     wrong = sum(run.is_false_success for run in runs)
@@ -55,7 +55,8 @@ def _scene(group: SceneRuns) -> list[Block]:
 
 
 def _gate(group: SceneRuns) -> list[Block]:
-    """The comparison of the engines' mechanisms at the start; nothing where it was not made."""
+    """Return a sentence on the comparison of the engines' mechanisms at the start; empty if it was not
+    made."""
     if not group.gate:
         return []
     if reason := group.difference():
@@ -67,7 +68,7 @@ def _gate(group: SceneRuns) -> list[Block]:
 
 
 def _cost(runs: Sequence[Run], level: float) -> float:
-    """Seconds at which the curve of the completed runs reaches an error; NaN where it does not."""
+    """Return the seconds at which the curve of the completed runs reaches an error; NaN if it does not."""
     usable = [run for run in runs if run.completed and math.isfinite(run.error)]
     cost = cost_at_error([run.seconds for run in usable], [run.error for run in usable], level)
     return math.nan if cost is None else cost
@@ -78,7 +79,8 @@ def _least(costs: Costs, level: int) -> float:
 
 
 def _rank(best: Run, costs: Sequence[float]) -> tuple[bool, float, float]:
-    """Completed first, then by the middle level's cost, then by the least error."""
+    """Return the sort key of a curve: completed runs first, then the cost at the middle level, then the least
+    error."""
     middle = costs[len(costs) // 2]
     return not best.completed, middle if math.isfinite(middle) else math.inf, best.error
 
@@ -94,7 +96,7 @@ def _row(group: SceneRuns, best: Run, costs: Sequence[float], fastest: Sequence[
 
 
 def _otherwise(runs: Sequence[Run]) -> str:
-    """The number of wrong runs that completed, and the earliest end of each other outcome."""
+    """Return the number of wrong runs that completed, and the earliest end time for each other outcome."""
     wrong = sum(run.is_false_success for run in runs)
     earliest: dict[str, float] = {}
     for run in runs:

@@ -1,4 +1,4 @@
-"""Support matrix of the study's engines, feature by feature, as the adapters declare it."""
+"""Section: the features that each engine of the study supports, as its adapter declares."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ CAPTION = "✓: supported; –: not supported, for the numbered reason below."
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """The support matrix of the engines that have records and are known here; nothing is simulated."""
+    """Return the support matrix of the engines that have records; engines that are not installed here are
+    left out."""
     ran = dict.fromkeys(run.curve[0] for group in groups for run in group.runs)
     engines = [name for name in ran if name in engine_names()]
     if not engines:

@@ -1,4 +1,5 @@
-"""The first screen: the verdict in words, the mechanism in motion, and the matrix of scenes and engines."""
+"""Section: the top of the page with the verdict in words, the animated mechanism, and the matrix of scenes
+and engines."""
 
 from __future__ import annotations
 
@@ -25,7 +26,7 @@ KEY = (
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
-    """The opening and the matrix; the matrix alone where no truth was recorded."""
+    """Return the opening and the matrix; only the matrix if no truth was recorded."""
     known = [judged(group) for group in groups if group.truth]
     matrix = Matrix(
         KEY,
@@ -43,19 +44,20 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def _figure(group: SceneRuns) -> list[Block]:
-    """Time against error on the scene that is shown moving."""
+    """Return the figure of time against error for the scene that is animated."""
     _, figure, *_ = speed.render(group)
     return [Heading(f"Time against error: {group.scene.name}", 2), figure]
 
 
 def judged(group: SceneRuns) -> Judged:
-    """A scene's runs as the sentences take them."""
+    """Return a scene's runs in the form that the sentences of the verdict need."""
     assert group.truth is not None
     return Judged(group.scene, group.truth, [run.record for run in group.runs], group.differences)
 
 
 def motion(group: SceneRuns | None) -> tuple[str, str]:
-    """The picture of a scene's true motion with its worst run, and its caption; empty without a truth."""
+    """Return the animation of a scene's true motion and its worst run, with its caption; empty without a
+    truth."""
     if group is None or not (group.truth and group.truth["motion"]):
         return "", ""
     exact = motion_of(group.scene, group.truth["motion"])
@@ -72,13 +74,13 @@ def motion(group: SceneRuns | None) -> tuple[str, str]:
 
 
 def _shown(groups: Sequence[SceneRuns]) -> SceneRuns | None:
-    """The scene whose worst completed run is the furthest off, of those that can be shown."""
+    """Return the scene whose worst completed run has the largest error, among scenes that can be animated."""
     able = [group for group in groups if group.motion and group.truth and group.truth["motion"]]
     return max(able, key=_largest, default=None)
 
 
 def _largest(group: SceneRuns) -> float:
-    """The largest error of a completed run."""
+    """Return the largest error of a completed run."""
     return max((run.error for run in group.completed() if run.error == run.error), default=0.0)
 
 
@@ -94,7 +96,7 @@ def _scene(group: SceneRuns) -> tuple[str, str]:
 
 
 def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
-    """Return for each engine the best family, and the library's defaults if that is another one."""
+    """Return for each engine the best family, and the library's defaults if these are another family."""
     best = group.best()
     found: dict[str, list[Verdict]] = {}
     for engine in dict.fromkeys(engine for engine, _ in best):

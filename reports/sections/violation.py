@@ -1,4 +1,4 @@
-"""Constraint violation over time, from the poses and velocities of the records."""
+"""Section: constraint violation over time, from the poses and velocities of the records."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ LABELS = ("position (rad, or of the length)", "velocity (per second)")
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:
-    """Violation of the most accurate run of every family, at position and velocity level."""
+    """Return plots of the violation at position and velocity level for the most accurate run of every
+    family."""
 
     def measure(run: Run) -> list[np.ndarray]:
         levels = [violation_series(scene_runs.scene, run.trajectory, i) for i in range(len(LABELS))]

@@ -52,7 +52,7 @@ def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status,
     """Of three engines that repeat themselves in processes of their own two do not within a process."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     bench = trial.set_up(Isolated(f"fake_engines:{fake}", 60.0), SPECIMENS["pendulum"])
-    repeated, reordered = (suite.verdict_on(card, bench) for card in ("repeated", "reordered"))
+    repeated, reordered = (suite.verdict_on(check, bench) for check in ("repeated", "reordered"))
     assert repeated.status == status, repeated
     assert reordered.status == "pass", reordered
 

@@ -1,4 +1,4 @@
-"""Drawn mechanisms / every card: decided as often as asked, resumed from records, a defect found."""
+"""Drawn mechanisms / every check: decided as often as asked, resumed from records, a defect found."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
-from crosscheck.conformance import deep, drawn
+from crosscheck.conformance import deep, random_scenes
 from crosscheck.conformance.deep_table import tables
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.relations import RELATIONS
@@ -37,8 +37,8 @@ def known(monkeypatch):
     return make
 
 
-def test_every_card_and_the_sound_example_engine(known, tmp_path):
-    """Each card is decided as often as asked, and a second run takes the records of the first."""
+def test_every_check_and_the_sound_example_engine(known, tmp_path):
+    """Each check is decided as often as asked, and a second run takes the records of the first."""
     known(example())
     path, plan = tmp_path / "records.jsonl", deep.Plan("example", 2)
     found = deep.examined(plan, path)
@@ -51,11 +51,11 @@ def test_every_card_and_the_sound_example_engine(known, tmp_path):
     assert deep.examined(plan, path).to_record() == found.to_record(), "records were not taken"
 
 
-def test_records_without_a_card(known, tmp_path, monkeypatch):
-    """A card that records say nothing of is asked anew, and no other."""
+def test_records_without_a_check(known, tmp_path, monkeypatch):
+    """A check that records say nothing of is asked anew, and no other."""
     known(example())
     path, plan = tmp_path / "records.jsonl", deep.Plan("example", 1)
-    monkeypatch.setattr(deep, "KINDS", ((drawn.mechanism, ("run", "closure", "smooth")),))
+    monkeypatch.setattr(deep, "KINDS", ((random_scenes.mechanism, ("run", "closure", "smooth")),))
     before = deep.examined(plan, path).to_record()
     (record,) = [json.loads(line) for line in path.read_text().splitlines()]
     del record["asked"]
@@ -64,12 +64,12 @@ def test_records_without_a_card(known, tmp_path, monkeypatch):
     asked = []
     judged = deep.suite.verdict_on
     monkeypatch.setattr(
-        deep.suite, "verdict_on", lambda card, bench: asked.append(card) or judged(card, bench)
+        deep.suite, "verdict_on", lambda check, bench: asked.append(check) or judged(check, bench)
     )
     assert deep.examined(plan, path).to_record() == before and asked == ["smooth"], asked
 
 
-def test_planted_defect_and_the_cards_that_find_it(known):
+def test_planted_defect_and_the_checks_that_find_it(known):
     known(example(DEFECTS["gyroscopic moment with the wrong sign"]))
     found = deep.examined(deep.Plan("example", 1))
     assert {"truth", "balance"} <= {v["property"] for v in found.violations}, found.violations
@@ -77,7 +77,7 @@ def test_planted_defect_and_the_cards_that_find_it(known):
 
 def test_two_engines_and_their_agreement(known):
     """Two sound engines agree on a mechanism; a faulty one agrees with neither."""
-    specimen = Specimen(drawn.mechanism(1), None, True, reference_time=0.0)
+    specimen = Specimen(random_scenes.mechanism(1), None, True, reference_time=0.0)
     late = example(DEFECTS["a driver's time a hundredth of a second late"])
     for simulator, status in ((example(), "pass"), (late, "fail")):
         verdict = deep.agreement(set_up(InProcess(simulator), specimen), "pinocchio")
@@ -86,8 +86,8 @@ def test_two_engines_and_their_agreement(known):
 
 def test_drawn_mechanisms_and_what_is_promised_of_them():
     """Joints and drivers hold, velocities are the given ones; every kind of load and driver is drawn."""
-    scenes = list(map(drawn.mechanism, range(24)))
-    for scene in [*scenes, *map(drawn.floating, range(6))]:
+    scenes = list(map(random_scenes.mechanism, range(24)))
+    for scene in [*scenes, *map(random_scenes.floating, range(6))]:
         pose, rates = initial_poses(scene), initial_twists(scene)
         rows = [*closure(scene, 0.0, *pose).values(), *closure_rates(scene, 0.0, *pose, *rates).values()]
         kept = np.abs(rates[0] - [body.velocity for body in scene.body]).max()
@@ -101,19 +101,19 @@ def test_drawn_mechanisms_and_what_is_promised_of_them():
         if joint.name == d.joint
     } == {"angle", "displacement"}
     assert not any(scene.driver for scene in scenes[::2]), "an even seed has a driver"
-    assert not any(GROUND in joint.bodies for joint in drawn.floating(3).joint)
+    assert not any(GROUND in joint.bodies for joint in random_scenes.floating(3).joint)
 
 
 @pytest.mark.parametrize("seed", [1001, 1005])
 def test_redundant_rows_stay_so_in_an_exact_motion(seed):
     """Rows that are redundant at the start do not hold the motion when a step drifts."""
-    scene = drawn.random_mechanism(seed).with_(duration=0.1)
+    scene = random_scenes.random_mechanism(seed).with_(duration=0.1)
     motion = gauss_motion(scene, (0.0, 0.05, 0.1))
     assert violation_series(scene, motion).max() < 1e-9
 
 
 def test_command_and_its_records(known, capsys, tmp_path):
-    """The command prints the counts of the cards, and is 1 where a card is violated."""
+    """The command prints the counts of the checks, and is 1 where a check is violated."""
     known(example())
     arguments = ["verify", "mbref", "--mechanisms", "1", "--records", str(tmp_path / "r.jsonl")]
     arguments += [
@@ -133,7 +133,7 @@ def test_command_and_its_records(known, capsys, tmp_path):
 
 
 def test_tally_and_seeds_that_decide_nothing(known):
-    """A card that says nothing of any mechanism ends the search at MOST seeds for each."""
+    """A check that says nothing of any mechanism ends the search at MOST seeds for each."""
 
     class Refusing(type(example())):
         def cannot(self, scene):
@@ -150,7 +150,7 @@ def test_tally_and_seeds_that_decide_nothing(known):
 @pytest.mark.parametrize(("seed", "change"), [(101, "rotated"), (211, ""), (319, "rotated")])
 def test_drawn_mechanism_that_mbref_did_not_run(seed, change):
     """A driven displacement had a part in series where none should be, and a wrong unit of length."""
-    scene = drawn.mechanism(seed)
+    scene = random_scenes.mechanism(seed)
     scene = RELATIONS[change].change(scene, None) if change else scene
     run = simulate(scene, "taylor", np.linspace(0.0, scene.duration, 3), Limits(rtol=1e-9))
     assert run.outcome is Outcome.COMPLETED, run.message

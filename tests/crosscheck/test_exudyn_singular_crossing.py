@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.drawn import mechanism
+from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.engines.exudyn.dynamic import stretches

@@ -84,7 +84,7 @@ def test_the_term_that_an_engine_lacks_is_named(defect, names, says, monkeypatch
 
 def test_an_engine_without_a_defect_is_told_to_look_at_its_integration(monkeypatch):
     found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
-    assert "begin with the scene 'pendulum', card truth" in found
+    assert "begin with the scene 'pendulum', check truth" in found
     assert "accelerations agree with the judge's, so look at the integration" in found
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.conformance.drawn import mechanism
+from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD, INTEGRATED_HERE, NEWTON

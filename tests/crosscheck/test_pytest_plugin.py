@@ -95,7 +95,7 @@ def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
 
 
 def test_shrinking_and_what_still_fails():
-    """A scene gets smaller only as long as the card fails; a sound engine's stays as it is."""
+    """A scene gets smaller only as long as the check fails; a sound engine's stays as it is."""
     scene = moving_probes()["spring load"]
     faulty = violates(InProcess(engine(DEFECTS["spring's damping with the wrong sign"])), "truth")
     small = shrunk(scene, faulty, tries=12)

@@ -322,7 +322,7 @@ def test_runs_of_another_mechanism_are_not_compared(tmp_path):
     assert told == [f"{first.name}: the mechanism was changed, so its runs are not compared."], told
     console = Console(width=80, file=io.StringIO())
     assert differences.show(console, *map(str, folders), False)
-    assert "The sets have no run in common" in console.file.getvalue()
+    assert "The two sets have no run in common" in console.file.getvalue()
 
 
 def test_a_comparison_leaves_files_as_they_are(tmp_path):

@@ -1,4 +1,4 @@
-"""The built-in engines / the cards of the suite, in this process; what fails is known, with its reason."""
+"""The built-in engines / the checks of the suite, in this process; what fails is known, with its reason."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from crosscheck.engine import BUILT_IN, engine
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in trial.specimens()}
 QUICK = ("heavy top", "universal joint", "cylindrical driver", "door", "floating pair", "two drivers")
-KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, card): why it fails
+KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, check): why it fails
     ("pinocchio", "drawn loop", "in millimetres"): "mu of the proximal solver is absolute, chosen for metres",
     ("mujoco", "spinning loop", "reversed"): "reactions 1.06e-6 apart, allowed 1e-6; not analysed",
 }
 
 
 def violations(name: str, scenes: tuple[str, ...], related: bool) -> dict[tuple[str, str, str], str]:
-    """Known failures, by engine, scene and card."""
+    """Known failures, by engine, scene and check."""
     found = {}
     for scene in scenes:
         bench = trial.set_up(InProcess(engine(name)), replace(SPECIMENS[scene], related=related))

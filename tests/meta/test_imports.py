@@ -86,7 +86,7 @@ MAKERS = (
     "crosscheck.processes",
     "crosscheck.engines",
     "crosscheck.cli.collection",
-    "crosscheck.cli.passage",
+    "crosscheck.cli.moving_picture",
     "crosscheck.study.sweep",
     "crosscheck.study.timings",
 )
@@ -151,7 +151,7 @@ def test_no_module_that_renders_can_make_a_record():
 
 def test_the_program_asks_crosscheck_s_command_line_for_its_records():
     names = {n for n in of("reports", "reports.__main__") if n.startswith("crosscheck.")}
-    allowed = {"collection", "options", "scene_request", "passage"}
+    allowed = {"collection", "options", "scene_request", "moving_picture"}
     wrong = {n for n in names if not {*n.split(".")[2:3]} <= allowed}
     assert not wrong, sorted(wrong)
 

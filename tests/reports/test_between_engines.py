@@ -61,7 +61,7 @@ def test_choices_that_are_rounding_are_told_as_zero():
     blocks = reactions.render(runs_of("planar_slider_crank_gravity"))
     assert len([block for block in blocks if isinstance(block, Table)]) == 1
     assert [b.text for b in blocks if isinstance(b, Text)] == [
-        "At t = 0.005 s the components that redundancy leaves open are 0 in every engine."
+        "At t = 0.005 s the components that redundancy leaves undetermined are 0 in every engine."
     ]
 
 

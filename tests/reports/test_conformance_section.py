@@ -31,16 +31,16 @@ def verified(tmp_path):
     return stored.verified(tmp_path)
 
 
-def test_cards_of_every_engine_and_their_counts(verified):
+def test_checks_of_every_engine_and_their_counts(verified):
     assert [found["engine"] for found in verified] == ["mujoco", "exudyn"], "in the order of the engines"
-    _, text, cards, *_ = conformance.render(verified)
+    _, text, checks, *_ = conformance.render(verified)
     assert (
         isinstance(text, Text) and "MuJoCo 1.0: 1 verdicts hold, 1 violated, 1 cannot be asked" in text.text
     )
-    rows = {row[0]: tuple(row[2:]) for row in cards.rows}
-    proofs = sum(proof.card == "truth" for proof in explained.proofs())
+    rows = {row[0]: tuple(row[2:]) for row in checks.rows}
+    proofs = sum(proof.check == "truth" for proof in explained.proofs())
     assert rows[f"truth/{PROPERTIES['truth'].version}"] == (str(proofs), "✓ 1, ✗ 1", "✓ 1")
-    assert rows["closure/1"][1:] == ("–", "○") and rows[VERDICTS[3].card()][1:] == ("○", "○")
+    assert rows["closure/1"][1:] == ("–", "○") and rows[VERDICTS[3].check()][1:] == ("○", "○")
 
 
 def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
@@ -48,7 +48,7 @@ def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
     assert row == (
         "MuJoCo",
         "pendulum",
-        VERDICTS[1].card(),
+        VERDICTS[1].check(),
         "2.0e-03",
         "1.0e-06",
         conformance.UNEXPLAINED,
@@ -80,7 +80,7 @@ def test_methods_have_a_row_each_with_what_they_violate(tmp_path, monkeypatch):
         if isinstance(b, Table) and b.header[0] == "Method"
     ]
     assert table.rows[0][:5] == ("lm2+none", "1", "1", "1", "1")
-    assert table.rows[0][5:] == (f"{VERDICTS[1].card()} on pendulum", "It drifts. Project.")
+    assert table.rows[0][5:] == (f"{VERDICTS[1].check()} on pendulum", "It drifts. Project.")
 
 
 def test_drawn_mechanisms_have_counts_and_violations_a_cause(tmp_path, monkeypatch):
@@ -88,15 +88,15 @@ def test_drawn_mechanisms_have_counts_and_violations_a_cause(tmp_path, monkeypat
     tally = Tally(Plan("mujoco", 2))
     tally.add({"version": "1.0", "verdicts": list(map(record_of, VERDICTS))})
     (tmp_path / "conformance" / "mujoco_drawn.json").write_text(json.dumps(tally.to_record()))
-    known = {("mujoco", "truth", conformance.ANY_DRAWN): explained.Explanation("It slips.", "Hold it.")}
+    known = {("mujoco", "truth", conformance.ANY_RANDOM): explained.Explanation("It slips.", "Hold it.")}
     monkeypatch.setattr(conformance, "explanations", lambda: known)
-    _, _, cards, violated, *_ = conformance.render(stored.verified(tmp_path))
-    assert {row[0]: row[2] for row in cards.rows}[VERDICTS[1].card()] == "1 of 2"
+    _, _, checks, violated, *_ = conformance.render(stored.verified(tmp_path))
+    assert {row[0]: row[2] for row in checks.rows}[VERDICTS[1].check()] == "1 of 2"
     assert violated.rows[0][2:] == ("1", "pendulum", "2.0e-03", "1.0e-06", "It slips.", "Hold it.")
 
 
-def test_explanations_are_of_engines_and_cards_that_exist():
-    for engine, card, _ in explained.explanations():
+def test_explanations_are_of_engines_and_checks_that_exist():
+    for engine, check, _ in explained.explanations():
         assert engine.partition(" ")[0] in engine_names(), engine
-        assert card in {*FIRST, *PROPERTIES, AGREEMENT}, card
-    assert {proof.card for proof in explained.proofs()} == {*FIRST, *PROPERTIES}
+        assert check in {*FIRST, *PROPERTIES, AGREEMENT}, check
+    assert {proof.check for proof in explained.proofs()} == {*FIRST, *PROPERTIES}

@@ -9,7 +9,7 @@ import pytest
 from drawn import SVG, bars
 from synthetic import exact, motion, record, scene, truths
 
-from crosscheck.cli.passage import singular_instants
+from crosscheck.cli.moving_picture import singular_instants
 from crosscheck.study.truths import FRAMES, TURN, truth_record
 from mbref.drawing.shapes import moved, shapes
 from mbref.scenes import SCENES

@@ -124,7 +124,10 @@ def test_differing_cells_and_their_reasons(blocks):
     reasons = {row[:3]: row[5] for row in found.rows}
     assert len(reasons) == 3, reasons
     late = reasons["I", "θ₂ = π/4", "MPI (SVD)"]
-    assert "θ₂ = -2π" in late and "the paper's in 1 of 20 draws; it has the paper's with: rtol 1e-5" in late
+    assert (
+        "θ₂ = -2π" in late
+        and "the paper's outcome and end time in 1 of 20 draws; it has them with: rtol 1e-5" in late
+    )
     assert "passes every crossing" in reasons["II", "five-bar", "MPI (SVD) + CP"], reasons
     assert reasons["III", "spatial slider-crank, driven", "LM2"].startswith("drift"), reasons
 

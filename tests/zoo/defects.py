@@ -1,4 +1,5 @@
-"""The zoo: defects of one line, planted one at a time in the example engine, and the card that tells each."""
+"""Planted defects of one line, applied one at a time to the example engine, with the check that detects
+each."""
 
 from __future__ import annotations
 
@@ -18,13 +19,13 @@ TABLE = Path(__file__).with_name("defects.toml")
 
 
 class Defect(NamedTuple):
-    """``old`` stands once in the engine's source and becomes ``new``; ``card`` fails on ``scene``."""
+    """``old`` stands once in the engine's source and becomes ``new``; ``check`` fails on ``scene``."""
 
     about: str
     old: str
     new: str
     scene: str
-    card: str
+    check: str
 
 
 DEFECTS = {entry["about"]: Defect(**entry) for entry in tomllib.loads(TABLE.read_text())["defect"]}

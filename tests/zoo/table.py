@@ -1,4 +1,4 @@
-"""The table of cards and the defects that prove them, written by ``python -m tests.zoo.table
+"""The table of checks and the defects that prove them, written by ``python -m tests.zoo.table
 docs/conformance.md``, and the same as data for reports."""
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from crosscheck.conformance.suite import Verdict, abouts
 from tests.zoo.defects import DEFECTS
 
 FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
-HEAD = f"""# Conformance cards
+HEAD = f"""# Conformance checks
 
-This page lists the checks ("cards") of the conformance suite, for readers of a verdict by
-`crosscheck verify ENGINE`. [Verify your engine](verify-your-engine.md) explains how to run it. A card passes,
-fails, or does not apply, with a reason. The number of a card increases when its check changes, so that
-verdicts of different checks are never compared.
+This page lists the checks of the conformance suite, for readers of a verdict by
+`crosscheck verify ENGINE`. [Verify your engine](verify-your-engine.md) explains how to run it. A check
+passes, fails, or does not apply, with a reason. The number of a check increases when the check changes, so
+that verdicts of different versions are never compared.
 
-Each card has been tested with defects: {len(DEFECTS)} changes of one line, planted one at a time in
-`examples/spatial_engine` (`tests/zoo/defects.toml`). With a defect the card in its row fails on the scene in
+Each check has been tested with defects: {len(DEFECTS)} changes of one line, planted one at a time in
+`examples/spatial_engine` (`tests/zoo/defects.toml`). With a defect the check in its row fails on the scene in
 its row, and passes without it (`pytest tests/zoo`). This page is written by
 `python -m tests.zoo.table docs/conformance.md`.
 """
@@ -28,29 +28,29 @@ its row, and passes without it (`pytest tests/zoo`). This page is written by
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *_cards(), "", "## Defects", "", *_defects()]) + "\n"
+    return "\n".join([HEAD, *_checks(), "", "## Defects", "", *_defects()]) + "\n"
 
 
-def _cards() -> Iterator[str]:
-    yield "## Cards"
+def _checks() -> Iterator[str]:
+    yield "## Checks"
     yield ""
-    yield "| card | what it checks | defects |"
+    yield "| check | what it checks | defects |"
     yield "| --- | --- | --: |"
     for name, about in abouts().items():
-        count = sum(defect.card == name for defect in DEFECTS.values())
-        yield f"| {Verdict(name, '', '').card()} | {about} | {count} |"
+        count = sum(defect.check == name for defect in DEFECTS.values())
+        yield f"| {Verdict(name, '', '').check()} | {about} | {count} |"
 
 
 def _defects() -> Iterator[str]:
-    yield "| defect | scene | card that fails |"
+    yield "| defect | scene | check that fails |"
     yield "| --- | --- | --- |"
     for defect in DEFECTS.values():
-        yield f"| {defect.about} | {defect.scene} | {defect.card} |"
+        yield f"| {defect.about} | {defect.scene} | {defect.check} |"
 
 
 def data() -> str:
-    """The defects, each with the scene and the card that detects it, as TOML."""
-    lines = ("[[defect]]", "about = {about!r}", "scene = {scene!r}", "card = {card!r}", "")
+    """The defects, each with the scene and the check that detects it, as TOML."""
+    lines = ("[[defect]]", "about = {about!r}", "scene = {scene!r}", "check = {check!r}", "")
     head = "# Written by `python -m tests.zoo.table docs/conformance.md`.\n\n"
     told = (line.format(**defect._asdict()) for defect in DEFECTS.values() for line in lines)
     return head + "\n".join(told)

@@ -1,4 +1,5 @@
-"""The zoo: every defect / a named card that tells it; every card / a defect; the sound engine / all cards."""
+"""Every planted defect fails the named check, every check has a defect, and the sound engine passes all
+checks."""
 
 from __future__ import annotations
 
@@ -24,25 +25,25 @@ def sound_bench(scene: str) -> trial.Bench:
 
 
 @pytest.mark.parametrize("about", DEFECTS)
-def test_defect_and_the_card_that_tells(about):
-    """The named card fails with the defect, and passes without it."""
+def test_defect_and_the_check_that_tells(about):
+    """The named check fails with the defect, and passes without it."""
     defect = DEFECTS[about]
-    runner, sound = InProcess(engine(defect)), suite.verdict_on(defect.card, sound_bench(defect.scene))
+    runner, sound = InProcess(engine(defect)), suite.verdict_on(defect.check, sound_bench(defect.scene))
     bench = suite.asked(runner, SPECIMENS[defect.scene])
     if isinstance(bench, trial.Bench):
-        faulty = suite.verdict_on(defect.card, bench)
-        alone = defect.card in suite.FIRST or bench.specimen.dead_end
+        faulty = suite.verdict_on(defect.check, bench)
+        alone = defect.check in suite.FIRST or bench.specimen.dead_end
         first = alone or suite.first_run(bench).status == suite.PASS
-        assert first, f"{about}: the run does not complete, so that no card but run is asked"
+        assert first, f"{about}: the run does not complete, so that no check but run is asked"
     else:
         faulty = bench
-    assert faulty.status == suite.FAIL, f"{about}: {defect.card} on {defect.scene} says {faulty}"
-    assert faulty.property == defect.card
+    assert faulty.status == suite.FAIL, f"{about}: {defect.check} on {defect.scene} says {faulty}"
+    assert faulty.property == defect.check
     assert sound.status == suite.PASS, f"the sound engine: {sound}"
 
 
-def test_every_card_and_a_defect_that_trips_it():
-    idle = {*suite.FIRST, *PROPERTIES} - {defect.card for defect in DEFECTS.values()}
+def test_every_check_and_a_defect_that_trips_it():
+    idle = {*suite.FIRST, *PROPERTIES} - {defect.check for defect in DEFECTS.values()}
     assert not idle, f"no defect of the zoo trips {sorted(idle)}"
 
 
@@ -58,9 +59,9 @@ def test_sound_engine_and_the_whole_suite():
     assert found.conforms, failed
 
 
-def test_page_of_cards_and_the_table():
+def test_page_of_checks_and_the_table():
     """docs/conformance.md is what its command writes."""
     path = Path(__file__).parents[2] / "docs" / "conformance.md"
     assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
     assert FOR_REPORTS.read_text() == data(), "the same command renews it"
-    assert set(tomllib.loads(data())["defect"][0]) == {"about", "scene", "card"}
+    assert set(tomllib.loads(data())["defect"][0]) == {"about", "scene", "check"}

@@ -1,4 +1,4 @@
-"""Bullet as an engine."""
+"""Adapter of Bullet."""
 
 from crosscheck.engines.bullet.adapter import ENGINE
 

@@ -1,7 +1,8 @@
-"""Bullet, through PyBullet: joint coordinates of multibodies; closures are impulses, solved iteratively.
+"""Bullet, through PyBullet: multibodies in joint coordinates, with loops closed by impulses that an iterative
+solver finds.
 
-Its step is semi-implicit and of first order.  A driver is a motor of prescribed velocity: the mean one of a
-step, by which positions are met.
+Its step is semi-implicit and of first order. A driver is a motor with a prescribed velocity: its mean over a
+step, so that positions are met at the end of the step.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from mbref.trajectory import Trajectory
 
 DEFAULT_STEP, DEFAULT_ITERATIONS = 1 / 240, 50
 ITERATIONS = 1000
-FINER = 1  # steps more, each a third of the one before: the method is of first order
+FINER = 1  # number of further, finer steps, each a third of the previous one: the method is of first order
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
     "iterated": "1000 iterations; a cut hinge closed by two points, in a planar mechanism by one",
-    "defaults": "50 iterations, the library's number; a cut hinge closed by two points",
+    "defaults": "50 iterations, the library's default; a cut hinge closed by two points",
 }
 OPTIONS = {"step": "time step, s", "iterations": "iterations of the solver in a step"}
 
@@ -51,11 +52,11 @@ class Bullet(Engine):
         import pybullet  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse scenes without masses whose motion the drivers do not determine completely."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Steps by the angle turned in one."""
+        """Return settings whose steps are chosen by the angle that a body turns in one step."""
         rate = scouted_rate(self, scene, "defaults", iterations=DEFAULT_ITERATIONS)
         fine = steps(scene, rate, finer=FINER)
         plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
@@ -65,11 +66,11 @@ class Bullet(Engine):
         ]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Every family serves every scene."""
+        """Return whether the family exists; every family can run every scene."""
         return family in FAMILIES
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         import pybullet
 
         if setting.family == "iterated":
@@ -102,7 +103,7 @@ class _World:
         self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s) from time t."""
+        """Take ``count`` steps of length h (s) from time t."""
         p = self.p
         p.setTimeStep(h)
         for n in range(count):
@@ -123,7 +124,7 @@ class _World:
             self.p.applyExternalTorque(place.body, place.link, moment.tolist(), self.p.WORLD_FRAME)
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         return self.mechanism.motion()
 
 

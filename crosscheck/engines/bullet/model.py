@@ -1,8 +1,10 @@
-"""A scene's tree as multibodies of PyBullet: one for every link that hangs from the ground or floats.
+"""A scene's spanning tree as multibodies of PyBullet: one for every link that is joined to the ground or
+floats.
 
 A link's frame has its origin at the joint's anchor and world-aligned axes at t = 0; states are of the frame
-of its centre of mass and principal axes.  Links are listed depth first: others are renumbered silently.
-Inertias are set alone and last, because together with damping they are dropped, silently too.
+of its centre of mass and principal axes.  Links are listed depth first, since PyBullet renumbers links in any
+other order without a message. Inertias are set in a separate last call, since PyBullet ignores them in a call
+that also sets damping.
 """
 
 from __future__ import annotations
@@ -21,14 +23,14 @@ from crosscheck.engines.tree_reactions import LinkMotion
 from mbref import rotations
 from mbref.scene import Scene
 
-NEGLIGIBLE = 1e-12  # mass of bodies in chains of joints, of their links
-STRONGEST, FASTEST = 1e9, 1e9  # N of a closure; rad/s or m/s of a joint
+NEGLIGIBLE = 1e-12  # mass of auxiliary bodies in chains of joints / mass of the links
+STRONGEST, FASTEST = 1e9, 1e9  # N, limit of a closure force; rad/s or m/s, limit of a joint rate
 BASE = -1  # PyBullet's number of a multibody's base
 O, UNIT = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]
 
 
 class Place(NamedTuple):
-    """A link in PyBullet: its multibody and number there, the offset of its centre of mass from the link's
+    """Place of a link in PyBullet: its multibody and number, the offset of its centre of mass from the link's
     frame (3,), and its principal axes (3, 3)."""
 
     body: int
@@ -56,10 +58,10 @@ class Mechanism:
             self._close(closure)
 
     def _add(self, parts: list[Piece], start: int) -> None:
-        """A multibody of the pieces that hang together; the first of them has the number ``start``."""
+        """Add a multibody of connected pieces; the first piece has the number ``start``."""
         floats = parts[0].mobility is not None and parts[0].mobility.kind == FREE
         first, links = (parts[0], parts[1:]) if floats else (None, parts)
-        up = start if floats else start - 1  # offset from pieces to PyBullet's links
+        up = start if floats else start - 1  # offset from numbers of pieces to PyBullet's link numbers
         base: dict[str, Any] = {"baseMass": 0.0}
         if first:
             centre = (first.origin + first.offset).tolist()
@@ -77,7 +79,8 @@ class Mechanism:
             self.p.resetBaseVelocity(body, linear.tolist(), v[3:].tolist())
 
     def _links(self, links: list[Piece], up: int, base: Piece | None) -> dict[str, Any]:
-        """PyBullet's arguments of links; on a floating base they are placed in the frame of its centre."""
+        """Return PyBullet's arguments for links; on a floating base they are placed in the frame of its
+        centre of mass."""
         p = self.p
         kinds = {SLIDE: p.JOINT_PRISMATIC, TURN: p.JOINT_REVOLUTE, BALL_JOINT: p.JOINT_SPHERICAL}
         starts, turns = [], []
@@ -104,7 +107,7 @@ class Mechanism:
         }
 
     def _settle(self, body: int, j: int, piece: Piece) -> None:
-        """Inertia, no motor, velocity at t = 0."""
+        """Set inertia and initial velocity of a link, and switch its motor off."""
         p, kind = self.p, piece.mobility.kind if piece.mobility else ""
         moments = np.linalg.eigvalsh(piece.inertia)
         p.changeDynamics(body, j, localInertiaDiagonal=moments.tolist())
@@ -115,7 +118,8 @@ class Mechanism:
             self.places[piece.link] = Place(body, j, piece.offset, _axes(piece))
         if kind == BALL_JOINT:
             p.setJointMotorControlMultiDof(body, j, p.POSITION_CONTROL, targetPosition=UNIT, force=O)
-            spin = _axes(piece).T @ self.rates[piece.velocity :][:3]  # a ball's frame has the principal axes
+            # the frame of a ball joint has the principal axes
+            spin = _axes(piece).T @ self.rates[piece.velocity :][:3]
             p.resetJointStateMultiDof(body, j, UNIT, spin.tolist())
         elif kind in (SLIDE, TURN):
             p.setJointMotorControl2(body, j, p.VELOCITY_CONTROL, force=0.0)
@@ -135,14 +139,15 @@ class Mechanism:
             p.changeConstraint(c, maxForce=STRONGEST)
 
     def _end(self, link: int, point: np.ndarray) -> tuple[tuple[int, int], list[float]]:
-        """Multibody and link, and a point (world at t = 0) in the frame of its centre of mass."""
+        """Return multibody and link, and a point (world at t = 0) in the frame of the link's centre of
+        mass."""
         if link == GROUND_LINK:
             return (-1, -1), point.tolist()
         place, tree = self.places[link], self.tree.links[link]
         return (place.body, place.link), (place.axes.T @ (point - tree.position - place.offset)).tolist()
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         found = [self._state(self.places[k]) for k in range(len(self.tree.links))]
         rotation, position, velocity, omega = (np.array(part) for part in zip(*found, strict=True))
         coordinates, rates = np.zeros((2, self.tree.nv))
@@ -163,7 +168,7 @@ class Mechanism:
 
 
 def _axes(piece: Piece) -> np.ndarray:
-    """Principal axes (3, 3) of a piece, right-handed, by increasing moments."""
+    """Return the principal axes (3, 3) of a piece, right-handed, in the order of increasing moments."""
     axes = np.linalg.eigh(piece.inertia)[1]
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return axes

@@ -1,4 +1,4 @@
-"""CasADi's generated C code as an engine."""
+"""Adapter of CasADi's generated C code."""
 
 from crosscheck.engines.casadi.adapter import ENGINE
 

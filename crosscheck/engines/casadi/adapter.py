@@ -1,7 +1,7 @@
-"""CasADi: C code generated from a mechanism's equations in joint coordinates, in a compiled DOP853.
+"""CasADi: generated C code for a mechanism's equations in joint coordinates, integrated by a compiled DOP853.
 
-CasADi eliminates common subexpressions, and a C compiler optimises its code and the integrator as one piece
-for this machine; the step control equals crosscheck's compiled DOP853.
+CasADi eliminates common subexpressions. A C compiler optimises its code together with the integrator for this
+machine. The step control equals the one in ``crosscheck.engines.compiled.dop853``.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FAMILIES = {
 OPTIONS = {
     **RTOL,
     "min_step": "shortest step (s); the error is not tested below it",
-    "beta": "double root of the closure errors (1/s)",
+    "beta": "decay rate of the closure errors, a double root (1/s)",
 }
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 ENDS = {  # status: outcome and sentence
@@ -37,14 +37,14 @@ ENDS = {  # status: outcome and sentence
     2: (Outcome.STEP_FAILED, "no step after {t:.6g} s is short enough for the tolerance"),
     3: (Outcome.STEP_FAILED, "{steps} steps have only reached {t:.6g} s"),
 }
-RATE = 0.1  # 1/s, of the closures where they are not projected
-LEAST_TURN = 0.03  # rad turned within the shortest step, which only singular positions need
-SCOUT = {"rtol": 1e-6}  # setting of the coarse run that measures how fast a scene turns
-SCOUT_STEP, SCOUTED = 1e-5, 101  # of the coarse run: shortest step / duration, number of samples
+RATE = 0.1  # 1/s; decay rate of the closure errors if they are not projected
+LEAST_TURN = 0.03  # rad; largest rotation within the shortest step, which only singular positions need
+SCOUT = {"rtol": 1e-6}  # setting of the coarse run that measures the scene's fastest rate
+SCOUT_STEP, SCOUTED = 1e-5, 101  # coarse run: shortest step / duration, number of samples
 
 
 class CasADi(Generator):
-    """CasADi (PyPI ``casadi``), beside a C compiler."""
+    """CasADi (PyPI ``casadi``), which needs a C compiler."""
 
     name = package = "casadi"
     families, options, integrated_here = FAMILIES, OPTIONS, tuple(FAMILIES)
@@ -56,13 +56,14 @@ class CasADi(Generator):
         return Cannot(Owner.ADAPTER, reason) if (reason := why_not()) else None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Both families by relative tolerance, their shortest step by how fast a coarse run turns."""
+        """Return both families by relative tolerance; the shortest step follows from the fastest rate in a
+        coarse run."""
         shortest = float(f"{LEAST_TURN / _fastest(scene):.2g}")
         fed_back = sweep(PLAIN, RTOLS, min_step=shortest, beta=RATE)
         return [*sweep(PROJECTED, RTOLS, min_step=shortest), *fed_back]
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         self._known(setting)
         began, equations = time.process_time(), equations_of(scene)
         compiled = library(scene, setting.options.get("beta", 0.0))
@@ -76,7 +77,8 @@ class CasADi(Generator):
 
 @functools.lru_cache(maxsize=16)
 def _fastest(scene: Scene) -> float:
-    """The fastest rate (rad/s or m/s) of a joint coordinate in a coarse run, or that a scene states."""
+    """Return the fastest rate (rad/s or m/s) of a joint coordinate in a coarse run, or the rate that a scene
+    states if that is larger."""
     equations = equations_of(scene)
     run = _Run(np.linspace(0.0, scene.duration, SCOUTED), equations.start)
     run.advance(library(scene, 0.0), Setting(PROJECTED, {**SCOUT, "min_step": SCOUT_STEP * scene.duration}))
@@ -93,7 +95,7 @@ class _Run:
         self.status, self.clock = 0, np.zeros(1)
 
     def advance(self, compiled: ctypes.CDLL, setting: Setting) -> None:
-        """From the start to the last time."""
+        """Integrate from the start to the last time."""
         options = setting.options
         self.status = compiled.integrate(
             _pointer(self.start),
@@ -108,7 +110,7 @@ class _Run:
         )
 
     def reached(self) -> np.ndarray:
-        """States (k, 2 n) at the times that were reached."""
+        """Return the states (k, 2 n) at the times that were reached."""
         return self.samples[: self.counts[3]]
 
     def failure(self) -> Failed | None:

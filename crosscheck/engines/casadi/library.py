@@ -1,7 +1,7 @@
-"""The C code of a scene, with the integrator of ``dop853.c`` compiled as one piece for this machine.
+"""The C code of a scene, compiled together with the integrator ``dop853.c`` for this machine.
 
-The library is kept in the user's cache folder for its scene, the rate of its closures, CasADi's version, the
-compiler's command, the sources and the machine, so that a kept one needs neither CasADi nor compiler.
+The library is stored in the user's cache folder by scene, decay rate of its closures, CasADi's version,
+compiler command, sources and machine. A stored library needs neither CasADi nor a compiler.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from crosscheck.engines.symbolic.generator import equations_of, origin
 from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 
-FOLDER = "casadi"  # folder in the cache
+FOLDER = "casadi"  # name of the folder in the cache
 FLAGS = ("-O3", "-march=native", "-fno-math-errno", "-shared", "-fPIC", "-w")
 INTEGRATOR = Path(__file__).with_name("dop853.c")
 WRAPPER = """
@@ -38,7 +38,7 @@ static void {macro}(const double *y, double *result) {{
 
 
 def why_not() -> str:
-    """Why no library can be compiled here, in a sentence; empty where nothing is missing."""
+    """Return the reason why no library can be compiled here, in a sentence; empty if nothing is missing."""
     try:
         C.path()
     except NoLibrary as reason:
@@ -48,7 +48,7 @@ def why_not() -> str:
 
 @functools.lru_cache(maxsize=16)
 def library(scene: Scene, beta: float) -> ctypes.CDLL:
-    """The integrator compiled with the rates and the projection of a state; raises NoLibrary."""
+    """Return the compiled integrator with the rates and the projection of a state; raises NoLibrary."""
     made_of = _origin(scene, beta)
     path = kept.made_once(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
     return ctypes.CDLL(str(path))
@@ -61,7 +61,7 @@ def _origin(scene: Scene, beta: float) -> str:
 
 
 def _source(scene: Scene, beta: float) -> str:
-    """The C code: tableau, rates, projection and integrator."""
+    """Return the C code: coefficients, rates, projection and integrator."""
     import casadi
 
     equations, arithmetic = equations_of(scene), symbolic(casadi.sin, casadi.cos)
@@ -82,7 +82,7 @@ def _source(scene: Scene, beta: float) -> str:
 
 
 def _tableau() -> str:
-    """DOP853's coefficients as C arrays."""
+    """Return DOP853's coefficients as C arrays."""
     stages = dop853.STAGES
     arrays = {"B": dop853.B, "E3": dop853.ERROR3, "E5": dop853.ERROR5}
     text = "".join(f"static const double {name}[{stages}] = {_c(array)};\n" for name, array in arrays.items())
@@ -95,7 +95,7 @@ def _c(array: np.ndarray) -> str:
 
 
 def _compile(text: str, target: Path) -> None:
-    """Compiles a C source; raises NoLibrary with the compiler's words."""
+    """Compile a C source; raises NoLibrary with the compiler's message."""
     with tempfile.TemporaryDirectory() as folder:
         source = Path(folder, "code.c")
         source.write_text(text)

@@ -1,1 +1,1 @@
-"""Engines' accelerations in a compiled integrator: no Python between two samples of a run."""
+"""Compiled integrators around the accelerations of engines, without Python between two samples of a run."""

@@ -1,6 +1,6 @@
-"""C functions called by address from compiled code.
+"""Calls of C functions by their address from code that numba compiles.
 
-An address is a number, so that compiled code keeps none of this process's addresses and can be cached.
+An address is an argument, so that compiled code contains no address of this process and can be cached.
 Without compilation (NUMBA_DISABLE_JIT) ctypes makes the calls.
 """
 
@@ -20,7 +20,7 @@ RATES = ctypes.CFUNCTYPE(ctypes.c_int32, POINTER, REAL, POINTER, POINTER)
 
 
 def _called(context: Any, builder: Any, address: Any, result: Any, arguments: list[Any]) -> Any:
-    """The call of the function at an integer address with integers as pointers, in LLVM."""
+    """Emit the LLVM call of the function at an integer address, with integers passed as pointers."""
     kinds = [argument.type for argument in arguments]
     pointer = ir.PointerType(ir.FunctionType(result, kinds))
     return builder.call(builder.inttoptr(address, pointer), arguments)
@@ -28,7 +28,7 @@ def _called(context: Any, builder: Any, address: Any, result: Any, arguments: li
 
 @intrinsic
 def _rates_of(typing: Any, address: Any, context: Any, t: Any, y: Any, rates: Any) -> Any:
-    """The call of a RATES function."""
+    """Call a function of type RATES at an address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         return _called(target, builder, arguments[0], ir.IntType(32), arguments[1:])
@@ -38,7 +38,7 @@ def _rates_of(typing: Any, address: Any, context: Any, t: Any, y: Any, rates: An
 
 @intrinsic
 def call_with_two(typing: Any, address: Any, first: Any, second: Any) -> Any:
-    """The call of ``void function(void *first, void *second)``."""
+    """Call ``void function(void *first, void *second)`` at an address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
@@ -49,7 +49,7 @@ def call_with_two(typing: Any, address: Any, first: Any, second: Any) -> Any:
 
 @intrinsic
 def call_with_three(typing: Any, address: Any, first: Any, second: Any, third: Any) -> Any:
-    """The call of ``void function(void *first, void *second, void *third)``."""
+    """Call ``void function(void *first, void *second, void *third)`` at an address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
@@ -62,7 +62,7 @@ def call_with_three(typing: Any, address: Any, first: Any, second: Any, third: A
 def call_with_three_and_real(
     typing: Any, address: Any, first: Any, second: Any, third: Any, real: Any
 ) -> Any:
-    """The call of ``void function(void *first, void *second, void *third, double real)``."""
+    """Call ``void function(void *first, void *second, void *third, double real)`` at an address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
@@ -73,7 +73,7 @@ def call_with_three_and_real(
 
 @intrinsic
 def small_integers(typing: Any, address: Any) -> Any:
-    """The pointer to integers of 32 bits at an integer address."""
+    """Return the pointer to 32-bit integers at an integer address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
@@ -83,7 +83,7 @@ def small_integers(typing: Any, address: Any) -> Any:
 
 @intrinsic
 def reals(typing: Any, address: Any) -> Any:
-    """The pointer to numbers at an integer address."""
+    """Return the pointer to doubles at an integer address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
@@ -93,7 +93,7 @@ def reals(typing: Any, address: Any) -> Any:
 
 @intrinsic
 def integers(typing: Any, address: Any) -> Any:
-    """The pointer to integers at an integer address."""
+    """Return the pointer to 64-bit integers at an integer address."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))

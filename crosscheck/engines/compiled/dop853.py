@@ -1,9 +1,10 @@
-"""DOP853 from sample to sample, compiled, around a C function that gives the rates of a state.
+"""Compiled integrator DOP853 from sample to sample, around a C function that computes the rates of a state.
 
 The 8(5,3) pair of Dormand and Prince (Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I,
-2nd edition, 1993, section II.5) with the step control that costs the fewest evaluations on mechanisms: the
-error is the largest over the components, the step's factor 0.8 error^(-1/8), between 0.2 and 100, less where
-errors grew from the step before (K. Gustafsson, ACM Trans. Math. Software 20, 1994).
+2nd edition, 1993, section II.5) with the step control that needed the fewest evaluations on mechanisms. The
+error is the largest over the components. The next step is the last one times 0.8 error^(-1/8), limited to 0.2
+… 100. The factor is smaller if errors grew since the previous step (K. Gustafsson, ACM Trans. Math. Software
+20, 1994).
 """
 
 from __future__ import annotations
@@ -23,12 +24,13 @@ B, C, ERROR3, ERROR5 = map(np.array, (tableau.B, tableau.C, tableau.ERROR3, tabl
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
 ORDER = 8
-STRETCH = 1e-9  # relative extension of a step that ends at a sample
-SMALLEST = 1e-14  # step over the last sample's time, below which a run has failed
-JUMPS, LONGEST_JUMP = 16, 4.0  # lengths tried where the shortest step fails, the longest in shortest steps
+STRETCH = 1e-9  # relative extension of a step so that it ends at a sample
+SMALLEST = 1e-14  # shortest step / time of the last sample
+# lengths tried if the shortest step fails, and the longest of them in shortest steps
+JUMPS, LONGEST_JUMP = 16, 4.0
 
-REACHED, NOT_FINITE, TOO_SMALL, TOO_MANY, REFUSED = range(5)  # statuses of an integration to a sample
-STEPS, REJECTED, EVALUATIONS = range(3)  # places of the counts
+REACHED, NOT_FINITE, TOO_SMALL, TOO_MANY, REFUSED = range(5)  # status codes of an integration to a sample
+STEPS, REJECTED, EVALUATIONS = range(3)  # indices of the counters
 
 
 class System(NamedTuple):
@@ -36,28 +38,29 @@ class System(NamedTuple):
 
     function: int  # address of ``int rates(void *context, double t, double *y, double *rates)``
     context: int
-    quaternions: np.ndarray  # first places of unit quaternions within the state
+    quaternions: np.ndarray  # indices of the first components of unit quaternions in the state
     rtol: float
     atol: float
-    shortest: float  # s; taken whatever its error
+    shortest: float  # s; a step of this length is accepted whatever its error
     longest: float  # s
     most_steps: int
-    settle: int  # address of a C function that corrects an accepted state in place; or 0
+    settle: int  # address of a C function that corrects an accepted state in place, or 0
 
 
 class Memory(NamedTuple):
-    """Numbers that a run keeps; n is the length of the state."""
+    """Arrays of a run; n is the length of the state."""
 
-    y: np.ndarray  # (n,) the accepted state
-    slopes: np.ndarray  # (STAGES, n)
-    new: np.ndarray  # (n,)
-    errors: np.ndarray  # (2, n)
-    clock: np.ndarray  # time reached, step to be tried, length and error of the last step; 0 before
+    y: np.ndarray  # (n,) accepted state
+    slopes: np.ndarray  # (STAGES, n) rates at the stages
+    new: np.ndarray  # (n,) state at the end of an attempted step
+    errors: np.ndarray  # (2, n) two error estimates
+    # reached time, length of the next step, length and error of the last step (0 before the first)
+    clock: np.ndarray
     counts: np.ndarray  # STEPS, REJECTED, EVALUATIONS
 
 
 def memory(y: np.ndarray) -> Memory:
-    """The memory of a run from a state (n,)."""
+    """Return the arrays of a run that starts from a state (n,)."""
     n = len(y)
     return Memory(
         y.copy(), np.zeros((STAGES, n)), np.zeros(n), np.zeros((2, n)), np.zeros(4), np.zeros(3, np.int64)
@@ -66,13 +69,13 @@ def memory(y: np.ndarray) -> Memory:
 
 @njit(cache=True)
 def is_finite(y):
-    """Whether all numbers are finite, and their sum too."""
+    """Return whether all numbers and their sum are finite."""
     return math.isfinite(np.sum(y))
 
 
 @njit(cache=True)
 def evaluate(system, t, y, rates, memory):
-    """Rates of a state; REACHED, NOT_FINITE, or REFUSED by the function."""
+    """Compute the rates of a state; returns REACHED, NOT_FINITE, or REFUSED if the function fails."""
     memory.counts[EVALUATIONS] += 1
     if not is_finite(y):
         return NOT_FINITE
@@ -83,7 +86,7 @@ def evaluate(system, t, y, rates, memory):
 
 @njit(cache=True)
 def add_slopes(weights, count, factor, slopes, total):
-    """total += factor Σ_s weights[s] slopes[s]; zero weights cost nothing."""
+    """Add factor Σ_s weights[s] slopes[s] to ``total``; zero weights are skipped."""
     for s in range(count):
         if weights[s] != 0.0:
             weight = factor * weights[s]
@@ -93,8 +96,8 @@ def add_slopes(weights, count, factor, slopes, total):
 
 @njit(cache=True)
 def attempt(system, h, memory):
-    """The new state of a step of h into ``memory.new``; its error over the tolerance, -1 where it has
-    none."""
+    """Write the state after a step of h into ``memory.new``; returns its error over the tolerance, or -1 if
+    the step fails."""
     t, y, new, slopes = memory.clock[0], memory.y, memory.new, memory.slopes
     for s in range(1, STAGES):
         new[:] = y
@@ -111,7 +114,7 @@ def attempt(system, h, memory):
 
 @njit(cache=True)
 def is_settled(system, t, memory):
-    """Corrects the new state; whether that was possible."""
+    """Correct the new state by the function ``system.settle``; returns whether that was possible."""
     new, spare = memory.new, memory.errors[0]
     status = rates_of(system.settle, system.context, t, new.ctypes.data, spare.ctypes.data)
     return status == 0 and is_finite(new)
@@ -119,7 +122,7 @@ def is_settled(system, t, memory):
 
 @njit(cache=True)
 def error_ratio(system, h, memory):
-    """The error of a step over the tolerance, from the estimates of orders 5 and 3."""
+    """Return the error of a step over the tolerance, from the estimates of orders 5 and 3."""
     y, new, errors = memory.y, memory.new, memory.errors
     errors[:] = 0.0
     add_slopes(ERROR3, STAGES, 1.0, memory.slopes, errors[0])
@@ -133,7 +136,7 @@ def error_ratio(system, h, memory):
 
 @njit(cache=True)
 def growth(ratio):
-    """Factor of the step after an error over the tolerance."""
+    """Return the factor for the next step length, from the error over the tolerance."""
     if ratio < 0.0:
         return RETRY
     return GROW if ratio == 0.0 else min(GROW, max(SHRINK, SAFETY * ratio ** (-1.0 / ORDER)))
@@ -141,7 +144,7 @@ def growth(ratio):
 
 @njit(cache=True)
 def trend(h, ratio, clock):
-    """The factor, 1 at most, by which the trend of errors shortens the step after one of length h."""
+    """Return the factor, at most 1, by which growing errors shorten the step after one of length h."""
     length, before = clock[2], clock[3]
     clock[2], clock[3] = h, ratio
     if not min(ratio, before) > 0.0:
@@ -151,7 +154,7 @@ def trend(h, ratio, clock):
 
 @njit(cache=True)
 def first_step(system, end, memory):
-    """The first guess of Hairer, Nørsett & Wanner, section II.4, from the sizes of y and y'."""
+    """Return the initial step by Hairer, Nørsett & Wanner, section II.4, from the sizes of y and y'."""
     y, rate = memory.y, memory.slopes[0]
     size, speed = 0.0, 0.0
     for i in range(y.shape[0]):
@@ -162,7 +165,7 @@ def first_step(system, end, memory):
 
 @njit(cache=True)
 def step_within(left, h):
-    """The next step towards a sample: all that is left, its half, or h."""
+    """Return the next step towards a sample: all that is left, its half, or h."""
     if h * (1.0 + STRETCH) >= left:
         return left
     return min(h, 0.5 * left)
@@ -170,7 +173,7 @@ def step_within(left, h):
 
 @njit(cache=True)
 def jump(system, left, memory):
-    """Takes the step, of the shortest and some longer ones, whose error is the least; 0 where all fail."""
+    """Try the shortest and some longer steps and return the length with the least error; 0 if all fail."""
     best, least = 0.0, math.inf
     for k in range(JUMPS):
         h = min(system.shortest * (1.0 + (LONGEST_JUMP - 1.0) * k / (JUMPS - 1)), left)
@@ -185,7 +188,7 @@ def jump(system, left, memory):
 
 @njit(cache=True)
 def accept(system, t, memory):
-    """The new state is the accepted one; its quaternions are normalised."""
+    """Accept the new state and normalise its quaternions."""
     y = memory.y
     y[:] = memory.new
     for start in system.quaternions:
@@ -239,7 +242,8 @@ def advance(system, target, end, memory):
 
 @njit(cache=True)
 def integrate(system, times, samples, memory):
-    """States at the times into the rows of ``samples``; how it ended, and the number of samples reached."""
+    """Write the states at the times into the rows of ``samples``; returns the status and the number of
+    samples reached."""
     for k in range(times.shape[0]):
         status = advance(system, times[k], times[-1], memory)
         if status != REACHED:

@@ -1,5 +1,5 @@
-"""A mechanism that only drivers move, followed from sample to sample in compiled code by a C function that
-meets its closures at a time."""
+"""Compiled kinematics of a fully driven mechanism: a C function satisfies the closures at each time from
+sample to sample."""
 
 from __future__ import annotations
 
@@ -12,18 +12,21 @@ from numba import njit
 from crosscheck.engines.compiled.calls import rates_of
 from crosscheck.engines.compiled.dop853 import EVALUATIONS, NOT_FINITE, REACHED, STEPS, is_finite
 
-NOT_MET = 10  # further status of the way to a sample: closures are not satisfied
-STRETCH = 1e-9  # relative extension of a step that ends at a sample
+NOT_MET = 10  # further status: the closures could not be satisfied at a time
+STRETCH = 1e-9  # relative extension of a step so that it ends at a sample
 
 
 class System(NamedTuple):
-    """``int follow(void *context, double t, double *y, double *numbers)`` moves a state y to time t, and is 0
-    where it could; numbers are a tolerance, the evaluations so far, and the time of y."""
+    """The C function ``int follow(void *context, double t, double *y, double *numbers)``, which moves a state
+    y to time t.
+
+    It returns 0 if it succeeds. ``numbers`` are a tolerance, the count of evaluations, and the time of y.
+    """
 
     function: int
     context: int
     tolerance: float
-    longest: float  # s; of a step
+    longest: float  # s; longest step
 
 
 @njit(cache=True)
@@ -45,7 +48,8 @@ def advance(system, target, memory, numbers):
 
 @njit(cache=True)
 def integrate(system, times, samples, memory):
-    """States at the times into the rows of ``samples``; how it ended, and the number of samples reached."""
+    """Write the states at the times into the rows of ``samples``; returns the status and the number of
+    samples reached."""
     numbers = np.zeros(3)
     numbers[0] = system.tolerance
     for k in range(times.shape[0]):

@@ -1,4 +1,4 @@
-"""A run whose stepping is one call of compiled code, from the first sample to the last."""
+"""A run whose stepping is a single call of compiled code, from the first sample to the last."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 MOST_STEPS = 10**6
-ENDS = {  # status: outcome and sentence
+ENDS = {  # status code → outcome and sentence
     dop853.NOT_FINITE: (Outcome.NOT_FINITE, "the motion is not finite after {t:.6g} s"),
     dop853.TOO_SMALL: (Outcome.STEP_FAILED, "no step after {t:.6g} s is short enough for the tolerance"),
     dop853.TOO_MANY: (Outcome.STEP_FAILED, "{steps} steps have only reached {t:.6g} s"),
@@ -27,7 +27,7 @@ System = dop853.System | newton.System
 
 
 def prepare() -> None:
-    """Compile the steppers, or load them from their cache."""
+    """Compile the integrators, or load them from their cache."""
     places = np.zeros(0, dtype=np.int64)
     for system in (dop853.System(0, 0, places, 1.0, 1.0, 1.0, 1.0, 0, 0), newton.System(0, 0, 1.0, 1.0)):
         _stepped(system, np.zeros(0), np.zeros((0, 2)), dop853.memory(np.zeros(2)))
@@ -43,7 +43,7 @@ def trajectory(
     built: float,
     labels: dict[str, Any],
 ) -> Trajectory:
-    """The trajectory from a state (n,); ``load`` puts a state at its time into the engine's data."""
+    """Return the trajectory from a state (n,); ``load`` puts a state at its time into the engine's data."""
     memory, samples = dop853.memory(y), np.zeros((len(times), len(y)))
     times = np.ascontiguousarray(times, dtype=float)
     start = time.process_time()

@@ -1,4 +1,4 @@
-"""DART as an engine."""
+"""Adapter of DART."""
 
 from crosscheck.engines.dart.adapter import ENGINE
 

@@ -1,7 +1,7 @@
-"""DART: joint coordinates, loops closed by constraints on velocities that are solved as an LCP.
+"""DART: joint coordinates, with loops closed by velocity constraints that an LCP solver satisfies.
 
-DART's step is semi-implicit and of first order.  The error reduction parameter of closures is one number of
-each class of constraint in the process, so that every run sets it.
+DART's step is semi-implicit and of first order. The error reduction parameter of a class of constraints is
+global in the process, so every run sets it.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mbref.trajectory import Trajectory
 
 DEFAULT_STEP = 1e-3  # s
 DEFAULT_ERP, STRONG_ERP = 0.01, 0.5  # fraction of a closure error that a step removes
-FINER = 2  # steps more, each a third of the one before: the method is of first order
+FINER = 2  # number of further, finer steps, each a third of the previous one: the method is of first order
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
     terms.FAMILY: terms.ABOUT,
@@ -36,7 +36,7 @@ FAMILIES = {
 }
 OPTIONS = {
     "step": "time step, s",
-    "erp": "part of a closure error that a step removes",
+    "erp": "fraction of a closure error that a step removes",
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
 }
@@ -58,7 +58,7 @@ class Dart(Engine):
         import dartpy  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse scenes without masses whose motion the drivers do not determine completely."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
@@ -128,7 +128,7 @@ class _World:
         self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s) from time t."""
+        """Take ``count`` steps of length h (s) from time t."""
         self.world.setTimeStep(h)
         for n in range(count):
             for joint, driver in self.driven:
@@ -146,7 +146,7 @@ class _World:
             node.addExtTorque(moment, False)
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         return self.mechanism.motion()
 
 

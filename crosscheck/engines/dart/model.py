@@ -1,4 +1,4 @@
-"""A scene's tree as a DART skeleton: bodies, joints of single freedoms, closures.
+"""A scene's spanning tree as a DART skeleton: bodies, joints of one degree of freedom each, closures.
 
 Every body frame has the link's origin and world-aligned axes at t = 0.
 """
@@ -49,7 +49,7 @@ class Mechanism:
         return found
 
     def _order(self) -> np.ndarray:
-        """DART's index of every velocity of the tree: it has angular before linear velocities."""
+        """Return DART's index of every velocity of the tree; DART has angular before linear velocities."""
         order = np.arange(self.tree.nv)
         for _, iv in self.coordinates.places:
             order[iv : iv + 6] = [*range(iv + 3, iv + 6), *range(iv, iv + 3)]
@@ -75,7 +75,8 @@ class Mechanism:
         return frame
 
     def constraints(self, closure: Closure, as_balls: bool) -> list[Any]:
-        """DART's constraints of a closure; a hinge as two balls on its axis where ``as_balls``."""
+        """Return DART's constraints of a closure; with ``as_balls`` a hinge becomes two ball constraints on
+        its axis."""
         constraint, anchor = self.dart.constraint, closure.anchor
         pair = [self.nodes[k] for k in closure.links if k != GROUND_LINK]
         if closure.kind == "weld":
@@ -87,7 +88,7 @@ class Mechanism:
         return [constraint.RevoluteJointConstraint(*pair, anchor, *[axis] * len(pair))]
 
     def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
-        """DART's terms, velocities in the tree's order."""
+        """Return DART's terms of the equations, with velocities in the tree's order."""
         self._put(q, v)
         skeleton, order = self.skeleton, self.order
         skeleton.setAccelerations(np.zeros(self.tree.nv))
@@ -106,7 +107,7 @@ class Mechanism:
         positions[at.single] = q[at.single_q]
         for iq, iv in at.quaternions:
             positions[iv : iv + 3] = rotation_vector(q[iq : iq + 4])
-        for iq, iv in at.places:  # DART has the rotation vector first
+        for iq, iv in at.places:  # DART's coordinates begin with the rotation vector
             positions[iv : iv + 6] = [*positions[iv + 3 : iv + 6], *q[iq : iq + 3]]
         self.skeleton.setPositions(positions)
         self.skeleton.setVelocities(self._in_order(v))
@@ -116,7 +117,7 @@ class Mechanism:
         return np.array([f.rotation() for f in frames]), np.array([f.translation() for f in frames])
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         single, coordinates = self.coordinates.single, np.zeros(self.tree.nv)
         coordinates[single] = self.skeleton.getPositions()[single]
         linear = np.array([node.getLinearVelocity() for node in self.nodes])

@@ -1,4 +1,4 @@
-"""Drake as an engine."""
+"""Adapter of Drake."""
 
 from crosscheck.engines.drake.adapter import ENGINE
 

@@ -1,8 +1,9 @@
-"""Drake: joint coordinates; loops closed by constraints of the discrete plant, which its SAP solver meets.
+"""Drake: joint coordinates, with loops closed by constraints of the discrete plant, which Drake's SAP solver
+satisfies.
 
-Drake's step is of first order.  Its solver ends the process when a ball constraint leads to the world's body
-(1.51.1, 1.58.0), so that loops are cut between moving links.  A continuous plant takes no constraints; its
-terms are integrated here.
+Drake's step is of first order. Its solver ends the process if a ball constraint connects a body to the world
+(1.51.1, 1.58.0), so loops are cut between moving links. A continuous plant has no constraints. Its terms are
+integrated by crosscheck.
 """
 
 from __future__ import annotations
@@ -29,11 +30,12 @@ from mbref.scene import GROUND, Scene
 from mbref.trajectory import Outcome, Trajectory
 
 DISCRETE = "discrete"
-FINER = 1  # steps more, each a third of the one before: the method is of first order
+FINER = 1  # number of further, finer steps, each a third of the previous one: the method is of first order
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
     terms.FAMILY: terms.ABOUT,
-    DISCRETE: "Drake's discrete plant and SAP solver; cut hinges held by balls, others by welds of ghosts",
+    DISCRETE: "Drake's discrete plant and SAP solver; cut hinges held by balls, all other cut joints "
+    "by welds of split bodies",
 }
 OPTIONS = {
     "step": "time step, s",
@@ -58,12 +60,14 @@ class Drake(Engine):
         from pydrake.multibody import plant, tree  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse scenes without masses whose motion the drivers do not determine completely."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Tolerances, and steps by the angle turned in one; steps where nothing drives, which the discrete
-        plant cannot."""
+        """Return settings by tolerance for the continuous plant, and settings by step for the discrete plant.
+
+        The discrete plant has no drivers, so driven scenes have no settings by step.
+        """
         if scene.driver:
             return terms.sweep(stated_rate(scene))
         rate = scouted_rate(self, scene, DISCRETE)
@@ -73,11 +77,11 @@ class Drake(Engine):
         ]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """The discrete plant prescribes no motion."""
+        """Return whether a family can run a scene; the discrete plant has no drivers."""
         return family == terms.FAMILY or (family == DISCRETE and not scene.driver)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have, or one that does not serve the scene."""
+        """Simulate a scene; raises ValueError for an unknown family or one that cannot run the scene."""
         if setting.family == DISCRETE and scene.driver:
             raise ValueError("Drake's discrete plant prescribes no motion of a joint")
         if setting.family == DISCRETE and (planar := planar_scene(scene)) is not scene:
@@ -93,8 +97,10 @@ def _simulation(scene: Scene, setting: Setting) -> Simulation:
 
 
 def _cut_between_links(scene: Scene) -> Tree:
-    """The tree with no closure to the ground: joints there are kept where others can be cut, and a joint that
-    is cut there nevertheless carries a ghost."""
+    """Return a spanning tree without closures to the ground, since joints at the ground are cut last.
+
+    If such a joint must be cut, it carries a part of the split body.
+    """
     kept = scene.with_(joint=tuple(sorted(scene.joint, key=lambda joint: GROUND not in joint.bodies)))
     tree = spanning_tree(kept, CLOSES)
     if any(GROUND_LINK in closure.links for closure in tree.closures):
@@ -108,7 +114,7 @@ def _cut_between_links(scene: Scene) -> Tree:
 
 
 class _Plant:
-    """A discrete plant; one of each length of step, which is fixed when a plant is made."""
+    """Discrete plants, one for each length of step, which is fixed when a plant is made."""
 
     def __init__(self, scene: Scene, tree: Tree, step: float):
         self.scene, self.tree = scene, tree
@@ -123,7 +129,7 @@ class _Plant:
         return self.plants[key]
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s) from time t."""
+        """Take ``count`` steps of length h (s) from time t."""
         other = self._of(h)
         other.context.SetDiscreteState(self.now.context.get_discrete_state().Clone())
         self.now = other
@@ -153,7 +159,7 @@ class _Plant:
         return Value[list[ExternallyAppliedSpatialForce]](found)
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         return self.now.motion()
 
 

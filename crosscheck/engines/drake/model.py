@@ -1,4 +1,5 @@
-"""A scene's tree as a MultibodyPlant of Drake: bodies, joints of single freedoms, closures.
+"""A scene's spanning tree as a MultibodyPlant of Drake: bodies, joints of one degree of freedom each,
+closures.
 
 Every body frame has the link's origin and world-aligned axes at t = 0.
 """
@@ -21,14 +22,14 @@ from crosscheck.engines.tree_reactions import LinkMotion
 from mbref import rotations
 from mbref.scene import Scene
 
-NEGLIGIBLE = 1e-24  # mass of bodies in chains of joints, of their links
-ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]  # Drake's order of a twist
+NEGLIGIBLE = 1e-24  # mass of auxiliary bodies in chains of joints / mass of the links
+ANGULAR_FIRST = [3, 4, 5, 0, 1, 2]  # order of Drake's components of a twist
 
 
 class Mechanism:
     """A scene in Drake: the ``plant``, its ``context``, and the ``bodies`` of the tree's links.
 
-    A ``time_step`` (s) of 0 is a continuous plant, which takes no closures.
+    With a ``time_step`` of 0 the plant is continuous and has no closures.
     """
 
     def __init__(self, scene: Scene, tree: Tree, time_step: float = 0.0):
@@ -40,7 +41,7 @@ class Mechanism:
         self.coordinates = joint_coordinates(tree, in_child=False)
         self.plant = plant.MultibodyPlant(time_step)
         if time_step:
-            self.plant.SetUseSampledOutputPorts(False)  # the update is then one of discrete states alone
+            self.plant.SetUseSampledOutputPorts(False)  # so that an update computes discrete states only
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
         self.joints: dict[int, Any] = {}  # keyed by first joint velocity of the tree
         self.bodies = self._bodies()
@@ -115,7 +116,7 @@ class Mechanism:
             self.plant.AddBallConstraint(first, point - starts[0], second, point - starts[1])
 
     def _number(self) -> None:
-        """Drake's indices of the tree's positions and velocities."""
+        """Store Drake's indices of the tree's positions and velocities."""
         at, joints = self.coordinates, self.joints
         self.v_index = np.zeros(self.tree.nv, dtype=int)
         for iv, joint in joints.items():
@@ -126,7 +127,7 @@ class Mechanism:
         self.q_ball = [(joints[iv].position_start(), iq) for iq, iv in at.quaternions if iv in joints]
 
     def put(self, q: np.ndarray, v: np.ndarray) -> None:
-        """Sets the state to positions and velocities of the tree."""
+        """Set the state to positions and velocities of the tree."""
         found, rates = np.zeros(self.plant.num_positions()), np.empty_like(v)
         found[self.q_single] = q[self.coordinates.single_q]
         for start, iq in self.q_ball:
@@ -139,7 +140,7 @@ class Mechanism:
         self.plant.SetVelocities(self.context, rates)
 
     def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Drake's terms, velocities in the tree's order."""
+        """Return Drake's terms of the equations, with velocities in the tree's order."""
         self.put(q, v)
         plant, context, world = self.plant, self.context, self.plant.world_frame()
         by_v, at = self.parts.JacobianWrtVariable.kV, self.v_index
@@ -159,7 +160,7 @@ class Mechanism:
         return np.array([f.rotation().matrix() for f in frames]), np.array([f.translation() for f in frames])
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         plant, context, coordinates = self.plant, self.context, np.zeros(self.tree.nv)
         twists = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in self.bodies]
         linear, angular = (

@@ -1,4 +1,4 @@
-"""Exudyn as an engine."""
+"""Adapter of Exudyn."""
 
 from crosscheck.engines.exudyn.adapter import ENGINE
 

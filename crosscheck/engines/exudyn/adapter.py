@@ -1,4 +1,5 @@
-"""Exudyn: rigid bodies with Euler parameters, implicit solvers with multipliers, static driven kinematics."""
+"""Exudyn: rigid bodies with Euler parameters, implicit solvers with Lagrange multipliers, and static analysis
+of driven mechanisms."""
 
 from __future__ import annotations
 
@@ -27,13 +28,13 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
-STEPS = (100, 400, 1600, 6400, 25600)  # over a scene's duration
+STEPS = (100, 400, 1600, 6400, 25600)  # numbers of steps over a scene's duration
 TUNED_STEPS = (0.4, 0.15, 0.05, 0.015, 0.006)  # rad turned per step
 MOST_TUNED = 25600  # steps over a scene's duration
 STATIC_STEPS = (100, 400, 1600)
-SHORTEST = 5e-6  # s; below, the full-pivoting solver loses rows of the scaled Newton matrix
+SHORTEST = 5e-6  # s; for shorter steps the full-pivoting solver loses rows of the scaled Newton matrix
 SPECTRAL_RADIUS = 0.9
-SCOUT = (250, 2000)  # steps of the coarse run that finds how fast a scene turns
+SCOUT = (250, 2000)  # numbers of steps of the coarse run that measures the scene's fastest rate
 SCOUT_SAMPLES = 26
 FAMILIES = {
     "defaults": "SolveDynamic with its default settings",
@@ -81,7 +82,7 @@ class Exudyn(Engine):
         return found
 
     def _tuned_steps(self, scene: Scene) -> list[float]:
-        """Steps (s) of the extrapolated family, by the angle turned in one."""
+        """Return steps (s) of the extrapolated family, chosen by the angle that a body turns in one step."""
         rate = fastest_rate(scene, lambda step: self._coarse(scene, step), SCOUT)
         shortest = max(SHORTEST * max(RICHARDSON), scene.duration / MOST_TUNED)
         return sorted({max(float(f"{angle / rate:.2g}"), shortest) for angle in TUNED_STEPS}, reverse=True)
@@ -145,7 +146,7 @@ class Exudyn(Engine):
 
 
 def _exudyn() -> Any:
-    """The module with its item classes; no user file is read, nothing is printed."""
+    """Return the exudyn module and its item classes; no user file is read, nothing is printed."""
     os.environ["EXUDYN_NO_USER_SETTINGS"] = "1"
     import exudyn
     import exudyn.itemInterface
@@ -157,7 +158,7 @@ def _exudyn() -> Any:
 
 @contextlib.contextmanager
 def _warnings(exu: Any) -> Iterator[list[str]]:
-    """Collects the different warnings that Exudyn prints while the block runs."""
+    """Collect the distinct warnings that Exudyn prints while the ``with`` block runs."""
     found: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         printed = Path(folder) / "printed"
@@ -171,7 +172,7 @@ def _warnings(exu: Any) -> Iterator[list[str]]:
 
 
 def _defaults(exu: Any, settings: Any, singular: bool) -> Any:
-    """The solver's settings as a user finds them."""
+    """Configure the solver with the library's defaults."""
     return exu.DynamicSolverType.GeneralizedAlpha
 
 
@@ -183,7 +184,8 @@ def _trapezoidal(exu: Any, settings: Any, singular: bool) -> Any:
 
 
 def _alpha(exu: Any, settings: Any, singular: bool) -> Any:
-    """Looser Newton tolerances than the trapezoidal rule's: only so it passes singular positions."""
+    """Configure the generalised-α solver with looser Newton tolerances, without which it fails at singular
+    positions."""
     settings.timeIntegration.newton.relativeTolerance = 1e-6
     settings.timeIntegration.newton.absoluteTolerance = 1e-8
     settings.timeIntegration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
@@ -195,7 +197,7 @@ DYNAMIC = {"defaults": _defaults, "trapezoidal": _trapezoidal, "alpha": _alpha}
 
 
 def _plain(exu: Any, settings: Any, singular: bool) -> None:
-    """Fixed steps, and full pivoting that ignores zero pivots where the constraints are redundant."""
+    """Configure fixed steps, and full pivoting that ignores zero pivots if the constraints are redundant."""
     settings.timeIntegration.adaptiveStep = False
     if singular:
         settings.linearSolver.solverType = exu.LinearSolverType.EigenDense
@@ -208,7 +210,7 @@ def _sweep(family: str, scene: Scene, counts: Sequence[int], shortest: float) ->
 
 
 def _fully_driven(scene: Scene) -> bool:
-    """Whether joints and drivers leave no freedom in the assembled configuration."""
+    """Return whether joints and drivers leave no degree of freedom in the assembled configuration."""
     if not scene.driver:
         return False
     matrix, _ = jacobian(scene, 0.0, *initial_poses(scene))
@@ -216,7 +218,7 @@ def _fully_driven(scene: Scene) -> bool:
 
 
 def _accelerates(driver: Driver) -> bool:
-    """Whether a driver's rate changes; Exudyn's initial accelerations leave that out."""
+    """Return whether a driver's rate changes; Exudyn's initial accelerations ignore that."""
     return any(driver.polynomial[2:]) or bool(driver.sine and driver.sine.amplitude)
 
 
@@ -225,7 +227,8 @@ def _normalised(p: np.ndarray) -> np.ndarray:
 
 
 def _angular(p: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """World angular velocity (…, 3) of Euler parameters and their rates, or acceleration of second rates."""
+    """Return the world angular velocity (…, 3) from Euler parameters and their rates, or the acceleration
+    from second rates."""
     product = rotations.multiply(rates, rotations.conjugate(p))
     return 2 * product[..., 1:] / np.sum(p * p, axis=-1, keepdims=True)
 

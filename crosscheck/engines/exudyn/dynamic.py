@@ -1,4 +1,4 @@
-"""Exudyn's implicit solvers over the sample times.
+"""Runs of Exudyn's implicit solvers from sample to sample.
 
 The functions take the exudyn module and do not import it.
 """
@@ -18,7 +18,7 @@ from crosscheck.engines.exudyn.model import System, build
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome
 
-SAME = 1e-12  # fraction of the end time: nearer sample times are equal
+SAME = 1e-12  # fraction of the end time: sample times nearer to each other count as equal
 
 Configure = Callable[[Any, Any, bool], Any]  # (exudyn, simulation settings, singular) -> solver type
 
@@ -27,7 +27,7 @@ Samples = tuple[np.ndarray, np.ndarray, np.ndarray]  # times (k,), coordinates (
 
 
 class State(NamedTuple):
-    """Initial values of a system at time t (s): node coordinates (nb * 7,), their rates, data coordinates."""
+    """State of a system at time t (s): node coordinates (nb * 7,), their rates, and data coordinates."""
 
     t: float
     coordinates: np.ndarray
@@ -36,7 +36,7 @@ class State(NamedTuple):
 
 
 class Ending(NamedTuple):
-    """The time t (s) at which a solver stopped, the outcome, and a sentence."""
+    """End of a solver's run: the time t (s), the outcome, and a sentence."""
 
     t: float
     outcome: Outcome
@@ -45,7 +45,7 @@ class Ending(NamedTuple):
 
 @dataclass(frozen=True)
 class Motion:
-    """Node coordinates (3, k, nb, 7) at times (k,): values, rates, second rates; and how it ended.
+    """Node coordinates (3, k, nb, 7) at times (k,): values, rates, second rates; and how the run ended.
 
     ``forces`` (k, ·) are the outputs of the joints' sensors, None where there are none.
     """
@@ -54,14 +54,13 @@ class Motion:
     coordinates: np.ndarray
     forces: np.ndarray | None
     cost: Cost
-    t_end: float  # the last time the solver accepted
+    t_end: float  # last time that the solver accepted
     outcome: Outcome = Outcome.COMPLETED
     message: str = ""
 
 
 class Solver:
-    """An Exudyn system moved on in time by Exudyn's implicit solvers; ``now`` (s) is the time of its
-    initial values."""
+    """An Exudyn system and its implicit solvers; ``now`` (s) is the time of the present state."""
 
     def __init__(self, exu: Any, scene: Scene):
         clock = time.process_time()
@@ -74,7 +73,8 @@ class Solver:
     def run(
         self, times: np.ndarray, steps: Callable[[float], int], configure: Configure
     ) -> tuple[Samples, Ending | None]:
-        """Samples at increasing ``times`` (k,) s, none before ``now``; fewer, and why, where it stops.
+        """Return samples at increasing ``times`` (k,) s, none before ``now``; fewer samples and the reason if
+        the solver stops.
 
         Sample intervals are filled with ``steps(interval)`` equal steps; ``configure`` chooses the solver.
         """
@@ -98,18 +98,18 @@ class Solver:
         return _join(times, pieces, complete=ending is None), ending
 
     def cost(self) -> Cost:
-        """The cost of building and of all runs so far."""
+        """Return the cost of building the system and of all runs so far."""
         steps, factorisations, newton = map(int, self.counts)
         return Cost(self.seconds, self.built, steps=steps, factorisations=factorisations, newton=newton)
 
     def state(self) -> State:
-        """The initial values."""
+        """Return the present state."""
         data, initial = self.system.mbs.systemData, self.exu.ConfigurationType.Initial
         reads = (data.GetODE2Coordinates, data.GetODE2Coordinates_t, data.GetDataCoordinates)
         return State(self.now, *(np.array(read(configuration=initial)) for read in reads))
 
     def put(self, state: State) -> None:
-        """Makes ``state`` the initial values."""
+        """Set the present state."""
         data, initial = self.system.mbs.systemData, self.exu.ConfigurationType.Initial
         data.SetODE2Coordinates(state.coordinates, configuration=initial)
         data.SetODE2Coordinates_t(state.rates, configuration=initial)
@@ -119,7 +119,7 @@ class Solver:
 
 
 def integrate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
-    """One run with equal time steps of at most ``step`` (s) that fill the sample intervals."""
+    """Return one run with equal time steps of at most ``step`` (s) that fill the sample intervals."""
     solver = Solver(exu, scene)
     samples, ending = solver.run(times, lambda interval: step_count(interval, step), configure)
     ended = (ending.outcome, ending.message) if ending else ()
@@ -127,7 +127,7 @@ def integrate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure:
 
 
 def finite(motion: Motion) -> Motion:
-    """The motion, up to the first sample that is not finite."""
+    """Return the motion up to the first sample that is not finite."""
     good = np.isfinite(motion.coordinates).all(axis=(0, 2, 3))
     if good.all():
         return motion
@@ -145,12 +145,13 @@ def finite(motion: Motion) -> Motion:
 
 
 def said(failure: Exception) -> str:
-    """The text of an Exudyn exception, on one line."""
+    """Return the text of an Exudyn exception on one line."""
     return " ".join(re.sub(r"\[Python file .*?\]", "", str(failure)).split())
 
 
 def stretches(times: np.ndarray, begin: float = 0.0) -> Iterator[tuple[float, float, int]]:
-    """(start, end, intervals) of the stretches of equally spaced samples, from ``begin`` (s) to the last."""
+    """Return (start, end, number of intervals) of the stretches of equally spaced samples, from ``begin`` (s)
+    to the last."""
     points = np.concatenate([[begin], times[times > begin]])
     tolerance = SAME * points[-1]
     first = 0
@@ -164,12 +165,12 @@ def stretches(times: np.ndarray, begin: float = 0.0) -> Iterator[tuple[float, fl
 
 
 def step_count(interval: float, step: float) -> int:
-    """Equal steps of at most ``step`` that fill an interval."""
+    """Return the number of equal steps of at most ``step`` that fill an interval."""
     return max(1, math.ceil(interval / step * (1 - 1e-9)))
 
 
 def _cover(settings: Any, start: float, end: float, intervals: int, steps: int) -> None:
-    """Equal intervals between samples, each of so many steps."""
+    """Set equal intervals between samples, each with the given number of steps."""
     settings.timeIntegration.startTime = start
     settings.timeIntegration.endTime = end
     settings.timeIntegration.numberOfSteps = intervals * steps
@@ -178,14 +179,14 @@ def _cover(settings: Any, start: float, end: float, intervals: int, steps: int) 
 
 
 def _accepted(system: System) -> float:
-    """The time (s) of the last step that the solver accepted."""
+    """Return the time (s) of the last step that the solver accepted."""
     it = system.mbs.sys["dynamicSolver"].it
     done = system.mbs.sys["dynamicSolver"].output.finishedSuccessfully
     return float(it.currentTime if done else it.currentTime - it.currentStepSize)
 
 
 def _failure(system: System, failure: Exception) -> Ending:
-    """The outcome of a failed solve, from the solver's own flags."""
+    """Return the outcome of a failed run, from the solver's own flags."""
     solver = system.mbs.sys["dynamicSolver"]
     t, flags = solver.it.currentTime, solver.conv
     if "not factorized" in str(failure) or flags.linearSolverFailed or flags.massMatrixNotInvertible:
@@ -197,13 +198,13 @@ def _failure(system: System, failure: Exception) -> Ending:
 
 
 def _counts(system: System) -> np.ndarray:
-    """Steps, Jacobian factorisations and Newton iterations of the last run."""
+    """Return steps, Jacobian factorisations and Newton iterations of the last run."""
     it = system.mbs.sys["dynamicSolver"].it
     return np.array([it.currentStepIndex - 1, it.newtonJacobiCount, it.newtonStepsCount])
 
 
 def _join(times: np.ndarray, pieces: Sequence[Samples], complete: bool) -> Samples:
-    """The wanted samples out of the records of the stretches, each of which repeats its start."""
+    """Return the wanted samples from the records of the stretches, each of which repeats its start."""
     recorded, values, forces = (
         np.concatenate([part if n == 0 else np.delete(part, 0, axis) for n, part in enumerate(parts)], axis)
         for axis, parts in zip((0, 1, 0), zip(*pieces, strict=True), strict=True)
@@ -219,7 +220,8 @@ def _join(times: np.ndarray, pieces: Sequence[Samples], complete: bool) -> Sampl
 
 
 def _moved(values: np.ndarray, dt: np.ndarray) -> np.ndarray:
-    """Samples taken to the wanted times with the recorded rates; halved steps may pass a sample time."""
+    """Return samples moved to the wanted times with the recorded rates; halved steps may miss a sample
+    time."""
     dt = dt[:, None, None]
     q, v, a = values
     return np.array([q + dt * v + dt**2 / 2 * a, v + dt * a, a])

@@ -1,10 +1,10 @@
 """Richardson's extrapolation of Exudyn's runs to h = 0, restarted after singular positions.
 
 The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end
-at regular positions; a step that ends beside a singular one fails.  Where a run fails, all runs are taken up
-to a window about the failure, which is crossed by extrapolation of the states, and start again behind it.
-All numbers of steps are even: the multipliers have an error that changes its sign from step to step.
-The functions take the exudyn module and do not import it.
+at regular positions; a step that ends near a singular one fails. If a run fails, all runs stop before a
+window around the failure. The states are extrapolated across the window, and the runs restart after it. All
+numbers of steps are even: the multipliers have an error that changes its sign from step to step. The
+functions take the exudyn module and do not import it.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ from mbref.scene import Scene
 from mbref.trajectory import Cost
 
 RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight; cancels h² and h⁴
-BEFORE, BEHIND = 2.0, 2.0  # steps from the failure to the ends of the window that is crossed
-NODES = 12  # states that the extrapolation across the window takes
+BEFORE, BEHIND = 2.0, 2.0  # distances of the ends of the window from the failure, in steps
+NODES = 12  # number of states before the window from which the states after it are extrapolated
 BESIDE = 0.05  # fraction of the node spacing: a node nearer to a sample is moved to it
-APART = 6.0  # steps between them, where the last crossing does not end nearer
+APART = 6.0  # distance between two states, in steps, unless the last crossing ends nearer
 
 
 def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
@@ -47,8 +47,7 @@ def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configur
 
 
 class _ExtrapolatedRuns:
-    """Three solvers, finest first as it is the first to fail; all start from the same, extrapolated
-    ``state``."""
+    """Three runs, finest first since it is the first to fail; all start from the extrapolated ``state``."""
 
     def __init__(self, exu: Any, scene: Scene, step: float, configure: Configure):
         self.scene, self.step, self.configure = scene, step, configure
@@ -57,7 +56,7 @@ class _ExtrapolatedRuns:
         self.pieces: list[Samples] = []
 
     def through(self, times: np.ndarray) -> Motion:
-        """The motion at ``times``, or as far as it got."""
+        """Return the motion at ``times``, or as far as the runs got."""
         ending = None
         while times.size and (ending := self.advance(times, times)[1]):
             if (nodes := self.approach(times, ending)) is None:
@@ -67,8 +66,10 @@ class _ExtrapolatedRuns:
         return self.motion(ending)
 
     def approach(self, times: np.ndarray, ending: Ending) -> Samples | None:
-        """Takes the samples up to the window about the first failure, and returns the nodes before it; None
-        where there is no room for them: then the failure is no passing one."""
+        """Take the samples up to the window around the first failure; returns the nodes before it.
+
+        The result is None without room for the nodes: then the failure is not due to a singular position.
+        """
         while True:
             start = ending.t - BEFORE * self.step
             spacing = min(APART * self.step, (start - self.state.t) / NODES)
@@ -81,14 +82,16 @@ class _ExtrapolatedRuns:
             ending = earlier
 
     def advance(self, to: np.ndarray, times: np.ndarray) -> tuple[Samples, Ending | None]:
-        """Samples at ``to``, of which those at ``times`` are kept; where a run fails nothing has changed, and
-        the samples belong to the run that failed."""
+        """Take samples at ``to``, and keep those at ``times``.
+
+        If a run fails, nothing changes and the samples of the failed run are returned.
+        """
         runs = []
         for solver, divisor in zip(self.solvers, RICHARDSON, strict=True):
             solver.put(self.state)
             run, ending = solver.run(to, partial(_even_steps, self.step, divisor), self.configure)
             if ending:
-                self.pieces.append(_at(run, times[:0]))  # shows the sizes
+                self.pieces.append(_at(run, times[:0]))  # defines the sizes of the arrays
                 return run, ending
             runs.append(run)
         found = (to, _limit([run[1] for run in runs]), _limit([run[2] for run in runs]))
@@ -97,20 +100,20 @@ class _ExtrapolatedRuns:
         return found, None
 
     def cross(self, times: np.ndarray, nodes: Samples, end: float) -> None:
-        """Crosses the window to ``end`` (s), with the samples on the way."""
+        """Cross the window to ``end`` (s), and take the samples inside it."""
         within = times[(times > self.state.t) & (times < end)]
         landed = extrapolated_states(self.scene, nodes, np.append(within, end))
         self.pieces.append(_at(landed, times))
         self.arrive(landed)
 
     def arrive(self, samples: Samples) -> None:
-        """Makes the last of the samples the present state."""
+        """Make the last of the samples the present state."""
         times, values, _ = samples
         data = self.solvers[-1].state().data  # the data variables only count turns
         self.state = State(float(times[-1]), values[0, -1].ravel(), values[1, -1].ravel(), data)
 
     def motion(self, ending: Ending | None) -> Motion:
-        """The samples so far, with the outcome of the run that ended early."""
+        """Return the samples so far, with the outcome of the run that ended early."""
         costs = [solver.cost() for solver in self.solvers]
         cost = Cost(*(sum(getattr(c, item.name) for c in costs) for item in fields(Cost)))
         times, coordinates, forces = (
@@ -122,18 +125,19 @@ class _ExtrapolatedRuns:
 
 
 def _even_steps(step: float, divisor: int, interval: float) -> int:
-    """An even number of steps, none longer than ``step`` (s) over the divisor, that fill an interval (s)."""
+    """Return an even number of steps that fill an interval (s), none longer than ``step`` (s) over the
+    divisor."""
     return 2 * divisor * step_count(interval, 2 * step)
 
 
 def _limit(results: Sequence[np.ndarray]) -> np.ndarray:
-    """Richardson's limit h → 0 of an array's values by the runs with the divisors of RICHARDSON."""
+    """Return Richardson's limit h → 0 of arrays from the runs with the divisors of RICHARDSON."""
     weighted = [weight * result for weight, result in zip(RICHARDSON.values(), results, strict=True)]
     return np.sum(weighted, axis=0)
 
 
 def _onto(times: np.ndarray, nodes: np.ndarray, spacing: float) -> np.ndarray:
-    """The nodes, where one is next to a sample time that very time."""
+    """Return the nodes; a node next to a sample time is moved to that time."""
     nearest = times[np.abs(times[:, None] - nodes).argmin(axis=0)]
     return np.where(np.abs(nearest - nodes) < BESIDE * spacing, nearest, nodes)
 

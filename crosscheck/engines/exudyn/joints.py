@@ -54,9 +54,9 @@ SUPPORTS = Supports(
 
 
 def marker_frame(joint: Joint) -> np.ndarray:
-    """World axes (columns) at t = 0 of a joint's markers, one of them along the joint's axis.
+    """Return the world axes (columns) at t = 0 of a joint's markers, one of them along the joint's axis.
 
-    A universal joint has x along the axis on the first body and y along the one on the second.
+    A universal joint has x along the axis on the first body and y along the axis on the second.
     """
     if not joint.directions:
         return np.eye(3)

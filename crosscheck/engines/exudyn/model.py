@@ -2,8 +2,8 @@
 
 Body frames are parallel to the world in the assembled configuration (the inertia is rotated instead):
 a relative rotation marker measures the angle between body frames, and must read zero at the start.
-The joint's special classes are preferred to the generic one, whose rows for free axes upset the rank
-of the scaled Newton matrix at small steps.  The functions take the exudyn module and do not import it.
+Special joint classes are preferred to Exudyn's generic joint, whose rows for free axes make the scaled Newton
+matrix ill-conditioned at small steps.  The functions take the exudyn module and do not import it.
 """
 
 from __future__ import annotations
@@ -29,14 +29,15 @@ class System:
 
     mbs: Any
     nodes: list[int]
-    sensors: list[list[int]]  # per node: coordinates (7), their rates and second rates
-    drivers: list[int]  # objects of the driver constraints
-    joint_sensors: list[int]  # joint by joint: the outputs of JOINTS; then forces of drivers and couplings
-    redundant: int  # redundant constraints in the assembled configuration
+    sensors: list[list[int]]  # sensors of each node: coordinates (7), their rates and second rates
+    drivers: list[int]  # object numbers of the driver constraints
+    # sensors of the outputs of JOINTS for each joint; then of the forces of drivers and couplings
+    joint_sensors: list[int]
+    redundant: int  # number of redundant constraints in the assembled configuration
 
     def samples(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The records of the last run: times (k,), node coordinates (3, k, nb, 7) - values, rates, second
-        rates -, and the outputs (k, ·) of the joints' sensors side by side."""
+        """Return the records of the last run: times (k,), node coordinates (3, k, nb, 7) as values, rates and
+        second rates, and the outputs (k, ·) of the joints' sensors side by side."""
         rows = np.array([[self.mbs.GetSensorStoredData(s) for s in node] for node in self.sensors])
         times = rows[0, 0, :, 0]
         outputs = [self.mbs.GetSensorStoredData(s)[:, 1:] for s in self.joint_sensors]
@@ -45,7 +46,7 @@ class System:
 
 
 def build(exu: Any, scene: Scene, forces: bool) -> System:
-    """The scene's system at t = 0; without ``forces`` it has no mass, no load and no velocity."""
+    """Return the scene's system at t = 0; without ``forces`` it has no mass, load or velocity."""
     items = exu.itemInterface
     container = exu.SystemContainer()
     mbs = container.AddSystem()
@@ -70,7 +71,7 @@ def build(exu: Any, scene: Scene, forces: bool) -> System:
 
 
 class _Parts:
-    """Adds items to one system; ``number`` gives the object of a body's name."""
+    """Adds items to a system; ``number`` maps a body's name to its object."""
 
     def __init__(self, exu: Any, items: Any, scene: Scene, mbs: Any, ground: int):
         self.exu, self.items, self.scene, self.mbs = exu, items, scene, mbs
@@ -100,7 +101,7 @@ class _Parts:
         self.mbs.AddLoad(self.items.LoadMassProportional(markerNumber=marker, loadVector=self.scene.gravity))
 
     def marker(self, body: str, point: Any, frame: np.ndarray | None = None) -> int:
-        """A marker on a body at a world point, its frame's columns the world axes given."""
+        """Return a marker on a body at a world point; the columns of its frame are the given world axes."""
         frame = np.eye(3) if frame is None else frame
         local = self.exu.HT(rotation=frame, translation=np.asarray(point) - self.position[body])
         return self.mbs.AddMarker(self.items.MarkerBodyRigid(bodyNumber=self.number[body], localHT=local))
@@ -117,7 +118,7 @@ class _Parts:
         return self.mbs.AddObject(getattr(self.items, item.name)(markerNumbers=markers, **given))
 
     def sensor(self, number: int, output: str) -> int:
-        """A sensor of an output variable of a joint or constraint."""
+        """Return a sensor of an output variable of a joint or constraint."""
         kind = getattr(self.exu.OutputVariableType, output)
         sensor = self.items.SensorObject(
             objectNumber=number, outputVariableType=kind, storeInternal=True, writeToFile=False
@@ -125,7 +126,7 @@ class _Parts:
         return self.mbs.AddSensor(sensor)
 
     def driver(self, driver: Driver) -> int:
-        """A coordinate constraint: relative coordinate of the joint's bodies = the driver's value."""
+        """Add a coordinate constraint: relative coordinate of the joint's bodies = the driver's value."""
         fixed = self.mbs.AddNode(self.items.NodePointGround())
         markers = [self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))]
         joint = self.scene.joint_named(driver.joint)
@@ -140,7 +141,7 @@ class _Parts:
         return self.mbs.AddObject(constraint)
 
     def coupling(self, coupling: Coupling) -> int:
-        """A coordinate constraint, ratio · q₁ - q₂ = 0, of relative coordinates of the joints' bodies."""
+        """Add a coordinate constraint, ratio · q₁ - q₂ = 0, of relative coordinates of the joints' bodies."""
         first, second = (
             self._rotation(joint) if kind == "angle" else self._translation(joint)
             for joint, kind in self.scene.coupled(coupling)
@@ -161,7 +162,7 @@ class _Parts:
         }
 
     def _turns(self) -> int:
-        """A data node in which a relative angle is continued beyond half a turn."""
+        """Return a data node with which a relative angle continues beyond half a turn."""
         return self.mbs.AddNode(self.items.NodeGenericData(initialCoordinates=[0], numberOfDataCoordinates=1))
 
     def _rotation(self, joint: Joint) -> int:
@@ -221,7 +222,7 @@ class _Parts:
 
 
 def _world_inertia(body: Any) -> np.ndarray:
-    """xx, yy, zz, yz, xz, xy of the inertia along the world axes at t = 0."""
+    """Return xx, yy, zz, yz, xz, xy of the inertia along the world axes at t = 0."""
     local = np.array(body.inertia)
     turn = rotations.to_matrix(np.array(body.orientation))
     j = turn @ (np.diag(local) if local.ndim == 1 else local) @ turn.T

@@ -1,8 +1,8 @@
-"""Joint reactions from Exudyn's sensors, which give raw multipliers of each joint's rotation constraints.
+"""Joint reactions from Exudyn's sensors, which record multipliers of each joint's rotation constraints.
 
-The force of a joint in Exudyn acts on the first body, in the first marker's frame; the components of its
+The force of a joint in Exudyn acts on the first body, in the first marker's frame. The components of its
 torque are multipliers of constraints a·b = 0 between an axis a of the first marker's frame and an axis b of
-the second's.  Such a constraint puts the moment multiplier × (a × b) on the second body.
+the second's. Such a constraint exerts the moment multiplier × (a × b) on the second body.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mbref.scene import GROUND, Joint, Scene
 def reactions(
     scene: Scene, moved: np.ndarray, turned: np.ndarray, forces: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Force and moment (k, 6), world, on each joint's second body at the anchor on that body.
+    """Return force and moment (k, 6), world, on each joint's second body at the anchor on that body.
 
     ``moved`` (k, nb, 3) and ``turned`` (k, nb, 4) are the bodies' displacements and rotations since
     t = 0; ``forces`` (k, ·) the outputs of each joint in JOINTS, then the force of each driver and coupling.
@@ -53,7 +53,8 @@ def _wrench(
     turn: np.ndarray,
     outputs: list[np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Force and moment (k, 3) of the joint without its driver; ``axes`` are its frames (k, 3, 3)."""
+    """Return force and moment (k, 3) of the joint without its driver; ``axes`` are the joint's frames (k, 3,
+    3)."""
     force, *torque = outputs
     moment = np.zeros((len(turn), 3))
     if joint.facts.condition == "constant distance":
@@ -70,7 +71,7 @@ def _wrench(
 
 
 def _turn(scene: Scene, body: str, turn: np.ndarray) -> np.ndarray:
-    """Rotation matrices (k, 3, 3) of a body, or the ground, since t = 0."""
+    """Return the rotation matrices (k, 3, 3) of a body, or the ground, since t = 0."""
     return (
         np.broadcast_to(np.eye(3), (len(turn), 3, 3)) if body == GROUND else turn[:, scene.body_index(body)]
     )
@@ -79,7 +80,7 @@ def _turn(scene: Scene, body: str, turn: np.ndarray) -> np.ndarray:
 def _point(
     scene: Scene, body: str, point: tuple[float, ...], moved: np.ndarray, turn: np.ndarray
 ) -> np.ndarray:
-    """World positions (k, 3) of a point of a body, given at t = 0."""
+    """Return the world positions (k, 3) of a point of a body, given at t = 0."""
     if body == GROUND:
         return np.broadcast_to(point, (len(turn), 3))
     k = scene.body_index(body)

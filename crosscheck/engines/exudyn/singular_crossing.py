@@ -12,18 +12,20 @@ from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import Scene
 
-CLOSED = 1e-15  # m and rad, where a projection ends
+CLOSED = 1e-15  # m and rad; residual at which a projection ends
 ITERATIONS = 8  # Newton iterations at most; two are usual
-UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # Euler parameters of a node that has not turned
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # Euler parameters of an unrotated node
 
 
 def extrapolated_states(scene: Scene, nodes: Samples, times: np.ndarray) -> Samples:
-    """Samples at ``times`` (k,) beyond those at the nodes, extrapolated by one polynomial through all of
-    them; coordinates and rates are then the nearest that satisfy the judge's joint equations."""
+    """Return samples at ``times`` (k,) after the nodes, extrapolated by one polynomial through all nodes.
+
+    Coordinates and rates are then moved to the nearest ones that satisfy the judge's joint equations.
+    """
     known, values, forces = nodes
     unit = np.ptp(known)
     at, wanted = (known - known[-1]) / unit, (times - known[-1]) / unit
-    weights = _weights(at)  # SciPy's own are rounded in a random order
+    weights = _weights(at)  # SciPy's own weights are rounded in a random order
     values = BarycentricInterpolator(at, values, axis=1, wi=weights)(wanted)
     forces = BarycentricInterpolator(at, forces, wi=weights)(wanted)
     for k, t in enumerate(times):
@@ -32,7 +34,7 @@ def extrapolated_states(scene: Scene, nodes: Samples, times: np.ndarray) -> Samp
 
 
 def _weights(at: np.ndarray) -> np.ndarray:
-    """Barycentric weights 1 / Π (tᵢ - tⱼ) of nodes (n,)."""
+    """Return the barycentric weights 1 / Π (tᵢ - tⱼ) of nodes (n,)."""
     apart = at[:, None] - at
     np.fill_diagonal(apart, 1.0)
     return 1 / np.prod(apart, axis=1)
@@ -41,7 +43,7 @@ def _weights(at: np.ndarray) -> np.ndarray:
 def projected(
     scene: Scene, t: float, coordinates: np.ndarray, rates: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The nearest node coordinates and rates (nb, 7) that satisfy joints and drivers at time t (s)."""
+    """Return the nearest node coordinates and rates (nb, 7) that satisfy joints and drivers at time t (s)."""
     start, orientation = initial_poses(scene)
     position, turn = start + coordinates[:, :3], coordinates[:, 3:] + UPRIGHT
     turn = turn / np.linalg.norm(turn, axis=1, keepdims=True)
@@ -50,7 +52,7 @@ def projected(
         residual = np.concatenate(list(closure(scene, t, *pose).values()))
         if np.abs(residual).max(initial=0.0) < CLOSED:
             break
-        rows = jacobian(scene, t, *pose)[0][: len(residual)]  # without couplings, which stand last
+        rows = jacobian(scene, t, *pose)[0][: len(residual)]  # without couplings, which are the last rows
         moved = _least(scene, pose[1], rows, -residual)
         position = position + moved[:, :3]
         turn = rotations.multiply(rotations.from_vector(moved[:, 3:]), turn)
@@ -65,8 +67,11 @@ def projected(
 
 
 def _least(scene: Scene, orientation: np.ndarray, rows: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The change (nb, 6) of the bodies' twists with these values of the rows and the least kinetic energy:
-    the noise of a light body is not handed on to a heavy one."""
+    """Return the change (nb, 6) of the bodies' twists of least kinetic energy for which the rows have the
+    wanted values.
+
+    With this metric the noise of a light body does not move a heavy one.
+    """
     root = np.zeros((len(scene.body), 6, 6))  # square root of M⁻¹, one block for each body
     masses = np.array([body.mass for body in scene.body], dtype=float)
     for k, (mass, inertia) in enumerate(zip(masses, inertia_matrices(scene), strict=True)):

@@ -1,8 +1,8 @@
 """Exudyn's static solver as kinematic analysis: poses of a fully driven mechanism, one after another.
 
-No mass and no force takes part.  Velocities come from Exudyn's own constraint Jacobian, whose rank also
-shows when a pose is singular: there the solver may jump to another branch without a word.
-The functions take the exudyn module and do not import it.
+Masses and forces have no influence. Velocities come from Exudyn's own constraint Jacobian. Its rank shows
+whether a pose is singular: there the solver may change to another branch without a message. The functions
+take the exudyn module and do not import it.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ JUMP = 0.5  # relative deviation from the trapezoidal rule above which a step ha
 
 
 class Stopped(Exception):
-    """The analysis cannot go on; ``outcome`` and a sentence say why."""
+    """The analysis cannot continue; ``outcome`` and a sentence give the reason."""
 
     def __init__(self, outcome: Outcome, message: str):
         self.outcome = outcome
@@ -31,7 +31,7 @@ class Stopped(Exception):
 
 
 class Drive:
-    """A mechanism being moved along its drivers; ``state`` (2, nb * 7) holds coordinates and rates."""
+    """A mechanism that is moved along its drivers; ``state`` (2, nb * 7) has coordinates and rates."""
 
     def __init__(self, exu: Any, scene: Scene):
         self.exu, self.scene = exu, scene
@@ -40,7 +40,7 @@ class Drive:
         self.state = np.zeros((2, 7 * len(scene.body)))
 
     def start(self) -> None:
-        """The rates at t = 0; raises Stopped when the first pose is singular."""
+        """Compute the rates at t = 0; raises Stopped if the first pose is singular."""
         self.state[1] = self._rates(0.0)
 
     def advance(self, t: float, step: float) -> None:
@@ -85,7 +85,7 @@ class Drive:
         return settings
 
     def _rates(self, t: float) -> np.ndarray:
-        """Rates (nb * 7,) of the coordinates from C_q q' = -C_t; raises Stopped at a singular pose."""
+        """Return rates (nb * 7,) of the coordinates from C_q q' = -C_t; raises Stopped at a singular pose."""
         matrix, rhs = self._jacobian(), self._driver_rates(t)
         u, s, vt = np.linalg.svd(matrix, full_matrices=False)
         if s.size < matrix.shape[1] or s[-1] <= RANK * s[0]:
@@ -93,7 +93,7 @@ class Drive:
         return vt.T @ ((u.T @ rhs) / s)
 
     def _jacobian(self) -> np.ndarray:
-        """Exudyn's constraint Jacobian (rows, nb * 7) at the present pose."""
+        """Return Exudyn's constraint Jacobian (rows, nb * 7) at the present pose."""
         mbs, n = self.system.mbs, self.state.shape[1]
         solver = self.exu.MainSolverStatic()
         solver.InitializeSolver(mbs, self._settings())
@@ -104,7 +104,7 @@ class Drive:
         return matrix
 
     def _driver_rates(self, t: float) -> np.ndarray:
-        """-C_t: the rate of each driver in the row of its constraint, zero elsewhere."""
+        """Return -C_t: the rate of each driver in the row of its constraint, zero elsewhere."""
         rhs = np.zeros(self.system.mbs.systemData.AEsize())
         for number, driver in zip(self.system.drivers, self.scene.driver, strict=True):
             rhs[self.system.mbs.systemData.GetObjectLTGAE(number)] = motion(driver, t)[1]
@@ -112,7 +112,7 @@ class Drive:
 
 
 def drive(exu: Any, scene: Scene, times: np.ndarray, step: float) -> Motion:
-    """Coordinates and rates at ``times`` (k,), in static load steps of at most ``step`` (s)."""
+    """Return coordinates and rates at ``times`` (k,), in static load steps of at most ``step`` (s)."""
     clock = time.process_time()
     moving = Drive(exu, scene)
     built = time.process_time()

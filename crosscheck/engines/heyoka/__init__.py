@@ -1,4 +1,4 @@
-"""heyoka's Taylor series as an engine."""
+"""Adapter of heyoka's Taylor series."""
 
 from crosscheck.engines.heyoka.adapter import ENGINE
 

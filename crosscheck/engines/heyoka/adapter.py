@@ -1,8 +1,8 @@
 """heyoka: Taylor series of a mechanism's equations in joint coordinates, compiled by heyoka.
 
 The order is the one that heyoka chooses for a tolerance; samples are its dense output.  Closure errors are
-neither fed back nor projected.  A compiled integrator is kept in the user's cache folder for its scene,
-tolerance, heyoka's version and the machine.
+neither fed back nor projected. A compiled integrator is stored in the user's cache folder by scene,
+tolerance, heyoka's version and machine.
 """
 
 from __future__ import annotations
@@ -42,11 +42,11 @@ class Heyoka(Generator):
         import heyoka  # noqa: F401
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """One family, by tolerance."""
+        """Return the settings of the one family, by tolerance."""
         return sweep(FAMILY, RTOLS)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         self._known(setting)
         began, equations = time.process_time(), equations_of(scene)
         integrator = _integrator(scene, setting.options["rtol"])
@@ -62,7 +62,8 @@ class Heyoka(Generator):
 
 
 def _propagated(integrator: Any, times: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, str, int]:
-    """States (k, 2 n) at the times that were reached, how the integrator ended, and its steps."""
+    """Return states (k, 2 n) at the times that were reached, how the integrator ended, and its number of
+    steps."""
     grid = np.array(times if times[0] == 0.0 else [0.0, *times], dtype=float)
     if len(grid) == 1:
         return start[None], "", 0
@@ -73,7 +74,7 @@ def _propagated(integrator: Any, times: np.ndarray, start: np.ndarray) -> tuple[
 
 @functools.lru_cache(maxsize=16)
 def _integrator(scene: Scene, rtol: float) -> Any:
-    """The compiled integrator of a scene, from the cache or made anew."""
+    """Return the compiled integrator of a scene, from the cache or compiled now."""
     import heyoka
 
     made_of = origin(scene, repr(rtol), heyoka.__version__, platform.node(), Path(__file__).read_text())

@@ -1,4 +1,4 @@
-"""MuJoCo MJX as an engine."""
+"""Adapter of MuJoCo MJX."""
 
 from crosscheck.engines.mjx.adapter import ENGINE
 

@@ -1,6 +1,6 @@
 """MuJoCo MJX: MuJoCo's model stepped by code in JAX, here on the processor in double precision.
 
-Code is compiled for each model before the clock runs, in some 5 to 30 s.
+Code is compiled for each model before the timed run, which takes 5 to 30 s.
 """
 
 from __future__ import annotations
@@ -35,20 +35,20 @@ class Mjx(Engine):
         _mjx()
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Drivers, and what MuJoCo's adapter refuses."""
+        """Refuse drivers, and scenes that MuJoCo's adapter refuses."""
         return refusal(scene, "MJX")
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Steps by the angle turned in one."""
+        """Return settings with steps chosen by the angle that a body turns in one step."""
         return sweep(scene)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
 
 
 def _mjx() -> Any:
-    """The modules jax and mujoco.mjx, in double precision on the processor."""
+    """Return the modules jax and mujoco.mjx, set to double precision on the processor."""
     import jax
 
     config: Any = jax.config
@@ -77,16 +77,16 @@ class _World:
             return jax.lax.fori_loop(0, count, lambda _, now: mjx.step(model, now), data)
 
         self.stepped = jax.jit(stepped)
-        self.stepped(self.model, self.data, 0)  # compiled before the clock runs
+        self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s)."""
+        """Take ``count`` steps of length h (s)."""
         model = self.model.tree_replace({"opt.timestep": self.model.opt.timestep * 0 + h})
         self.data = self.stepped(model, self.data, count)
         self.data.qpos.block_until_ready()
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         return self.ported.motion(self.data.qpos, self.data.qvel)
 
 

@@ -1,4 +1,4 @@
-"""MuJoCo as an engine."""
+"""Adapter of MuJoCo."""
 
 from crosscheck.engines.mujoco.adapter import ENGINE
 

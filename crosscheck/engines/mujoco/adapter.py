@@ -1,6 +1,7 @@
 """MuJoCo: joint coordinates, loops closed by soft equality constraints.
 
-A driver is an equality of one joint whose reference acceleration is rewritten at every evaluation.
+A driver is an equality constraint on one joint; the adapter writes its reference acceleration at every
+evaluation.
 """
 
 from __future__ import annotations
@@ -42,8 +43,10 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
-TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
-SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
+# rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
+# ones
+TURN_PER_STEP = 0.25
+SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 
 
 class MuJoCo(Engine):
@@ -62,15 +65,16 @@ class MuJoCo(Engine):
         return mujoco.__version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse scenes without masses whose motion the drivers do not determine completely."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
+        """Return fixed steps chosen by the angle that a body turns in one step, and adaptive steps by
+        relative tolerance."""
         return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return what the sweep offers, which has the tuned family for every scene."""
+        """Return whether a family can run a scene; the sweep offers the tuned family for every scene."""
         return family == "tuned" or super().serves(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
@@ -108,7 +112,7 @@ class MuJoCo(Engine):
 
 
 class _MujocoSimulation:
-    """One simulation: model, data and how they are advanced."""
+    """One simulation: a model, its data and the method by which they are advanced."""
 
     def __init__(self, scene: Scene, setting: Setting):
         import mujoco
@@ -132,7 +136,8 @@ class _MujocoSimulation:
         if setting.family == "defaults":
             return
         model.opt.integrator = getattr(mujoco.mjtIntegrator, STOCK.get(setting.family, RK4))
-        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE  # 4.0.0's sparse factor is wrong for some trees
+        # sparse factors of MuJoCo 4.0.0 are wrong for some trees
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_ISLAND
         if setting.family in STOCK:
             model.eq_solref[:], model.eq_solimp[:] = (2 * self.nominal, 1.0), STIFFEST
@@ -151,7 +156,8 @@ class _MujocoSimulation:
             self.step = self._adaptively
 
     def _harden(self, beta: float, factor: float) -> None:
-        """Closure errors decay as exp(-beta t), and the regulariser is scaled by a factor."""
+        """Set closures such that their errors decay as exp(-beta t), and scale the regulariser by a
+        factor."""
         model = self.model
         model.eq_solref[:], model.eq_solimp[:] = (-(beta**2), -2 * beta), STIFFEST
         model.body_invweight0[:] *= factor
@@ -161,9 +167,11 @@ class _MujocoSimulation:
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
-        """MuJoCo's process-wide hooks are this run's, until the run is over."""
+        """Install this run's callbacks in MuJoCo, whose callbacks are global in the process, until the run
+        ends."""
         mujoco = self.mujoco
-        mujoco.set_mju_user_warning(lambda _: None)  # warnings would go to the terminal and to MUJOCO_LOG.TXT
+        # MuJoCo would write warnings to the terminal and to MUJOCO_LOG.TXT
+        mujoco.set_mju_user_warning(lambda _: None)
         try:
             if self.compiled.drivers:
                 mujoco.set_mjcb_control(self._drive)
@@ -173,23 +181,24 @@ class _MujocoSimulation:
             mujoco.set_mju_user_warning(None)
 
     def integrated(self, times: np.ndarray, start: float, labels: dict[str, Any]) -> Trajectory:
-        """The run of the compiled family; its construction began at ``start`` (s of process time)."""
+        """Return the run of a compiled family; its construction began at ``start`` (s of process time)."""
         family, options = self.setting.family, self.setting.options
         run = compiled_run.compiled_run(self.scene, self.compiled, self.data, family, options, self.longest)
         built = time.process_time() - start
         return run.trajectory(self.scene, times, self.sample, built, labels)
 
     def _rows(self, equality: int) -> np.ndarray:
-        """The constraint rows of an equality, at this step: MuJoCo leaves out those that nothing moves."""
+        """Return the constraint rows of an equality at this step; MuJoCo leaves out rows that no coordinate
+        moves."""
         data, kind = self.data, int(self.mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         return np.flatnonzero((data.efc_type == kind) & (data.efc_id == equality))
 
     def _driven(self) -> list[tuple[int, Driver]]:
-        """The rows of the drivers, at this step."""
+        """Return the rows of the drivers at this step."""
         return [(int(row), d) for equality, d in self.compiled.drivers for row in self._rows(equality)[:1]]
 
     def _drive(self, model: Any, data: Any) -> None:
-        """Adds the prescribed motion to the reference accelerations of the drivers' rows."""
+        """Add the prescribed motion to the reference accelerations of the drivers' rows."""
         reference, gains = data.efc_aref, data.efc_KBIP
         for row, driver in self._driven():
             value, rate, acceleration = motion(driver, data.time)
@@ -197,7 +206,7 @@ class _MujocoSimulation:
             reference[row] += acceleration + damping * rate + stiffness * impedance * value
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the data from t0 to t1; raises Failed."""
+        """Move the data from t0 to t1; raises Failed."""
         try:
             self.step(t0, t1)
         except self.mujoco.FatalError as error:
@@ -225,7 +234,7 @@ class _MujocoSimulation:
         self.data.qpos[:], self.data.qvel[:] = y[: self.model.nq], y[self.model.nq :]
 
     def _rhs(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Time derivative (nq + nv,) of positions and velocities."""
+        """Return the time derivative (nq + nv,) of positions and velocities."""
         model, data = self.model, self.data
         self._load(t, y)
         self.mujoco.mj_forward(model, data)
@@ -251,7 +260,7 @@ class _MujocoSimulation:
         return rates
 
     def sample(self, t: float) -> Sample:
-        """Poses, velocities and reactions of the scene's bodies and joints."""
+        """Return poses, velocities and reactions of the scene's bodies and joints."""
         scene, tree = self.scene, self.compiled.tree
         motion = self.link_motion()
         own = list(tree.own)
@@ -280,21 +289,22 @@ class _MujocoSimulation:
             position=data.xpos[links],
             velocity=twists[:, 3:],
             angular_velocity=twists[:, :3],
-            acceleration=changes[:, 3:] + model.opt.gravity,  # MuJoCo's world falls upwards
+            # MuJoCo counts gravity as an upward acceleration of the world
+            acceleration=changes[:, 3:] + model.opt.gravity,
             angular_acceleration=changes[:, :3],
             coordinates=self._coordinates(),
             rates=data.qvel.copy(),
         )
 
     def _coordinates(self) -> np.ndarray:
-        """(nv,): coordinates by the velocity they belong to; zero where a joint has no angles."""
+        """Return coordinates (nv,) in the order of the velocities; zero for joints without angles."""
         model, coordinates = self.model, np.zeros(self.model.nv)
         single = np.isin(model.jnt_type, [int(k) for k in self.compiled.single])
         coordinates[model.jnt_dofadr[single]] = self.data.qpos[model.jnt_qposadr[single]]
         return coordinates
 
     def closing(self) -> list[np.ndarray]:
-        """Per closure of the tree, the wrench on its second link."""
+        """Return the wrench on the second link of each closure of the tree."""
         data, tree, wrenches = self.data, self.compiled.tree, []
         for k, closure in enumerate(tree.closures):
             if closure.kind == "point":

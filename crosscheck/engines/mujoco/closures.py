@@ -1,5 +1,8 @@
-"""MuJoCo's states put onto its closures in compiled code, as C functions: Newton's method on the rows of its
-equalities (efc_pos, efc_J), by the least change of the velocities, redundant rows left out by pivoting."""
+"""MuJoCo's states projected onto its closures in compiled code, as C functions.
+
+Newton's method uses the rows of the equalities (efc_pos, efc_J) and the least change of the velocities.
+Redundant rows are left out by pivoting.
+"""
 
 from __future__ import annotations
 
@@ -43,17 +46,17 @@ from crosscheck.engines.mujoco.context import (
 )
 from crosscheck.engines.mujoco.rates import SIGNATURE, put
 
-ITERATIONS = 10  # iterations of Newton's method at most; usually two
-CLOSED = 1e-13  # m and rad, where it ends
-CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # fraction of the largest row: smaller remainders of elimination are redundant rows
+ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
+CLOSED = 1e-13  # m and rad; residual at which Newton's method ends
+CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
+REDUNDANT = 1e-7  # remainder of a row after elimination / largest row; smaller remainders are redundant rows
 MET, NOT_MET = 0, 1
-TOLERANCE, EVALUATIONS, TIME = range(3)  # numbers of a motion that is followed
+TOLERANCE, EVALUATIONS, TIME = range(3)  # indices of the numbers of a followed motion
 
 
 @register_jitable
 def root_of(mass, n):
-    """The lower Cholesky factor, in place."""
+    """Replace a matrix (n, n) by its lower Cholesky factor."""
     for i in range(n):
         for j in range(i + 1):
             total = mass[i, j]
@@ -64,7 +67,7 @@ def root_of(mass, n):
 
 @register_jitable
 def spread(root, row, n):
-    """L⁻¹ times a row, in place."""
+    """Replace a row by L⁻¹ times the row."""
     for i in range(n):
         total = row[i]
         for k in range(i):
@@ -74,7 +77,7 @@ def spread(root, row, n):
 
 @register_jitable
 def gather(root, change, n):
-    """L⁻ᵀ times a change, in place."""
+    """Replace a change by L⁻ᵀ times the change."""
     for i in range(n - 1, -1, -1):
         total = change[i]
         for k in range(i + 1, n):
@@ -84,7 +87,7 @@ def gather(root, change, n):
 
 @register_jitable
 def largest(rows, left, count, n):
-    """The row with the largest square, of those that are left, and its square."""
+    """Return the index and the square of the largest row among the rows that are left."""
     best, most = -1, 0.0
     for i in range(left, count):
         size = 0.0
@@ -97,9 +100,9 @@ def largest(rows, left, count, n):
 
 @register_jitable
 def least(rows, wanted, change, count, n):
-    """The least change with rows · change = wanted; rows that depend on others count once.
+    """Compute the least change with rows · change = wanted; rows that depend on others count once.
 
-    Rows are made orthonormal one by one, the largest that is left first.
+    Rows are made orthonormal one by one, the largest remaining row first.
     """
     change[:n] = 0.0
     enough = 0.0
@@ -118,7 +121,7 @@ def least(rows, wanted, change, count, n):
 
 @register_jitable
 def subtract(rows, wanted, k, count, n, scale):
-    """Row k becomes a unit row, and what later rows have along it is taken out of them."""
+    """Normalise row k, and subtract its component from later rows and their wanted values."""
     wanted[k] *= scale
     for j in range(n):
         rows[k, j] *= scale
@@ -133,8 +136,10 @@ def subtract(rows, wanted, k, count, n, scale):
 
 @register_jitable
 def parts(c):
-    """Memory for the rows of closures, their values, the root of the mass, and a change; behind it stands the
-    size of an entry that is rounding."""
+    """Return memory for the rows of closures, their values, the root of the mass matrix, and a change.
+
+    The last number is the size of a Jacobian entry that counts as rounding.
+    """
     n, most = c[NV], c[MOST_ROWS]
     work = carray(reals(c[WORK]), (most * (n + 1) + n * (n + 2) + 1,))
     rows, rest = work[: most * n].reshape((most, n)), work[most * n :]
@@ -143,7 +148,7 @@ def parts(c):
 
 @register_jitable
 def smallest(c):
-    """The size of a Jacobian's entry that is rounding."""
+    """Return the size of a Jacobian entry that counts as rounding."""
     n, most = c[NV], c[MOST_ROWS]
     size = most * (n + 1) + n * (n + 2) + 1
     return carray(reals(c[WORK]), (size,))[size - 1]
@@ -151,7 +156,7 @@ def smallest(c):
 
 @register_jitable
 def moves(row, nothing):
-    """Whether anything moves a row."""
+    """Return whether any coordinate moves a row."""
     largest_entry = 0.0
     for x in row:
         largest_entry = max(largest_entry, abs(x))
@@ -160,7 +165,7 @@ def moves(row, nothing):
 
 @register_jitable
 def weigh(c, root):
-    """The lower Cholesky factor of the mass matrix of the data's position."""
+    """Compute the lower Cholesky factor of the mass matrix at the data's position."""
     if c[WEIGHTED] != 0:
         call_with_three(c[FULL_MASS], c[MODEL], c[DATA], root.ctypes.data)
         root_of(root, c[NV])
@@ -168,7 +173,8 @@ def weigh(c, root):
 
 @register_jitable
 def fetch(c, rows, root):
-    """The Jacobian's rows over the root of the mass, or without the driven coordinates; their number."""
+    """Fetch the Jacobian's rows, multiplied by the inverse root of the mass matrix or without driven
+    coordinates; returns their number."""
     n, count = c[NV], carray(small_integers(c[COUNT]), (1,))[0]
     jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, n))
     drives = carray(reals(c[DRIVE]), (c[DRIVES], c[DRIVE_WIDTH]))
@@ -187,14 +193,14 @@ def fetch(c, rows, root):
 
 @register_jitable
 def residuals(c):
-    """The closure errors (m, rad) of the data's position."""
+    """Return the closure errors (m, rad) at the data's position."""
     count = carray(small_integers(c[COUNT]), (1,))[0]
     return carray(reals(carray(integers(c[RESIDUALS]), (1,))[0]), (count,))
 
 
 @register_jitable
 def place(c):
-    """MuJoCo's closures at the data's position."""
+    """Compute MuJoCo's closures at the data's position."""
     call_with_two(c[KINEMATICS], c[MODEL], c[DATA])
     call_with_two(c[CENTRES], c[MODEL], c[DATA])
     call_with_two(c[CLOSURES], c[MODEL], c[DATA])
@@ -202,7 +208,7 @@ def place(c):
 
 @register_jitable
 def change_by(c, rows, wanted, root, change, count):
-    """The least change of the velocities that gives the rows the wanted values."""
+    """Compute the least change of the velocities for which the rows have the wanted values."""
     least(rows, wanted, change, count, c[NV])
     if c[WEIGHTED] != 0:
         gather(root, change, c[NV])
@@ -210,7 +216,7 @@ def change_by(c, rows, wanted, root, change, count):
 
 @register_jitable
 def meet(c, tolerance):
-    """Moves the data's position onto the closures; the number of evaluations, negative where not met."""
+    """Move the data's position onto the closures; returns the number of evaluations, negative on failure."""
     rows, wanted, root, change = parts(c)
     worst = math.inf
     for k in range(ITERATIONS):
@@ -233,7 +239,7 @@ def meet(c, tolerance):
 
 @register_jitable
 def meet_rates(c, qvel):
-    """Changes the data's velocities to those that the closures leave."""
+    """Change the data's velocities to the nearest ones that the closures allow."""
     rows, wanted, root, change = parts(c)
     count = carray(small_integers(c[COUNT]), (1,))[0]
     jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, c[NV]))
@@ -248,14 +254,15 @@ def meet_rates(c, qvel):
 
 @register_jitable
 def take(c, y, qpos, qvel):
-    """The data's state into y."""
+    """Copy the data's state into y."""
     state = carray(y, (c[NQ] + c[NV],))
     state[: c[NQ]], state[c[NQ] :] = qpos, qvel
 
 
 @cfunc(SIGNATURE, cache=True)
 def settle(context, t, y, out):
-    """The state y at time t (s) put onto the closures, by the least kinetic energy; MET or NOT_MET."""
+    """Project the state y at time t (s) onto the closures by the least kinetic energy; returns MET or
+    NOT_MET."""
     c = carray(context, (WIDTH,))
     qpos, qvel = put(c, t, y)
     if c[MOST_ROWS] == 0:
@@ -269,7 +276,8 @@ def settle(context, t, y, out):
 
 @cfunc(SIGNATURE, cache=True)
 def follow(context, t, y, numbers):
-    """The state y at time TIME moved to time t by Newton's method on the closures; MET or NOT_MET."""
+    """Move the state y from time TIME to time t by Newton's method on the closures; returns MET or
+    NOT_MET."""
     c, n = carray(context, (WIDTH,)), carray(numbers, (3,))
     state = carray(y, (c[NQ] + c[NV],))
     qpos, qvel = carray(reals(c[QPOS]), (c[NQ],)), carray(reals(c[QVEL]), (c[NV],))

@@ -1,7 +1,8 @@
-"""MuJoCo without Python between samples: ``mj_forward`` in the compiled DOP853, with states projected onto
-MuJoCo's closures or not, and Newton's method on those closures where nothing but drivers moves a scene.
+"""MuJoCo without Python between samples: ``mj_forward`` in the compiled DOP853, or Newton's method for fully
+driven scenes.
 
-Where MuJoCo itself gives up (mju_error), it ends the process: a run in a child is then one that crashed.
+States may be projected onto MuJoCo's closures. A fatal error of MuJoCo (mju_error) ends the process, so the
+run of a child process is then reported as CRASHED.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from mbref.trajectory import Trajectory
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.context import Context
 
-ITERATIONS = 3  # iterations of Newton's method; one satisfies equalities to rounding
+ITERATIONS = 3  # largest number of Newton iterations; one satisfies the equalities to rounding
 UNUSED = (
     "CONTACT",
     "LIMIT",
@@ -38,7 +39,8 @@ UNUSED = (
 
 
 def leave_out_unused(mujoco: Any, model: Any) -> None:
-    """No more of MuJoCo than a scene needs, and no more iterations than are exact."""
+    """Switch off the features of MuJoCo that a scene does not need, and iterations that do not increase
+    accuracy."""
     for name in UNUSED:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     model.opt.iterations = ITERATIONS
@@ -55,13 +57,13 @@ def prepare() -> None:
 
 @dataclass(frozen=True)
 class CompiledRun:
-    """A model and its data for the compiled steppers."""
+    """A model and its data for the compiled integrators."""
 
     family: str
     options: Mapping[str, float]
     context: Context
     start: np.ndarray  # (nq + nv,)
-    longest: float  # s; of a step
+    longest: float  # s; longest step
 
     def trajectory(
         self,
@@ -71,7 +73,7 @@ class CompiledRun:
         built: float,
         labels: dict[str, Any],
     ) -> Trajectory:
-        """The motion from the start; construction took ``built`` seconds."""
+        """Return the motion from the start; construction took ``built`` seconds."""
         from crosscheck.engines.compiled.run import trajectory
         from crosscheck.engines.mujoco.rates import load
 
@@ -112,7 +114,7 @@ class CompiledRun:
 def compiled_run(
     scene: Scene, built: Compiled, data: Any, family: str, options: Mapping[str, float], longest: float
 ) -> CompiledRun:
-    """The run from the data's state; drivers become prescribed coordinates instead of equalities."""
+    """Return the run from the data's state; drivers become prescribed coordinates instead of equalities."""
     from crosscheck.engines.mujoco.context import context
 
     if family == NEWTON and may_move_freely(scene):

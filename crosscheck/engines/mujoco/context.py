@@ -1,7 +1,7 @@
-"""Addresses and numbers of a MuJoCo model that its C functions in compiled code read.
+"""Addresses and numbers of a MuJoCo model that C functions in compiled code read.
 
-A state is qpos and qvel.  A driven coordinate has its prescribed value and rate, and an armature so large
-that the generalised force which belongs to the prescribed acceleration gives it.
+A state consists of qpos and qvel. A driven coordinate has its prescribed value and rate. Its armature is so
+large that a generalised force causes the prescribed acceleration to rounding accuracy.
 """
 
 from __future__ import annotations
@@ -57,17 +57,18 @@ FUNCTIONS = (
     MOST_ROWS,
     WEIGHTED,
     WIDTH,
-) = range(29)  # places in the context
-POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)  # numbers of a drive
-ROWS = 7  # most rows of an equality
-NOTHING = 1e-12  # fraction of the model's extent: smaller closure rows are rounding
+) = range(29)  # indices in the context
+# indices of the numbers of a driver
+POSITION, VELOCITY, INERTIA, AMPLITUDE, FREQUENCY, PHASE, POLYNOMIAL = range(7)
+ROWS = 7  # largest number of rows of an equality
+NOTHING = 1e-12  # smaller entries of closure rows, relative to the model's extent, are rounding
 
 
 class Context(NamedTuple):
-    """The numbers that the C functions read, and the arrays that they point to."""
+    """The numbers that the C functions read, and the arrays to which they point."""
 
     numbers: np.ndarray
-    quaternions: np.ndarray  # places in qpos
+    quaternions: np.ndarray  # indices of quaternions in qpos
     kept: tuple[Any, ...]
 
     @property
@@ -77,7 +78,7 @@ class Context(NamedTuple):
 
 
 def function(name: str) -> int:
-    """The address of a function of the library that the wheel carries."""
+    """Return the address of a function in MuJoCo's library."""
     import mujoco
 
     folder = Path(mujoco.__file__).parent
@@ -88,9 +89,10 @@ def function(name: str) -> int:
 def context(
     model: Any, data: Any, drivers: Sequence[tuple[int, Driver]], is_weighted: bool = True
 ) -> Context:
-    """The context of a model; ``drivers`` are joints of the model with their motions.
+    """Return the context of a model; ``drivers`` are joints of the model with their motions.
 
-    Closures are met by the least change of the velocities, by kinetic energy where ``is_weighted``.
+    Closures are satisfied by the least change of the velocities, measured by kinetic energy if
+    ``is_weighted``.
     """
     single, turn = (np.array(pairs, dtype=np.int64).reshape(-1, 2) for pairs in _coordinates(model))
     drives, most = _drives(model, drivers), ROWS * model.neq
@@ -124,7 +126,8 @@ def _address(array: np.ndarray) -> int:
 
 
 def _coordinates(model: Any) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
-    """Places in qpos and qvel of coordinates with a rate, and of quaternions with an angular velocity."""
+    """Return indices in qpos and qvel of coordinates with a rate, and of quaternions with an angular
+    velocity."""
     import mujoco
 
     kinds, single, turn = mujoco.mjtJoint, [], []
@@ -140,7 +143,7 @@ def _coordinates(model: Any) -> tuple[list[tuple[int, int]], list[tuple[int, int
 
 
 def _drives(model: Any, drivers: Sequence[tuple[int, Driver]]) -> np.ndarray:
-    """A row of numbers of each driver; its coordinate gets the armature."""
+    """Return a row of numbers for each driver, and set the armature of its coordinate."""
     inertia = ARMATURE * model.stat.meaninertia
     width = max((len(driver.polynomial) for _, driver in drivers), default=0)
     table = np.zeros((len(drivers), POLYNOMIAL + width))

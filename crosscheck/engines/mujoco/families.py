@@ -1,8 +1,8 @@
 """MuJoCo's families of settings, and the sweep over their accuracies for a scene.
 
 The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
-default ten times that.  Of the FAMILIES ``stiff`` costs an order of convergence, and brings
-a run through singular positions with less left of the closure errors that they magnify.
+default ten times that.  The family ``stiff`` loses an order of convergence, but has smaller closure errors
+after singular positions, which amplify them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
-HARD = 1e-7  # factor of the regulariser: its error and rounding are below 1e-9; at 1e-8 rounding grows
+HARD = 1e-7  # factor on the regulariser; its error and its rounding are below 1e-9, at 1e-8 rounding grows
 RK4 = "mjINT_RK4"
 STOCK = {
     "stock": RK4,
@@ -23,17 +23,21 @@ STOCK = {
     "implicit": "mjINT_IMPLICIT",
     "implicitfast": "mjINT_IMPLICITFAST",
 }
-BETA = 5.0  # double root of the closure errors, in fastest rates of the scene: survives singular passages
+# decay rate of the closure errors in fastest rates of the scene, a double root; large enough to cross
+# singular positions
+BETA = 5.0
 DEFAULT_STEP = 2e-3  # s
-STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step; 2 beta step stays below 2
+STEPS = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad turned per step, for each setting; 2 beta step stays below 2
 STIFF_STEPS = (0.015, 0.005, 0.0015, 0.0005)
-STIFF = 0.2  # double root of the stiff closures' errors, in 1/step
-RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # finer ones get lost in the noise at singular positions
-ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}  # factor of the regulariser: less leaves noise to integrate
+STIFF = 0.2  # decay rate of the stiff closures' errors in 1/step, a double root
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # at tighter tolerances the noise at singular positions dominates
+# factor on the regulariser; with smaller factors the accelerations are too noisy
+ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}
 FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON = "forward, compiled", "projected, compiled", "newton, compiled"
 COMPILED = (FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON)
-COMPILED_HARD = {"point": 1e-9, "weld": 1e-7}  # factor of the regulariser; welds are redundant
-COMPILED_BETA = 0.1, 10.0  # double root of the closure errors, in fastest rates and in 1/duration
+COMPILED_HARD = {"point": 1e-9, "weld": 1e-7}  # factor on the regulariser; welds are redundant
+# decay rate of the closure errors, a double root, in fastest rates and in 1/duration
+COMPILED_BETA = 0.1, 10.0
 TOLERANCES, NEWTON_TURN = (1e-4, 1e-7, 1e-10, 1e-13), 0.6
 COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
@@ -43,7 +47,8 @@ FAMILIES = {
     "euler": "default closures, first-order integrator Euler",
     "implicit": "default closures, first-order integrator implicit",
     "implicitfast": "default closures, first-order integrator implicitfast; only where a load damps",
-    "tuned": "the regulariser scaled away through invweight0, critically damped closures at five times the "
+    "tuned": "the regulariser made negligible through invweight0, critically damped closures at five "
+    "times the "
     "fastest rate of the scene, RK4, Newton's method iterated to convergence",
     "stiff": "the tuned model with the stiffest closures that are stable at the step",
     "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
@@ -57,20 +62,25 @@ OPTIONS = {
     "step": "time step, s",
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
-    "beta": "double root of the closure errors, 1/s",
-    "hard": "factor of the regulariser",
+    "beta": "decay rate of the closure errors, a double root, 1/s",
+    "hard": "factor on the regulariser",
     "tolerance": "closure error at which Newton's method stops, m or rad",
     "turn": "rad a driver may move within one step",
 }
 MAX_STEPS = 250_000
-STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
-CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain of a Newton iteration; two or three are usual
-SCALED = "model.body_invweight0[:] *= {0:g}; model.dof_invweight0[:] *= {0:g}"  # after compilation
+# impedance parameters; MuJoCo clamps the first two at this value
+STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain at which Newton iterations end; two or three are usual
+# Python statements to be run after the model's compilation
+SCALED = "model.body_invweight0[:] *= {0:g}; model.dof_invweight0[:] *= {0:g}"
 
 
 def sweep(scene: Scene, rate: float) -> list[Setting]:
-    """Fixed steps by the angle turned in one at the scene's fastest rate (rad/s), adaptive ones by relative
-    tolerance; coarse to fine in each family."""
+    """Return fixed steps chosen by the angle that a body turns in one step at the fastest rate (rad/s), and
+    adaptive steps by relative tolerance.
+
+    Settings are coarse to fine in each family.
+    """
     beta = _rounded(BETA * rate)
     steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
     plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
@@ -112,13 +122,14 @@ def _rounded(number: float) -> float:
 
 
 def _stock(scene: Scene) -> list[str]:
-    """The families of stock closures whose integrators differ on the scene."""
+    """Return the families with default closures whose integrators differ on the scene."""
     is_damped = any(load.is_damped for load in scene.load)
     return [family for family in STOCK if is_damped or family != "implicitfast"]
 
 
 def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    """Return steps (s) that turn by the angles (rad) at a rate (rad/s); steps that are too many are left
+    out."""
     steps = [_rounded(angle / rate) for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
@@ -144,7 +155,7 @@ def own_code(setting: Setting) -> str:
     return f"{_option(attributes, flags)}{_closures(-(beta**2), -2 * beta)} and in Python: {hardened}"
 
 
-NAMES = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast"}  # in MJCF
+NAMES = {"EULER": "Euler", "IMPLICIT": "implicit", "IMPLICITFAST": "implicitfast"}  # names in MJCF
 
 
 def _option(attributes: Mapping[str, str], flags: Mapping[str, str]) -> str:
@@ -153,6 +164,6 @@ def _option(attributes: Mapping[str, str], flags: Mapping[str, str]) -> str:
 
 
 def _closures(first: float, second: float) -> str:
-    """The stiffness of all equalities: solref, and the hardest impedance."""
+    """Return the stiffness of all equalities as MJCF: solref, and the hardest impedance."""
     impedance = " ".join(map(repr, STIFFEST))
     return f'<default><equality solref="{first!r} {second!r}" solimp="{impedance}"/></default>'

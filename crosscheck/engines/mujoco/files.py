@@ -1,4 +1,5 @@
-"""The format that ``mbref import`` and ``mbref export`` find under mbref.formats: MJCF, and URDF to read."""
+"""The file format that ``mbref import`` and ``mbref export`` find through the entry point mbref.formats:
+MJCF, and URDF for reading."""
 
 from __future__ import annotations
 
@@ -19,13 +20,13 @@ class MujocoFiles:
     writes = (".xml",)
 
     def read(self, path: Path, options: ImportOptions) -> Imported:
-        """The scene of a .xml or .urdf file; raises SceneError, ValueError, OSError."""
+        """Return the scene of a .xml or .urdf file; raises SceneError, ValueError, OSError."""
         _need_mujoco()
         found = source(path, options)
         return replace(found.imported, originals=originals(path, options, found))
 
     def write(self, scene: Scene) -> Exported:
-        """The scene as MJCF; raises SceneError where a body has no mass."""
+        """Return the scene as MJCF; raises SceneError if a body has no mass."""
         _need_mujoco()
         return write(scene)
 

@@ -1,8 +1,9 @@
-"""A scene's tree as a MuJoCo model: bodies and joints, closures and drivers as equalities, loads.
+"""A scene's spanning tree as a MuJoCo model: bodies and joints, closures and drivers as equalities, loads.
 
 Every body frame has its origin at the centre of mass of the scene's body and world-aligned axes at t = 0.
-Masses are written after compilation, because the compiler refuses thin discs and rods by rounding; the
-stand-ins until then have no coinciding frames and no equal moments that it could simplify by.
+Masses are written after compilation, because the compiler refuses some thin discs and rods due to rounding.
+Until then placeholder inertias are used, with distinct frames and moments, so that the compiler does not
+simplify the model.
 """
 
 from __future__ import annotations
@@ -44,9 +45,10 @@ SUPPORTS = Supports(
     couplings=("angle", "displacement"),
     armatures=("angle", "displacement"),
 )
-COUPLING = "coupling "  # begins the names of equalities of couplings
+COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 UNIT = (1.0, 0.0, 0.0, 0.0)
-GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))  # moments, centre, axes until compiled
+# placeholder moments, centre and axes during compilation
+GENERAL = ((1.0, 1.1, 1.2), (0.1, 0.2, 0.3), (0.5, 0.5, 0.1, 0.7))
 
 
 @dataclass(frozen=True)
@@ -56,14 +58,14 @@ class Compiled:
     model: Any
     tree: Tree
     links: np.ndarray  # MuJoCo's body of each link
-    single: tuple[Any, ...]  # kinds of MuJoCo joints with one coordinate
-    drivers: list[tuple[int, Driver]]  # equality and motion
+    single: tuple[Any, ...]  # types of MuJoCo joints with one coordinate
+    drivers: list[tuple[int, Driver]]  # equality and motion of each driver
     applied: np.ndarray  # (nbody, 6) constant world forces and moments at the centres of mass
     rates: np.ndarray  # joint velocities at t = 0
 
 
 def compiled(scene: Scene) -> Compiled:
-    """The scene as a MuJoCo model with the library's default options and softness."""
+    """Return the scene as a MuJoCo model with the library's default options and softness."""
     import mujoco
 
     tree = spanning_tree(scene)
@@ -85,7 +87,8 @@ def compiled(scene: Scene) -> Compiled:
 
 
 def description(scene: Scene, tree: Tree) -> Any:
-    """The scene's tree as a MjSpec of bodies ``link k``, joints ``joint k.i``, stand-ins for masses."""
+    """Return the scene's tree as a MjSpec with bodies ``link k``, joints ``joint k.i`` and placeholder
+    masses."""
     import mujoco
 
     return _built(mujoco, scene, tree).spec
@@ -117,7 +120,7 @@ def _name(link: int) -> str:
 
 
 class _Builder:
-    """Adds a tree's parts to a MjSpec."""
+    """Adds the parts of a tree to a MjSpec."""
 
     def __init__(self, mujoco: Any, scene: Scene, tree: Tree, spec: Any):
         self.mujoco, self.scene, self.tree, self.spec = mujoco, scene, tree, spec
@@ -126,7 +129,7 @@ class _Builder:
         self.applied: list[tuple[str, np.ndarray]] = []
 
     def centre(self, link: int) -> np.ndarray:
-        """Origin of a link's frame (world) at t = 0."""
+        """Return the origin of a link's frame (world) at t = 0."""
         return self.tree.links[link].position if link != GROUND_LINK else np.zeros(3)
 
     def add_link(self, k: int, link: Link) -> None:
@@ -145,7 +148,7 @@ class _Builder:
             )
 
     def site(self, link: int, point: np.ndarray, name: str) -> str:
-        """A point (world at t = 0) of a link, as a site."""
+        """Add a site at a point (world at t = 0) of a link."""
         self.body[link].add_site(name=name, pos=point - self.centre(link))
         return name
 
@@ -166,7 +169,7 @@ class _Builder:
         equality.data[:5] = 0.0
 
     def add_coupling(self, coupling: Coupling) -> None:
-        """q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
+        """Add the equality q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
         first, second = (
             self.joint[self.tree.coordinate(self.scene, joint.name, kind)].name
             for joint, kind in self.scene.coupled(coupling)
@@ -189,17 +192,18 @@ class _Builder:
         elif isinstance(load, TorsionSpring):
             joint = self.joint[self.tree.coordinate(self.scene, load.joint)]
             before, added = joint.stiffness[0], load.stiffness
-            if added > 0:  # two springs act as one about the mean of their natural angles, by stiffness
+            if added > 0:  # two springs act as one; its natural angle is their mean, weighted by stiffness
                 moment = before * joint.springref + added * load.natural_angle
                 joint.stiffness[0], joint.springref = before + added, moment / (before + added)
             joint.damping[0] += load.damping
 
     def link_of(self, body: str) -> int:
-        """The link of a scene's body, by name."""
+        """Return the link of a scene's body, by name."""
         return self.tree.link_of(self.scene.body_index(body))
 
     def _force(self, k: int, load: Force) -> None:
-        """A massless body fixed at the point of attack, because MuJoCo applies forces at centres of mass."""
+        """Add a massless body fixed at the point of attack, because MuJoCo applies forces at centres of
+        mass."""
         link = self.link_of(load.body)
         body = self.body[link].add_body(name=f"force {k}", pos=np.array(load.point) - self.centre(link))
         _inertial(body, 0.0, np.zeros(3), np.zeros(3), UNIT)
@@ -218,7 +222,8 @@ def _inertial(body: Any, mass: float, inertia: Any, position: Any, orientation: 
 
 
 def _write_masses(mujoco: Any, model: Any, tree: Tree) -> None:
-    """The true masses, centres of mass and principal moments; constants that follow from them."""
+    """Write the true masses, centres of mass and principal moments, and recompute the constants that depend
+    on them."""
     for k, link in enumerate(tree.links):
         b = model.body(_name(k)).id
         moments, axes = np.linalg.eigh(link.inertia)

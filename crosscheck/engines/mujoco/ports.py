@@ -1,7 +1,8 @@
-"""Parts shared by MuJoCo's ports to other machines: MuJoCo's model of a scene, settings and samples.
+"""Functions shared by MuJoCo's ports to other machines (MJX, Warp): MuJoCo's model of a scene, settings and
+samples.
 
-A port steps MuJoCo's model by code of its own.  Poses and velocities at the samples are computed from its
-joint coordinates by MuJoCo in C, which adds rounding alone.
+A port steps MuJoCo's model with its own code. Poses and velocities at the samples are computed from its joint
+coordinates by MuJoCo in C, which adds only rounding.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, couplings=(), armatures=())
 DEFAULT_STEP = 2e-3  # s
-STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance, as far as it is not clamped
+# impedance parameters; MuJoCo clamps the first two at this value
+STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 FAMILIES = {
     "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4",
     "euler": "default closures, first-order integrator Euler",
@@ -34,7 +36,7 @@ OPTIONS = {"step": "time step, s"}
 
 
 def refusal(scene: Scene, port: str) -> Cannot | None:
-    """The refusal of drivers, which need a callback into the step, and of bodies without mass."""
+    """Return the refusal of drivers, which need a callback in the step, and of bodies without mass."""
     if scene.driver:
         reason = f"{port} has no callback in which the driver of joint {scene.driver[0].joint!r} could act"
         return Cannot(Owner.ENGINE, reason)
@@ -42,7 +44,7 @@ def refusal(scene: Scene, port: str) -> Cannot | None:
 
 
 def sweep(scene: Scene) -> Sequence[Setting]:
-    """Fixed steps by the angle turned in one, coarse to fine in each family."""
+    """Return fixed steps chosen by the angle that a body turns in one step, coarse to fine in each family."""
     fine = steps(scene, stated_rate(scene))
     plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
     return [
@@ -70,7 +72,7 @@ class PortedModel:
         mujoco.mj_forward(model, self.data)
 
     def motion(self, qpos: Any, qvel: Any) -> LinkMotion:
-        """The motion of the links at joint coordinates (nq,) and velocities (nv,)."""
+        """Return the motion of the links at joint coordinates (nq,) and velocities (nv,)."""
         mujoco, model, data, links = self.mujoco, self.model, self.data, self.built.links
         data.qpos[:], data.qvel[:] = np.asarray(qpos, dtype=float), np.asarray(qvel, dtype=float)
         mujoco.mj_normalizeQuat(model, data.qpos)

@@ -1,4 +1,4 @@
-"""MuJoCo's states put back onto its equality constraints, by the least kinetic energy."""
+"""Projection of MuJoCo's states onto its equality constraints, by the least kinetic energy."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from crosscheck.engines.sampling import Failed
 from mbref.scene import Driver
 from mbref.trajectory import Outcome
 
-ITERATIONS = 10  # iterations of Newton's method at most; usually two
-CLOSED = 1e-13  # m and rad, where it ends
-CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
+ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
+CLOSED = 1e-13  # m and rad; residual at which Newton's method ends
+CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
+REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
 
-Rows = Callable[[], Sequence[tuple[int, Driver]]]  # the driven constraint rows of the data as they are
+# function that returns the driven constraint rows of the present data
+Rows = Callable[[], Sequence[tuple[int, Driver]]]
 
 
 def projected(
@@ -30,8 +31,11 @@ def projected(
     load: Callable[[float, np.ndarray], None],
     y: np.ndarray,
 ) -> np.ndarray:
-    """The state (nq + nv,) nearest to ``y``, by kinetic energy, whose positions and velocities satisfy the
-    equality constraints at time t (s); ``load`` puts a state into the data.  Raises Failed."""
+    """Return the state (nq + nv,) nearest to ``y``, by kinetic energy, whose positions and velocities satisfy
+    the equality constraints at time t (s).
+
+    ``load`` puts a state into the data. Raises Failed.
+    """
     load(t, y)
     mujoco.mj_forward(model, data)
     q, v, root = data.qpos.copy(), data.qvel.copy(), _root_of_mass(mujoco, model, data, t)
@@ -53,7 +57,7 @@ def projected(
 
 
 def _root_of_mass(mujoco: Any, model: Any, data: Any, t: float) -> np.ndarray:
-    """The lower Cholesky factor (nv, nv) of the mass matrix."""
+    """Return the lower Cholesky factor (nv, nv) of the mass matrix."""
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     if not np.isfinite(mass).all():
@@ -62,7 +66,8 @@ def _root_of_mass(mujoco: Any, model: Any, data: Any, t: float) -> np.ndarray:
 
 
 def _least(root: np.ndarray, jacobian: np.ndarray, wanted: np.ndarray, t: float) -> np.ndarray:
-    """The change (nv,) of the velocities of least kinetic energy with these values of the rows."""
+    """Return the change (nv,) of the velocities of least kinetic energy for which the rows have the wanted
+    values."""
     if not (np.isfinite(jacobian).all() and np.isfinite(wanted).all()):
         raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
     spread = solve_triangular(root, jacobian.T, lower=True).T

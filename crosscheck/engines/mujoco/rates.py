@@ -1,4 +1,4 @@
-"""``mj_forward`` of libmujoco as a C function of a state's rates, called by compiled code."""
+"""MuJoCo's ``mj_forward`` as a C function that computes a state's rates for compiled code."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ SIGNATURE = types.int32(
 
 
 def load(context: Context, t: float, y: np.ndarray) -> None:
-    """Puts a state into the data, with the forces and accelerations that belong to it."""
+    """Put a state into the data, and compute the forces and accelerations that belong to it."""
     RATES(rates.address)(context.address, t, y.ctypes.data, np.empty(len(y)).ctypes.data)
 
 
 @register_jitable
 def prescribe(drive, t, qpos, qvel, force):
-    """The value and rate of a driven coordinate, and the force of its acceleration."""
+    """Set the value and rate of a driven coordinate, and the force of its acceleration."""
     value, rate, acceleration = 0.0, 0.0, 0.0
     for i in range(drive.shape[0] - 1, POLYNOMIAL - 1, -1):
         acceleration = acceleration * t + 2.0 * rate
@@ -65,7 +65,7 @@ def prescribe(drive, t, qpos, qvel, force):
 
 @register_jitable
 def turn_rates(q, omega, out):
-    """dq/dt = q/|q| (0, ω)/2 of a quaternion q (w, x, y, z) with ω in body axes."""
+    """Compute dq/dt = q/|q| (0, ω)/2 of a quaternion q (w, x, y, z) with ω in body axes."""
     half = 0.5 / math.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
     w, x, y, z = half * q[0], half * q[1], half * q[2], half * q[3]
     out[0] = -x * omega[0] - y * omega[1] - z * omega[2]
@@ -76,7 +76,7 @@ def turn_rates(q, omega, out):
 
 @register_jitable
 def position_rates(c, qpos, qvel, out):
-    """The rates of qpos."""
+    """Compute the rates of qpos."""
     single, turn = carray(integers(c[SINGLE]), (c[SINGLES], 2)), carray(integers(c[TURN]), (c[TURNS], 2))
     for k in range(c[SINGLES]):
         out[single[k, 0]] = qvel[single[k, 1]]
@@ -87,7 +87,7 @@ def position_rates(c, qpos, qvel, out):
 
 @register_jitable
 def put(c, t, y):
-    """Puts a state into the data; driven coordinates as prescribed at time t."""
+    """Put a state into the data, with driven coordinates as prescribed at time t."""
     nq, nv = c[NQ], c[NV]
     qpos, qvel, state = carray(reals(c[QPOS]), (nq,)), carray(reals(c[QVEL]), (nv,)), carray(y, (nq + nv,))
     qpos[:], qvel[:] = state[:nq], state[nq:]
@@ -99,7 +99,7 @@ def put(c, t, y):
 
 @cfunc(SIGNATURE, cache=True)
 def rates(context, t, y, out):
-    """Rates (nq + nv,) of a state at time t (s), by mj_forward; 0."""
+    """Compute the rates (nq + nv,) of a state at time t (s) by mj_forward; returns 0."""
     c = carray(context, (WIDTH,))
     nq, nv = c[NQ], c[NV]
     qpos, qvel = put(c, t, y)

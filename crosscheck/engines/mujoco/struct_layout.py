@@ -1,4 +1,5 @@
-"""Places of fields in the C structure ``mjData``, by the wheel's own description of its headers."""
+"""Byte offsets of fields in the C structure ``mjData``, from the description of MuJoCo's headers in its
+Python package."""
 
 from __future__ import annotations
 
@@ -22,7 +23,7 @@ SIMPLE: dict[str, Any] = {
 
 @functools.cache
 def _structure(name: str) -> Any:
-    """The structure as a ctypes class; raises LookupError for a type that is not known."""
+    """Return the structure as a ctypes class; raises LookupError for an unknown type."""
     from mujoco.introspect import structs
 
     fields = [(field.name, _type(field.type)) for field in structs.STRUCTS[name].fields]
@@ -42,5 +43,5 @@ def _type(kind: Any) -> Any:
 
 
 def offset(field: str) -> int:
-    """Bytes from the start of mjData to a field."""
+    """Return the number of bytes from the start of mjData to a field."""
     return int(getattr(_structure("mjData"), field).offset)

@@ -1,7 +1,7 @@
 """A scene as MJCF: the tree, closures as equalities, true masses and inertias, springs and gravity.
 
-Bodies have the names of the scene's, their frames the world's axes at t = 0 with the origin at the centre
-of mass.  A cut joint hangs a share of its body's mass on its other side, named ``rod (share 1)``.
+Bodies have the names of the scene's bodies. At t = 0 their frames have world axes and the origin at the
+centre of mass. A cut joint carries a part of its body's mass on its other side, named ``rod (share 1)``.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from mbref import rotations
 from mbref.formats import Exported
 from mbref.scene import Force, Moment, Scene, SceneError
 
-CONSTANT = (Moment, Force)  # loads that MJCF does not know
+CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
 
 
 def write(scene: Scene) -> Exported:
@@ -40,7 +40,7 @@ def write(scene: Scene) -> Exported:
 
 
 def _text(spec: Any, new: dict[str, str]) -> str:
-    """The MJCF text with every digit: MuJoCo's own writer keeps six."""
+    """Return the MJCF text with all digits: MuJoCo's own writer prints six."""
     root = ET.Element("mujoco", model=spec.modelname)
     ET.SubElement(root, "compiler", angle="radian")
     ET.SubElement(root, "option", gravity=_digits(spec.option.gravity))
@@ -74,7 +74,7 @@ def _text(spec: Any, new: dict[str, str]) -> str:
 
 
 def _add_body(element: ET.Element, body: Any) -> None:
-    """The inertia, joints, sites and children of a body."""
+    """Add inertia, joints, sites and children of a body."""
     if element.tag == "body":
         ET.SubElement(
             element,
@@ -107,7 +107,8 @@ def _digits(numbers: Any) -> str:
 
 
 def _names(scene: Scene, tree: Tree) -> list[str]:
-    """The scene's name of every link; shares of a body and rods of distance joints by number."""
+    """Return the name of every link: the scene's body, with a number for parts of split bodies and rods of
+    distance joints."""
     names: list[str] = []
     for k, link in enumerate(tree.links):
         name = scene.body[link.body].name if link.body >= 0 else "rod of a distance joint"
@@ -117,7 +118,7 @@ def _names(scene: Scene, tree: Tree) -> list[str]:
 
 
 def _name_joints(spec: Any, scene: Scene, tree: Tree) -> dict[str, str]:
-    """Name joints as the scene does, with a number where the scene's has several elementary motions; return
+    """Name joints as the scene does, with a number if a joint consists of several elementary motions; returns
     new names by old ones."""
     new: dict[str, str] = {}
     for k, link in enumerate(tree.links):
@@ -132,7 +133,8 @@ def _name_joints(spec: Any, scene: Scene, tree: Tree) -> dict[str, str]:
 
 
 def _true_inertia(body: Any, link: Link) -> None:
-    """Mass, centre and principal moments; the largest is at most the others' sum, as the compiler demands."""
+    """Return mass, centre and principal moments; the largest moment is at most the sum of the two others, as
+    the compiler demands."""
     moments, axes = np.linalg.eigh(link.inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     moments = np.maximum(moments, 0.0)

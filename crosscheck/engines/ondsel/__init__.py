@@ -1,4 +1,4 @@
-"""OndselSolver as an engine."""
+"""Adapter of OndselSolver."""
 
 from crosscheck.engines.ondsel.adapter import ENGINE
 

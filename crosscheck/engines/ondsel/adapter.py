@@ -1,4 +1,4 @@
-"""OndselSolver: the paper's own coordinates and joints; kinematics and inverse dynamics of driven scenes.
+"""OndselSolver: kinematics and inverse dynamics of driven scenes, in the coordinates and joints of the paper.
 
 Positions, velocities, accelerations and reactions follow from the drivers pose by pose, by Newton's method;
 redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose
@@ -28,9 +28,9 @@ from mbref.trajectory import Outcome, Trajectory
 
 FAMILY = "kinematics"
 FAMILIES = {FAMILY: "kinematics and inverse dynamics of a driven mechanism, pose by pose"}
-STEPS = (100, 400, 1600)  # over a scene's duration
+STEPS = (100, 400, 1600)  # numbers of steps over a scene's duration
 BRYANT = ("Bryantx", "Bryanty", "Bryantz")
-LOCKED = 1e-3  # cosine of the second angle below which the other two lose digits
+LOCKED = 1e-3  # cosine of the second angle below which the first and third angle lose digits
 EVEN = 1e-9  # relative difference below which sample intervals count as equal
 
 
@@ -50,13 +50,13 @@ class Ondsel(Engine):
         import pyondsel.solve_raw  # noqa: F401
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        """Distance joints, which OndselSolver itself lacks; then as every engine."""
+        """Refuse distance joints, which OndselSolver lacks, and then scenes that any engine may refuse."""
         if any(isinstance(joint, Distance) for joint in scene.joint):
             return Cannot(Owner.ENGINE, "OndselSolver does not implement its joint of constant distance")
         return super().cannot(scene)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes whose motion is not prescribed in full: forward dynamics is not exposed."""
+        """Refuse scenes whose motion is not prescribed completely: the solver offers no forward dynamics."""
         rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
         if not scene.driver or np.linalg.matrix_rank(rows, rtol=RANK) < rows.shape[1]:
             reason = (
@@ -66,11 +66,11 @@ class Ondsel(Engine):
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Steps over the scene's duration."""
+        """Return settings by the number of steps over the scene's duration."""
         return [Setting(FAMILY, {"step": scene.duration / n}) for n in STEPS]
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         if setting.family != FAMILY:
             raise ValueError(f"ondsel has no family {setting.family!r}")
         start = time.process_time()
@@ -89,7 +89,7 @@ class Ondsel(Engine):
 
 
 class _OndselSimulation:
-    """One simulation: the samples computed so far, and the pose the next analysis starts from."""
+    """One simulation: the samples computed so far, and the pose at which the next analysis starts."""
 
     def __init__(self, scene: Scene, times: np.ndarray, step: float):
         from pyondsel.solve_raw import solve_asmt_raw
@@ -99,10 +99,10 @@ class _OndselSimulation:
         self.counts = Counts()
         self.samples: dict[float, Sample] = {}
         self.pose = initial_poses(scene)
-        self.hindered = False  # True after a failed analysis: then each sample is computed alone
+        self.hindered = False  # True after a failed analysis; then each sample is computed alone
 
     def advance(self, t0: float, t1: float) -> None:
-        """Has the sample at t1, and those after it at the same spacing, computed; raises Failed."""
+        """Compute the sample at t1, and later samples with equal spacing; raises Failed."""
         if t1 in self.samples:
             return
         later = self.times[self.times >= t1]
@@ -119,7 +119,7 @@ class _OndselSimulation:
             self._analyse(t0, many[:1])
 
     def _analyse(self, t0: float, targets: np.ndarray, keep_start: bool = False) -> None:
-        """Samples at ``targets``, equally spaced from t0, of which the pose is known."""
+        """Compute samples at ``targets``, equally spaced from t0, at which the pose is known."""
         each = step_count(t0, float(targets[0]), self.step)
         frames = each * len(targets)
         taken = [0] if keep_start else list(range(each, frames + 1, each))
@@ -129,8 +129,8 @@ class _OndselSimulation:
             self.pose = (samples[-1].position, samples[-1].orientation)
 
     def _samples(self, t0: float, t1: float, frames: int, taken: Sequence[int]) -> list[Sample]:
-        """The frames ``taken`` of an analysis in a world where the solver's angles determine all
-        orientations."""
+        """Return the frames ``taken`` of an analysis, in a world frame in which the solver's angles determine
+        all orientations."""
         names = [f"b{k}" for k in range(len(self.scene.body))]
         for assembly in self.assemblies:
             text = assembly.text(t0, t1, frames, *self.pose)
@@ -146,14 +146,14 @@ class _OndselSimulation:
         raise Failed(Outcome.NOT_FINITE, t0, f"angles after {t0:.6g} s do not determine the orientations")
 
     def sample(self, t: float) -> Sample:
-        """The sample computed at t; at 0, of the first step."""
+        """Return the sample computed at t; at 0, the sample of the first step."""
         if t not in self.samples:
             self._analyse(t, np.array([t + self.step]), keep_start=True)
         return self.samples[float(t)]
 
 
 class _Reader:
-    """One frame of an answer, in the scene's world."""
+    """One frame of a result, in the scene's world."""
 
     def __init__(self, assembly: Assembly, answer: Table, frame: int):
         self.assembly, self.scene = assembly, assembly.scene
@@ -161,7 +161,7 @@ class _Reader:
         self.back = rotations.conjugate(assembly.world)
 
     def sample(self) -> Sample:
-        """The bodies' motion and the joints' reactions."""
+        """Return the bodies' motion and the joints' reactions."""
         turned = _bryant(self._raw(BRYANT))
         body = rotations.multiply(turned, rotations.conjugate(self.assembly.principal))
         position, orientation = self._vectors("X", "Y", "Z"), rotations.multiply(self.back, body)
@@ -183,8 +183,11 @@ class _Reader:
         return rotations.rotate(self.back, self._raw(labels))
 
     def _reactions(self, position: np.ndarray, orientation: np.ndarray) -> dict[str, np.ndarray]:
-        """Force and moment (6,) on each joint's second body at the anchor on it, the driver's included;
-        none without masses, or with loads, of which the solver does not know."""
+        """Return force and moment (6,) on each joint's second body at the anchor on it, the driver's
+        included.
+
+        The result is empty without masses, or with loads, which the solver does not receive.
+        """
         if self.scene.load or not self.scene.has_mass():
             return {}
         found = {}
@@ -203,7 +206,7 @@ class _Reader:
         return found
 
     def _anchors(self, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> list[np.ndarray]:
-        """Anchors (3,) of a joint on its two bodies, world."""
+        """Return the anchors (3,) of a joint on its two bodies, world."""
         places = []
         for name, point, _ in self.assembly.ends(joint):
             b = self.scene.body_index(name)
@@ -213,7 +216,7 @@ class _Reader:
 
 
 def _bryant(angles: np.ndarray) -> np.ndarray:
-    """Quaternions (…, 4) of turns about body-fixed x, y and z, one after another (…, 3)."""
+    """Return quaternions (…, 4) of successive rotations (…, 3) about body-fixed x, y and z."""
     x, y, z = (rotations.from_vector(angles[..., n, None] * np.eye(3)[n]) for n in range(3))
     return rotations.multiply(rotations.multiply(x, y), z)
 

@@ -1,4 +1,4 @@
-"""A driven scene as an assembly of OndselSolver, and the tables of its answer."""
+"""A driven scene as an assembly of OndselSolver, and the tables of its result."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Scene
 
 End = tuple[str, np.ndarray, np.ndarray]  # end of a joint: body, point, axes (columns)
-JOINTS = {  # joint type: OndselSolver's
+JOINTS = {  # joint type → OndselSolver's joint
     "fixed": "fixed",
     "revolute": "revolute",
     "universal": "universal",
@@ -27,13 +27,13 @@ JOINTS = {  # joint type: OndselSolver's
 MOTIONS: dict[str | None, str] = {
     "angle": "rotational",
     "displacement": "translational",
-}  # driven coordinate: OndselSolver's motion
+}  # driven coordinate → OndselSolver's motion
 SUPPORTS = Supports(
     joints=tuple(JOINTS),
     drivers=("angle", "displacement"),
     loads=("moment", "force", "spring", "torsion_spring"),  # loads do not change a prescribed motion
 )
-# joints whose accelerations are right only where the first body is at rest:
+# joints whose accelerations are right only if the first body is at rest:
 ACCURATE_ON_GROUND = ("cylindrical", "planar")
 NAME = "scene"
 TOLERANCE = 1e-9
@@ -42,12 +42,13 @@ TILT = rotations.from_vector(np.array([0.5, -0.4, 0.3]))
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of the answer by series, such as ``"b0"`` or ``"j1"``, and label, such as ``"VX"``: (frames,)."""
+    """Rows of the result by series, such as ``"b0"`` or ``"j1"``, and label, such as ``"VX"``: (frames,)."""
 
     series: dict[str, dict[str, np.ndarray]]
 
     def three(self, name: str, *labels: str) -> np.ndarray:
-        """(frames, 3) of three rows, in the assembly's world; zero for a series the answer has not."""
+        """Return (frames, 3) of three rows, in the assembly's world; zero for a series that the result
+        lacks."""
         rows = self.series.get(name)
         if rows is None:
             frames = len(next(iter(self.series.values()))["X"])
@@ -58,10 +59,10 @@ class Table:
 class Assembly:
     """A scene in a turned world, with bodies in their principal axes.
 
-    The solver gives orientations as angles that lose their meaning where a body's third axis is along the
-    first of the world.  So ``world`` (4,) first turns the scene such that the first driver's axis is the
-    third; ``tilted``, another turn follows.  ``principal`` (nb, 4) turns principal to body axes, the third
-    of them the nearest to the driver's axis.
+    The solver returns orientations as three angles, which are singular if a body's third axis is along the
+    first world axis. So the rotation ``world`` (4,) makes the first driver's axis the third world axis; with
+    ``tilted`` a further rotation follows. ``principal`` (nb, 4) rotates principal axes to body axes. The
+    third principal axis is the one nearest to the driver's axis.
     """
 
     def __init__(self, scene: Scene, tilted: bool = False):
@@ -79,7 +80,8 @@ class Assembly:
         self.principal = rotations.from_matrix(np.array(self.axes))
 
     def text(self, t0: float, t1: float, frames: int, position: np.ndarray, orientation: np.ndarray) -> str:
-        """The assembly from poses (nb, 3), (nb, 4; body axes) at t0, to be moved to t1 in equal steps."""
+        """Return the text of the assembly with poses (nb, 3), (nb, 4; body axes) at t0, to be moved to t1 in
+        equal steps."""
         from pyondsel.model.asmt_model import AsmtModel
         from pyondsel.model.simulation import Simulation
 
@@ -139,7 +141,7 @@ class Assembly:
             model.add_motion(Motion(f"d{k}", f"j{k}", text, MOTIONS[joint.facts.driven]))
 
     def ends(self, joint: Joint) -> list[End]:
-        """Body, point and axes (3, 3, columns) of a joint's two markers, in principal axes."""
+        """Return body, point and axes (3, 3, columns) of a joint's two markers, in principal axes."""
         ends = []
         for name, frame in zip(joint.bodies, _frames(joint), strict=True):
             point, axes = (
@@ -154,18 +156,21 @@ class Assembly:
 
 
 def is_reversed(joint: Joint) -> bool:
-    """Whether the solver is given the joint's second body as its first, because that is the ground."""
+    """Return whether the solver receives the joint's second body as its first one, because that is the
+    ground."""
     return joint.type in ACCURATE_ON_GROUND and joint.bodies[1] == GROUND
 
 
 def _turned_back(name: str, point: np.ndarray, axes: np.ndarray, angle: float) -> End:
-    """A marker turned back about its third axis by what its driver has turned: angles start at zero."""
+    """Return a marker rotated back about its third axis by the driver's angle so far: the solver's angles
+    start at zero."""
     c, s = np.cos(angle), np.sin(angle)
     return name, point, axes @ [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
 
 
 def _principal(inertia: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Principal moments and axes (3, 3, columns) of an inertia, the last the nearest to ``axis`` (3,)."""
+    """Return principal moments and axes (3, 3, columns) of an inertia, the last axis nearest to ``axis``
+    (3,)."""
     moments, axes = np.linalg.eigh(inertia)
     last = int(np.argmax(np.abs(axes.T @ axis)))
     order = [(last + 1) % 3, (last + 2) % 3, last]
@@ -174,13 +179,14 @@ def _principal(inertia: np.ndarray, axis: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 def _frames(joint: Joint) -> list[np.ndarray]:
-    """Axes (3, 3, columns, world at t = 0) of the two markers; the joint's axis is the third."""
+    """Return the axes (3, 3, columns, world at t = 0) of the two markers; the joint's axis is the third."""
     frames = [joint_frame(axis) for axis in joint.directions] or [np.eye(3)]
     return [frames[0], frames[-1]]
 
 
 def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
-    """The driver's value times ``sign``, less the angle ``turned`` (rad), in OndselSolver's syntax."""
+    """Return the driver's value times ``sign``, minus the angle ``turned`` (rad), in OndselSolver's
+    syntax."""
     t = f"(time + {t0!r})"
     terms = ["*".join([f"({sign * c!r})"] + [t] * n) for n, c in enumerate(driver.polynomial)]
     if s := driver.sine:
@@ -189,7 +195,7 @@ def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
 
 
 def table(answer: str, frames: int) -> Table:
-    """The time series of an answer; its first column, the poses as given, is left out.
+    """Return the time series of a result; its first column, the given poses, is left out.
 
     Raises ValueError when the analysis ended before all its frames.
     """

@@ -1,4 +1,4 @@
-"""Pinocchio as an engine."""
+"""Adapter of Pinocchio."""
 
 from crosscheck.engines.pinocchio.adapter import ENGINE
 

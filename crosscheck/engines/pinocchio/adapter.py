@@ -1,9 +1,10 @@
-"""Pinocchio: rigid-body dynamics in joint coordinates, closed by its proximal constraint solver.
+"""Pinocchio: rigid-body dynamics in joint coordinates, with loops closed by its proximal constraint solver.
 
-Pinocchio has no integrator of its own; the families differ in the integrator and the stabilisation put
-around ``constraintDynamics`` (FAMILIES).
+Pinocchio has no integrator of its own; the families (FAMILIES) combine ``constraintDynamics`` with different
+integrators and stabilisations.
 
-A driven coordinate has an armature of 1e18 and the torque that goes with it: exact to rounding.
+A driven coordinate has an armature of 1e18 kg m² and a matching torque, so that it follows its driver to
+rounding.
 """
 
 from __future__ import annotations
@@ -41,21 +42,24 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
-Step = Callable[[np.ndarray, float, float], np.ndarray]  # (state, its time, a later time) -> state then
-WITHOUT_PYTHON = 1e-9, 1e-7, 5  # solver parameters in compiled code; fewer iterations suffice
+# (state, its time, a later time) → state at the later time
+Step = Callable[[np.ndarray, float, float], np.ndarray]
+WITHOUT_PYTHON = 1e-9, 1e-7, 5  # solver parameters in compiled code, where fewer iterations suffice
 FORCES = (
     1e-9,
     1e-6,
     50,
-)  # solver parameters for forces of redundant closures, whose rounding grows as 1/mu
-PROJECTIONS = 10  # Newton iterations at most; two are usual
-CLOSED = 1e-13  # m and rad, where a projection ends
-REDUNDANT = 1e-7  # fraction of the largest singular value: smaller ones belong to redundant rows
-NOTHING = 1e-12  # fraction of the scene's length: smaller closure rows are rounding
-CLOSED_ENOUGH = 1e-8  # m and rad, beyond which it has failed
-TURN_PER_STEP = 0.25  # rad a driver may move within one adaptive step: closures can fold in between
+)  # solver parameters for forces of redundant closures, whose rounding errors grow as 1/mu
+PROJECTIONS = 10  # largest number of Newton iterations; two are usual
+CLOSED = 1e-13  # m and rad; residual at which a projection ends
+REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
+NOTHING = 1e-12  # smaller entries of closure rows, relative to the scene's length, are rounding
+CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
+# rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
+# ones
+TURN_PER_STEP = 0.25
 SCOUT_RTOL = 1e-5
-SCOUT_SAMPLES = 41  # samples of the coarse run that measures how fast a scene turns
+SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 HINTS = {"defaults": ": the default solver settings fail on redundant closures"}
 
 
@@ -81,7 +85,7 @@ class Pinocchio(Engine):
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Fixed steps by the angle turned in one, adaptive ones by relative tolerance."""
+        """Return fixed steps by the angle that a body turns in one step, and adaptive steps by tolerance."""
         rate = fastest_rate(scene, lambda step: self._coarse(scene, step))
         return sweep(scene, rate)
 
@@ -94,12 +98,12 @@ class Pinocchio(Engine):
         return own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
-        """Compile the steppers and the library of the compiled families."""
+        """Compile the integrators and the library of the compiled families."""
         if set(COMPILED) & set(families):
             compiled_run.prepare()
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         if setting.family in COMPILED and (planar := planar_scene(scene)) is not scene:
             return replace(self.run(planar, times, setting), reactions=None)
         start = time.process_time()
@@ -123,7 +127,7 @@ class Pinocchio(Engine):
 
 
 class _PinocchioSimulation:
-    """One simulation: the state, its right-hand side and how it is advanced."""
+    """One simulation: the state, its right-hand side and the method by which it is advanced."""
 
     def __init__(self, scene: Scene, setting: Setting):
         self.mechanism = mechanism = Mechanism(scene)
@@ -131,8 +135,9 @@ class _PinocchioSimulation:
         self.counts = Counts()
         self.loads = Loads(mechanism)
         self.nq = self.model.nq
-        self.least = NOTHING * max(1.0, scene_length(scene))  # smallest Jacobian entry that is not rounding
-        self.flat = self.nq == self.model.nv  # no quaternions: dq/dt = v
+        # entries of the Jacobian below this size are rounding
+        self.least = NOTHING * max(1.0, scene_length(scene))
+        self.flat = self.nq == self.model.nv  # True without quaternions: then dq/dt = v
         self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
         self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])
         self.frames = [mechanism.frame(k) for k in range(len(mechanism.tree.links))]
@@ -176,7 +181,7 @@ class _PinocchioSimulation:
         return rk4(self.rhs, self.on_spheres, y, t0, t1, step, self.counts)
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1; raises Failed."""
+        """Move the state from t0 to t1; raises Failed."""
         self._finite(t0, self.rhs(t0, self.y))
         self.y = self.step(self.y, t0, t1)
 
@@ -188,7 +193,7 @@ class _PinocchioSimulation:
     def without_python(
         self, times: np.ndarray, setting: Setting, start: float, labels: dict[str, Any]
     ) -> Trajectory:
-        """The run of a compiled family; its construction began at ``start`` (s of process time)."""
+        """Return the run of a compiled family; its construction began at ``start`` (s of process time)."""
         solver = compiled_run.Solver(*WITHOUT_PYTHON, setting.options.get("beta", 0.0), self.least)
         run = compiled_run.CompiledRun(self.mechanism, self.loads, solver)
         built, is_projected = time.process_time() - start, setting.family == TUNED_COMPILED
@@ -200,7 +205,7 @@ class _PinocchioSimulation:
         return run.trajectory(times, *given, load, self.sample, built, labels)
 
     def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Configuration and velocity of a state vector; driven coordinates as prescribed at t."""
+        """Return configuration and velocity of a state vector, with driven coordinates as prescribed at t."""
         if self.driven:
             y = y.copy()
             for iq, iv, driver in self.driven:
@@ -209,26 +214,26 @@ class _PinocchioSimulation:
         return (q if self.flat else self.pin.normalize(self.model, q)), v
 
     def rhs(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Time derivative (nq + nv,) of the state."""
+        """Return the time derivative (nq + nv,) of the state."""
         q, v = self.split(t, y)
         a = self.accelerations(t, q, v, self.solver)
         rates = v if self.flat else self.pin.tangentMap(self.model, q) @ v
         return np.concatenate((rates, a))
 
     def accelerations(self, t: float, q: np.ndarray, v: np.ndarray, solver: Any) -> np.ndarray:
-        """Joint accelerations (nv,) from Pinocchio."""
+        """Return joint accelerations (nv,) from Pinocchio."""
         tau = self.loads.constant if self.still else self.loads.torques(t, q, v)
         return self.pin.constraintDynamics(
             self.model, self.data, q, v, tau, self.closures, self.closure_data, solver
         )
 
     def on_spheres(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The state with unit quaternions and driven coordinates as prescribed."""
+        """Return the state with unit quaternions and driven coordinates as prescribed."""
         return y if self.flat and not self.driven else np.concatenate(self.split(t, y))
 
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
-        """The nearest state, by kinetic energy, whose positions and velocities satisfy the closures: the
-        rounding of a light body is not handed on to a heavy one."""
+        """Return the nearest state, by kinetic energy, whose positions and velocities satisfy the closures.
+        With this metric the rounding of a light body does not move a heavy one."""
         q, v = self.split(t, y)
         if not len(self.closures):
             return np.concatenate((q, v))
@@ -244,14 +249,14 @@ class _PinocchioSimulation:
         return np.concatenate((q, v))
 
     def _root_of_mass(self, t: float, q: np.ndarray) -> np.ndarray:
-        """The lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
+        """Return the lower Cholesky factor of the mass matrix of the coordinates that are not driven."""
         mass = self.pin.crba(self.model, self.data, q)[np.ix_(self.free, self.free)]
         if not np.isfinite(mass).all():
             raise Failed(Outcome.NOT_FINITE, t, f"the state is not finite at {t:.6g} s")
         return np.linalg.cholesky(mass)
 
     def closure_errors(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Closure residuals (rows,), m and rad, and the Jacobian (rows, nv) with d residual = -J dq."""
+        """Return closure residuals (rows,), m and rad, and the Jacobian (rows, nv): d residual = -J dq."""
         pin = self.pin
         pin.computeJointJacobians(self.model, self.data, q)
         residual = []
@@ -266,7 +271,7 @@ class _PinocchioSimulation:
     def _least_change(
         self, t: float, root: np.ndarray, jacobian: np.ndarray, target: np.ndarray
     ) -> np.ndarray:
-        """The dv (nv,) of least kinetic energy, zero in driven coordinates, with J dv = target."""
+        """Return the dv (nv,) of least kinetic energy, zero in driven coordinates, with J dv = target."""
         change = np.zeros(self.model.nv)
         if not (np.isfinite(jacobian).all() and np.isfinite(target).all()):
             raise Failed(Outcome.NOT_FINITE, t, f"the closure errors are not finite at {t:.6g} s")
@@ -276,7 +281,7 @@ class _PinocchioSimulation:
         return change
 
     def sample(self, t: float) -> Sample:
-        """Poses, velocities and reactions of the scene's bodies and joints."""
+        """Return poses, velocities and reactions of the scene's bodies and joints."""
         q, v = self.split(t, self.y)
         motion = self.link_motion(t, q, v)
         own = list(self.mechanism.tree.own)
@@ -293,7 +298,7 @@ class _PinocchioSimulation:
         )
 
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
-        """The motion of the links; leaves the closure forces of this state in the closures' data."""
+        """Return the motion of the links; the closure forces of this state are then in the closures' data."""
         pin, model, data = self.pin, self.model, self.data
         a = self._finite(t, self.accelerations(t, q, v, self.sampler))
         pin.forwardKinematics(model, data, q, v, a)
@@ -314,7 +319,7 @@ class _PinocchioSimulation:
         )
 
     def closing(self) -> list[np.ndarray]:
-        """Per closure of the tree, the wrench on its second link."""
+        """Return the wrench on the second link of each closure of the tree."""
         wrenches = [np.zeros(6) for _ in self.mechanism.tree.closures]
         for k, closure, data in zip(self.mechanism.closed, self.closures, self.closure_data, strict=True):
             place, force = self.data.oMi[closure.joint1_id] * closure.joint1_placement, data.contact_force

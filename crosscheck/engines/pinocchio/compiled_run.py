@@ -1,5 +1,7 @@
-"""Pinocchio without Python between samples: ``constraintDynamics`` of its C++ library in the compiled DOP853,
-with states projected onto the closures or not."""
+"""Pinocchio without Python between samples: ``constraintDynamics`` of its C++ library in the compiled DOP853.
+
+States may be projected onto the closures.
+"""
 
 from __future__ import annotations
 
@@ -18,21 +20,21 @@ from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
 KINDS = {TURN: 0, SLIDE: 1, BALL_JOINT: 2, FREE: 3}
-QUATERNION = {BALL_JOINT: 0, FREE: 3}  # place in the coordinates of a joint
+QUATERNION = {BALL_JOINT: 0, FREE: 3}  # index of the quaternion in the coordinates of a joint
 
 
 class Solver(NamedTuple):
-    """Numbers of Pinocchio's constraint solver."""
+    """Parameters of Pinocchio's constraint solver."""
 
     accuracy: float
     mu: float
     iterations: int
-    beta: float  # double root of the closure errors, 1/s
-    nothing: float  # smaller entries of the closure Jacobian are rounding
+    beta: float  # decay rate of the closure errors, a double root, 1/s
+    nothing: float  # entries of the closure Jacobian below this size are rounding
 
 
 def why_not(scene: Scene) -> str:
-    """Why the compiled families cannot run a scene, in a sentence; empty where they can."""
+    """Return the reason why the compiled families cannot run a scene, in a sentence; empty if they can."""
     if reason := library.why_not():
         return reason
     for load in Loads(Mechanism(scene)).evaluated:
@@ -49,7 +51,7 @@ def prepare() -> None:
 
 
 class CompiledRun:
-    """A mechanism in the library, and its state at t = 0."""
+    """A mechanism in the compiled library, and its state at t = 0."""
 
     def __init__(self, mechanism: Mechanism, loads: Loads, solver: Solver):
         self.mechanism, self._library = mechanism, library.library()
@@ -97,7 +99,8 @@ class CompiledRun:
         built: float,
         labels: dict[str, Any],
     ) -> Trajectory:
-        """The motion; ``load`` takes a state at its time, construction took ``built`` seconds."""
+        """Return the motion; ``load`` puts a state at its time into the data, and construction took ``built``
+        seconds."""
         from crosscheck.engines.compiled.dop853 import System
         from crosscheck.engines.compiled.run import MOST_STEPS, trajectory
 
@@ -125,7 +128,7 @@ def _pointer(array: np.ndarray) -> ctypes.c_void_p:
 
 
 def _joints(mechanism: Mechanism) -> np.ndarray:
-    """A row of 21 numbers a joint, as ``rates.cpp`` reads them."""
+    """Return a row of 21 numbers for each joint, as ``rates.cpp`` reads them."""
     model, rows = mechanism.model, []
     for j, motion in enumerate(mechanism.motions, 1):
         inertia = model.inertias[j]
@@ -145,7 +148,7 @@ def _joints(mechanism: Mechanism) -> np.ndarray:
 
 
 def _closures(mechanism: Mechanism) -> np.ndarray:
-    """A row of 9 numbers a closure."""
+    """Return a row of 9 numbers for each closure."""
     rows = [
         [
             6 if closure.type == mechanism.pin.ContactType.CONTACT_6D else 3,
@@ -160,7 +163,7 @@ def _closures(mechanism: Mechanism) -> np.ndarray:
 
 
 def _drive(iq: int, iv: int, driver: Driver) -> np.ndarray:
-    """Six numbers of a driver, before the coefficients of its polynomial."""
+    """Return the six numbers of a driver that precede the coefficients of its polynomial."""
     wave = (0.0, 0.0, 0.0)
     if sine := driver.sine:
         wave = (sine.amplitude, sine.frequency, sine.phase)

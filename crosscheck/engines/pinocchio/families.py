@@ -8,11 +8,13 @@ from crosscheck.engine import Setting
 from crosscheck.engines.pinocchio import compiled_run
 from mbref.scene import Scene
 
-BAUMGARTE = 0.1  # double root of the closure errors, in 1/step
-RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)  # finer ones get lost in the noise at singular positions
+BAUMGARTE = 0.1  # decay rate of the closure errors in 1/step, a double root
+# at tighter tolerances the noise at singular positions dominates
+RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
-STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step
-FINEST = 0.0007  # rad per step, of the stabilised family alone: only there the closure errors allow it
+STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step, for each setting
+# rad turned per step, for the stabilised family only: without stabilisation closure errors dominate
+FINEST = 0.0007
 MAX_FIXED_STEPS = 250_000
 FIXED = ("defaults", "proximal", "baumgarte")
 DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
@@ -28,18 +30,22 @@ FAMILIES = {
     "compiled DOP853; needs a C++ compiler and the package cmeel-eigen",
     TUNED_COMPILED: "like tuned, without Python; needs a C++ compiler and cmeel-eigen",
 }
-CONVERGED = 1e-9, 1e-8, 50  # change of the forces (N), mu, iterations: accelerations near singular positions
+# change of the forces (N), mu, iterations: needed for accelerations near singular positions
+CONVERGED = 1e-9, 1e-8, 50
 OPTIONS = {
     "step": "time step, s",
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
-    "beta": "double root of the closure errors, 1/s",
+    "beta": "decay rate of the closure errors, a double root, 1/s",
 }
 
 
 def sweep(scene: Scene, rate: float) -> list[Setting]:
-    """Fixed steps by the angle turned in one at the scene's fastest rate (rad/s), adaptive ones by relative
-    tolerance; coarse to fine in each family."""
+    """Return fixed steps chosen by the angle that a body turns in one step at the fastest rate (rad/s), and
+    adaptive steps by relative tolerance.
+
+    Settings are coarse to fine in each family.
+    """
     fixed = [
         Setting(family, {"step": h})
         for family in FIXED
@@ -52,7 +58,7 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
 
 
 def _compiled(least: float) -> list[Setting]:
-    """The sweep of the compiled families; ``least`` is the shortest step (s)."""
+    """Return the settings of the compiled families; ``least`` is the shortest step (s)."""
     given: list[tuple[str, dict[str, float]]] = [(DOP853_COMPILED, {"beta": 0.0}), (TUNED_COMPILED, {})]
     return [
         Setting(family, {"rtol": rtol, "min_step": least, **options})
@@ -62,7 +68,8 @@ def _compiled(least: float) -> list[Setting]:
 
 
 def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Steps (s) that turn by the angles (rad) at a rate (rad/s), as far as they are not too many."""
+    """Return steps (s) that turn by the angles (rad) at a rate (rad/s); steps that are too many are left
+    out."""
     steps = [float(f"{angle / rate:.2g}") for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
 

@@ -1,7 +1,8 @@
-"""Our C functions around Pinocchio, compiled once from ``rates.cpp`` against the headers of its wheel.
+"""crosscheck's C++ functions that call Pinocchio, compiled once from ``rates.cpp`` with the headers of its
+Python package.
 
-The library is kept in the user's cache folder for its source, compiler's command and Pinocchio's version.
-It needs a C++ compiler and Eigen's headers (package ``cmeel-eigen``).
+The library is stored in the user's cache folder by source, compiler command and Pinocchio's version. It needs
+a C++ compiler and Eigen's headers (package ``cmeel-eigen``).
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from pathlib import Path
 from crosscheck.engines import kept
 from crosscheck.engines.compiler import CXX, NoLibrary
 
-FOLDER = "pinocchio"  # folder in the cache
+FOLDER = "pinocchio"  # name of the folder in the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
 FLAGS = (
     "-std=c++17",
@@ -32,7 +33,8 @@ EIGEN = Path("/usr/include/eigen3")  # system folder, searched after the folder 
 
 
 def why_not() -> str:
-    """Why the library cannot be compiled here, in a sentence; empty where nothing is missing."""
+    """Return the reason why the library cannot be compiled here, in a sentence; empty if nothing is
+    missing."""
     try:
         _command(Path("library"))
     except NoLibrary as reason:
@@ -42,7 +44,7 @@ def why_not() -> str:
 
 @functools.cache
 def library() -> ctypes.CDLL:
-    """The library, compiled where it is not in the cache; raises NoLibrary."""
+    """Return the library, compiled if it is not in the cache; raises NoLibrary."""
     path = _kept() or _compiled()
     try:
         return ctypes.CDLL(str(path))
@@ -51,7 +53,7 @@ def library() -> ctypes.CDLL:
 
 
 def _prefix() -> Path:
-    """The folder with Pinocchio's ``include`` and ``lib``."""
+    """Return the folder with Pinocchio's ``include`` and ``lib``."""
     import pinocchio
 
     for folder in Path(pinocchio.__file__).parents:
@@ -68,7 +70,7 @@ def _eigen(prefix: Path) -> Path:
 
 
 def _command(target: Path) -> list[str]:
-    """The compiler's command line; raises NoLibrary where something is missing."""
+    """Return the compiler's command line; raises NoLibrary if something is missing."""
     compiler, prefix = CXX.path(), _prefix()
     headers = [f"-isystem{folder}" for folder in (prefix / "include", _eigen(prefix))]
     linked = [path for path in (prefix / "lib").glob("libpinocchio_default.*") if path.is_file()]
@@ -80,19 +82,19 @@ def _command(target: Path) -> list[str]:
 
 @functools.cache
 def _origin() -> str:
-    """Hash of Pinocchio's version, the compiler's command and the source."""
+    """Return a hash of Pinocchio's version, the compiler command and the source."""
     import pinocchio
 
     return kept.hashed(pinocchio.__version__, *_command(Path("library")), SOURCE.read_text())
 
 
 def _kept() -> Path | None:
-    """The library in the cache."""
+    """Return the library in the cache."""
     return kept.kept(FOLDER, _origin(), ".so")
 
 
 def _compiled() -> Path:
-    """Compiles the library and puts it into the cache."""
+    """Compile the library and store it in the cache."""
     return kept.keep(FOLDER, _origin(), ".so", _compile)
 
 

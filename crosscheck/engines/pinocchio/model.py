@@ -1,8 +1,8 @@
-"""A scene's tree as a Pinocchio model: joints, closures, drivers and loads.
+"""A scene's spanning tree as a Pinocchio model: joints, closures, drivers and loads.
 
 Every joint frame has its origin at the joint's anchor and world-aligned axes at t = 0, so the neutral
 configuration is the scene's.  Joints are added depth first: in any other order Pinocchio's Cholesky
-factorisation is silently wrong.
+factorisation is wrong without a message.
 """
 
 from __future__ import annotations
@@ -45,14 +45,15 @@ SUPPORTS = Supports(
     couplings=("angle", "displacement"),  # refused by the engine with a reason
     armatures=("angle", "displacement"),
 )
-DRIVEN_ARMATURE = 1e18  # inertia of a driven coordinate: it then moves with its torque alone
+# kg m² or kg; armature of a driven coordinate, so large that only its own torque moves it
+DRIVEN_ARMATURE = 1e18
 
 
 class Mechanism:
     """A scene in Pinocchio: ``model``, ``closures`` (RigidConstraintModels), and its state at t = 0.
 
-    ``joint`` and ``origin`` give, per link, the Pinocchio joint it hangs from and where (world, t = 0)
-    that joint's frame started.
+    For each link, ``joint`` is the Pinocchio joint that carries it, and ``origin`` the position (world, t =
+    0) of that joint's frame.
     """
 
     def __init__(self, scene: Scene):
@@ -91,7 +92,7 @@ class Mechanism:
         self.joint.append(joint)
 
     def _closure(self, closure: Closure) -> Any | None:
-        """The RigidConstraintModel of a closure; None where both links hang from one joint."""
+        """Return the RigidConstraintModel of a closure; None if one joint carries both links."""
         pin = self.pin
         joints = [self.joint[k] if k != GROUND_LINK else 0 for k in closure.links]
         if joints[0] == joints[1]:
@@ -111,14 +112,15 @@ class Mechanism:
         self.model.armature = armature
 
     def frame(self, link: int) -> tuple[int, np.ndarray]:
-        """Joint that carries a link (or the ground), and where in its frame the link's sits (3,)."""
+        """Return the joint that carries a link (or the ground), and the position (3,) of the link's frame in
+        the joint's frame."""
         if link == GROUND_LINK:
             return 0, np.zeros(3)
         joint = self.joint[link]
         return joint, self.tree.links[link].position - self.origin[joint]
 
     def coordinates(self, q: np.ndarray) -> np.ndarray:
-        """(nv,): coordinates by the velocity they belong to; zero where a joint has no angles."""
+        """Return coordinates (nv,) in the order of the velocities; zero for joints without angles."""
         coordinates = np.zeros(self.model.nv)
         for iv, iq in self.q_of_v.items():
             coordinates[iv] = q[iq]
@@ -126,7 +128,7 @@ class Mechanism:
 
 
 def _joint_models(pin: Any, link: Link) -> list[Any]:
-    """The chain of Pinocchio joints that carries a link."""
+    """Return the chain of Pinocchio joints that carries a link."""
     of_kind = {
         SLIDE: pin.JointModelPrismaticUnaligned,
         TURN: pin.JointModelRevoluteUnaligned,
@@ -146,10 +148,10 @@ class _PointForce:
 
 
 class Loads:
-    """Generalised forces of a scene's loads, and of its drivers' heavy coordinates.
+    """Generalised forces of a scene's loads, and of its driven coordinates with large armatures.
 
-    What never changes (a moment on a body that turns about one direction) is evaluated once; the rest is
-    brought to joint torques by Pinocchio's static torque of a model without gravity.
+    Constant loads (a moment on a body that turns about one direction) are evaluated once. All others are
+    converted to joint torques by Pinocchio's static torque for a model without gravity.
     """
 
     def __init__(self, mechanism: Mechanism):
@@ -163,7 +165,7 @@ class Loads:
         self.forces: list[_PointForce] = []
         self.springs: list[tuple[Spring, list[tuple[int, Any]]]] = []
         self.torsion: list[tuple[int, int, TorsionSpring]] = []
-        self.evaluated: list[Any] = []  # loads whose torques change with the position
+        self.evaluated: list[Any] = []  # loads whose torques depend on the position
         maps = twist_maps(mechanism.tree)
         for load in mechanism.scene.load:
             self._add(load, maps)
@@ -196,7 +198,7 @@ class Loads:
         return joint, self.pin.SE3(np.eye(3), np.array(point) - self.mechanism.origin[joint])
 
     def torques(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-        """Generalised forces (nv,) at time t (s), configuration q and velocity v."""
+        """Return generalised forces (nv,) at time t (s), configuration q and velocity v."""
         tau = self.constant.copy()
         for iq, iv, load in self.torsion:
             tau[iv] -= load.stiffness * (q[iq] - load.natural_angle) + load.damping * v[iv]
@@ -207,7 +209,7 @@ class Loads:
         return tau
 
     def _external(self, q: np.ndarray, v: np.ndarray) -> Any:
-        """Forces on the joints' frames, each in its own axes."""
+        """Return the forces on the joints' frames, each in its own axes."""
         pin, data = self.pin, self.data
         pin.forwardKinematics(self.model, data, q, v)
         external = pin.StdVec_Force()
@@ -227,7 +229,7 @@ class Loads:
         return point.act(self.pin.Force(rotation.T @ force, np.zeros(3)))
 
     def _tension(self, spring: Spring, ends: list[tuple[int, Any]]) -> np.ndarray:
-        """World force (3,) of a spring on its first body."""
+        """Return the world force (3,) of a spring on its first body."""
         pin, data = self.pin, self.data
         frame = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
         first, second = (data.oMi[j].act(point.translation) for j, point in ends)
@@ -240,7 +242,7 @@ class Loads:
 
 
 def _turns_about_one_direction(tree: Tree, link: int) -> bool:
-    """Whether every rotation between the ground and a link is about parallel axes."""
+    """Return whether every rotation between the ground and a link is about parallel axes."""
     axes: list[np.ndarray] = []
     while link != GROUND_LINK:
         mobilities = tree.links[link].mobilities

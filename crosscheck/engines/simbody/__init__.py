@@ -1,4 +1,4 @@
-"""Simbody through OpenSim as an engine."""
+"""Adapter of Simbody through OpenSim."""
 
 from crosscheck.engines.simbody.adapter import ENGINE
 

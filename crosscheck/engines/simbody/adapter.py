@@ -1,8 +1,9 @@
-"""Simbody, through OpenSim: joint coordinates, constraints met to the tolerance at every accepted step.
+"""Simbody, through OpenSim: joint coordinates, with constraints satisfied to the tolerance after every
+accepted step.
 
-Redundant closures are borne (least-norm multipliers).  The families are Simbody's error-controlled
-integrators; the one option is their ``accuracy``, a tolerance of one step.  OpenSim reports no counts of
-steps, so the cost has none.
+Redundant closures are allowed (multipliers of least norm). The families are Simbody's error-controlled
+integrators. Their only option is ``accuracy``, the tolerance of one step. OpenSim reports no numbers of
+steps, so these are missing in the cost.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ ACCURACIES = (1e-2, 1e-3, 1e-4, 1e-6, 1e-8, 1e-10)
 
 
 class Simbody(Engine):
-    """Simbody as it comes with OpenSim (PyPI ``opensim``)."""
+    """Simbody in the package OpenSim (PyPI ``opensim``)."""
 
     name = "simbody"
     package = "opensim"
@@ -63,7 +64,7 @@ class Simbody(Engine):
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Integrators by accuracy."""
+        """Return settings by accuracy for each integrator."""
         return [Setting(family, {"accuracy": a}) for family in INTEGRATORS for a in ACCURACIES]
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
@@ -73,7 +74,7 @@ class Simbody(Engine):
         return f"manager.setIntegratorMethod({kind}); {accuracy}"
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         if setting.family not in INTEGRATORS:
             raise ValueError(f"simbody has no family {setting.family!r}")
         start = time.process_time()
@@ -105,7 +106,7 @@ class _SimbodySimulation:
         self.start = np.array([body.orientation for body in scene.body])
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1; raises Failed."""
+        """Move the state from t0 to t1; raises Failed."""
         try:
             self.state = self.manager.integrate(t1)
         except RuntimeError as error:
@@ -113,7 +114,7 @@ class _SimbodySimulation:
             raise Failed(Outcome.STEP_FAILED, reached, _sentence(error)) from None
 
     def sample(self, t: float) -> Sample:
-        """Poses, velocities, accelerations and reactions."""
+        """Return poses, velocities, accelerations and reactions."""
         motion = self._motion()
         own = list(self.mechanism.tree.own)
         weighed = self.scene.has_mass()
@@ -129,7 +130,7 @@ class _SimbodySimulation:
         )
 
     def _motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         state, bodies = self.state, self.mechanism.bodies
         self.mechanism.model.realizeAcceleration(state)
         of = {
@@ -155,7 +156,7 @@ class _SimbodySimulation:
         )
 
     def _closing(self, motion: LinkMotion) -> list[np.ndarray]:
-        """Per closure of the tree, the wrench on its second link about the world's origin."""
+        """Return, for each closure of the tree, the wrench on its second link about the world's origin."""
         found = []
         for closure, constraint in zip(self.mechanism.tree.closures, self.mechanism.closures, strict=True):
             second = closure.links[1]
@@ -164,7 +165,8 @@ class _SimbodySimulation:
             at = next(k for k in range(labels.getSize()) if labels.get(k).endswith(name))
             force, moment = np.array([values.get(at + k) for k in range(6)]).reshape(2, 3)
             origin = motion.position[second] if second != GROUND_LINK else np.zeros(3)
-            found.append(-wrench(force, origin, moment))  # OpenSim records the wrench that the bodies exert
+            # OpenSim records the wrench that the bodies exert on the joint
+            found.append(-wrench(force, origin, moment))
         return found
 
 
@@ -177,7 +179,7 @@ def _matrix(rotation: Any) -> list[list[float]]:
 
 
 def _sentence(error: RuntimeError) -> str:
-    """The line of OpenSim's report that says what happened."""
+    """Return the line of OpenSim's report that states the error."""
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     return next((line for line in lines if "advance" in line or "rror" in line), lines[0])
 

@@ -1,4 +1,4 @@
-"""A scene's tree as an OpenSim model on Simbody: bodies, joints, closures, drivers and loads.
+"""A scene's spanning tree as an OpenSim model for Simbody: bodies, joints, closures, drivers and loads.
 
 Every body frame has the link's origin and world-aligned axes at t = 0; coordinates start at zero.
 """
@@ -16,7 +16,7 @@ from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
 from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
 
-JOINTS = {  # joint type: OpenSim's joint, and its coordinates in the order of the tree's
+JOINTS = {  # joint type → OpenSim's joint, and its coordinates in the tree's order
     "fixed": ("WeldJoint", ()),
     "revolute": ("PinJoint", (0,)),
     "universal": ("UniversalJoint", (0, 1)),
@@ -61,22 +61,22 @@ class Mechanism:
         self.model.finalizeConnections()
 
     def start(self) -> Any:
-        """The state at t = 0."""
+        """Return the state at t = 0."""
         state = self.model.initSystem()
         for k, rate in enumerate(initial_rates(self.scene, self.tree)):
             self.coordinates[k].setSpeedValue(state, float(rate))
         return state
 
     def vector(self, values: Any) -> Any:
-        """Three numbers as OpenSim's vector."""
+        """Return three numbers as OpenSim's vector."""
         return self.opensim.Vec3(*map(float, values))
 
     def frame(self, link: int) -> Any:
-        """OpenSim's frame of a link or the ground."""
+        """Return OpenSim's frame of a link or the ground."""
         return self.model.getGround() if link == GROUND_LINK else self.bodies[link]
 
     def place(self, link: int, point: Any) -> Any:
-        """A point (world at t = 0) in the frame of a link."""
+        """Return a point (world at t = 0) in the frame of a link."""
         origin = np.zeros(3) if link == GROUND_LINK else self.tree.links[link].position
         return self.vector(np.array(point) - origin)
 
@@ -109,7 +109,7 @@ class Mechanism:
             self.coordinates[self.tree.starts[k] + n] = coordinate
 
     def _cylindrical(self, k: int) -> Any:
-        """Rotation about and translation along z; coordinates in this order."""
+        """Return a joint with a rotation about and a translation along z, with coordinates in this order."""
         o = self.opensim
         transform = o.SpatialTransform()
         for n, axis in enumerate((transform.upd_rotation3(), transform.upd_translation3())):
@@ -157,7 +157,7 @@ class Mechanism:
         coordinate.setDefaultIsPrescribed(True)
 
     def _motion(self, driver: Driver) -> Any:
-        """The driver's value as a function of time."""
+        """Return the driver's value as OpenSim's function of time."""
         o, s = self.opensim, driver.sine
         if s is None:
             descending = o.Vector(len(driver.polynomial), 0.0)
@@ -170,7 +170,7 @@ class Mechanism:
         return FORCES[type(load)](self, name, load)
 
     def link_of(self, body: str) -> int:
-        """The link of a scene's body, by name."""
+        """Return the link of a scene's body, by name."""
         return self.tree.link_of(self.scene.body_index(body))
 
 
@@ -194,7 +194,8 @@ def _point_force(mechanism: Mechanism, name: str, load: Force) -> Any:
 
 
 def _spring(mechanism: Mechanism, name: str, load: Spring) -> Any:
-    """Return the force of a spring at distance d and its rate; positive pulls together."""
+    """Return the force of a spring as a function of distance d and its rate; positive forces pull
+    together."""
     force = mechanism.opensim.ExpressionBasedPointToPointForce()
     links = [mechanism.link_of(body) for body in load.bodies]
     first, second = (mechanism.frame(link) for link in links)
@@ -226,7 +227,8 @@ FORCES: dict[type, Callable[..., Any]] = {
 
 
 def _joint(link: Link) -> tuple[str, np.ndarray, tuple[int, ...]]:
-    """OpenSim's joint of a link, its frame (3, 3), and the indices of its coordinates in the tree's order."""
+    """Return OpenSim's joint of a link, its frame (3, 3), and the indices of its coordinates in the tree's
+    order."""
     kind, order = JOINTS[link.kind]
     axes = link.axes
     if kind == "UniversalJoint":
@@ -238,7 +240,8 @@ def _joint(link: Link) -> tuple[str, np.ndarray, tuple[int, ...]]:
 
 
 def _angles(r: np.ndarray) -> tuple[float, float, float]:
-    """Angles of rotations about body-fixed x, y, z in turn that make up a rotation matrix (3, 3)."""
+    """Return the angles of successive rotations about body-fixed x, y, z that give a rotation matrix (3,
+    3)."""
     cosine = np.hypot(r[0, 0], r[0, 1])
     if cosine < LOCKED:
         return np.arctan2(r[2, 1], r[1, 1]), np.arctan2(r[0, 2], cosine), 0.0

@@ -1,4 +1,4 @@
-"""SUNDIALS IDA as an engine."""
+"""Adapter of SUNDIALS IDA."""
 
 from crosscheck.engines.sundials.adapter import ENGINE
 

@@ -5,11 +5,11 @@ With Euler parameters p, body-fixed ω', and the twist V = (v, ω'), the residua
     q' = T(q) (V + Φ_qᵀ μ),   M V' = f + Φ_qᵀ λ,   Φ(q, t) = 0,   Φ_q V = ν,
 
 the index-2 form of Gear, Gupta and Leimkuhler; λ and μ are derivatives of two further states, which makes
-it of index 1 (Gear).  Rows that are redundant at the start are left out, chosen by pivoted QR; when the
-chosen ones become ill-conditioned beside another choice, the run restarts with that.  A row left out that
-is violated later ends the run.
+it of index 1 (Gear).  Rows that are redundant at the start are left out; a QR decomposition with pivoting
+selects the others. If another selection becomes much better conditioned, the run restarts with it. The run
+ends if a row that was left out is violated later.
 
-The residual is numpy; its cost, not IDA's, is most of the time.  The one option is ``rtol``.
+The residual is computed by numpy, which takes most of the time.  The one option is ``rtol``.
 """
 
 from __future__ import annotations
@@ -61,15 +61,15 @@ class Sundials(Engine):
         import sksundae.ida  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses whose motion is not prescribed in full."""
+        """Refuse scenes without masses whose motion the drivers do not determine completely."""
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """One family, by relative tolerance."""
+        """Return the settings of the one family, by relative tolerance."""
         return [Setting(FAMILY, {"rtol": rtol}) for rtol in RTOLS]
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         if setting.family != FAMILY:
             raise ValueError(f"sundials has no family {setting.family!r}")
         from sksundae.ida import IDA

@@ -11,13 +11,13 @@ from crosscheck.engines.generalised_forces import Forces
 from mbref import rotations
 from mbref.scene import Scene
 
-CORRECTIONS = 10  # Newton iterations to consistent poses
-CLOSED = 1e-14  # m and rad, where they end
+CORRECTIONS = 10  # Newton iterations for consistent poses
+CLOSED = 1e-14  # m and rad; residual at which Newton's method ends
 
 
 @dataclass(frozen=True)
 class State:
-    """Parts (…, ·) of a state: positions, Euler parameters, v, ω' by body; torsion angles."""
+    """Parts (…, ·) of a state: positions, Euler parameters, v and ω' by body, and torsion angles."""
 
     r: np.ndarray
     p: np.ndarray
@@ -30,9 +30,9 @@ class State:
 
 
 class Equations:
-    """The residual F(t, y, y') of a scene with the constraint rows ``rows`` (m,).
+    """Residual F(t, y, y') of a scene with the constraint rows ``rows`` (m,).
 
-    y holds r, p, V = (v, ω') and the angles of torsion springs, then the integrals of λ and of μ.
+    y contains r, p, V = (v, ω') and the angles of torsion springs, then the integrals of λ and of μ.
     """
 
     def __init__(self, scene: Scene):
@@ -43,7 +43,7 @@ class Equations:
         n = 13 * self.nb
         self.at_r, self.at_p = slice(0, 3 * self.nb), slice(3 * self.nb, 7 * self.nb)
         self.at_v, self.at_angles = slice(7 * self.nb, n), slice(n, n + self.springs)
-        self.motion = n + self.springs  # components that are not multipliers
+        self.motion = n + self.springs  # number of components that are not multipliers
 
     @property
     def at_lambda(self) -> slice:
@@ -55,11 +55,11 @@ class Equations:
 
     @property
     def size(self) -> int:
-        """Number of components of y."""
+        """Return the number of components of y."""
         return self.motion + 2 * len(self.rows)
 
     def state(self, y: np.ndarray) -> State:
-        """The parts of y (…, size)."""
+        """Return the parts of y (…, size)."""
         lead = y.shape[:-1]
         twist = y[..., self.at_v].reshape(*lead, self.nb, 6)
         return State(
@@ -71,7 +71,7 @@ class Equations:
         )
 
     def residual(self, t: float, y: np.ndarray, yp: np.ndarray) -> np.ndarray:
-        """F (…, size) at y (…, size) and y' (size,)."""
+        """Return F (…, size) at y (…, size) and y' (size,)."""
         s = self.state(y)
         f = s.frames()
         phi, rate, _ = self.constraints.levels(t, f)[..., self.rows]
@@ -93,7 +93,8 @@ class Equations:
         )
 
     def matrix(self, t: float, y: np.ndarray, yp: np.ndarray, cj: float, steps: np.ndarray) -> np.ndarray:
-        """∂F/∂y + cj ∂F/∂y' (size, size): difference quotients for the motion, the rest written out."""
+        """Return ∂F/∂y + cj ∂F/∂y' (size, size): difference quotients for the motion, exact entries for
+        multipliers."""
         moved = np.repeat(y[None], self.motion + 1, axis=0)
         moved[np.arange(self.motion), np.arange(self.motion)] += steps
         values = self.residual(t, moved, yp)
@@ -128,7 +129,7 @@ class Equations:
         return np.concatenate([r.ravel(), p.ravel(), twist, s.angles])
 
     def accelerations(self, t: float, s: State) -> tuple[np.ndarray, np.ndarray]:
-        """V' (6 nb,) and λ (m,) at a state."""
+        """Return V' (6 nb,) and λ (m,) at a state."""
         f = s.frames()
         j, gamma = self.constraints.jacobian(t, f)[self.rows], -self.constraints.levels(t, f)[2, self.rows]
         m = len(self.rows)
@@ -138,5 +139,5 @@ class Equations:
 
 
 def pure(vector: np.ndarray) -> np.ndarray:
-    """Quaternions (…, 4) without real part."""
+    """Return quaternions (…, 4) with zero real part."""
     return np.concatenate([np.zeros((*vector.shape[:-1], 1)), vector], axis=-1)

@@ -1,4 +1,4 @@
-"""One run of IDA on a scene's equations: choice of rows, start and restart, stepping, reading out."""
+"""One run of IDA on a scene's equations: selection of rows, start and restart, stepping, and samples."""
 
 from __future__ import annotations
 
@@ -18,12 +18,13 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome
 
 INCREMENT = 1e-7  # increment of difference quotients / scale of the component
-WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this part of the best choice's
-LOST = 1e-2  # fraction of the length, or rad: a dropped row violated by more was not redundant
-LOOSE = 1e2  # tolerance of ∫μ / its scale; loose, because ∫μ is not used and would limit the steps
-LEAST_STEP = 1e-12  # fraction of the duration
+WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this fraction of the best choice's
+# fraction of the length, or rad: a row that was left out and is violated by more was not redundant
+LOST = 1e-2
+LOOSE = 1e2  # tolerance of ∫μ / its scale; large, because ∫μ is not used and would limit the steps
+LEAST_STEP = 1e-12  # shortest step / duration
 MAX_STEPS = 10**6
-ENDINGS = {  # IDA's return flags
+ENDINGS = {  # IDA's return flags → sentence
     -1: Outcome.STEP_FAILED,
     -3: Outcome.STEP_FAILED,
     -4: Outcome.NOT_CONVERGED,
@@ -47,16 +48,17 @@ class Run:
         self._initialise(0.0)
 
     def _start(self) -> np.ndarray:
-        """Poses and velocities of the scene; no multipliers yet."""
+        """Set the poses and velocities of the scene, with zero multipliers."""
         r, p = initial_poses(self.scene)
         v, w = initial_twists(self.scene)
         twist = np.hstack([v, rotations.rotate(rotations.conjugate(p), w)])
         return np.concatenate([r.ravel(), p.ravel(), twist.ravel(), np.zeros(self.equations.springs)])
 
     def _choose(self, t: float) -> bool:
-        """Whether other rows than the present ones are better, and have been chosen.
+        """Choose better rows than the present ones; returns whether the choice changed.
 
-        Their number is the rank at the start: away from closed poses redundant rows seem independent.
+        The number of rows is the rank at the start, because redundant rows seem independent if the pose does
+        not satisfy the joints exactly.
         """
         e = self.equations
         scale = np.tile(np.repeat([1.0, 1 / self.length], 3), e.nb)
@@ -74,7 +76,7 @@ class Run:
         return True
 
     def _initialise(self, t: float) -> None:
-        """(Re)starts IDA near the present motion, with accelerations and multipliers that fit it."""
+        """Start or restart IDA near the present motion, with consistent accelerations and multipliers."""
         e = self.equations
         start = e.projected(t, self.y)
         s = e.state(start)
@@ -107,7 +109,7 @@ class Run:
         self.evaluated = 0
 
     def _scale(self, multipliers: np.ndarray) -> np.ndarray:
-        """Sizes (size,) of the components: absolute tolerances are ``rtol`` of them."""
+        """Return the sizes (size,) of the components: absolute tolerances are ``rtol`` times these."""
         e, rate = self.equations, stated_rate(self.scene)
         force = max(np.abs(multipliers).max(initial=0.0), np.abs(e.forces.mass).max() * rate**2 * self.length)
         twist = np.repeat([self.length * rate, rate], 3)
@@ -131,7 +133,7 @@ class Run:
         out[:] = self.equations.matrix(t, y, yp, cj, steps)
 
     def advance(self, t0: float, t1: float) -> None:
-        """Moves the state from t0 to t1; raises Failed."""
+        """Move the state from t0 to t1; raises Failed."""
         reached = t0
         while reached < t1:
             result = self.solver.step(t1, method="onestep")
@@ -161,7 +163,7 @@ class Run:
             raise Failed(Outcome.VIOLATION, t, f"joint {name!r} is off by {phi.max():.3g} at {t:.6g} s")
 
     def sample(self, t: float) -> Sample:
-        """Poses, velocities, accelerations and reactions."""
+        """Return poses, velocities, accelerations and reactions."""
         e = self.equations
         s = e.state(self.y)
         f = s.frames()
@@ -179,8 +181,10 @@ class Run:
         )
 
     def _reactions(self, t: float, f: Frames, multipliers: np.ndarray) -> dict[str, np.ndarray]:
-        """Force and moment (6,) on each joint's second body at the anchor on it, world axes; rows left out
-        bear nothing."""
+        """Return force and moment (6,) on each joint's second body at the anchor on it, world axes.
+
+        Rows that are left out transmit no force.
+        """
         e, c = self.equations, self.equations.constraints
         forces = np.zeros(len(c.joint))
         forces[e.rows] = multipliers
@@ -196,7 +200,7 @@ class Run:
         return found
 
     def _anchor(self, f: Frames, k: int) -> np.ndarray:
-        """Joint k's anchor (3,) on its second body, world."""
+        """Return joint k's anchor (3,) on its second body, world."""
         group, row = next(
             (g, int(np.flatnonzero(g.joint == k)[0]))
             for g in self.equations.constraints.groups
@@ -207,6 +211,7 @@ class Run:
 
 
 def _pivots(j: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sizes of the pivots of a QR decomposition of rows (m, n), decreasing, and the rows' order."""
+    """Return the sizes of the pivots of a QR decomposition of rows (m, n), decreasing, and the order of the
+    rows."""
     r, order = qr(j.T, mode="r", pivoting=True)
     return np.abs(np.diag(r)), order

@@ -1,1 +1,1 @@
-"""A mechanism's equations in joint coordinates as symbols, for engines that make code of them."""
+"""A mechanism's equations in joint coordinates as symbols, for engines that generate code from them."""

@@ -5,9 +5,8 @@ closed by points:
 
     M q̈ + Gᵀ λ = f,    G q̈ = γ - 2 β G q' - β² Φ
 
-with accelerations by the Schur complement G M⁻¹ Gᵀ, as somebody who generates code for one mechanism would
-write them.  Rows of G that vanish everywhere (of a planar mechanism) are left out, and entries that are zero
-everywhere cost nothing where the arithmetic drops products with zero.
+with accelerations from the Schur complement G M⁻¹ Gᵀ. Rows of G that always vanish (in a planar mechanism)
+are left out. Entries that are always zero need no operations, since the arithmetic drops products with zero.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ SEED = 1  # random seed of the pose at which vanishing rows are found
 
 
 class TreeEquations:
-    """The equations of a scene; raises ValueError, with a reason, where they are not derived."""
+    """Equations of a scene; the constructor raises ValueError with a reason if they cannot be derived."""
 
     def __init__(self, scene: Scene):
         self.scene = planar_scene(scene)
@@ -48,7 +47,8 @@ class TreeEquations:
             raise ValueError("nothing moves" if not self.n else "its closures depend on each other")
 
     def accelerations(self, q: Entries, v: Entries, arithmetic: Arithmetic, beta: float) -> Any:
-        """q̈ (n,) of coordinates and rates (n,); ``beta`` (1/s) is the double root of the closure errors."""
+        """Return q̈ (n,) for coordinates and rates (n,); ``beta`` (1/s) is the decay rate of the closure
+        errors, a double root."""
         frames = self.frames(q, v, arithmetic)
         mass, force = self._inertia(frames)
         violation, jacobian, bias = self._closures(frames)
@@ -61,7 +61,7 @@ class TreeEquations:
         return free + along @ solved(jacobian @ along, gamma - jacobian @ free)
 
     def settled(self, q: Entries, v: Entries, arithmetic: Arithmetic) -> tuple[Any, Any]:
-        """Coordinates and rates after one mass-orthogonal Newton step onto the closures."""
+        """Return coordinates and rates after one mass-orthogonal Newton step onto the closures."""
         q, v = np.array(q, dtype=object), np.array(v, dtype=object)
         frames = self.frames(q, v, arithmetic)
         mass, _ = self._inertia(frames)
@@ -73,7 +73,7 @@ class TreeEquations:
         return q - along @ solved(schur, violation), v - along @ solved(schur, jacobian @ v)
 
     def frames(self, q: Entries, v: Entries, arithmetic: Arithmetic) -> list[Frame]:
-        """The links in motion, their origins at ``position``."""
+        """Return the moving frames of the links, with their origins at ``position``."""
         zero = np.zeros(3, dtype=object)
         ground = Frame(np.zeros(3), zero, np.eye(3).astype(object), zero, zero, zero, zero)
         anchored: list[Frame] = []  # frames whose origin is the anchor of the link's joint
@@ -87,7 +87,7 @@ class TreeEquations:
         return [frame.moved(frame.arm(link.position), link.position) for link, frame in pairs]
 
     def _inertia(self, frames: Sequence[Frame]) -> tuple[np.ndarray, np.ndarray]:
-        """M (n, n) and f (n,) with gravity and moments."""
+        """Return M (n, n) and f (n,) with gravity and moments."""
         mass, force = _zeros(self.n, self.n), _zeros(self.n)
         gravity = np.array(self.scene.gravity, dtype=float)
         for k, (link, at_link) in enumerate(zip(self.tree.links, frames, strict=True)):
@@ -108,7 +108,8 @@ class TreeEquations:
         return mass, force
 
     def _closures(self, frames: Sequence[Frame]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Φ (m,), G (m, n) and the accelerations (m,) of the closures for q̈ = 0, on rows that matter."""
+        """Return Φ (m,), G (m, n) and the accelerations (m,) of the closures for q̈ = 0, for rows that do not
+        vanish."""
         violations, jacobians, biases = [_zeros(0)], [_zeros(0, self.n)], [_zeros(0)]
         for closure in self.tree.closures:
             ends = []
@@ -139,12 +140,13 @@ class TreeEquations:
         return sum((np.array(load.moment, dtype=float) for load in own), np.zeros(3))
 
     def _rank(self) -> int:
-        """Rank of the closures at the start."""
+        """Return the rank of the closures at the start."""
         _, jacobian, _ = self._closures(self.frames(np.zeros(self.n), np.zeros(self.n), NUMBERS))
         return int(np.linalg.matrix_rank(jacobian.astype(float), rtol=RANK_TOLERANCE))
 
     def link_motion(self, y: np.ndarray) -> tuple[LinkMotion, list[np.ndarray]]:
-        """The motion of the links at a state (2 n,), and per closure the wrench (6,) on its second link."""
+        """Return the motion of the links at a state (2 n,), and for each closure the wrench (6,) on its
+        second link."""
         q, v = y[: self.n], y[self.n :]
         frames = self.frames(q, v, NUMBERS)
         change, forces = self._solved(frames)
@@ -159,7 +161,8 @@ class TreeEquations:
         return motion, self._closing(frames, forces)
 
     def _solved(self, frames: Sequence[Frame]) -> tuple[np.ndarray, np.ndarray]:
-        """q̈ (n,) and the forces (closures, 3) of the closures, by least squares where they are singular."""
+        """Return q̈ (n,) and the forces (closures, 3) of the closures, by least squares if these are
+        singular."""
         mass, force = (part.astype(float) for part in self._inertia(frames))
         _, jacobian, bias = (part.astype(float) for part in self._closures(frames))
         free, along = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)
@@ -179,7 +182,7 @@ class TreeEquations:
 
 
 def _changes(frame: Frame, change: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Linear and angular acceleration (3,) of a link at the joint accelerations."""
+    """Return the linear and angular acceleration (3,) of a link at the joint accelerations."""
     along, about = frame.acceleration, frame.spin_rate
     for column in frame.columns:
         place, turns, axis, _ = column
@@ -193,7 +196,7 @@ def _zeros(*shape: int) -> np.ndarray:
 
 
 def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """The solution (n,) of a symmetric positive definite system by L D Lᵀ without pivoting."""
+    """Return the solution (n,) of a symmetric positive definite system by L D Lᵀ without pivoting."""
     n = len(right)
     lower, d, x = _zeros(n, n), _zeros(n), np.array(right, dtype=object)
     for j in range(n):

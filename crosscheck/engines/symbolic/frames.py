@@ -1,4 +1,4 @@
-"""Links in motion, in any arithmetic: place, rotation, velocities and accelerations of q̈ = 0."""
+"""Moving links in any arithmetic: position, rotation, velocities, and accelerations for q̈ = 0."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from crosscheck.engines.spanning_tree import TURN
 from crosscheck.engines.symbolic.symbols import NOTHING, Arithmetic
 
-Vector = np.ndarray  # (3,) of numbers or symbols
+Vector = np.ndarray  # (3,) numbers or symbols
 
 
 @dataclass(frozen=True)
 class Turned:
-    """The last turns about one axis: the rotation before them, the axis, and the sum of their angles."""
+    """Successive turns about one axis: the rotation before them, the axis, and the sum of their angles."""
 
     before: np.ndarray
     axis: np.ndarray
     angle: Any
 
     def further(self, axis: np.ndarray, angle: Any) -> Turned | None:
-        """With another turn about the same axis; None where that is another one."""
+        """Return this object with another turn about an equal axis added; None if the axis differs."""
         along = float(axis @ self.axis)
         if abs(along) < 1 - NOTHING:
             return None
@@ -32,10 +32,10 @@ class Turned:
 
 @dataclass
 class Frame:
-    """A link in motion: the point that was at ``reference`` is at ``origin``, turned by ``rotation``.
+    """A moving link: its point that was at ``reference`` is at ``origin``, and it is rotated by ``rotation``.
 
-    ``columns`` are the coordinates that move it: place, whether it turns, axis, and a point of the axis.
-    The accelerations hold for q̈ = 0.
+    ``columns`` lists the coordinates that move it: index, whether it is a turn, axis, and a point of the
+    axis. The accelerations hold for q̈ = 0.
     """
 
     reference: np.ndarray
@@ -49,7 +49,7 @@ class Frame:
     turned: Turned | None = None
 
     def arm(self, point: np.ndarray) -> Vector:
-        """From the origin to a point of the link, given by its place (3,) at t = 0."""
+        """Return the vector from the origin to a point of the link, given by its position (3,) at t = 0."""
         return self.rotation @ (point - self.reference)
 
     def moved(self, arm: Vector, reference: np.ndarray) -> Frame:
@@ -69,12 +69,12 @@ class Frame:
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b of symbols too, which `rotations.cross` does not take."""
+    """Return a × b, also for symbols, which `rotations.cross` does not accept."""
     return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def turn(axis: np.ndarray, angle: Any, arithmetic: Arithmetic) -> np.ndarray:
-    """The rotation (3, 3) about a unit vector of numbers; entries that never change are numbers."""
+    """Return the rotation (3, 3) about a unit vector of numbers; entries that are constant are numbers."""
     k = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     s, c, still = arithmetic.sin(angle), arithmetic.cos(angle), np.outer(axis, axis)
     entries = [
@@ -92,7 +92,7 @@ def _sum(*terms: tuple[float, Any]) -> Any:
 def moved_by(
     frame: Frame, kind: str, axis: np.ndarray, place: int, state: tuple[Any, Any], arithmetic: Arithmetic
 ) -> Frame:
-    """The frame after an elementary motion of coordinate and rate ``state``."""
+    """Return the frame after an elementary motion with coordinate and rate ``state``."""
     along, (q, v) = frame.rotation @ axis, state
     if kind == TURN:
         rate = cross(frame.spin, along) * v
@@ -118,6 +118,6 @@ def moved_by(
 
 
 def velocity_of(frame: Frame, column: tuple[int, bool, Vector, Vector], point: Vector) -> Vector:
-    """The velocity of a point of the link by one coordinate's rate."""
+    """Return the velocity of a point of the link for the unit rate of one coordinate."""
     _, turns, axis, origin = column
     return cross(axis, point - origin) if turns else axis

@@ -1,4 +1,5 @@
-"""Engines that generate code from the symbolic equations of a scene; making the code is construction."""
+"""Base of engines that generate code from the symbolic equations of a scene; generating the code counts as
+construction."""
 
 from __future__ import annotations
 
@@ -27,18 +28,18 @@ RTOL = {"rtol": "relative tolerance"}
 
 @functools.lru_cache(maxsize=4)
 def equations_of(scene: Scene) -> TreeEquations:
-    """The equations of a scene; raises ValueError where they are not derived."""
+    """Return the equations of a scene; raises ValueError if they cannot be derived."""
     return TreeEquations(scene)
 
 
 def origin(scene: Scene, *parts: str) -> str:
-    """Hash of a scene, of the sources that derive its equations, and of further parts."""
+    """Return a hash of a scene, of the sources that derive its equations, and of further parts."""
     sources = sorted(Path(__file__).parent.glob("*.py"))
     return hashed(scene.model_dump_json(warnings=False), *(path.read_text() for path in sources), *parts)
 
 
 class Generator(Engine):
-    """A generator of code for trees of slides and turns whose loops points close, moved by gravity and
+    """A code generator for trees of slides and turns with loops closed by points, under gravity and
     moments."""
 
     supports = Supports(joints=JOINTS, loads=("moment",))
@@ -48,7 +49,7 @@ class Generator(Engine):
         return metadata.version(self.package)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Scenes without masses, and those whose equations are not derived."""
+        """Refuse scenes without masses, and scenes whose equations cannot be derived."""
         if found := lacks_mass(scene):
             return found
         try:
@@ -58,7 +59,7 @@ class Generator(Engine):
         return None
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Every family serves every scene that is not refused."""
+        """Return whether the family exists; every family can run every scene that is not refused."""
         return family in self.families
 
     def _known(self, setting: Setting) -> None:
@@ -74,7 +75,8 @@ class Generator(Engine):
         failure: Failed | None,
         cost: Cost,
     ) -> Trajectory:
-        """The bodies and joints at the states (k, 2 n) reached; ``failure`` is the end of the others."""
+        """Return the trajectory at the reached states (k, 2 n); ``failure`` is the reason for an early
+        end."""
         labels = {
             "engine": self.name,
             "version": self.version(),
@@ -100,7 +102,7 @@ class Generator(Engine):
 
 
 def _sample(scene: Scene, y: np.ndarray) -> Sample:
-    """Poses, velocities and accelerations; reactions where the joints are the scene's own."""
+    """Return poses, velocities and accelerations; with reactions if the joints are the scene's own."""
     equations = equations_of(scene)
     motion, closing = equations.link_motion(y)
     own, tree = list(equations.tree.own), equations.tree
@@ -120,5 +122,5 @@ def _sample(scene: Scene, y: np.ndarray) -> Sample:
 
 
 def sweep(family: str, rtols: Sequence[float], **options: float) -> list[Setting]:
-    """A family at these relative tolerances."""
+    """Return the settings of a family at the given relative tolerances."""
     return [Setting(family, {"rtol": rtol, **options}) for rtol in rtols]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-NOTHING = 1e-12  # smaller entries are rounding
+NOTHING = 1e-12  # entries below this size are rounding
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,8 @@ NUMBERS = Arithmetic(math.sin, math.cos)
 
 
 class Symbol:
-    """A symbol of a code generator as an entry of arrays; sums with zero and products with zero or one add no
-    operation."""
+    """A symbol of a code generator as an entry of arrays; sums with zero and products with zero or one are
+    simplified."""
 
     def __init__(self, value: Any):
         self.value = value
@@ -63,10 +63,10 @@ def _bare(number: Any) -> Any:
 
 
 def symbolic(sin: Callable[[Any], Any], cos: Callable[[Any], Any]) -> Arithmetic:
-    """The arithmetic of a generator's symbols, as entries of arrays."""
+    """Return the arithmetic of a generator's symbols, as entries of arrays."""
     return Arithmetic(lambda x: Symbol(sin(x.value)), lambda x: Symbol(cos(x.value)))
 
 
 def bare(entries: Iterable[Any]) -> list[Any]:
-    """The generator's own symbols, or numbers, of the entries."""
+    """Return the generator's own symbols, or numbers, of the entries."""
     return [_bare(entry) for entry in entries]

@@ -1,4 +1,4 @@
-"""MuJoCo Warp as an engine."""
+"""Adapter of MuJoCo Warp."""
 
 from crosscheck.engines.warp.adapter import ENGINE
 

@@ -33,20 +33,20 @@ class Warp(Engine):
         _warp()
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Drivers, and what MuJoCo's adapter refuses."""
+        """Refuse drivers, and scenes that MuJoCo's adapter refuses."""
         return refusal(scene, "MuJoCo Warp")
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Steps by the angle turned in one."""
+        """Return settings with steps chosen by the angle that a body turns in one step."""
         return sweep(scene)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have."""
+        """Simulate a scene; raises ValueError for an unknown family."""
         return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
 
 
 def _warp() -> Any:
-    """The module mujoco_warp; Warp's kernels print nothing while they are compiled."""
+    """Return the module mujoco_warp, set such that Warp prints nothing while it compiles kernels."""
     import warp
 
     warp.config.log_level = warp.LOG_ERROR
@@ -69,13 +69,13 @@ class _World:
         self.data = self.warp.put_data(ported.model, ported.data)
 
     def step(self, t: float, h: float, count: int) -> None:
-        """Takes steps of length h (s)."""
+        """Take ``count`` steps of length h (s)."""
         self.model.opt.timestep.fill_(h)
         for _ in range(count):
             self.warp.step(self.model, self.data)
 
     def motion(self) -> LinkMotion:
-        """The motion of the links."""
+        """Return the motion of the links."""
         return self.ported.motion(self.data.qpos.numpy()[0], self.data.qvel.numpy()[0])
 
 

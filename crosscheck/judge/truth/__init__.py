@@ -39,7 +39,7 @@ __all__ = ["NoSolution", "Truth", "closed_form", "truth_for"]
 
 
 class Truth(Protocol):
-    """The exact motion of one scene."""
+    """Interface of the exact motion of one scene."""
 
     @property
     def name(self) -> str:
@@ -80,7 +80,8 @@ def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
 
 @functools.lru_cache(maxsize=64)
 def closed_form(scene: Scene) -> Truth | None:
-    """The truth of a scene of a known family, or None; kept, with the part of the motion that is solved.
+    """Return the truth of a scene of a known family, or None. It is cached with the part of the motion that
+    is already solved.
 
     No family has couplings or armatures.
     """

@@ -1,4 +1,4 @@
-"""Slider-cranks side by side whose cranks are fixed to one another: each moves along the path of its own."""
+"""Slider-cranks side by side whose cranks are fixed to each other: each moves along its own path."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from mbref.scene import GROUND, Fixed, Scene
 
 
 def crankshaft(scene: Scene) -> Path | None:
-    """The path of a scene that looks like the family, or None."""
+    """Return the path of a scene that may belong to this family, or None."""
     groups = _without_shaft(scene)
     if len(groups) < 2:
         return None
@@ -36,7 +36,7 @@ def crankshaft(scene: Scene) -> Path | None:
 
 
 def _without_shaft(scene: Scene) -> list[np.ndarray]:
-    """Indices of the bodies that hang together without ground and fixed joints."""
+    """Return the indices of connected bodies, when the ground and fixed joints are ignored."""
     linked = np.zeros((len(scene.body), len(scene.body)))
     for joint in scene.joint:
         if GROUND not in joint.bodies and not isinstance(joint, Fixed):
@@ -46,7 +46,7 @@ def _without_shaft(scene: Scene) -> list[np.ndarray]:
 
 
 def _part(scene: Scene, group: np.ndarray) -> Scene:
-    """The bodies of a group alone, with the joints among them and to the ground."""
+    """Return the scene of a group of bodies, with the joints among them and to the ground."""
     names = {scene.body[b].name for b in group} | {GROUND}
     joints = tuple(joint for joint in scene.joint if names.issuperset(joint.bodies))
     return scene.with_(body=tuple(scene.body[b] for b in group), joint=joints, driver=(), load=())

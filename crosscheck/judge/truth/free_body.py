@@ -19,7 +19,7 @@ NO_TURN = np.zeros(3)
 
 
 class FreeBody:
-    """Truth of a scene of one free body under gravity, forces, moments and springs to the ground."""
+    """Truth of a scene with one free body under gravity, forces, moments and springs to the ground."""
 
     name = "free_body"
     accuracy = TRUTH_DYNAMIC
@@ -39,7 +39,7 @@ class FreeBody:
         self._solution = Solution(self._derivative, start, 0.5 / (pace + 1 / scene.duration))
 
     def poses(self, times: np.ndarray) -> Trajectory:
-        """Trajectory at times (k,) ≥ 0."""
+        """Return the trajectory at times (k,) ≥ 0."""
         times = np.asarray(times, dtype=float)
         state = self._solution(times)
         motion, force, moment = self._loaded(state)
@@ -76,14 +76,15 @@ class FreeBody:
         return (principal * self._moments) @ np.swapaxes(principal, -1, -2)
 
     def _spin_of(self, rotation: np.ndarray, momentum: np.ndarray) -> np.ndarray:
-        """Inverse inertia times vectors (k, 3), world."""
+        """Return the inverse inertia times vectors (k, 3), world."""
         principal = rotation @ self._axes
         local = np.einsum("kij,ki->kj", principal, momentum) / self._moments
         return np.einsum("kij,kj->ki", principal, local)
 
 
 def free_body(scene: Scene) -> FreeBody | None:
-    """The truth of a scene of one free body with mass and three positive principal moments, or None."""
+    """Return the truth of a scene with one free body that has mass and three positive principal moments, or
+    None."""
     if len(scene.body) != 1 or scene.joint or not scene.has_mass():
         return None
     if any(isinstance(load, TorsionSpring) for load in scene.load):
@@ -93,7 +94,7 @@ def free_body(scene: Scene) -> FreeBody | None:
 
 
 def _matrix(q: np.ndarray) -> np.ndarray:
-    """Rotation matrices (k, 3, 3) of quaternions (k, 4) of nearly unit length, in their precision."""
+    """Return rotation matrices (k, 3, 3) of quaternions (k, 4) of nearly unit length, in their precision."""
     w, x, y, z = (q / np.sqrt(np.sum(q * q, axis=1, keepdims=True))).T
     rows = [
         [w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -1,4 +1,4 @@
-"""Mechanisms that cannot move: their constraint rows leave no freedom, and no driver moves them."""
+"""Mechanisms that cannot move: their constraint rows leave no degree of freedom, and no driver moves them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbref.trajectory import Trajectory
 
 
 class Locked:
-    """Truth of a scene that stays where it is."""
+    """Truth of a scene that does not move."""
 
     name = "locked"
     accuracy = TRUTH_DRIVEN
@@ -22,7 +22,7 @@ class Locked:
         self._scene = scene
 
     def poses(self, times: np.ndarray) -> Trajectory:
-        """Trajectory at times (k,) ≥ 0."""
+        """Return the trajectory at times (k,) ≥ 0."""
         times = np.asarray(times, dtype=float)
         position, orientation = constraints.initial_poses(self._scene)
         k, rest = len(times), np.zeros((len(times), *position.shape))
@@ -32,7 +32,7 @@ class Locked:
 
 
 def locked(scene: Scene) -> Locked | None:
-    """The truth of a scene whose rows have full column rank at the start, or None."""
+    """Return the truth of a scene whose rows have full column rank at the start, or None."""
     rows = sum(len(lengths) for lengths in constraints.length_rows(scene).values())
     if scene.driver or rows < 6 * len(scene.body):
         return None

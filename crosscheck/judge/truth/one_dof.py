@@ -1,4 +1,5 @@
-"""Motion of a mechanism with one degree of freedom: poses along its path, and how far along it is when.
+"""Motion of a mechanism with one degree of freedom: the poses along its path, and the path coordinate as a
+function of time.
 
 A family gives the path — every body's pose as a function of one coordinate q, with first and second
 derivatives — and the rest is common: either a driver prescribes q(t), or q follows from the reduced
@@ -23,18 +24,19 @@ from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
 EYE = np.eye(3)
-TURNS = (Revolute, Cylindrical)  # joints that carry a torsion spring
-Pair = tuple[np.ndarray, np.ndarray]  # of linear and angular rates, (k, nb, 3) each
+TURNS = (Revolute, Cylindrical)  # joint types that can have a torsion spring
+Pair = tuple[np.ndarray, np.ndarray]  # linear and angular rates, (k, nb, 3) each
 TURN = 8 * np.arctan(REAL(1))
 REPEATED = 64 * float(
     np.finfo(REAL).eps
 )  # relative difference of poses and slopes that count as equal after a turn
-PROBES = (0.0, 0.31, -0.83)  # path coordinates (rad, or lengths of the scene) where a path is tried
+# path coordinates (rad, or fractions of the scene's length) at which a path is checked
+PROBES = (0.0, 0.31, -0.83)
 
 
 @dataclass(frozen=True)
 class Pose:
-    """All bodies at coordinates q (k,): position, rotation matrix, turn, and derivatives by q.
+    """Poses of all bodies at coordinates q (k,): position, rotation matrix, turn, and derivatives by q.
 
     With primes for d/dq, the velocity at rate q' is ``dposition`` q', the angular velocity ``spin`` q';
     (k, nb, 3), rotation (k, nb, 3, 3), turn (k, nb) as in Motion.
@@ -49,13 +51,17 @@ class Pose:
     dspin: np.ndarray
 
 
-DrivenSign = Callable[[Driver], float | None]  # sign of a driver's motion of q; None: no motion
+# sign with which a driver changes q; None: the driver does not belong to the family
+DrivenSign = Callable[[Driver], float | None]
 
 
 @dataclass(frozen=True)
 class Path:
-    """A family's guess for a scene: poses at q (q = 0 at t = 0), the axis of the turns, and the sign
-    with which a driver of a joint moves q (None: not this family's driver)."""
+    """A possible path of a scene: poses at q (q = 0 at t = 0), the rotation axis of the turns, and the sign
+    with which a driver of a joint changes q.
+
+    The sign is None if the driver does not belong to the family.
+    """
 
     family: str
     poses: Callable[[np.ndarray], Pose]
@@ -64,7 +70,7 @@ class Path:
 
 
 class OneDof:
-    """Truth of a scene that moves along a path; ``rate`` is q' at t = 0, None when q is driven."""
+    """Truth of a scene that moves along a path; ``rate`` is q' at t = 0, None if q is driven."""
 
     def __init__(self, scene: Scene, path: Path, rate: float | None):
         self.name = path.family
@@ -73,8 +79,8 @@ class OneDof:
         self._reduced = None if rate is None else Reduced(scene, path, rate)
 
     def poses(self, times: np.ndarray) -> Trajectory:
-        """Trajectory at times (k,) ≥ 0; raises NoSolution when the motion ends at a singular position
-        before."""
+        """Return the trajectory at times (k,) ≥ 0; raises NoSolution if the motion ends at a singular
+        position before."""
         times = np.asarray(times, dtype=float)
         q, dq, ddq = self._coordinate(times)
         pose = self._path.poses(q)
@@ -90,11 +96,11 @@ class OneDof:
         )
 
     def coordinate(self, times: np.ndarray) -> np.ndarray:
-        """(k, 2) path coordinate and its rate at times (k,)."""
+        """Return the path coordinate and its rate (k, 2) at times (k,)."""
         return np.stack(self._coordinate(np.asarray(times, dtype=float))[:2], axis=-1).astype(float)
 
     def _coordinate(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        """q, q', q'' (k,) at times (k,)."""
+        """Return q, q', q'' (k,) at times (k,)."""
         if self._reduced is None:
             driver = self._scene.driver[0]
             sign = self._path.driven_sign(driver)
@@ -103,10 +109,10 @@ class OneDof:
 
 
 class Reduced:
-    """q(t) of the reduced equation of motion, integrated along σ with dt = sqrt(I) dσ.
+    """Solution q(t) of the reduced equation of motion, integrated along σ with dt = sqrt(I) dσ.
 
-    There dq/dσ = s and ds/dσ = Q, where s = sqrt(I) q': the inertia drops out, and the time is one more
-    quadrature.  A motion that comes back with the same s after a turn of q repeats itself.
+    Then dq/dσ = s and ds/dσ = Q with s = sqrt(I) q': the inertia is eliminated, and the time follows from a
+    quadrature. The motion is periodic if s is equal after a full turn of q.
     """
 
     def __init__(self, scene: Scene, path: Path, rate: float):
@@ -119,11 +125,12 @@ class Reduced:
         self._solution = Solution(self._derivative, start, 0.3 / (pace * root[0]))
 
     def __call__(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
-        """q, q', q'' (k,) at times (k,) ≥ 0; raises NoSolution with the time at which the motion ends."""
+        """Return q, q', q'' (k,) at times (k,) ≥ 0; raises NoSolution with the time at which the motion
+        ends."""
         try:
             turns, rest = self._turns(np.asarray(times, dtype=REAL))
             q, s, _ = self._solution.where(2, rest).T
-        except NoSolution as found:  # it has σ, not the time
+        except NoSolution as found:  # the error has σ instead of the time
             end = float(self._solution.reach(lambda _: True)[2])
             raise NoSolution.ending(found.reason, end) from None
         root = self._terms(q, s)[0]
@@ -132,7 +139,8 @@ class Reduced:
         return q + TURN * turns, rate, (push - half_slope * rate**2) / root**2
 
     def _turns(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whole turns (k,) of q before times (k,), and the times since, where the motion repeats itself."""
+        """Return the number (k,) of full turns of q before times (k,), and the times since then, if the
+        motion is periodic."""
         reached = self._solution.reach(lambda y: y[2] >= times.max(initial=0) or y[0] >= TURN)
         if reached[0] < TURN or not self._repeats():
             return np.zeros_like(times), times
@@ -141,7 +149,7 @@ class Reduced:
         return turns, times - turns * period
 
     def _repeats(self) -> bool:
-        """Whether all that the motion depends on is the same after one turn of q."""
+        """Return whether everything on which the motion depends is equal after one turn of q."""
         if self._damped or any(isinstance(load, TorsionSpring) for load in self._scene.load):
             return False
         before, after = (self._path.poses(np.array([q], dtype=REAL)) for q in (REAL(0), TURN))
@@ -161,7 +169,7 @@ class Reduced:
         return np.stack([s, push, root], axis=-1)
 
     def _terms(self, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """sqrt(I), Q and I'/2 (n,) at coordinates q and rates (n,)."""
+        """Return sqrt(I), Q and I'/2 (n,) at coordinates q and rates (n,)."""
         pose = self._path.poses(q)
         dq = rate[:, None, None]
         motion = Motion(pose.position, pose.rotation, pose.dposition * dq, pose.spin * dq, pose.turn)
@@ -176,7 +184,7 @@ class Reduced:
 
 
 def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
-    """The truth along a path, or None when the scene does not move along it, and along it only."""
+    """Return the truth along a path, or None if the scene does not move along it and only along it."""
     if path is None or not _fits(scene, path):
         return None
     if scene.driver:
@@ -190,7 +198,7 @@ def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
 
 
 def initial_rate(scene: Scene, path: Path) -> float | None:
-    """q' at t = 0 from the scene's velocities; None when those are not along the path."""
+    """Return q' at t = 0 from the scene's velocities; None if these are not along the path."""
     velocity, spin = constraints.initial_twists(scene)
     pose = path.poses(np.zeros(1, dtype=REAL))
     length = constraints.scene_length(scene)
@@ -213,7 +221,8 @@ def trajectory(
     rates: Pair,
     accelerations: Pair,
 ) -> Trajectory:
-    """A Trajectory of engine "truth" in double precision; rates and accelerations are pairs (k, nb, 3)."""
+    """Return a Trajectory of engine "truth" in double precision; rates and accelerations are pairs (k, nb,
+    3)."""
     velocity, spin = (np.asarray(a, dtype=float) for a in rates)
     acceleration, spin_rate = (np.asarray(a, dtype=float) for a in accelerations)
     return Trajectory(
@@ -239,7 +248,7 @@ def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
 
 
 def _fits(scene: Scene, path: Path) -> bool:
-    """The path closes every joint, and no motion but along it does."""
+    """Return whether the path satisfies every joint, and no other motion does."""
     undriven = scene.with_(driver=())
     length = constraints.scene_length(scene)
     with np.errstate(invalid="ignore"):
@@ -254,7 +263,7 @@ def _fits(scene: Scene, path: Path) -> bool:
 
 
 def freedoms_at(scene: Scene, position: np.ndarray, orientation: np.ndarray) -> int:
-    """Freedoms that the rows of a scene without drivers leave at a pose (nb, 3), (nb, 4)."""
+    """Return the number of degrees of freedom of a scene without drivers at a pose (nb, 3), (nb, 4)."""
     rows, _ = constraints.jacobian(scene, 0.0, position, orientation)
     values = np.linalg.svd(rows, compute_uv=False)
     return 6 * len(scene.body) - int(np.sum(values > FREEDOM * values.max(initial=1.0)))
@@ -273,14 +282,15 @@ def _torsion_angles_known(scene: Scene, path: Path) -> bool:
 
 
 def turned(axis: np.ndarray, angle: np.ndarray) -> np.ndarray:
-    """Rotation matrices (k, 3, 3) by angles (k,) about a unit axis."""
+    """Return rotation matrices (k, 3, 3) by angles (k,) about a unit axis."""
     skew = np.cross(axis, EYE).T
     sine, versine = np.sin(angle)[:, None, None], (2 * np.sin(angle / 2) ** 2)[:, None, None]
     return EYE + sine * skew + versine * (skew @ skew)
 
 
 def circle(axis: np.ndarray, angle: np.ndarray, arm: np.ndarray) -> tuple[np.ndarray, ...]:
-    """A vector turning about a unit axis: its values (k, 3), first and second derivative by the angle."""
+    """Return a vector (k, 3) that rotates about a unit axis, and its first and second derivative by the
+    angle."""
     along = axis * (axis @ arm)
     radial, ahead = arm - along, np.cross(axis, arm)
     cosine, sine = np.cos(angle)[:, None], np.sin(angle)[:, None]

@@ -1,4 +1,4 @@
-"""Cranks that turn in step about parallel axes, and bodies they carry without turning them.
+"""Cranks that turn by equal angles about parallel axes, and bodies that they move without rotation.
 
 One crank alone is a pendulum; two of equal length and a coupler are a parallelogram, more couplers the
 five-bar.  On this branch every crank has turned by the same angle θ - θ₀, and a coupler has moved along
@@ -19,7 +19,7 @@ from mbref.scene import GROUND, Cylindrical, Distance, Driver, Revolute, Scene
 
 
 def parallelogram(scene: Scene) -> Path | None:
-    """The path of a scene that looks like the family, or None."""
+    """Return the path of a scene that may belong to this family, or None."""
     pivots = pivots_of(scene)
     if not pivots:
         return None
@@ -49,13 +49,13 @@ def parallelogram(scene: Scene) -> Path | None:
 
 
 def pivots_of(scene: Scene) -> dict[str, Revolute]:
-    """Revolute joints to the ground, by the body they hold."""
+    """Return the revolute joints to the ground, by the body that they carry."""
     found = [j for j in scene.joint if isinstance(j, Revolute) and GROUND in j.bodies]
     return {name: joint for joint in found for name in joint.bodies if name != GROUND}
 
 
 def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray) -> DrivenSign:
-    """driven_sign of a path whose bodies turn by `turns` (nb,) times q about `axis`."""
+    """Return the function driven_sign of a path whose bodies turn by `turns` (nb,) times q about `axis`."""
 
     def sign(driver: Driver) -> float | None:
         joint = next(j for j in scene.joint if j.name == driver.joint)
@@ -69,13 +69,14 @@ def turning_driver(scene: Scene, axis: np.ndarray, turns: np.ndarray) -> DrivenS
 
 
 def unit(vector: Sequence[float] | np.ndarray) -> np.ndarray:
-    """The vector (3,) at length one, in extended precision."""
+    """Return the vector (3,) at length one, in extended precision."""
     given = np.array(vector, dtype=REAL)
     return given / np.sqrt(np.sum(given * given))
 
 
 def _arm(scene: Scene, pivots: dict[str, Revolute], name: str) -> np.ndarray | None:
-    """From the pivot to what a body's centre circles with: itself on a crank, its crank pin on a coupler."""
+    """Return the vector from a pivot to the point that moves with a body's centre: the centre of a crank, the
+    crank pin of a coupler."""
     if name in pivots:
         return np.array(scene.body[scene.body_index(name)].position) - np.array(pivots[name].anchor)
     for joint in scene.joint:

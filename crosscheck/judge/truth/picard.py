@@ -19,19 +19,22 @@ from crosscheck.judge.deadline import TimeIsUp, ask, within
 NODES = 64  # nodes of a panel (polynomials of degree 63)
 SWEEPS = 60  # Picard iterations before a panel is shortened
 EASY = 20  # iterations: after fewer of them the next panel is longer
-ROOT_STEPS = 20  # Newton iterations for the place of a value
+ROOT_STEPS = 20  # Newton iterations for the time at which a component has a given value
 UP, DOWN = np.longdouble(1.2), np.longdouble(0.7)  # factors on the length of the next panel
 REAL = np.longdouble  # 64-bit mantissa on x86; double elsewhere, with the accuracy of double
 SETTLED = 64 * float(np.finfo(REAL).eps)  # relative limit of the last change and of the last coefficients
-SECONDS = 20.0  # CPU time for all panels of a solution: it is known up to where they came
-SMALLEST = 1e-12  # panel length, relative to the time reached, at which the solution has a singularity
+SECONDS = 20.0  # CPU seconds for all panels of a solution; it is known up to the end of the last one
+SMALLEST = 1e-12  # panel length / time reached below which the solution counts as singular
 
 Derivative = Callable[[np.ndarray], np.ndarray]
 
 
 class NoSolution(ArithmeticError):
-    """The solution ends before the time asked for: its derivative becomes singular, or the time for it was
-    up; it is known up to ``until`` (s)."""
+    """The solution ends before the requested time: its derivative becomes singular, or the CPU time has
+    passed.
+
+    The solution is known up to ``until`` (s).
+    """
 
     def __init__(self, reason: str, until: float = 0.0):
         super().__init__(reason)
@@ -39,29 +42,29 @@ class NoSolution(ArithmeticError):
 
     @classmethod
     def ending(cls, reason: str, end: float) -> NoSolution:
-        """The solution ends for a reason, a clause, at a value of its variable."""
+        """Return the error for a reason, a clause, at a value of the independent variable."""
         found = cls(f"{reason} at t = {end:.9g}", float(np.nextafter(end, 0.0)))
         found.reason = reason
         return found
 
 
 class Solution:
-    """y' = f(y), y(0) = y0, for any t ≥ 0; f maps (n, m) states to (n, m) derivatives.
+    """Solution of y' = f(y), y(0) = y0, for any t ≥ 0; f maps states (n, m) to derivatives (n, m).
 
-    Panels are computed when first asked for, in at most SECONDS of CPU time, and kept; threads may ask at
+    Panels are computed at first access, within SECONDS of CPU time, and cached; several threads may call at
     once.
     """
 
     def __init__(self, derivative: Derivative, start: np.ndarray, first_panel: float):
         self._derivative = derivative
         self._edges = [REAL(0)]
-        self._values: list[np.ndarray] = []  # (NODES, m) per panel
+        self._values: list[np.ndarray] = []  # (NODES, m) for each panel
         self._state = np.asarray(start, dtype=REAL)
         self._next = REAL(first_panel)
         self._asked, self._spent = Lock(), 0.0
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
-        """States (k, m) at times (k,) ≥ 0; raises NoSolution when the solution ends before."""
+        """Return states (k, m) at times (k,) ≥ 0; raises NoSolution if the solution ends before."""
         times = np.asarray(times, dtype=REAL)
         edges, values = self._panels(lambda: self._edges[-1] < times.max(initial=0))
         panel = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(values) - 1)
@@ -69,12 +72,12 @@ class Solution:
         return np.einsum("kn,knm->km", _cardinal(x), values[panel])
 
     def reach(self, is_enough: Callable[[np.ndarray], bool]) -> np.ndarray:
-        """The state (m,) at the end of the first panels behind which is enough."""
+        """Return the state (m,) at the end of the first panel after which ``is_enough`` is true."""
         self._panels(lambda: not is_enough(self._state))
         return self._state
 
     def where(self, component: int, wanted: np.ndarray) -> np.ndarray:
-        """States (k, m) at which a component that grows from 0 has the wanted values (k,)."""
+        """Return states (k, m) at which a component that grows from 0 has the wanted values (k,)."""
         wanted = np.asarray(wanted, dtype=REAL)
         edges, values = self._panels(lambda: self._state[component] < wanted.max(initial=0))
         nodes = edges[:-1, None] + (_nodes() + 1) / 2 * np.diff(edges)[:, None]
@@ -90,7 +93,8 @@ class Solution:
         return self(np.clip(at, 0, edges[-1]))
 
     def _panels(self, is_short: Callable[[], bool]) -> tuple[np.ndarray, np.ndarray]:
-        """Edges (p + 1,) and values (p, NODES, m) of the panels, of which there are added while too few."""
+        """Return edges (p + 1,) and values (p, NODES, m) of the panels; panels are added while ``is_short``
+        is true."""
         with self._asked:
             began = time.thread_time()
             try:
@@ -137,14 +141,14 @@ class Solution:
 
 @functools.cache
 def _nodes() -> np.ndarray:
-    """Chebyshev points from -1 to 1."""
+    """Return the Chebyshev points from -1 to 1."""
     pi = 4 * np.arctan(REAL(1))
     return -np.cos(pi * np.arange(NODES).astype(REAL) / (NODES - 1))
 
 
 @functools.cache
 def _matrices() -> tuple[np.ndarray, np.ndarray]:
-    """(integrals from -1 to each node, Chebyshev coefficients) of values at the nodes."""
+    """Return (integrals from -1 to each node, Chebyshev coefficients) as matrices for values at the nodes."""
     n = NODES - 1
     pi = 4 * np.arctan(REAL(1))
     angles = pi * ((np.arange(NODES)[:, None] * (n - np.arange(NODES))) % (2 * n)).astype(REAL) / n
@@ -164,7 +168,7 @@ def _matrices() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _cardinal(x: np.ndarray) -> np.ndarray:
-    """Barycentric interpolation weights (k, NODES) at points x (k,) in [-1, 1]."""
+    """Return barycentric interpolation weights (k, NODES) at points x (k,) in [-1, 1]."""
     sign = np.where(np.arange(NODES) % 2, REAL(-1), REAL(1))
     sign[[0, -1]] /= 2
     distance = x[:, None] - _nodes()

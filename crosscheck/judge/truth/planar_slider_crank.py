@@ -21,7 +21,8 @@ from mbref.scene import GROUND, Distance, Revolute, Scene, Translational
 
 @dataclass(frozen=True)
 class Lengths:
-    """Crank a, rod b, offset h of the line (m), and the initial angles of crank and rod (rad)."""
+    """Lengths of crank a, rod b and offset h of the line (m), and the initial angles of crank and rod
+    (rad)."""
 
     a: float
     b: float
@@ -30,15 +31,15 @@ class Lengths:
     phi0: float
 
     def equal(self) -> bool:
-        """Whether the linkage has singular positions it can pass smoothly."""
+        """Return whether the linkage has singular positions that it can pass smoothly."""
         return abs(self.a - self.b) <= SAME_LENGTH * self.b and abs(self.h) <= SAME_LENGTH * self.b
 
     def turns_fully(self) -> bool:
-        """Whether the crank meets no dead point."""
+        """Return whether the crank has no dead position."""
         return self.equal() or self.a + abs(self.h) < self.b
 
     def rod(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """φ and its first and second derivative by θ."""
+        """Return φ and its first and second derivative by θ."""
         if self.equal():
             folded = np.cos(self.phi0 - self.theta0 - np.pi) > np.cos(self.phi0 + self.theta0) + ON_PATH
             slope = 1.0 if folded else -1.0
@@ -52,7 +53,7 @@ class Lengths:
 
 
 def planar_slider_crank(scene: Scene) -> Path | None:
-    """The path of a scene that looks like the family, or None."""
+    """Return the path of a scene that may belong to this family, or None."""
     parts = parts_of(scene, Revolute)
     if parts is None:
         return None
@@ -100,7 +101,7 @@ def planar_slider_crank(scene: Scene) -> Path | None:
 
 
 class Parts(NamedTuple):
-    """Three bodies in a chain from ground to ground, by index, and the joints on the way."""
+    """Indices of three bodies in a chain from ground to ground, and the joints between them."""
 
     crank: int
     rod: int
@@ -112,7 +113,7 @@ class Parts(NamedTuple):
 
 
 def parts_of(scene: Scene, pin_type: type) -> Parts | None:
-    """The parts of a slider-crank whose crank pin is a joint of the type asked for, or None."""
+    """Return the parts of a slider-crank whose crank pin is a joint of the given type, or None."""
     if len(scene.body) != 3 or len(scene.joint) != 4:
         return None
     pivots = pivots_of(scene)
@@ -132,6 +133,7 @@ def parts_of(scene: Scene, pin_type: type) -> Parts | None:
 
 
 def _chained(path: tuple[np.ndarray, ...], slope: np.ndarray, bend: np.ndarray) -> tuple[np.ndarray, ...]:
-    """A path given by an angle, with derivatives by q instead, the angle's derivatives being given."""
+    """Return a path given by an angle, with derivatives by q; the derivatives of the angle by q are
+    arguments."""
     value, first, second = path
     return value, first * slope[:, None], second * slope[:, None] ** 2 + first * bend[:, None]

@@ -1,4 +1,4 @@
-"""The truth of a scene of no known family: its reference, computed when poses are first asked for."""
+"""The truth of a scene of no known family: its reference, computed at the first request for poses."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from crosscheck.judge.truth.picard import NoSolution
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-SAMPLES = 101  # samples over the duration, to state a truth's accuracy before poses are requested
+SAMPLES = 101  # samples over the duration from which the accuracy is computed before poses are requested
 
 
 class ReferenceTruth:
-    """Truth of any scene, within so many CPU seconds; threads may ask at once."""
+    """Truth of any scene, computed within CPU seconds; several threads may call at once."""
 
     name = "reference"
 
@@ -25,14 +25,16 @@ class ReferenceTruth:
 
     @property
     def accuracy(self) -> float:
-        """The largest bound on the error of the poses given so far, or of the scene's whole duration; raises
-        NoSolution when there is no reference."""
+        """Largest bound on the error of the poses returned so far, or of the scene's whole duration.
+
+        Raises NoSolution if there is no reference.
+        """
         if self._accuracy is None:
             self.poses(np.linspace(0.0, self._scene.duration, SAMPLES))
         return self._accuracy or 0.0
 
     def poses(self, times: np.ndarray) -> Trajectory:
-        """Trajectory at times (k,) ≥ 0; raises NoSolution, with the reason and the time, where the reference
+        """Return the trajectory at times (k,) ≥ 0; raises NoSolution, with reason and time, if the reference
         ends before."""
         times = np.asarray(times, dtype=float)
         with self._asked:
@@ -45,7 +47,7 @@ class ReferenceTruth:
 
 
 def trajectory(scene: Scene, samples: Reference) -> Trajectory:
-    """A reference as a Trajectory of engine "truth"."""
+    """Return a reference as a Trajectory of engine "truth"."""
     return Trajectory(
         scene=scene.name,
         engine="truth",

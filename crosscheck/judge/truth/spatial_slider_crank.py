@@ -1,8 +1,9 @@
 """Slider-crank in space: crank on a revolute, rod on a universal and a spherical joint, slider on a line.
 
-The slider's place is where the line meets the sphere of the rod's length about the crank pin.  The rod
-turns with x, its direction, and with z, its own axis of the universal joint, which keeps its angle to
-x and stays perpendicular to the crank's axis e: ω = x × x' + λ x with λ such that e·z stays zero.
+The slider's position is the intersection of the line with a sphere about the crank pin whose radius is the
+rod's length.  The rod turns with x, its direction, and with z, its own axis of the universal joint, which
+keeps its angle to x and stays perpendicular to the crank's axis e: ω = x × x' + λ x with λ such that e·z
+stays zero.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from mbref.scene import Scene, Universal
 
 
 def spatial_slider_crank(scene: Scene) -> Path | None:
-    """The path of a scene that looks like the family, or None."""
+    """Return the path of a scene that may belong to this family, or None."""
     parts = parts_of(scene, Universal)
     if parts is None:
         return None
@@ -75,7 +76,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
 def _slide(
     pins: tuple[np.ndarray, ...], c0: np.ndarray, line: np.ndarray, length: float, side: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Displacement s (k,) along the line that keeps |c0 + s line - pin| = length, and s', s''."""
+    """Return the displacement s (k,) along the line that keeps |c0 + s line - pin| = length, and s', s''."""
     gap = c0 - pins[0]
     along = gap @ line
     root = side * np.sqrt(along**2 - np.sum(gap * gap, axis=-1) + length**2)
@@ -87,7 +88,7 @@ def _slide(
 
 
 def _held(x: np.ndarray, e: np.ndarray, lean: float, hand: float) -> np.ndarray:
-    """Unit vectors z with z·e = 0, z·x = lean, on the given side of the plane of e and x."""
+    """Return unit vectors z with z·e = 0, z·x = lean, on the given side of the plane of e and x."""
     p = x - e * np.sum(x * e, axis=-1, keepdims=True)
     size = np.sqrt(np.sum(p * p, axis=-1, keepdims=True))
     share = lean / size
@@ -97,7 +98,7 @@ def _held(x: np.ndarray, e: np.ndarray, lean: float, hand: float) -> np.ndarray:
 def _spin(
     x: np.ndarray, dx: np.ndarray, ddx: np.ndarray, z: np.ndarray, e: np.ndarray, axis: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Angular velocity of the rod per crank angle, and its derivative."""
+    """Return the rod's angular velocity for unit crank rate, and its derivative by the crank angle."""
     normal = cross(z, e)
     base, down = axis - cross(x, dx), np.sum(x * normal, axis=-1, keepdims=True)
     roll = np.sum(base * normal, axis=-1, keepdims=True) / down
@@ -109,7 +110,7 @@ def _spin(
 
 
 def _triad(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Rotation matrices (k, 3, 3) with x as first column and z in the plane of first and third."""
+    """Return rotation matrices (k, 3, 3) with x as first column and z in the plane of first and third."""
     third = z - x * np.sum(x * z, axis=-1, keepdims=True)
     third = third / np.sqrt(np.sum(third * third, axis=-1, keepdims=True))
     return np.stack([x, cross(third, x), third], axis=-1)

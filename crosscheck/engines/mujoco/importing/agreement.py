@@ -1,7 +1,7 @@
-"""A scene compared with the compiled model that it was read from, in the model's joint coordinates.
+"""Comparison of a scene with the compiled model from which it was read, in the model's joint coordinates.
 
-Poses and velocities of the scene's bodies come from the model's kinematics.  Masses, weight, springs and
-rows of joints come from the scene alone, with the judge's equations: B is the Jacobian of the bodies' twists,
+Poses and velocities of the scene's bodies come from the model's kinematics. Masses, weight, springs and rows
+of joints come from the scene alone, with the judge's equations. B is the Jacobian of the bodies' twists, and
 Bᵀ M B their mass matrix in joint coordinates.
 """
 
@@ -20,15 +20,15 @@ from crosscheck.judge.joint_coordinates import reflected
 from mbref import rotations
 from mbref.scene import Scene, SceneError, Spring
 
-AGREE = 1e-8  # fraction of the largest entry: rounding of inertias and poses leaves less than 1e-10
+AGREE = 1e-8  # largest difference / largest entry; rounding of inertias and poses leaves less than 1e-10
 RANK = 1e-8  # fraction of the largest singular value of rows of length one
 RANDOM_POSES = 2
-TRIES = 12  # random poses tried for each one, because not every pose can be closed
-REACH = 0.25  # rad, and m of the extent: largest change of a coordinate of a random pose
+TRIES = 12  # random poses tried for each comparison, since not every pose can be closed
+REACH = 0.25  # rad, and fraction of the extent: largest change of a coordinate in a random pose
 
 
 class Agreement:
-    """The comparison at the poses of a model; every method raises SceneError that names the part."""
+    """Comparison at the poses of a model; every method raises SceneError that names the part."""
 
     def __init__(self, mujoco: Any, model: Any, groups: Groups, poses: Poses):
         self.mujoco, self.model, self.groups, self.poses = mujoco, model, groups, poses
@@ -48,7 +48,7 @@ class Agreement:
         self.poses.place()
 
     def _random_pose(self, start: np.ndarray, random: np.random.Generator) -> bool:
-        """Move to a random closed pose near the start; False where none was found."""
+        """Move to a random closed pose near the start; returns False if none was found."""
         data, reach = self.poses.data, REACH * min(1.0, self.poses.extent)
         for k in range(TRIES):
             data.qpos[:] = start
@@ -83,7 +83,7 @@ class Agreement:
         self._same(ours, self.poses.mass(), "mass matrix")
 
     def _forces(self, scene: Scene, pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray) -> None:
-        """Bias forces with weight and springs."""
+        """Compare bias forces, with weight and springs."""
         data = self.poses.data
         motion = (twists @ data.qvel).reshape(-1, 6)
         drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
@@ -92,7 +92,7 @@ class Agreement:
         self._same(ours, data.qfrc_bias - data.qfrc_passive, "bias forces")
 
     def _drift(self) -> np.ndarray:
-        """Accelerations (6 nb,) of the bodies' twists at constant joint velocities: Ḃ q̇."""
+        """Return the accelerations (6 nb,) of the bodies' twists at constant joint velocities: Ḃ q̇."""
         data, found = self.poses.data, []
         for g in self.groups.massive:
             rates = np.zeros((6, self.model.nv))
@@ -116,7 +116,8 @@ class Agreement:
     def _tree(
         self, scene: Scene, tree: Sequence[str], pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray
     ) -> None:
-        """The joints of the tree hold at every pose, and allow the motion of the joint coordinates only."""
+        """Check that the joints of the tree hold at every pose, and allow only the motion of the joint
+        coordinates."""
         bare = scene.with_(joint=[j for j in scene.joint if j.name in tree], coupling=(), driver=())
         for name, residual in closure(bare, 0.0, *pose).items():
             if (gap := np.abs(residual).max(initial=0.0)) > AGREE * max(1.0, self.poses.extent):
@@ -134,7 +135,8 @@ class Agreement:
     def _loops(
         self, scene: Scene, tree: Sequence[str], pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray
     ) -> None:
-        """Rows of loops and of locked coordinates have the file's row space, in joint coordinates."""
+        """Check that rows of loops and of locked coordinates have the row space of the file's rows, in joint
+        coordinates."""
         ours = jacobian(scene, 0.0, *pose)[0] @ twists
         theirs = np.vstack([self._equalities(), self.poses.jacobian()])
         least = RANK * min(1.0, self.poses.extent)
@@ -146,14 +148,14 @@ class Agreement:
             )
 
     def _equalities(self) -> np.ndarray:
-        """MuJoCo's rows (m, nv) of equalities that the scene has."""
+        """Return MuJoCo's rows (m, nv) of the equalities that the scene has."""
         data, model = self.poses.data, self.model
         rows = data.efc_type[: data.nefc] == self.mujoco.mjtConstraint.mjCNSTR_EQUALITY
         return np.asarray(data.efc_J[: data.nefc * model.nv].reshape(data.nefc, model.nv)[rows])
 
 
 def rank(rows: np.ndarray) -> int:
-    """Number of independent rows."""
+    """Return the number of independent rows."""
     if not rows.size:
         return 0
     sizes = np.linalg.svd(rows, compute_uv=False)
@@ -161,13 +163,13 @@ def rank(rows: np.ndarray) -> int:
 
 
 def _unit(rows: np.ndarray, least: float) -> np.ndarray:
-    """Rows of length one, without rows that are not longer than ``least``."""
+    """Return rows of length one, without rows that are not longer than ``least``."""
     sizes = np.linalg.norm(rows, axis=1)
     return np.asarray(rows[sizes > least] / sizes[sizes > least, None])
 
 
 def _masses(scene: Scene, orientation: np.ndarray) -> np.ndarray:
-    """Mass matrix (6 nb, 6 nb) of the twists of the centres of mass, world."""
+    """Return the mass matrix (6 nb, 6 nb) of the twists of the centres of mass, world."""
     found = np.zeros((6 * len(scene.body),) * 2)
     turns = rotations.to_matrix(orientation)
     for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
@@ -177,7 +179,7 @@ def _masses(scene: Scene, orientation: np.ndarray) -> np.ndarray:
 
 
 def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.ndarray:
-    """M Ḃ q̇ and the gyroscopic moments (6 nb,)."""
+    """Return M Ḃ q̇ and the gyroscopic moments (6 nb,)."""
     mass = _masses(scene, orientation)
     found = (mass @ drift).reshape(-1, 6)
     for k, twist in enumerate(motion):
@@ -187,8 +189,8 @@ def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: 
 
 
 def _pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarray) -> np.ndarray:
-    """Weight and forces of the scene's springs (6 nb,)."""
-    found = np.zeros((len(scene.body) + 1, 6))  # the ground stands last
+    """Return weight and forces of the scene's springs (6 nb,)."""
+    found = np.zeros((len(scene.body) + 1, 6))  # the last entry is the ground's
     found[:-1, :3] = np.outer([body.mass or 0.0 for body in scene.body], np.array(scene.gravity))
     for load in scene.load:
         for body, wrench in (
@@ -236,6 +238,6 @@ def _torsion(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
 
 
 def _turn(scene: Scene, pose: Any, b: int) -> np.ndarray:
-    """Rotation (3, 3) of a body since the scene's pose."""
+    """Return the rotation (3, 3) of a body since the scene's pose."""
     start = rotations.to_matrix(np.array(scene.body[b].orientation))
     return np.asarray(rotations.to_matrix(pose[1][b]) @ start.T)

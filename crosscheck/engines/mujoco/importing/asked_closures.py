@@ -15,8 +15,8 @@ from crosscheck.engines.mujoco.importing.urdf import along
 from mbref.scene import GROUND, SceneError
 
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-SHORT = {"3d": "spherical", "6d": "fixed"}  # numbers of equations, as YAML files of parallel robots name them
-COINCIDENT = 1e-6  # fraction of the model's extent
+SHORT = {"3d": "spherical", "6d": "fixed"}  # numbers of equations, as in YAML files of parallel robots
+COINCIDENT = 1e-6  # distance / extent of the model at which frames coincide
 GRAMMAR = "frame_a=frame_b[:type[:axis]] or a .yaml file"
 
 
@@ -29,7 +29,7 @@ class Frames:
         self._kinds = (kinds.mjOBJ_SITE, kinds.mjOBJ_BODY)
 
     def find(self, name: str) -> Frame:
-        """The frame of a site, body or link; raises SceneError that names the nearest."""
+        """Return the frame of a site, body or link; raises SceneError that names similar ones."""
         if name in (GROUND, "world", self.root):
             return Frame(WORLD, np.zeros(3), np.eye(3))
         site, body = (self.mujoco.mj_name2id(self.model, kind, name) for kind in self._kinds)
@@ -43,14 +43,14 @@ class Frames:
         return Frame(int(body), np.zeros(3), np.eye(3))
 
     def names(self) -> Iterator[str]:
-        """The names of all bodies, then of all sites."""
+        """Return the names of all bodies, then of all sites."""
         model = self.model
         for kind, count in zip(reversed(self._kinds), (model.nbody, model.nsite), strict=True):
             yield from filter(None, (self.mujoco.mj_id2name(model, kind, k) for k in range(count)))
 
 
 def asked(options: Sequence[str], frames: Frames) -> Iterator[Closure]:
-    """The closures of ``--close`` options; raises SceneError, OSError."""
+    """Return the closures of the ``--close`` options; raises SceneError, OSError."""
     for text in options:
         if text.endswith((".yaml", ".yml")):
             yield from _of_yaml(Path(text), frames)
@@ -80,7 +80,7 @@ def _closure(first: str, second: str, kind: str, axis: str, frames: Frames) -> C
 
 
 def _of_yaml(path: Path, frames: Frames) -> Iterator[Closure]:
-    """``closed_loop: [[frame_a, frame_b], …]`` with ``type: [3d, …]`` and ``axis: [z, …]``, both optional."""
+    """Read ``closed_loop: [[frame_a, frame_b], …]`` with optional ``type: [3d, …]`` and ``axis: [z, …]``."""
     try:
         import yaml
     except ImportError:
@@ -108,7 +108,8 @@ def _as_many(value: Any, count: int, default: str, path: Path, key: str) -> list
 def unclosed(
     groups: Groups, data: Any, frames: Frames, closed: Sequence[Closure], extent: float
 ) -> Iterator[str]:
-    """A sentence for every two frames without mass that coincide on bodies that nothing joins there."""
+    """Return a sentence for every two frames without mass that coincide on bodies that no joint connects
+    there."""
     places = [(name, int(groups.of[f.body]), f.place(data)) for name, f in _marks(groups, frames)]
     taken = [c.frames[0].place(data) for c in closed] + list(data.xanchor)
     for i, (first, a, place) in enumerate(places):
@@ -123,7 +124,7 @@ def unclosed(
 
 
 def _marks(groups: Groups, frames: Frames) -> Iterator[tuple[str, Frame]]:
-    """Named sites, and named bodies without mass or children that are fixed to another body."""
+    """Return named sites, and named bodies without mass or children that are fixed to another body."""
     model = groups.model
     parents = set(model.body_parentid[1:].tolist())
     for b in range(1, model.nbody):

@@ -1,4 +1,4 @@
-"""Elementary motions between two bodies with mass, and the scene's joints with exactly these motions."""
+"""Elementary motions between two bodies with mass, and the joints of a scene with exactly these motions."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from mbref.scene import (
     Universal,
 )
 
-ALIGNED = 1e-9  # between unit vectors; and between points, of the model's extent
-RANK = 1e-9  # fraction of the largest singular value: smaller ones are not independent motions
+ALIGNED = 1e-9  # largest difference of unit vectors, and of points / extent of the model
+RANK = 1e-9  # singular value / largest one; smaller ones belong to dependent motions
 Made = list[tuple[type[Any], dict[str, Any]]]
 
 
@@ -42,7 +42,8 @@ class Chain:
 
 
 def chains(mujoco: Any, groups: Groups, data: Any) -> Iterator[Chain]:
-    """The chain of every group with mass; raises SceneError where a group without mass carries several."""
+    """Return the chain of every group with mass; raises SceneError if a group without mass carries
+    several."""
     for group in groups.massive:
         joints, parent = groups.joints(group), groups.parent(group)
         while not groups.mass[parent] > 0:
@@ -53,12 +54,12 @@ def chains(mujoco: Any, groups: Groups, data: Any) -> Iterator[Chain]:
 
 
 def kind_of(mujoco: Any, model: Any, joint: int) -> str:
-    """free, ball, slide or hinge."""
+    """Return the kind of a MuJoCo joint: free, ball, slide or hinge."""
     return str(mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower())
 
 
 def without_effect(groups: Groups) -> list[int]:
-    """Groups without mass that carry none, whose motion nothing determines."""
+    """Return groups without mass that carry no other group, so that nothing determines their motion."""
 
     def carries(group: int) -> bool:
         return any(groups.mass[child] > 0 or carries(child) for child in groups.children(group))
@@ -77,7 +78,7 @@ def _refuse_branch(groups: Groups, group: int) -> None:
 
 
 def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint]:
-    """The scene's joints with the motions of a chain; none for a free body.
+    """Return the scene's joints with the motions of a chain; none for a free body.
 
     Raises SceneError for motions that no joints of a scene have.
     """
@@ -102,7 +103,7 @@ def _refusal(chain: Chain, pair: tuple[str, str]) -> str:
 
 
 def _recognised(chain: Chain, extent: float) -> Made | None:
-    """Types of joints and their places; None where a scene has none."""
+    """Return types of joints and their places; None if a scene has no such joints."""
     if _rank(chain, extent) < _freedoms(chain):
         return None
     for recognise in (_free, _single, _cylindrical, _universal, _spherical, _planar, _two_hinges, _rod):
@@ -117,7 +118,7 @@ def _freedoms(chain: Chain) -> int:
 
 
 def _rank(chain: Chain, extent: float) -> int:
-    """Number of independent motions at the pose."""
+    """Return the number of independent motions at the pose."""
     twists: list[np.ndarray] = []
     for kind, anchor, axis in zip(chain.kinds, chain.anchors, chain.axes, strict=True):
         if kind in ("free", "slide"):
@@ -163,7 +164,7 @@ def _spherical(chain: Chain, extent: float) -> Made | None:
 
 
 def _planar(chain: Chain, extent: float) -> Made | None:
-    """Three independent motions in a plane: hinges along its normal, slides across."""
+    """Recognise three independent motions in a plane: hinges along its normal, slides across."""
     turns = [k for k, kind in enumerate(chain.kinds) if kind == "hinge"]
     slides = [k for k, kind in enumerate(chain.kinds) if kind == "slide"]
     if len(chain.kinds) != 3 or len(turns) + len(slides) != 3 or not turns:
@@ -176,7 +177,8 @@ def _planar(chain: Chain, extent: float) -> Made | None:
 
 
 def _two_hinges(chain: Chain, extent: float) -> Made | None:
-    """Parallel hinges apart: a rod without mass in a plane, which keeps their distance."""
+    """Recognise two parallel hinges at a distance: a rod without mass in a plane, which keeps their
+    distance."""
     if chain.kinds != ("hinge", "hinge") or not _parallel(chain.axes):
         return None
     first, second = chain.anchors
@@ -189,7 +191,8 @@ def _two_hinges(chain: Chain, extent: float) -> Made | None:
 
 
 def _rod(chain: Chain, extent: float) -> Made | None:
-    """Five rotations about two points: a rod without mass between them that keeps their distance."""
+    """Recognise five rotations about two points: a rod without mass between them, which keeps their
+    distance."""
     for turns in (2, 3):
         points = [_centre(chain, part, extent) for part in _halves(chain, turns)]
         if len(points) == 2 and points[0] is not None and points[1] is not None:
@@ -198,7 +201,8 @@ def _rod(chain: Chain, extent: float) -> Made | None:
 
 
 def _halves(chain: Chain, turns: int) -> list[slice]:
-    """The first ``turns`` rotations of five and the rest, where no ball is divided."""
+    """Return the first ``turns`` rotations of five and the remaining ones; none if a ball joint would be
+    divided."""
     sizes = [{"hinge": 1, "ball": 3}.get(kind, 9) for kind in chain.kinds]
     ends = np.cumsum(sizes)
     if not len(ends) or ends[-1] != 5 or turns not in ends:
@@ -217,7 +221,7 @@ def _parallel(axes: np.ndarray) -> bool:
 
 
 def _meeting(chain: Chain, part: slice, extent: float) -> list[float] | None:
-    """The point (3,) where the lines of several hinges meet; None where they miss each other."""
+    """Return the point (3,) in which the lines of several hinges meet; None if they do not meet."""
     axes, anchors = chain.axes[part], chain.anchors[part]
     if len(axes) < 2:
         return None

@@ -1,4 +1,5 @@
-"""Closures of loops between frames of two bodies: their residuals and Jacobians, and the scene's joints."""
+"""Closures of loops between frames of two bodies: their residuals and Jacobians, and the joints of the
+scene."""
 
 from __future__ import annotations
 
@@ -33,24 +34,24 @@ class Frame:
     axes: np.ndarray
 
     def place(self, data: Any) -> np.ndarray:
-        """World place (3,) of the origin."""
+        """Return the world position (3,) of the origin."""
         return np.asarray(data.xpos[self.body] + data.xmat[self.body].reshape(3, 3) @ self.origin)
 
     def turn(self, data: Any) -> np.ndarray:
-        """World axes (3, 3), as columns."""
+        """Return the world axes (3, 3) as columns."""
         return np.asarray(data.xmat[self.body].reshape(3, 3) @ self.axes)
 
 
 @dataclass(frozen=True)
 class Closure:
-    """A joint of a scene that closes a loop: its type, and a frame of each body; z is along the axis."""
+    """A joint that closes a loop: its type, and a frame on each body with z along the axis."""
 
     name: str
     type: type[Any]
     frames: tuple[Frame, Frame]
 
     def gap(self, data: Any) -> np.ndarray:
-        """Residuals (rows,) at a pose: m along the first frame's axes, then rad."""
+        """Return residuals (rows,) at a pose: m along the first frame's axes, then rad."""
         first, second = self.frames
         turn = first.turn(data)
         apart = turn.T @ (second.place(data) - first.place(data))
@@ -58,7 +59,7 @@ class Closure:
         return np.concatenate([apart[self._lengths], twist[self._angles]])
 
     def rows(self, mujoco: Any, model: Any, data: Any) -> np.ndarray:
-        """Jacobian (rows, nv) of the residuals at a closed pose."""
+        """Return the Jacobian (rows, nv) of the residuals at a closed pose."""
         first, second = self.frames
         turn, found = first.turn(data), np.zeros((2, 6, model.nv))
         for frame, jacobian in zip(self.frames, found, strict=True):
@@ -76,7 +77,7 @@ class Closure:
         return list(self.type.facts.forbidden_rotations)
 
     def joint(self, data: Any, groups: Groups) -> Joint:
-        """The scene's joint at a closed pose; raises SceneError where a side has no mass."""
+        """Return the scene's joint at a closed pose; raises SceneError if one side has no mass."""
         for frame in self.frames:
             group = int(groups.of[frame.body])
             if not groups.mass[group] > 0:
@@ -91,9 +92,9 @@ class Closure:
 
 
 def of_equalities(mujoco: Any, model: Any) -> Iterator[Closure]:
-    """The active connect and weld equalities, each with the frames that MuJoCo keeps together.
+    """Return the active connect and weld equalities, each with the frames that MuJoCo keeps together.
 
-    A weld whose torquescale is zero holds no rotation: it is a spherical joint.
+    A weld whose torquescale is zero constrains no rotation: it is a spherical joint.
     """
     for e in range(model.neq):
         name = model.equality(e).name or f"equality {e}"
@@ -113,18 +114,18 @@ def _ends(mujoco: Any, model: Any, e: int) -> tuple[Frame, Frame]:
     if model.eq_type[e] == mujoco.mjtEq.mjEQ_CONNECT:
         return Frame(first, data[0:3].copy(), np.eye(3)), Frame(second, data[3:6].copy(), np.eye(3))
     relative = rotations.to_matrix(data[6:10] / np.linalg.norm(data[6:10]))
-    # the pose of the second body's frame in the first, held at the second body's anchor
+    # pose of the second body's frame in the first one, at the second body's anchor
     anchor = data[0:3].copy()
     return Frame(first, data[3:6] + 0.0, relative), Frame(second, anchor, np.eye(3))
 
 
 def of_site(model: Any, s: int) -> Frame:
-    """The frame of a site."""
+    """Return the frame of a site."""
     return Frame(int(model.site_bodyid[s]), model.site_pos[s].copy(), rotations.to_matrix(model.site_quat[s]))
 
 
 def _rotation_vector(matrix: np.ndarray) -> np.ndarray:
-    """Rotation vector (3,) of a rotation matrix, at most half a turn long."""
+    """Return the rotation vector (3,) of a rotation matrix, at most half a turn long."""
     q = rotations.from_matrix(matrix)
     q = q if q[0] >= 0 else -q
     sine = float(np.linalg.norm(q[1:]))

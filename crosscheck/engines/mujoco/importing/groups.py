@@ -1,4 +1,4 @@
-"""Bodies of a compiled model that are fixed to each other, as one body of a scene."""
+"""Bodies of a compiled model that are fixed to each other, merged into one body of a scene."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Body
 
 WORLD = 0  # MuJoCo's number of the world, and of the group that is fixed to it
-PLAIN = 1e-15  # fraction of the largest moment: products of inertia below it are rounding
+PLAIN = 1e-15  # product of inertia / largest moment; smaller ones are rounding
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Placed:
 
 
 class Groups:
-    """The groups of bodies that no joint separates, by the number of their first body."""
+    """Groups of bodies that no joint separates; the key of a group is the number of its first body."""
 
     def __init__(self, mujoco: Any, model: Any):
         self.mujoco, self.model = mujoco, model
@@ -38,28 +38,29 @@ class Groups:
 
     @property
     def massive(self) -> list[int]:
-        """The groups with mass, without the world: the bodies of the scene."""
+        """Return the groups with mass, without the world: the bodies of the scene."""
         return [g for g in self.members if g != WORLD and self.mass[g] > 0]
 
     def parent(self, group: int) -> int:
-        """The group that carries another."""
+        """Return the group that carries a group."""
         return int(self.of[self.model.body_parentid[group]])
 
     def children(self, group: int) -> list[int]:
-        """The groups that one carries."""
+        """Return the groups that a group carries."""
         return [g for g in self.members if g != WORLD and self.parent(g) == group]
 
     def joints(self, group: int) -> list[int]:
-        """MuJoCo's joints between a group and its parent, in order."""
+        """Return MuJoCo's joints between a group and its parent, in order."""
         first = int(self.model.body_jntadr[group])
         return list(range(first, first + int(self.model.body_jntnum[group])))
 
     def name_of(self, body: int) -> str:
-        """The scene's body that holds MuJoCo's body."""
+        """Return the scene's body that contains MuJoCo's body."""
         return self.names[int(self.of[body])]
 
     def main(self, group: int) -> int:
-        """The body that names a group: its first if that has mass, otherwise its heaviest."""
+        """Return the body that gives a group its name: the first one if it has mass, otherwise the
+        heaviest."""
         masses = self.model.body_mass
         heaviest = max(self.members[group], key=lambda b: float(masses[b]))
         return group if masses[group] > 0 else int(heaviest)
@@ -71,7 +72,7 @@ class Groups:
         return self.model.body(b).name or f"body {b}"
 
     def placed(self, data: Any, group: int) -> Placed:
-        """A group at the pose of the data, whose kinematics and centres MuJoCo has computed."""
+        """Return a group at the pose of the data, whose kinematics and centres MuJoCo has computed."""
         masses = self.model.body_mass[self.members[group]]
         centre = masses @ data.xipos[self.members[group]] / masses.sum()
         jacobian = np.zeros((6, self.model.nv))
@@ -79,7 +80,7 @@ class Groups:
         return Placed(centre, data.xquat[self.main(group)].copy(), jacobian)
 
     def body(self, data: Any, group: int, twist: np.ndarray | None) -> Body:
-        """A group as a body of a scene, with the velocities of a twist (6,) where one is given."""
+        """Return a group as a body of a scene, with the velocities of a twist (6,) if one is given."""
         at = self.placed(data, group)
         turn = rotations.to_matrix(at.orientation)
         inertia = turn.T @ self._inertia(data, group, at.position) @ turn
@@ -96,7 +97,7 @@ class Groups:
         )
 
     def _inertia(self, data: Any, group: int, centre: np.ndarray) -> np.ndarray:
-        """World inertia (3, 3) about the group's centre of mass, by Steiner's theorem."""
+        """Return the world inertia (3, 3) about the group's centre of mass, by Steiner's theorem."""
         total = np.zeros((3, 3))
         for b in self.members[group]:
             axes, arm = data.ximat[b].reshape(3, 3), data.xipos[b] - centre

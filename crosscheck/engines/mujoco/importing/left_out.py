@@ -1,4 +1,5 @@
-"""Parts of a model that a scene does not have: those that change the motion, by kind, and mere notes."""
+"""Parts of a model that a scene cannot describe: those that change the motion, by kind, and those that do
+not."""
 
 from __future__ import annotations
 
@@ -26,14 +27,14 @@ EVERYTHING = "everything"
 
 @dataclass(frozen=True)
 class Part:
-    """A part that changes the motion and that the scene does not have: its kind and a sentence."""
+    """A part that changes the motion and that a scene cannot describe: its kind and a sentence."""
 
     kind: str
     sentence: str
 
 
 def checked(without: Collection[str]) -> frozenset[str]:
-    """The kinds of parts to leave out; ValueError names an unknown one."""
+    """Return the kinds of parts to be left out; raises ValueError for an unknown one."""
     for kind in without:
         if kind not in (*KINDS, EVERYTHING):
             raise ValueError(f"--without: {kind!r} is none of {', '.join((*KINDS, EVERYTHING))}")
@@ -41,7 +42,7 @@ def checked(without: Collection[str]) -> frozenset[str]:
 
 
 def refuse_others(parts: Collection[Part], without: frozenset[str]) -> None:
-    """Raises SceneError with every part whose kind is not to be left out."""
+    """Raise SceneError with every part whose kind is not to be left out."""
     faults = [
         f"{part.sentence}: it changes the motion; --without {part.kind} leaves it out"
         for part in parts
@@ -52,7 +53,8 @@ def refuse_others(parts: Collection[Part], without: frozenset[str]) -> None:
 
 
 def of_model(mujoco: Any, model: Any, keyframe: int, kept: Collection[int]) -> Iterator[Part]:
-    """Armature, friction, fluid, compensation, flexible bodies, and motors that a keyframe controls.
+    """Return parts that change the motion: armature, friction, fluid, compensation, flexible bodies, and
+    motors controlled by a keyframe.
 
     Armature of the coordinates ``kept`` is in the scene.
     """
@@ -79,13 +81,13 @@ def _controlled(model: Any, keyframe: int) -> list[str]:
 
 
 def _joint_names(model: Any, numbers: np.ndarray) -> list[str]:
-    """Names of the joints whose coordinates (nv,) have a number that is not zero."""
+    """Return the names of the joints whose coordinates (nv,) have a nonzero number."""
     joints = dict.fromkeys(int(j) for j in model.dof_jntid[np.flatnonzero(numbers)])
     return [joint_name(model, j) for j in joints]
 
 
 def joint_name(model: Any, j: int) -> str:
-    """Name of a joint, or of its body and number where it has none."""
+    """Return the name of a joint, or its body and number if it has no name."""
     body = model.body(int(model.jnt_bodyid[j])).name or f"body {int(model.jnt_bodyid[j])}"
     return repr(model.joint(j).name) if model.joint(j).name else f"joint {j} (of body {body!r})"
 
@@ -96,7 +98,7 @@ def _listed(names: list[str], most: int = 6) -> str:
 
 
 def notes(mujoco: Any, model: Any) -> Iterator[str]:
-    """Sentences about parts that a scene does not have and that do not change a motion without them."""
+    """Return sentences about parts that a scene cannot describe and that do not change the motion."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
     counts = {
@@ -119,14 +121,14 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
 
 
 def _holding_sites(mujoco: Any, model: Any) -> set[int]:
-    """The sites at the ends of equalities and tendons."""
+    """Return the sites at the ends of equalities and tendons."""
     ends = model.eq_objtype == int(mujoco.mjtObj.mjOBJ_SITE)
     wrapped = model.wrap_type == int(mujoco.mjtWrap.mjWRAP_SITE)
     return {*model.eq_obj1id[ends], *model.eq_obj2id[ends], *model.wrap_objid[wrapped]}
 
 
 def stripped(model: Any, kept: Collection[int]) -> None:
-    """Take out of the model, in place, the parts of ``of_model`` that its matrices contain."""
+    """Remove the parts of ``of_model`` from the model's matrices, in place."""
     armature = model.dof_armature.copy()
     for numbers in (
         model.dof_armature,

@@ -1,4 +1,4 @@
-"""Springs and dampers of joints and tendons as loads of a scene, and those that no load describes."""
+"""Springs and dampers of joints and tendons as loads of a scene, and those that no load can describe."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from mbref.scene import Joint, Load, Spring, TorsionSpring
 
 
 def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
-    """A torsion spring of every hinge with stiffness or damping; others are parts to leave out.
+    """Return a torsion spring for every hinge with stiffness or damping; all other springs are parts to be
+    left out.
 
-    ``joint_of`` has the scene's joint of a MuJoCo joint, where it is the whole of it.
+    ``joint_of`` maps a MuJoCo joint to the scene's joint if that consists of it alone.
     """
     for j in range(model.njnt):
         stiffness, damping = _springs(mujoco, model, j)
@@ -34,7 +35,7 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
 
 
 def _springs(mujoco: Any, model: Any, j: int) -> tuple[float, float]:
-    """Stiffness and damping of a joint, zero where the file disables them."""
+    """Return stiffness and damping of a joint, zero if the file disables them."""
     flags, disabled = mujoco.mjtDisableBit, model.opt.disableflags
     stiffness = 0.0 if disabled & flags.mjDSBL_SPRING else float(model.jnt_stiffness[j])
     damping = 0.0 if disabled & flags.mjDSBL_DAMPER else float(model.dof_damping[model.jnt_dofadr[j]])
@@ -54,7 +55,7 @@ def _dofs(model: Any, j: int) -> slice:
 
 
 def _polynomials(model: Any) -> Iterator[Part]:
-    """Stiffness and damping that are no constants."""
+    """Return sentences on stiffness and damping that are not constant."""
     for kind, numbers, joint in (
         ("springs", model.jnt_stiffnesspoly, np.arange(model.njnt)),
         ("damping", model.dof_dampingpoly, model.dof_jntid),
@@ -66,7 +67,7 @@ def _polynomials(model: Any) -> Iterator[Part]:
 
 
 def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[Load | Part]:
-    """A spring of every tendon between two sites that has stiffness or damping."""
+    """Return a spring for every tendon between two sites that has stiffness or damping."""
     for k in range(model.ntendon):
         stiffness, damping = float(model.tendon_stiffness[k]), float(model.tendon_damping[k])
         if not stiffness and not damping:

@@ -13,11 +13,11 @@ from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure
 from mbref.scene import SceneError
 
-CLOSED = 1e-12  # fraction of the model's extent, or rad: smaller gaps are closed
-ROUNDED = 1e-9  # limit like CLOSED at nearly singular positions, where Newton's method is less accurate
+CLOSED = 1e-12  # smaller gaps, relative to the model's extent or in rad, count as closed
+ROUNDED = 1e-9  # limit like CLOSED near singular positions, where Newton's method is less accurate
 ITERATIONS = 200
-LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in an iteration
-RANK = 1e-9  # fraction of the largest singular value: smaller ones belong to redundant rows
+LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in one iteration
+RANK = 1e-9  # singular value / largest one; smaller ones belong to redundant rows
 
 
 @dataclass(frozen=True)
@@ -25,23 +25,23 @@ class JointRow:
     """A joint coordinate that follows another one: q = offset + ratio · q₂, both from the reference."""
 
     name: str
-    joints: tuple[int, int]  # MuJoCo's numbers; the second is -1 for a constant
+    joints: tuple[int, int]  # MuJoCo's numbers; the second is -1 if the first follows a constant
     offset: float
     ratio: float
 
 
 class Poses:
-    """Poses of a model: every one with its loops closed."""
+    """Poses of a model with closed loops."""
 
     def __init__(
         self, mujoco: Any, model: Any, closures: Sequence[Closure], rows: Sequence[JointRow], extent: float
     ):
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         self.closures, self.joint_rows, self.extent = closures, rows, extent
-        self.held: list[int] = []  # velocities' numbers of coordinates that a pose gives
+        self.held: list[int] = []  # indices of the velocities whose coordinates the user gives
 
     def start(self, keyframe: str, pose: Mapping[str, float]) -> None:
-        """Begin at a keyframe, or the reference, with given joint coordinates; raises SceneError."""
+        """Set the start: a keyframe or the reference, with given joint coordinates; raises SceneError."""
         model, data = self.model, self.data
         data.qpos[:] = model.qpos0
         if keyframe:
@@ -56,19 +56,20 @@ class Poses:
         self.place()
 
     def place(self) -> None:
-        """Compute places of bodies and joints at the data's coordinates."""
+        """Compute positions of bodies and joints at the data's coordinates."""
         self.mujoco.mj_kinematics(self.model, self.data)
         self.mujoco.mj_comPos(self.model, self.data)
 
     def gaps(self) -> dict[str, float]:
-        """Largest residual (m or rad) of every closure and coupled coordinate at the pose."""
+        """Return the largest residual (m or rad) of every closure and coupled coordinate at the pose."""
         found = {c.name: float(np.abs(c.gap(self.data)).max()) for c in self.closures}
         return found | {row.name: abs(self._residual(row)) for row in self.joint_rows}
 
     def close(self) -> None:
-        """Move the coordinates, in the metric of the masses, until all loops are closed.
+        """Move the coordinates until all loops are closed, by the least change weighted with the masses.
 
-        Coordinates of ``--pose`` stay where the loops allow it.  Raises SceneError with the gap that is left.
+        Coordinates of ``--pose`` are unchanged if the loops allow it. Raises SceneError with the remaining
+        gap.
         """
         start = self.data.qpos.copy()
         if self._newton(self.held):
@@ -101,7 +102,7 @@ class Poses:
         return bool(np.abs(self.residuals()).max() <= ROUNDED * max(self.extent, 1.0))
 
     def _step(self, r: np.ndarray, rows: np.ndarray, held: list[int]) -> np.ndarray:
-        """The least change (nv,) in the metric of the masses that closes the linearised loops."""
+        """Return the least change (nv,), weighted with the masses, that closes the linearised loops."""
         free = [k for k in range(self.model.nv) if k not in held]
         mass = self.mass()[np.ix_(free, free)]
         root = np.linalg.cholesky(mass + 1e-9 * np.trace(mass) / len(free) * np.eye(len(free)))
@@ -111,24 +112,24 @@ class Poses:
         return step
 
     def mass(self) -> np.ndarray:
-        """MuJoCo's mass matrix (nv, nv) at the pose."""
+        """Return MuJoCo's mass matrix (nv, nv) at the pose."""
         self.mujoco.mj_makeM(self.model, self.data)
         found = np.zeros((self.model.nv, self.model.nv))
         self.mujoco.mj_fullM(self.model, self.data, found)
         return found
 
     def residuals(self) -> np.ndarray:
-        """Residuals of all closures and coupled coordinates, m and rad."""
+        """Return the residuals of all closures and coupled coordinates, m and rad."""
         parts = [c.gap(self.data) for c in self.closures] + [[self._residual(r)] for r in self.joint_rows]
         return np.concatenate([np.zeros(0), *parts])
 
     def jacobian(self) -> np.ndarray:
-        """Jacobian (rows, nv) of the residuals."""
+        """Return the Jacobian (rows, nv) of the residuals."""
         found = [c.rows(self.mujoco, self.model, self.data) for c in self.closures]
         return np.vstack([np.zeros((0, self.model.nv)), *found, *map(self.joint_row, self.joint_rows)])
 
     def joint_row(self, row: JointRow) -> np.ndarray:
-        """Jacobian (1, nv) of a coupled coordinate."""
+        """Return the Jacobian (1, nv) of a coupled coordinate."""
         found, (first, second) = np.zeros((1, self.model.nv)), row.joints
         found[0, self.model.jnt_dofadr[first]] = 1.0
         if second >= 0:
@@ -145,7 +146,7 @@ class Poses:
 
 
 def _found(mujoco: Any, model: Any, kind: Any, what: str, name: str, count: int) -> int:
-    """Number of a named object; SceneError lists the names."""
+    """Return the number of a named object; raises SceneError that lists the names."""
     number = int(mujoco.mj_name2id(model, kind, name))
     if number < 0:
         known = [str(mujoco.mj_id2name(model, kind, k) or "") for k in range(count)]

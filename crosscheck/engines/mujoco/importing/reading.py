@@ -1,7 +1,7 @@
 """MJCF and URDF as scenes: bodies, joints, closures, springs and gravity of the compiled model.
 
 Bodies that are fixed to each other are one body of the scene.  Its frame has the origin at the centre of mass
-and the axes of the file's body.  A scene is given back only after its matrices agree with the model's.
+and the axes of the file's body.  A scene is returned only if its matrices agree with the model's.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mbref.formats import Imported, ImportOptions
 from mbref.scene import GROUND, Body, Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
-OPEN = 1e-6  # fraction of the model's extent: a wider gap at the start is reported
+OPEN = 1e-6  # gap / extent of the model; a wider gap at the start is reported
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Source:
 
 
 def source(path: Path, options: ImportOptions) -> Source:
-    """The scene and the model of a .xml (MJCF) or .urdf file; raises SceneError, ValueError, OSError.
+    """Return the scene and the model of a .xml (MJCF) or .urdf file; raises SceneError, ValueError, OSError.
 
-    SceneError names a part that changes the motion and that a scene does not have, a loop that cannot be
+    SceneError names a part that changes the motion and that a scene cannot describe, a loop that cannot be
     closed, or a part in which the scene and the compiled model disagree.
     """
     import mujoco
@@ -89,7 +89,7 @@ def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urd
 
 
 def _renamed(joints: list[Joint]) -> Iterator[Joint]:
-    """Joints with names of their own: a second one of a name gets a number."""
+    """Return joints with unique names: a repeated name gets a number."""
     seen: set[str] = set()
     for joint in joints:
         name, number = joint.name, 2
@@ -101,7 +101,7 @@ def _renamed(joints: list[Joint]) -> Iterator[Joint]:
 
 @dataclass
 class _Reader:
-    """A compiled model, and what was read of it."""
+    """A compiled model, and everything that was read from it."""
 
     mujoco: Any
     model: Any
@@ -119,7 +119,7 @@ class _Reader:
 
     def __post_init__(self) -> None:
         self.groups = Groups(self.mujoco, self.model)
-        self.kept: list[int] = []  # joint velocities whose armature is in the scene
+        self.kept: list[int] = []  # indices of joint velocities whose armature is in the scene
 
     def read(self) -> None:
         """Read everything, at a pose with closed loops."""
@@ -137,7 +137,7 @@ class _Reader:
         self.notes += unclosed(self.groups, self.poses.data, self.frames, closures, self.poses.extent)
 
     def scene(self, name: str) -> Scene:
-        """The scene of the parts that were read."""
+        """Return the scene made of the parts that were read."""
         gravity_off = self.model.opt.disableflags & self.mujoco.mjtDisableBit.mjDSBL_GRAVITY
         return Scene(
             name=name,
@@ -156,7 +156,7 @@ class _Reader:
             yield self.groups.body(data, g, twist)
 
     def _closures(self) -> list[Closure]:
-        """The closures of the file and of the user; joint rows are noted beside."""
+        """Return the closures of the file and of the user; joint rows are stored separately."""
         reference = self.mujoco.MjData(self.model)
         self.mujoco.mj_kinematics(self.model, reference)
         root = _root_link(self.text)
@@ -186,7 +186,7 @@ class _Reader:
         return first != second
 
     def _read_equalities(self) -> None:
-        """Equalities of joints and others: locked coordinates are rows, all others are parts to leave out."""
+        """Read equalities: locked joint coordinates become rows, all others are parts to be left out."""
         kinds, model = self.mujoco.mjtEq, self.model
         for e in range(model.neq):
             name, kind = model.equality(e).name or f"equality {e}", model.eq_type[e]
@@ -205,12 +205,12 @@ class _Reader:
                 model.eq_active0[e] = 0
 
     def _reads_row(self, e: int) -> bool:
-        """Whether an equality of joints locks one, or is linear and not to be left out."""
+        """Return whether an equality of joints locks one, or is linear and not to be left out."""
         is_linear = not np.any(self.model.eq_data[e, 2:5])
         return self.model.eq_obj2id[e] < 0 or (is_linear and "couplings" not in self.without)
 
     def _close(self) -> None:
-        """Close the loops and report how wide they were open."""
+        """Close the loops, and report how large their gaps were."""
         wide = {n: gap for n, gap in self.poses.gaps().items() if gap > OPEN * self.poses.extent}
         self.poses.close()
         for name, gap in wide.items():
@@ -220,7 +220,7 @@ class _Reader:
         self._keep_velocities()
 
     def _keep_velocities(self) -> None:
-        """Velocities of a keyframe, less the parts that the closures forbid."""
+        """Return the velocities of a keyframe without the parts that the closures forbid."""
         data = self.poses.data
         if np.any(data.qvel):
             rows = self.poses.jacobian()
@@ -249,7 +249,7 @@ class _Reader:
         self._couple()
 
     def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
-        """The joints of a chain, a single one with the armature of its hinge or slide."""
+        """Return the joints of a chain; if it is a single hinge or slide, with its armature."""
         driven = joints[0].facts.driven if len(joints) == 1 else None
         wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
         kinds = [wanted.get(kind) for kind in chain.kinds]
@@ -271,8 +271,10 @@ class _Reader:
                 self.notes.append(f"fixed to {self.groups.name_of(main)!r} and part of it: {names}")
 
     def _couple(self) -> None:
-        """A coordinate that follows another is a coupling, a locked one a driver that stands still; raises
-        SceneError where a scene has none."""
+        """Make a coupling of a coordinate that follows another, and a constant driver of a locked one.
+
+        Raises SceneError if a scene has no such coordinate.
+        """
         taken = {joint.name for joint in self.joints}
         for row in self.rows:
             ends = [self._coordinate(row, j) for j in row.joints if j >= 0]
@@ -290,8 +292,8 @@ class _Reader:
             self.couplings.append(Coupling(name=name, joints=pair, ratio=row.ratio, coordinates=kinds))
 
     def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate]:
-        """The joint of the scene that has a hinge or slide of the file, and its coordinate; SceneError where
-        none has."""
+        """Return the scene's joint of a hinge or slide in the file, and its coordinate; raises SceneError if
+        there is none."""
         joint, couples = self.joint_of.get(j), row.joints[1] >= 0
         if joint is not None and joint.facts.driven and (couples or joint.type != "cylindrical"):
             is_hinge = kind_of(self.mujoco, self.model, j) == "hinge"
@@ -310,7 +312,7 @@ class _Reader:
 
 
 def _root_link(text: urdf.Text | None) -> str:
-    """The link of a URDF that no joint carries, which MuJoCo fixes to the world."""
+    """Return the link of a URDF that no joint carries, which MuJoCo fixes to the world."""
     if text is None:
         return GROUND
     carried = {child.get("link") for child in text.root.iter("child")}
@@ -318,7 +320,7 @@ def _root_link(text: urdf.Text | None) -> str:
 
 
 def _extent(mujoco: Any, model: Any) -> float:
-    """Largest distance along an axis between centres of mass at the reference position (m)."""
+    """Return the largest distance along an axis between centres of mass at the reference position (m)."""
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     return max(float(np.ptp(data.xipos, axis=0).max()), 1e-3)

@@ -1,4 +1,5 @@
-"""URDF: a text that MuJoCo can compile, links with too little inertia for it, loops and coupled joints."""
+"""Preparation of a URDF for MuJoCo: links with too little inertia, loops and coupled joints are handled
+here."""
 
 from __future__ import annotations
 
@@ -26,20 +27,20 @@ PARTS = (
     "mimic",
     "mujoco",
 )
-LEAST = 1e-12  # kg and kg m²: MuJoCo compiles no moving body with less
+LEAST = 1e-12  # kg and kg m²; MuJoCo refuses moving bodies with less
 BodyOf = Callable[[str], int]
 
 
 @dataclass(frozen=True)
 class Text:
-    """A URDF for MuJoCo, and the inertia that was added to links, by link: mass and moments."""
+    """A URDF text for MuJoCo, and the mass and moments that were added to each link."""
 
     text: str
     added: dict[str, tuple[float, float]]
     root: ET.Element
 
     def take_back(self, mujoco: Any, model: Any) -> None:
-        """Take the added masses and moments out of the compiled model."""
+        """Subtract the added masses and moments from the compiled model."""
         for link, (mass, moment) in self.added.items():
             b = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link)
             if b > 0:
@@ -51,7 +52,7 @@ class Text:
 
 
 def prepared(text: str) -> Text:
-    """The URDF without shapes, loops and actuators; links are not merged."""
+    """Return the URDF without shapes, loops and actuators; links are not merged."""
     try:
         root, whole = ET.fromstring(text), ET.fromstring(text)
     except ET.ParseError as error:
@@ -67,7 +68,7 @@ def prepared(text: str) -> Text:
 
 
 def _enough(link: ET.Element) -> tuple[float, float]:
-    """Add inertia to a link that MuJoCo would refuse; the mass and the moment about every axis added."""
+    """Add inertia to a link that MuJoCo would refuse; returns the added mass and moment."""
     inertial = link.find("inertial")
     inertial = ET.SubElement(link, "inertial") if inertial is None else inertial
     mass = _part(inertial, "mass", {"value": "0"})
@@ -92,7 +93,7 @@ def _part(element: ET.Element, tag: str, default: dict[str, str]) -> ET.Element:
 
 
 def mimics(root: ET.Element, number_of: Callable[[str], int]) -> Iterator[JointRow]:
-    """Joints that follow others by ``<mimic>``; raises SceneError for an unknown joint."""
+    """Return joints that follow others by ``<mimic>``; raises SceneError for an unknown joint."""
     for joint in root.iter("joint"):
         if (mimic := joint.find("mimic")) is not None:
             name, other = str(joint.get("name")), str(mimic.get("joint"))
@@ -104,16 +105,18 @@ def mimics(root: ET.Element, number_of: Callable[[str], int]) -> Iterator[JointR
 
 
 def couplings(root: ET.Element) -> Iterator[Part]:
-    """Joints that follow others by ``<coupling>`` of URDF+."""
+    """Return joints that follow others by ``<coupling>`` of URDF+."""
     for coupling in root.iter("coupling"):
         yield Part("couplings", f"coupling {coupling.get('name', '')!r}")
 
 
 def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
-    """The closures of the loops, at their predecessors' origins, as the reference position has them.
+    """Return the closures of the loops, at the origins of their predecessors, as the reference position has
+    them.
 
-    ``<loop name type><predecessor link><origin/></predecessor><successor link>…</successor><axis/></loop>``,
-    the axis in the predecessor's origin frame.  Raises SceneError for an unknown type or link.
+    Format: ``<loop name type><predecessor link><origin/></predecessor><successor
+    link>…</successor><axis/></loop>`` with the axis in the predecessor's origin frame. Raises SceneError for
+    an unknown type or link.
     """
     for loop in root.iter("loop"):
         name, kind = loop.get("name", "loop"), loop.get("type", "")
@@ -127,7 +130,7 @@ def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
 
 
 def along(axis: np.ndarray) -> np.ndarray:
-    """Axes (3, 3) of a frame whose z is along an axis."""
+    """Return the axes (3, 3) of a frame whose z is along an axis."""
     z = axis / np.linalg.norm(axis)
     x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
     x /= np.linalg.norm(x)
@@ -135,7 +138,7 @@ def along(axis: np.ndarray) -> np.ndarray:
 
 
 def _end(loop: ET.Element, side: str, body_of: BodyOf, name: str) -> Frame:
-    """The frame of one side of a loop."""
+    """Return the frame of one side of a loop."""
     found = loop.find(side)
     if found is None or not found.get("link"):
         raise SceneError([f"loop {name!r}: names no {side}"])
@@ -150,7 +153,7 @@ def _numbers(element: Any, key: str, default: tuple[float, float, float]) -> np.
 
 
 def _roll_pitch_yaw(angles: np.ndarray) -> np.ndarray:
-    """Rotation matrix of fixed-axis angles about x, y, z."""
+    """Return the rotation matrix of angles about fixed x, y, z axes."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a), math.sin(a)) for a in angles)
     return np.array(
         [

@@ -1,7 +1,8 @@
-"""Mechanisms drawn from seeds for every card: closed loops with all loads and drivers, floating ones, rotors.
+"""Random mechanisms for the checks: closed loops with all types of loads and drivers, floating mechanisms,
+rotors.
 
-A check (card) for special mechanisms has its own kind of mechanism: momentum of floating mechanisms,
-a driver's constant moment of rotors, refusal of mechanisms without masses.
+Some checks need a special kind of mechanism: momentum a floating one, a driver's constant moment a rotor, and
+refusals a mechanism without masses.
 """
 
 from __future__ import annotations
@@ -19,15 +20,20 @@ from crosscheck.judge.constraints import closure_rates, initial_poses, initial_t
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
 
-DURATION = 0.05  # s: bodies of half a metre turn by a tenth of a radian
-REGULAR = 1e-3  # smallest singular value of unit rows with a driver: below it the driven joint hardly moves
-FRAME = "frame"  # the body in the ground's place
+DURATION = 0.05  # s; within it bodies of half a metre turn by about 0.1 rad
+# smallest singular value of the normalised constraint rows and driver row; below it the driver hardly moves
+# its joint
+REGULAR = 1e-3
+FRAME = "frame"  # name of the body that replaces the ground
 NUDGE = 0.1  # m or rad: amplitude of a driver's wave
 
 
 def mechanism(seed: int) -> Scene:
-    """A closed-loop mechanism with a gravity of any direction and, where a joint takes them, torsion spring
-    and driver.  That of an even seed has neither driver nor damping."""
+    """Return a closed-loop mechanism with gravity in a random direction.
+
+    Odd seeds have a torsion spring and a driver if a joint accepts them. Even seeds have neither driver nor
+    damping.
+    """
     rng = np.random.default_rng([seed, 1])
     scene = random_mechanism(seed)
     gravity = rng.normal(size=3)
@@ -41,8 +47,11 @@ def mechanism(seed: int) -> Scene:
 
 
 def floating(seed: int) -> Scene:
-    """The mechanism in flight: a body in the ground's place, without damping, driver and force at a point,
-    whose moment of momentum would follow the point."""
+    """Return the mechanism in flight: a body replaces the ground, and there is no damping, driver or force at
+    a point.
+
+    A force at a point would change the angular momentum.
+    """
     rng = np.random.default_rng([seed, 2])
     scene = _undamped(random_mechanism(seed)).with_(duration=DURATION)
     frame = Body(name=FRAME, mass=4.0, inertia=(0.3, 0.4, 0.5), position=(0.1, -0.2, 0.05))
@@ -54,7 +63,8 @@ def floating(seed: int) -> Scene:
 
 
 def rotor(seed: int) -> Scene:
-    """One to four welded bodies on a hinge along gravity, sped up evenly: the driver's moment is constant."""
+    """Return one to four welded bodies on a vertical hinge at constant angular acceleration: the driver's
+    moment is constant."""
     rng = np.random.default_rng([seed, 3])
     base = random_mechanism(seed)
     axis = rng.normal(size=3)
@@ -80,7 +90,7 @@ def rotor(seed: int) -> Scene:
 
 
 def without_masses(seed: int) -> Scene:
-    """The mechanism without masses and drivers, whose motion nothing determines."""
+    """Return the mechanism without masses and drivers, whose motion is undetermined."""
     return massless(random_mechanism(seed))
 
 
@@ -97,7 +107,7 @@ def _still(load: Load) -> Load:
 
 
 def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
-    """A torsion spring about a joint that takes one, for two of three mechanisms."""
+    """Return a torsion spring about a joint that accepts one, for two of three mechanisms."""
     joints = [joint.name for joint in scene.joint if joint.facts.takes_torsion_spring]
     if joints and rng.random() < 2 / 3:
         joint = str(rng.choice(joints))
@@ -106,7 +116,8 @@ def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
 
 
 def _driven(scene: Scene, rng: np.random.Generator) -> Scene:
-    """The scene with a driver that begins at the joint's own rate; without, where none leaves a motion."""
+    """Return the scene with a driver that starts at the joint's own rate; without a driver if no motion would
+    remain."""
     before = rank(scene)
     joints = [joint for joint in scene.joint if joint.facts.driven]
     for joint in rng.permutation(np.array(joints, dtype=object)):

@@ -1,4 +1,4 @@
-"""The runs behind the README's moving picture: a slider-crank through singular positions in two engines."""
+"""The runs of the README's animated picture: a slider-crank through singular positions in two engines."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 
 SCENE, SAMPLES = "planar_slider_crank_equal", 161
-FINE = 1001  # instants at which the Jacobian is looked at
-NEAR = 0.05  # smallest singular value: a local minimum below it counts as a singular position
+FINE = 1001  # equally spaced times at which the constraint Jacobian is evaluated
+# smallest singular value of the scaled Jacobian: a local minimum below it counts as a singular position
+NEAR = 0.05
 
 
-class Passage(NamedTuple):
-    """The scene, its exact motion, the instants (s) of its singular positions, and the records."""
+class MovingPicture(NamedTuple):
+    """Contents of the README's animated picture: scene, exact motion, times (s) of singular positions, and
+    records."""
 
     scene: Scene
     exact: Trajectory
@@ -29,19 +31,19 @@ class Passage(NamedTuple):
     records: list[Record]
 
 
-def passage() -> Passage:
-    """mbref's default method and MuJoCo at its defaults with the smallest step of the sweep."""
+def moving_picture() -> MovingPicture:
+    """Return runs of mbref's default method and of MuJoCo's defaults with the smallest step of the sweep."""
     scene = SCENES[SCENE]()
     truth, times = truth_for(scene), np.linspace(0.0, scene.duration, SAMPLES)
     assert truth is not None
     finest = [s for s in settings("mujoco", scene) if s.family == "defaults"][-1]
     chosen = (("mbref", Setting("taylor", {"rtol": 1e-9})), ("mujoco", finest))
     records = study([Case(scene, times, engine, setting) for engine, setting in chosen])
-    return Passage(scene, truth.poses(times), singular_instants(scene), records)
+    return MovingPicture(scene, truth.poses(times), singular_instants(scene), records)
 
 
 def singular_instants(scene: Scene) -> list[float]:
-    """Instants (s) at which the constraint Jacobian loses rank along the exact motion."""
+    """Return the times (s) at which the constraint Jacobian loses rank along the exact motion."""
     times = np.linspace(0.0, scene.duration, FINE)
     values = scaled_singular_values(scene, times)
     smallest = values[:, rank(np.median(values, axis=0)) - 1]
