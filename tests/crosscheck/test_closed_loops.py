@@ -59,7 +59,7 @@ def test_turned_four_bar_is_the_four_bar() -> None:
         assert np.linalg.norm(one.anchor) == pytest.approx(np.linalg.norm(other.anchor), abs=1e-12)
     angle = np.arccos(np.dot(plain.joint[0].axis, turned.joint[0].axis))
     assert 0.3 < angle < 0.7, "an axis along no axis of the world"
-    assert by_heading["long run"].with_(name="", duration=1.0) == plain.with_(name="", duration=1.0)
+    assert by_heading["long run"].with_(name=plain.name, duration=1.0) == plain
 
 
 @pytest.mark.parametrize(
