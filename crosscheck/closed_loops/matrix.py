@@ -22,7 +22,7 @@ LEGEND = {
     "✓ 3e-12": f"right: the largest error, at most {FLOOR:g} of the mechanism's length or rad",
     "≈ 3e-05": f"accurate to this error, at most {FALSE_SUCCESS:g}",
     "✗ 0.95": "wrong: the run completes without a message, and this is its error",
-    "! stopped": "the run stopped with a message, crashed, or did not end within its limit of CPU time",
+    "! ended": "the run ended early with a message, crashed, or did not end within its limit of CPU time",
     REFUSES: "refused: the engine or crosscheck's adapter cannot model it; the reason is below",
 }
 PLACES = {column.scene: column.place() for column in DIFFICULTIES}
@@ -95,7 +95,7 @@ def shown(record: Record | None) -> str:
 
 def _ended(record: Record) -> str:
     known = {Outcome.CRASHED.label: "crashed", Outcome.TIMED_OUT.label: "no end"}
-    return known.get(record["outcome"], "stopped")
+    return known.get(record["outcome"], "ended")
 
 
 def _size(record: Record) -> str:

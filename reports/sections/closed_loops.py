@@ -33,7 +33,7 @@ def render(records: Sequence[Record]) -> list[Block]:
             cells, True, "Each engine by its best family of settings, at the finest setting of each family."
         ),
         _map(cells, False, "Solver parameters as the library has them, with a fine step."),
-        Table("Signs.", ("Sign", "Meaning"), list(LEGEND.items())),
+        Table("How to read a cell.", ("Sign", "Meaning"), list(LEGEND.items())),
         Heading("The mechanisms", 2),
         Table("Scenes that the columns run.", ("Column", "Scene", "Until (s)", "Mechanism"), _mechanisms()),
         *(block for name, row in cells.items() for block in _engine(name, row)),

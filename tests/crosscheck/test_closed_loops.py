@@ -71,7 +71,7 @@ def test_turned_four_bar_is_the_four_bar() -> None:
         (run(0.0101), "✗ 0.01"),
         (run(0.9512), "✗ 0.95"),
         (run(1e-13, metrics={"error": 1e-13, "error_bound": 2e-12}), "✓ <2e-12"),
-        (run(None, outcome="STEP_FAILED"), "! stopped"),
+        (run(None, outcome="STEP_FAILED"), "! ended"),
         (run(None, outcome="CRASHED"), "! crashed"),
         (run(None, outcome="TIMED_OUT"), "! no end"),
         (refusal(), "–"),
