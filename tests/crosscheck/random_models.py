@@ -22,6 +22,7 @@ class File:
     loops: list[tuple[str, np.ndarray, str, np.ndarray]] = field(
         default_factory=list
     )  # spherical, no equality
+    mimics: list[tuple[str, str, float]] = field(default_factory=list)  # joint, the one it follows, ratio
 
 
 def numbers(values) -> str:
@@ -197,6 +198,7 @@ def urdf(seed: int) -> File:
         links.append(name)
         text += f'<link name="f{k}"/>' + _joint(f"tip{k}", "fixed", name, f"f{k}", a, random)
     file = File(f'<robot name="random">{text}</robot>', ".urdf", ImportOptions(without=["couplings"]))
+    file.mimics = [(f"j{k}", f"j{k - 1}", 2.0) for k in range(count) if f'<mimic joint="j{k - 1}" ' in text]
     return _with_loop(file, massive, random) if random.uniform() < 0.6 else file
 
 
@@ -240,4 +242,4 @@ def _with_loop(file: File, massive: list[str], random) -> File:
         )
     text = file.text.replace("</robot>", f"{extra}</robot>")
     options = ImportOptions(without=file.options.without, close=["loop_0=loop_1"])
-    return File(text, ".urdf", options, [tuple(ends)])
+    return File(text, ".urdf", options, [tuple(ends)], file.mimics)
