@@ -21,6 +21,7 @@ ANCHOR = 9.0  # px, from an anchor to the nearest edge of its name
 AROUND = ((-1, -1), (1, -1), (-1, 1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))  # left or right, up or down
 RINGS = (1.0, 2.0, 3.5)  # distances from an anchor, relative to ANCHOR
 ALONG = (0.5, 0.35, 0.65, 0.25, 0.75)  # places along a bar
+GAPS = (7.0, 16.0, 30.0)  # px, between a bar and the box of its name
 
 
 class Label(NamedTuple):
@@ -101,17 +102,26 @@ def _of_bodies(stage: Stage) -> Iterator[Label]:
 
 def _places(name: str, is_plate: bool, frames: np.ndarray) -> np.ndarray:
     """Return the middles (c, k, 2), px, that the name of a body with points (k, n, 2) may have."""
-    reach = np.array([8.0 + LETTER * len(name) / 2, 13.0])
+    half = np.array([LETTER * len(name), LINE]) / 2
     if frames.shape[1] == 1:
-        offsets = [(0.0, 26.0), (0.0, -26.0), (reach[0] + 17.0, 0.0), (-reach[0] - 17.0, 0.0), (0.0, 44.0)]
+        side = half[0] + 25.0
+        offsets = [(0.0, 26.0), (0.0, -26.0), (side, 0.0), (-side, 0.0), (0.0, 44.0)]
         return np.stack([frames[:, 0] + np.array(offset) for offset in offsets])
     bar = _longest_part(frames)
     start, along = bar[:, 0], bar[:, 1] - bar[:, 0]
     across = np.stack([along[:, 1], -along[:, 0]], axis=1)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
-    beside = [start + a * along + side * reach * across for a in ALONG for side in (1.0, -1.0)]
+    reach = np.abs(across) @ half  # half the width of the name's box across the bar
+    beside = [
+        start + a * along + side * (reach + gap)[:, None] * across
+        for gap in GAPS
+        for a in ALONG
+        for side in (1.0, -1.0)
+    ]
     middle = [frames[:, :-1].mean(axis=1)] if is_plate else []
-    return np.stack([*middle, *beside])
+    side = np.linalg.norm(along, axis=1)[:, None] / 2 + half[0] + GAPS[1]
+    level = [start + along / 2 + sign * side * np.array([1.0, 0.0]) for sign in (1.0, -1.0)]
+    return np.stack([*middle, *beside, *level])
 
 
 def _longest_part(frames: np.ndarray) -> np.ndarray:

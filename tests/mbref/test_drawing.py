@@ -19,6 +19,7 @@ from mbref.drawing.view import Page, View, view_of
 from mbref.scene import JOINT_TYPES, Scene
 from mbref.scenes import SCENES
 
+CLEAR = 3.5  # px, least distance between a bar's middle line, 6 px wide, and the box of a name
 SVG = "{http://www.w3.org/2000/svg}"
 
 
@@ -77,6 +78,29 @@ def covered(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
 def test_names_do_not_cover_one_another(name):
     found = labels(still(SCENES[name]()))
     assert len(found) > 1 and not covered(found)
+
+
+def bars(picture: str) -> list[np.ndarray]:
+    """Ends (2, 2), px, of the parts of bars."""
+    lines = [
+        node for node in ET.fromstring(picture).iter(f"{SVG}polyline") if node.get("stroke-width") == "6"
+    ]
+    points = [np.array([p.split(",") for p in line.attrib["points"].split()], dtype=float) for line in lines]
+    return [line[i : i + 2] for line in points for i in range(len(line) - 1)]
+
+
+def crossed(middle: np.ndarray, half: np.ndarray, bar: np.ndarray) -> bool:
+    """Whether a bar runs through a box."""
+    along = bar[0] + np.linspace(0.0, 1.0, 500)[:, None] * (bar[1] - bar[0])
+    return bool((np.abs(along - middle) < half).all(axis=1).any())
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_names_of_bodies_stay_clear_of_bars(name):
+    picture, scene = still(SCENES[name]()), SCENES[name]()
+    half = {body.name: np.array([LETTER * len(body.name), LINE]) / 2 + CLEAR for body in scene.body}
+    found = {word: place[0] for word, place in labels(picture).items() if word in half}
+    assert not [word for word, at in found.items() for bar in bars(picture) if crossed(at, half[word], bar)]
 
 
 def test_names_stay_apart_while_the_mechanism_moves(turning):
