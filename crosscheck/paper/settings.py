@@ -27,13 +27,11 @@ def first_step(seed: int) -> float:
 
 
 REASONS: Mapping[str, str] = {
-    "integrator adams": "variable-order Adams PECE after Shampine and Gordon, a common code when the "
-    "paper was written",
-    "rtol = 1e-06": "local error a step, relative and absolute, in STEP's Euclidean norm",
-    f"first step {first_step(0):.2e} s": "the integrator STEP needs a first step; it is random between "
-    f"{FIRST[0]:g} and "
-    f"{FIRST[1]:g} s, because STEP doubles it repeatedly, so that it decides how near to a crossing a step "
-    "ends",
+    "integrator adams": "variable-order Adams PECE after Shampine and Gordon, the usual code of the time",
+    "rtol = 1e-06": "bound on the local error of a step, relative and absolute, in a Euclidean norm",
+    f"first step {first_step(0):.2e} s": "Shampine and Gordon's routine STEP needs a first step, which the "
+    f"paper does not give. It is random between {FIRST[0]:g} and {FIRST[1]:g} s: steps grow by doubling from "
+    "it, so that it decides how near to a singular position a step ends",
     "smallest_step = forced_step = 3e-06": "s; a step this short is taken whatever its error estimate, so "
     "that a run goes on until its violation ends it, as the paper's do",
     "largest_step = 0.01": "s, about the paper's 103 steps a second",
@@ -45,8 +43,9 @@ REASONS: Mapping[str, str] = {
     "with the errors in the data, gaps of 1e-11 m decide the branch, which double precision does not",
     f"data errors {SIZE:g} m": "every joint anchor is displaced at random, uniformly up to this in x, y and "
     "z (section 1: input data of finite precision). Why this size: see what the settings decide",
-    "draws": f"the seed of the random first step and data errors is 0 in the tables, not chosen "
-    f"among seeds 0 to {SEEDS - 1} (0 to {FEW - 1} of runs that last), whose matches stand beside",
+    "draws": "a seed gives the random first step and the random errors in the data. The tables show seed 0, "
+    f"which was not chosen for its result; the column draws counts matches among seeds 0 to {SEEDS - 1} "
+    f"(0 to {FEW - 1} for runs of 20 s)",
     "Baumgarte α = β = 5": "as printed",
     "ALF α = 1e4, ε = 1e-11, ω = 10, μ = 1, 20 iterations": "the paper gives none of them. α weights rows "
     "of unit length, ε is relative to |q̈|. Away from singular positions 3 to 8 iterations meet ε; near "

@@ -43,10 +43,11 @@ def render(records: Records, illustration: Illustration) -> list[Block]:
         ),
         Text(score(records)),
         Text(
-            "Letters are the paper's footnotes: a singular matrix, b no convergence, c violation too large, "
-            "d integration failed; 20 s means to the end. Marks: = as printed, or within the given ms; "
-            "≈ the printed outcome at another time; ≠ another outcome. Error: distance from the true motion. "
-            "Draws: number of random first steps and data errors with the printed outcome and time."
+            "A cell states when and how a run ended; 20 s is the end time. Letters are the paper's: a "
+            "singular matrix, b no convergence, c violation too large, d integration failed. Marks: = the "
+            "printed outcome, at the printed time or within the milliseconds stated; ≈ the printed outcome "
+            "at another time; ≠ another outcome. Error: the largest distance from the true motion. Draws: "
+            "the number of repetitions with random first steps and errors of the data that end as printed."
         ),
         *(block for name in TITLES for block in _table(name, records)),
         _settings(),
@@ -71,9 +72,9 @@ def score(records: Records) -> str:
     return (
         f"Of {len(CELLS)} cells of Tables I to III, {marks[Match.SAME]} have the printed outcome and end "
         f"time within {1e3 * CLOSE:g} ms in the run shown, {marks[Match.OTHER_TIME]} the outcome at another "
-        f"time, {marks[Match.DIFFERENT]} another outcome. First step and errors in the data are drawn: "
-        f"{most} cells have the printed outcome and time in most draws, {some} in at least one; {inside} "
-        "more, of Table III, end by drift at times on both sides of the printed one."
+        f"time, {marks[Match.DIFFERENT]} another outcome. The paper gives no first step and few digits, so "
+        f"runs are repeated with random ones (draws): {most} cells have the printed outcome and time in "
+        f"most draws, {some} in at least one; {inside} more, of Table III, end by drift around that time."
     )
 
 
@@ -269,14 +270,14 @@ def _reason(cell: Cell, records: Records) -> str:
     same = _matching(cell, records, ("drawn",))
     varied = _matching(cell, records, ("sweep",))
     if same:
-        parts.append(f"it has the paper's outcome and end time in {len(same)} of {draws(cell)} draws")
+        parts.append(f"{len(same)} of {draws(cell)} draws end as printed")
     if varied:
-        parts.append(f"it has them with: {', '.join(varied)}")
+        parts.append(f"it ends as printed with the setting: {', '.join(varied)}")
     times = sorted({round(Run(r).t_end, 4) for r in found(records, cell, ("drawn", "sweep")).values()})
     if times and not same and not varied:
         parts.append(
             f"with other settings and draws it ends at {len(times)} times from {times[0]:.4f} to "
-            f"{times[-1]:.4g} s, none of them the paper's"
+            f"{times[-1]:.4g} s, none of them the printed one"
         )
     return "; ".join(parts)
 
@@ -308,23 +309,23 @@ def _papers_place(cell: Cell) -> list[str]:
     """Return the place where the paper's run ended, if that was at the start or between two crossings."""
     if cell.end == 0:
         return [
-            "the start is a singular position too, where ours converges: the errors of its state put less "
-            "than ε into the direction that vanishes"
+            "the start is singular too; the iteration converges, as errors of the state are below ε there"
         ]
     if cell.end is None:
         return []
     near = singular.crossing_distance(LINKAGES[cell.column][1], cell.end)
-    return [f"the paper's end is {near:.2g} rad from the nearest crossing"] if near > NEAR else []
+    return [f"the printed end is {near:.2g} rad from a singular position"] if near > NEAR else []
 
 
 def _where(column: str, run: Run) -> str:
     """Return the singular position at which a linkage's run ended."""
     if run.completed:
-        return f"passes every crossing, violation {power(run.metric('violation_position'))}"
+        return f"passes every singular position, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]
     t, k = min(singular.crossings(theta0, 25.0), key=lambda crossing: abs(crossing[0] - run.t_end))
     near, angle = singular.crossing_distance(theta0, run.t_end), singular.turns(k)
     if near > NEAR:
-        return f"ends {near:.2g} rad from the crossing θ₂ = {angle}, off the branch since an earlier one"
+        return f"ends {near:.2g} rad from the singular position θ₂ = {angle}, on a wrong branch"
     others = [time for time, _ in singular.crossings(theta0, t + 0.06)]
-    return f"ends at θ₂ = {angle} ({others.index(t) + 1} of {', '.join(f'{o:.4f}' for o in others)} s)"
+    place = f"{others.index(t) + 1} of {', '.join(f'{o:.4f}' for o in others)} s"
+    return f"ends at θ₂ = {angle}, singular position {place}"
