@@ -1,20 +1,16 @@
-"""Makes the site's figures, runs its commands, measures its methods and sets its formulas."""
+"""Make the site's figures, measure its methods and set its formulas."""
 
 from __future__ import annotations
 
 import logging
-import os
 import re
-import subprocess
 import sys
-import tempfile
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from latex2mathml.converter import convert
-from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File
 
 from crosscheck.judge.metrics import measure
@@ -85,8 +81,14 @@ def on_files(files: Any, config: Any) -> Any:
     for path in sorted(
         {link for file in files.documentation_pages() for link in _outside(file.content_string)}
     ):
-        files.append(File.generated(config, f"source/{path}", content=(ROOT / path).read_bytes()))
+        shown = _shown(path)
+        files.append(File.generated(config, f"source/{shown}", content=(ROOT / shown).read_bytes()))
     return files
+
+
+def _shown(path: str) -> str:
+    """Return the file that the site shows for a link: the page of a report for its Markdown."""
+    return re.sub(r"^(reports/\w+)/report\.md$", r"\1/index.html", path)
 
 
 def _outside(text: str) -> list[str]:
@@ -121,14 +123,13 @@ def joint_scene(kind: str) -> Scene:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Runs commands, fills tables of measurements, sets formulas, leads links to copies of files."""
+    """Fill tables of measurements, set formulas, and let links lead to copies of files."""
     markdown = markdown.replace(TABLE, table(FORMULATIONS.values()))
-    markdown = re.sub(r"^```run\n(.*?)^```$", _Commands(), markdown, flags=re.S | re.M)
     markdown = re.sub(r"<!-- measured: (.+?) -->", lambda m: measured(m[1].split()), markdown)
     markdown = markdown.replace("<!-- paper -->", paper())
     up = "../" * page.file.src_uri.count("/")
     for path in _outside(markdown):
-        markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{path})", markdown)
+        markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{_shown(path)})", markdown)
     markdown = re.sub(r"\]\((?:\.\./)+[^)#]*?([^)#/]+)/?\)", _directory, markdown)
     return formulas(markdown)
 
@@ -171,35 +172,6 @@ def paper() -> str:
     _, _, text = (PAPER / "report.md").read_text().partition("\n## ")
     body = text.partition("\n")[2].replace("\n### ", "\n## ")
     return re.sub(r"\(figures/([\w-]+)\.png\)", r"(figures/\1.svg)", body)
-
-
-class _Commands:
-    """The commands of one page, run in one new folder; a failing one ends the build."""
-
-    def __init__(self) -> None:
-        self._folder = tempfile.TemporaryDirectory()
-
-    def __call__(self, block: re.Match[str]) -> str:
-        told = []
-        for command in block[1].strip().splitlines():
-            LOG.info("running %s", command)
-            told.append(f"$ {command}\n{self._output(command)}".rstrip())
-        return "```text\n" + "\n".join(told) + "\n```"
-
-    def _output(self, command: str) -> str:
-        path = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
-        ran = subprocess.run(
-            command,
-            shell=True,
-            cwd=self._folder.name,
-            capture_output=True,
-            text=True,
-            check=False,
-            env={**os.environ, "PATH": path, "COLUMNS": "100"},
-        )
-        if ran.returncode:
-            raise PluginError(f"{command} ended with {ran.returncode}: {ran.stderr}")
-        return ran.stdout
 
 
 @cache

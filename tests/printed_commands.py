@@ -7,16 +7,19 @@ import shlex
 from collections.abc import Iterator
 from pathlib import Path
 
+from tests.transcripts import commands as shown
+
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def commands(page: Path) -> Iterator[list[str]]:
-    """Yield the words of each command in a page's shell blocks, without comments."""
-    for block in re.findall(r"^```(?:sh|run)?\n(.*?)^```$", page.read_text(), re.S | re.M):
-        for line in block.replace("\\\n", " ").splitlines():
+    """Yield the words of each command in a page's shell and console blocks, without comments and pipes."""
+    for kind, block in re.findall(r"^```(sh|console)?\n(.*?)^```$", page.read_text(), re.S | re.M):
+        lines = shown(block) if kind == "console" else block.replace("\\\n", " ").splitlines()
+        for line in lines:
             if line and re.match(r"(mbref|crosscheck|python|pytest) ", line):
-                yield shlex.split(line, comments=True)
+                yield shlex.split(line.partition(" | ")[0], comments=True)
 
 
 FOUND = [(str(page.relative_to(ROOT)), words) for page in PAGES for words in commands(page)]

@@ -46,8 +46,8 @@ def render(records: Records, illustration: Illustration) -> list[Block]:
             "A cell states when and how a run ended; 20 s is the end time. Letters are the paper's: a "
             "singular matrix, b no convergence, c violation too large, d integration failed. Marks: = the "
             "printed outcome, at the printed time or within the milliseconds stated; ≈ the printed outcome "
-            "at another time; ≠ another outcome. Error: the largest distance from the true motion. Draws: "
-            "the number of repetitions with random first steps and errors of the data that end as printed."
+            "at another time; ≠ another outcome. Error: distance from the true motion. Draws: repetitions "
+            "with random first steps and errors of the data that end as printed."
         ),
         *(block for name in TITLES for block in _table(name, records)),
         _settings(),
@@ -308,9 +308,7 @@ def _message(run: Run) -> list[str]:
 def _papers_place(cell: Cell) -> list[str]:
     """Return the place where the paper's run ended, if that was at the start or between two crossings."""
     if cell.end == 0:
-        return [
-            "the start is singular too; the iteration converges, as errors of the state are below ε there"
-        ]
+        return ["the start is singular; the iteration converges: errors of the state are below ε there"]
     if cell.end is None:
         return []
     near = singular.crossing_distance(LINKAGES[cell.column][1], cell.end)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import shlex
 import sys
 from pathlib import Path
 
 import pytest
 import yaml
 
-from mbref.cli.commands import main, parser
+from mbref.cli.commands import main
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
 from mbref.method import Method
@@ -75,14 +74,6 @@ def test_every_joint_and_load_has_its_figure():
     text = (DOCS / "scene-format.md").read_text()
     shown = set(re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text))
     assert shown == {f"joint_{name}" for name in JOINT_TYPES} | {f"load_{name}" for name in LOAD_TYPES}
-
-
-def test_commands_that_pages_run_are_commands():
-    blocks = [b for page in PAGES for b in re.findall(r"^```run\n(.*?)^```$", page.read_text(), re.S | re.M)]
-    commands = [shlex.split(line) for block in blocks for line in block.splitlines()]
-    assert len(commands) > 5
-    for program, *arguments in commands:
-        assert program == "mbref" and callable(parser().parse_args(arguments).action)
 
 
 def test_tests_that_the_page_on_robustness_names_are_tests():

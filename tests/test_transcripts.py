@@ -1,0 +1,46 @@
+"""Outputs shown in README and docs: each command still prints what stands under it, except for numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.printed_commands import PAGES, ROOT
+from tests.transcripts import blocks, commands, filled, shape
+
+SHOWING = {str(page.relative_to(ROOT)): page for page in PAGES if blocks(page.read_text())}
+RENEW = "python -m tests.transcripts {} renews the outputs"
+
+
+def lasts_minutes(page: Path) -> bool:
+    """Whether the commands of a page compare engines, which takes minutes."""
+    found = [command for block in blocks(page.read_text()) for command in commands(block)]
+    return any(command.startswith("crosscheck ") for command in found)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(n, marks=[pytest.mark.slow] * lasts_minutes(page)) for n, page in SHOWING.items()],
+)
+def test_commands_print_what_pages_show(name):
+    text = SHOWING[name].read_text()
+    for shown, found in zip(blocks(text), blocks(filled(text)), strict=True):
+        assert shape(shown) == shape(found), RENEW.format(name)
+
+
+def test_every_command_of_a_page_has_its_output():
+    for name, page in SHOWING.items():
+        for block in blocks(page.read_text()):
+            lines = block.splitlines()
+            bare = [a for a, b in zip(lines, [*lines[1:], "$ "], strict=True) if a[:2] == b[:2] == "$ "]
+            assert lines[0].startswith("$ ") and not bare, f"{name}: {bare}; {RENEW.format(name)}"
+
+
+def test_outputs_are_filled_in_and_compared_without_numbers():
+    text = "Before.\n\n```console\n$ echo 0.25 m\n$ echo two\n```\n\nBehind.\n"
+    page = filled(text)
+    assert page == text.replace("$ echo two", "0.25 m\n$ echo two\ntwo")
+    assert shape(page) == shape(page.replace("0.25", "< 1e-13")) != shape(page.replace("two\n", "three\n"))
+    with pytest.raises(RuntimeError, match="printed nothing, with exit status 3"):
+        filled("```console\n$ exit 3\n```\n")
