@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference picture docs site bench clean drawn paper
+.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference kinds picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -83,6 +83,13 @@ PAPER := reports/paper
 paper: $(VENV)/ready ## the committed page on the paper with its records, anew, into reports/paper/
 	rm -rf build/paper && $(BIN)/crosscheck paper --out build/paper
 	rm -rf $(PAPER) && mv build/paper $(PAPER)
+
+KINDS := planar_slider_crank_equal
+
+kinds: $(VENV)/ready ## the page on choosing an engine, with its records, anew, into docs/ and reports/kinds/
+	rm -rf build/kinds && $(BIN)/crosscheck report --quick $(KINDS) --out build/kinds
+	$(BIN)/python -m reports.which_engine --keep build/kinds
+	$(BIN)/python -m reports.which_engine docs/which-engine.md
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 	$(BIN)/python -m reports --picture reports/rendered/passage.svg

@@ -1,7 +1,8 @@
 """The page "Which engine, which settings, for my mechanism?", from committed records.
 
 ``python -m reports.which_engine docs/which-engine.md`` writes it anew, without a path it prints the page.
-``python -m reports.which_engine --run`` makes the records of scenes that the reference report lacks.
+``python -m reports.which_engine --keep REPORT`` keeps the records of a report as records of further kinds;
+`make kinds` does both.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from crosscheck.cli.comparison import compare
 from crosscheck.cli.tables import own_code
 from crosscheck.findings.finding import findings
 from crosscheck.study.grid import Record
@@ -23,12 +23,8 @@ from reports.runs import SceneRuns, duration, plain
 from reports.stored import groups, verified
 
 HERE = Path(__file__).parent
-REFERENCE, KINDS_FOLDER = HERE / "reference", HERE / "kinds"
-FOLDERS = (REFERENCE, KINDS_FOLDER)  # of committed records
-MADE = HERE.parent / "build" / "kinds"  # whole records, by scene, before their motions are left out
-ENGINES = ("mbref", "mujoco", "exudyn", "pinocchio", "simbody")
-MOST_SECONDS = 2.0  # CPU s of a run
-REFERENCE_SECONDS = 10.0  # CPU s of a reference solution
+KINDS_FOLDER = HERE / "kinds"
+FOLDERS = (HERE / "reference", KINDS_FOLDER)  # of committed records
 MOTION = ("bodies", "reactions", "open_reactions", "crossings")  # fields that the page does not need
 HEAD = f"""# Which engine, which settings, for my mechanism?
 
@@ -257,23 +253,6 @@ def _checks(folder: Path) -> Iterator[tuple[str, int, int]]:
             yield document["engine"], applied.count("fail"), len(applied)
 
 
-def run() -> None:
-    """Compare the engines on each scene that the reference report lacks, and keep the records."""
-    known = {group.scene.name for group in groups(REFERENCE)}
-    found = []
-    for name in (name for kind in KINDS for name in kind.scenes if name not in known):
-        compare(
-            name,
-            ENGINES,
-            time_limit=MOST_SECONDS,
-            reference_time=REFERENCE_SECONDS,
-            out=MADE / name,
-            notice=print,
-        )
-        found += groups(MADE / name)
-    keep(found, KINDS_FOLDER)
-
-
 def keep(found: Sequence[SceneRuns], folder: Path) -> None:
     """Write scenes, truths, and the records of runs without their motions into a folder."""
     (folder / "scenes").mkdir(parents=True, exist_ok=True)
@@ -291,8 +270,8 @@ def _write(path: Path, records: Sequence[Record]) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] == ["--run"]:
-        run()
+    if sys.argv[1:2] == ["--keep"]:
+        keep(groups(Path(sys.argv[2])), KINDS_FOLDER)
     elif sys.argv[1:]:
         Path(sys.argv[1]).write_text(page())
     else:
