@@ -7,6 +7,7 @@ check has its numbers written out: a threshold that moves by 10 % (a count: by o
 
 import itertools
 import math
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -310,11 +311,13 @@ def _(monkeypatch):
     """Two roots that are further apart than twice the offset enclose the time that is tried."""
 
     def found(apart):
-        of_determinant(monkeypatch, lambda h: (h - 0.5) ** 2 - apart**2 if abs(h - 0.5) > 1e-9 else 1e-20)
+        of_determinant(
+            monkeypatch, lambda h: 1e3 * ((h - 0.5) ** 2 - apart**2) if abs(h - 0.5) > 1e-9 else 1e-20
+        )
         monkeypatch.setattr(location, "time_of_minimum", lambda *_: 0.5)
         return location.find_pair(1.0, memory())[1] < 0.0
 
-    return flips(found, 0.9e-5, 1.2e-5)
+    return flips(found, 0.97e-5, 1.03e-5)
 
 
 @check("PAIR_DEPTH")
@@ -324,7 +327,7 @@ def _(monkeypatch):
         monkeypatch.setattr(location, "time_of_minimum", lambda *_: 0.5)
         return location.find_pair(1.0, memory())[1] < 0.0
 
-    return flips(single, 0.9e-11, 1.1e-11)
+    return flips(single, 0.95e-11, 1.05e-11)
 
 
 # --- steps that cross -----------------------------------------------------------------------------------
@@ -339,7 +342,7 @@ def _(_):
 
 @check("CROSSING_NOISE")
 def _(_):
-    return acceptance.crossing_tolerance(memory(start_pivot=1e-2)) == pytest.approx(4e-13, rel=1e-3)
+    return acceptance.crossing_tolerance(memory(start_pivot=1e-2)) == pytest.approx(4e-13, rel=1e-3, abs=0.0)
 
 
 def lengths(monkeypatch, longest, **numbers):
@@ -420,7 +423,7 @@ def _(_):
 @check("TIME_ROUNDING")
 def _(_):
     found = acceptance.violation_by_rounding(memory(drivers=1, time=100.0, speed=5.0))
-    return found == pytest.approx(1.5e-13)
+    return found == pytest.approx(1.5e-13, rel=1e-3, abs=0.0)
 
 
 def approach(pivot, turned=False, last=False, **numbers):
@@ -451,13 +454,15 @@ def _(_):
 def _(_):
     """Where the limit of unit rows does not count, because the steps began nearer."""
     return flips(
-        lambda pivot: approach(pivot, start_pivot=2.0 * pivot, entry_pivot=1e-12) == UNDECIDED, 0.9e-9, 1.1e-9
+        lambda pivot: approach(pivot, start_pivot=2.0 * pivot, entry_pivot=1e-12) == UNDECIDED,
+        0.95e-9,
+        1.05e-9,
     )
 
 
 @check("MIN_PIVOT_ACROSS")
 def _(_):
-    return flips(lambda pivot: across(pivot, start_pivot=pivot) == UNDECIDED, 0.9e-6, 1.1e-6)
+    return flips(lambda pivot: across(pivot, start_pivot=pivot) == UNDECIDED, 0.95e-6, 1.05e-6)
 
 
 @check("MIN_PIVOT_FREE")
@@ -468,9 +473,9 @@ def _(_):
 @check("MIN_PIVOT_RESOLVED")
 def _(_):
     driven = flips(
-        lambda pivot: approach(pivot, start_pivot=2.0 * pivot, variables=1) == UNDECIDED, 0.9e-7, 1.1e-7
+        lambda pivot: approach(pivot, start_pivot=2.0 * pivot, variables=1) == UNDECIDED, 0.95e-7, 1.05e-7
     )
-    return driven and flips(lambda pivot: start.hides_rank(memory(pivot=pivot)), 0.9e-7, 1.1e-7)
+    return driven and flips(lambda pivot: start.hides_rank(memory(pivot=pivot)), 0.95e-7, 1.05e-7)
 
 
 @check("ENTRY_RATIO")
@@ -673,3 +678,17 @@ def _(_):
 @pytest.mark.parametrize("name", [name for name in vars(thresholds) if name.isupper()])
 def test_a_decision_changes_at_its_threshold(name, monkeypatch):
     assert CHECKS[name](monkeypatch), name
+
+
+@pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
+@pytest.mark.parametrize("up", [False, True], ids=["smaller", "larger"])
+@pytest.mark.parametrize("name", [name for name in vars(thresholds) if name.isupper()])
+def test_the_check_fails_when_its_threshold_moves(name, up, monkeypatch):
+    """A number moves by a tenth, a count by one, in each module that reads it."""
+    usual = getattr(thresholds, name)
+    is_count = isinstance(usual, int)
+    moved = usual + (1 if up else -1) if is_count else usual * (1.1 if up else 1 / 1.1)
+    for key, module in list(sys.modules.items()):
+        if key.startswith("mbref.taylor") and hasattr(module, name):
+            monkeypatch.setattr(module, name, moved)
+    assert not CHECKS[name](monkeypatch), f"{name} = {moved:g} passes the check of {usual:g}"
