@@ -33,7 +33,6 @@ MOST_BODIES = 100  # up to here `taylor`, whose matrix is dense, is the default,
 # positions.  ``benchmarks/default_method.py``: it costs 6.3 times as much as the sparse method on a chain of
 # four-bars with 81 bodies, and 0.05 times as much on a chain of slider-cranks with 90
 SHORT = {
-    "kinematic": "alf-dual+projection/predictor",  # Newton–Raphson on Eqs. 1 to 3: integrators/predictor.py
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
 
@@ -139,8 +138,6 @@ class Method:
             _part(stabilisation, STABILISATIONS, "stabilisation", options),
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
         )
-        if not parts[2].integrates and not parts[1].projects:
-            raise MethodError(f"integrator {parts[2].name} only extrapolates: use it with +projection")
         if parts[2].step is None and not parts[1].projects:
             raise MethodError(f"integrator {parts[2].name} projects every step: use it with +projection")
         return Method(*parts, options)

@@ -57,8 +57,7 @@ def estimate_error(
         raise ValueError(f"error_estimate: a motion of {motion.engine}; crosscheck judges other engines")
     method = Method.parse(motion.method)
     limits = Limits(**{f.name: motion.settings[f.name] for f in fields(Limits)})
-    integrator = method.integrator
-    rtol = limits.rtol if integrator.adaptive and integrator.integrates else None
+    rtol = limits.rtol if method.integrator.adaptive else None
     if reason := _none(motion, seconds):
         return ErrorEstimate.none(motion.times, rtol, reason)
     check = _Check(seconds, progress)

@@ -18,7 +18,7 @@ settings.register_profile("first", settings.get_profile("check"), phases=(Phase.
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "check"))
 
 MANY = 2000  # tests, among which every kernel is needed
-GENERAL = ("alf-dual+projection", "mpi-svd+partitioning", "lm1+none/rk4", "lm2+projection/adams", "kinematic")
+GENERAL = ("alf-dual+projection", "mpi-svd+partitioning", "lm1+none/rk4", "lm2+projection/adams")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

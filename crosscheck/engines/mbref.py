@@ -21,7 +21,6 @@ METHODS = (
     "taylor",
     "taylor, generated",
     "alf-dual+projection",
-    "kinematic",
     "mpi-svd+partitioning",
     "mpi-svd+projection",
     "mpi-svd+none",
@@ -33,7 +32,6 @@ WITH_SINGULAR_MASS = (
     "lm1+projection",
     "alf+projection",
 )  # families for bodies that lack a moment of inertia
-KINEMATIC = "kinematic"  # family for fully driven scenes; it has no tolerance because it integrates nothing
 GENERATED = ", generated"  # suffix: machine code for the scene, compiled before the timed run
 FAMILIES = {
     "alf-dual+projection": "augmented Lagrangian in dual form, projection, DOP853; default of many bodies",
@@ -41,7 +39,6 @@ FAMILIES = {
     "lm1+projection": "Lagrange multipliers, projection, DOP853; where a body lacks a moment of inertia",
     "alf+projection": "augmented Lagrangian, projection, DOP853; where a body lacks a moment of inertia",
     "taylor": "Taylor series in natural coordinates; the default; crosses singular positions",
-    "kinematic": "Newton-Raphson on the constraints of a fully driven mechanism",
     "mpi-svd+partitioning": "Moore-Penrose inverse by SVD, coordinate partitioning, DOP853",
     "mpi-svd+projection": "Moore-Penrose inverse by SVD, projection, DOP853",
     "mpi-svd+none": "Moore-Penrose inverse by SVD without stabilisation, DOP853",
@@ -95,16 +92,14 @@ class Mbref(Engine):
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
         if not self.serves(scene, family):
             return []
-        sweep = [{}] if family.startswith(KINEMATIC) else [{"rtol": rtol} for rtol in TOLERANCES]
-        return [Setting(family, options) for options in sweep]
+        return [Setting(family, {"rtol": rtol}) for rtol in TOLERANCES]
 
     def serves(self, scene: Scene, family: str) -> bool:
         from mbref.equations.degrees_of_freedom import undriven_freedoms
         from mbref.simulation.simulate import why_no_code
 
         method = _method(family)
-        is_kinematic = family.startswith(KINEMATIC) or method.formulation.needs_independent_columns
-        if is_kinematic and undriven_freedoms(scene) > 0:
+        if method.formulation.needs_independent_columns and undriven_freedoms(scene) > 0:
             return False
         handles = method.is_series or method.formulation.handles_singular_mass
         if _has_singular_mass(scene) and not handles:

@@ -12,7 +12,6 @@ from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
-from mbref.method import default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
@@ -54,7 +53,7 @@ class AlongMotion:
 
 
 def along_motion(scene: Scene) -> AlongMotion:
-    """Over the scene's duration by the default method, or by ``kinematic`` without masses.
+    """Over the scene's duration by the default method.
 
     Raises SceneError where the scene cannot be moved, or has more than 300 rows.
     """
@@ -62,11 +61,10 @@ def along_motion(scene: Scene) -> AlongMotion:
     if model.m > MOST_ROWS:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
     times = np.linspace(0.0, scene.duration, SAMPLES)
-    method = default_method(scene) if scene.has_mass() else "kinematic"
-    motion = simulate(scene, method, times, Limits(most_steps=MOST_STEPS))
+    motion = simulate(scene, None, times, Limits(most_steps=MOST_STEPS))
     if not motion.times.size:  # the axes of joints may be rounded
         limits = Limits(most_steps=MOST_STEPS, rank_tolerance=ROUNDING)
-        motion = simulate(scene, method, times, limits)
+        motion = simulate(scene, None, times, limits)
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
     values = _singular_values(model, motion.times, motion.position, motion.orientation)

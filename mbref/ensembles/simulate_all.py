@@ -82,7 +82,7 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 def _can_lead(method: Method, limits: Limits) -> bool:
     """Whether runs of a method may lead a batch: those that projection or series hold to their motion."""
     held = limits.rank_tolerance <= DROPS and not limits.branches
-    return method.stabilisation.projects and method.integrator.integrates and held
+    return method.stabilisation.projects and held
 
 
 class _Runs:

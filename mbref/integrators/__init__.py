@@ -3,8 +3,7 @@
 from mbref.integrators.adams import ADAMS
 from mbref.integrators.base import Integrator
 from mbref.integrators.dop853 import DOP853
-from mbref.integrators.predictor import PREDICTOR
 from mbref.integrators.rk4 import RK4
 from mbref.integrators.taylor import TAYLOR
 
-INTEGRATORS: dict[str, Integrator] = {i.name: i for i in (DOP853, RK4, ADAMS, PREDICTOR, TAYLOR)}
+INTEGRATORS: dict[str, Integrator] = {i.name: i for i in (DOP853, RK4, ADAMS, TAYLOR)}

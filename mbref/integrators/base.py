@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import inf
 from typing import Literal
 
 from mbref.kernels.compilation import Exchangeable
@@ -37,8 +36,6 @@ class Integrator:
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
     crosses: Literal["no", "by series"] = "no"  # how it crosses singular positions
-    integrates: bool = True  # otherwise only where drivers leave no freedom
-    largest_turn: float = inf  # rad that a body may turn in a step, where the stabilisation allows more
 
     def highest_order(self, options: Mapping[str, float]) -> int:
         """The order the options allow; ValueError unless ``max_order`` is a whole number up to ``order``."""

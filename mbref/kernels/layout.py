@@ -12,7 +12,6 @@ from typing import Annotated, NamedTuple
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, pointer_to
 from mbref.kernels.named_memory import (
     Address,
-    Indices,
     Kernel,
     Matrix,
     Named,
@@ -20,8 +19,6 @@ from mbref.kernels.named_memory import (
     Vector,
 )
 from mbref.kernels.scene_layout import SceneData
-
-KEPT = 48  # states in a history
 
 # status of an evaluation or of a step
 OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
@@ -223,16 +220,6 @@ class Samples(NamedTuple):
     multipliers: Annotated[Matrix, "k", "m"]
 
 
-class History(NamedTuple):
-    """The last accepted states, a ring: step s stands in row s mod KEPT."""
-
-    time: Annotated[Vector, KEPT]
-    y: Annotated[Matrix, KEPT, "14*nb"]
-    y_rate: Annotated[Matrix, KEPT, "14*nb"]
-    nodes: Annotated[Indices, KEPT]  # rows chosen for an extrapolation
-    weights: Annotated[Matrix, 2, KEPT]  # of the nodes in an extrapolation
-
-
 class Ends(NamedTuple):
     """Both ends of a step of a run that watches pivots, and the product of their constraint gradients."""
 
@@ -254,7 +241,6 @@ class Loop(NamedTuple):
     y: Annotated[Vector, "14*nb"]
     y_rate: Annotated[Vector, "14*nb"]
     y_new: Annotated[Vector, "14*nb"]
-    history: History
     ends: Ends
 
 

@@ -52,7 +52,7 @@ def simulate(
         A Scene, the name of a built-in one, or a .toml file.
     method
         A Method or its name; by default ``method.default_method``: ``taylor``, or for many bodies
-        ``alf-dual+projection/dop853``.  ``kinematic`` integrates nothing (``integrators.predictor``).
+        ``alf-dual+projection/dop853``.
     times
         Sample times (k,), s, increasing; by default 101 from 0 to the scene's duration.
     limits

@@ -20,7 +20,6 @@ def control_of(model: Model, method: Method, times: np.ndarray, limits: Limits) 
     integrator, span = method.integrator, float(times[-1]) or 1.0
     options, largest_step = method.options_of(integrator), limits.largest_step or span
     turn = UNWRAPPED if model.has_angles else method.stabilisation.largest_turn
-    turn = min(turn, integrator.largest_turn)
     return Control(
         order=integrator.highest_order(options),
         fixed_step=0.0 if integrator.adaptive else min(options["step"], largest_step),

@@ -11,7 +11,6 @@ from mbref.stepping.samples import take_sample
 from mbref.stepping.singular_crossing import (
     keep_position,
     meets_singular_position,
-    remember_state,
     remember_watch,
 )
 
@@ -108,7 +107,6 @@ def advance_to_end(memory):
         status = evaluate_state(y, y_rate, memory)
         if status != OK:
             return status
-        remember_state(counts.steps, y, y_rate, memory)
         while clock.sample < times.shape[0] and clock.time >= times[clock.sample]:
             take_sample(memory)
         if clock.sample == times.shape[0]:

@@ -125,13 +125,8 @@ class Run:
         return model, at_rest(start, reduction.held), reduction
 
     def _check_freedoms(self, model: Model, start: Start) -> None:
-        """SceneError where bodies without mass, or a method that does not integrate, leave a freedom."""
-        integrates = self.method.integrator.integrates
-        freedoms = freedoms_left(model, start) if model.kinematic or not integrates else 0
-        if freedoms > 0 and not integrates:
-            fault = f"driver: {freedoms} degrees of freedom lack a driver; a kinematic analysis drives all"
-            raise SceneError([fault])
-        if freedoms > 0:
+        """SceneError where bodies lack a mass and drivers leave a freedom."""
+        if model.kinematic and freedoms_left(model, start) > 0:
             raise SceneError(missing_masses(self.scene))
 
     def begin_again(self) -> None:

@@ -17,7 +17,7 @@ from mbref.equations.evaluation import evaluate
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
 from mbref.linear_algebra.sparse_lu import factorise_product
-from mbref.linear_algebra.vectors import copy, sort
+from mbref.linear_algebra.vectors import sort
 from mbref.stabilisation.projection import factorise_constraints, keep_end
 
 REACHED = 1e-3  # relative pivot below which a step has reached a singular position
@@ -145,13 +145,3 @@ def remember_watch(memory):
     watch.past_pivot = watch.smallest_pivot
     watch.nearest = min(watch.nearest, relative_pivot(watch))
     keep_end(memory)
-
-
-@kernel
-def remember_state(taken, y, y_rate, memory):
-    """Row taken mod KEPT of the history := t, y, y'."""
-    history = memory.loop.history
-    row, n = taken % history.time.shape[0], y.shape[0]
-    history.time[row] = memory.loop.clock.time
-    copy(y, history.y[row, :n])
-    copy(y_rate, history.y_rate[row, :n])

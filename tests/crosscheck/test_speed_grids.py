@@ -71,12 +71,11 @@ def test_every_family_says_whose_integrator_it_has(monkeypatch: pytest.MonkeyPat
     assert OPPONENTS["own integrators"][1] == (OWN,) and OPPONENTS["engines"][1] == ()
     ours = {
         family: [w for w, belongs in OURSELVES.items() if belongs(family)]
-        for family in ("taylor", "taylor, generated", "kinematic", "lm2+projection")
+        for family in ("taylor", "taylor, generated", "lm2+projection")
     }
     assert ours == {
         "taylor": ["series"],
         "taylor, generated": ["series"],
-        "kinematic": ["other methods"],
         "lm2+projection": ["other methods"],
     }
 

@@ -84,13 +84,6 @@ def test_regularisation_crosses(method):
     assert run.outcome.name == "COMPLETED", run.message
 
 
-def test_kinematic_analysis_ends_at_a_flat_position():
-    scene = four_bar(0.3)
-    run = simulate(scene, "kinematic", np.linspace(0.0, 0.1, 41))
-    assert run.outcome.name == "SINGULAR_POSITION", run.message
-    assert run.t_end == pytest.approx(first_crossing(scene, 0.1), abs=2e-4)
-
-
 @pytest.mark.parametrize("rtol", [1e-5, 1e-8])
 @pytest.mark.parametrize("loops", [2, 3, 5, 12])
 def test_loops_that_are_flat_at_once_end_the_run_at_the_first_singular_position(loops, rtol):
