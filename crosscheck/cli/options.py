@@ -15,7 +15,7 @@ from crosscheck.study.sweep import QUICK_LIMIT
 from mbref import formats
 from mbref.scene_units import in_si
 
-FILES = "an MJCF (.xml) or URDF file, of which MJCF also runs in MuJoCo at its own settings"
+FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
 DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # allowed values of --digits
 
 
@@ -64,7 +64,7 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
     """Add the options for reading a file of another program."""
-    formats.add_options(parser.add_argument_group("how an MJCF or URDF file is read"))
+    formats.add_options(parser.add_argument_group("how a file of another program is read"))
 
 
 def add_engines(parser: argparse.ArgumentParser) -> None:

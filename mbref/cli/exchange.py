@@ -16,17 +16,18 @@ def add(commands: Any) -> None:
     """The commands' grammar."""
     take = commands.add_parser(
         "import",
-        help="a scene file from MJCF or URDF",
+        help="a scene file from MJCF, URDF or SDF",
         formatter_class=TEXT,
-        description="Make a scene file from a MuJoCo model (.xml) or a URDF (.urdf). Open loops are closed\n"
-        "by moving the joints. Mass matrix, bias forces and rows of loops are compared with MuJoCo's own\n"
-        "at three poses. A part that changes the motion and that a scene does not have is an error, unless\n"
-        "--without leaves it out; other parts are listed. Needs the extra engines.",
+        description="Make a scene file from a MuJoCo model (.xml), a URDF or an SDF (.sdf). Open loops of\n"
+        "MJCF and URDF are closed by moving the joints; mass matrix, bias forces and rows of loops are\n"
+        "compared with MuJoCo's own at three poses. Joints of an SDF may close loops themselves. A part\n"
+        "that changes the motion and that a scene does not have is an error, unless --without leaves it\n"
+        "out; other parts are listed. MJCF and URDF need the extra engines.",
         epilog="examples:\n  mbref import robot.xml --out robot.toml\n"
         "  mbref import robot.xml --keyframe home --without armature,damping\n"
         "  mbref import legs.urdf --close foot_a=foot_b:revolute:y --pose knee=0.4",
     )
-    take.add_argument("file", metavar="FILE", help="the .xml or .urdf file")
+    take.add_argument("file", metavar="FILE", help="the .xml, .urdf or .sdf file")
     take.add_argument("--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
     formats.add_options(take)
     take.set_defaults(action=_import)

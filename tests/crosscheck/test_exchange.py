@@ -275,4 +275,7 @@ def test_commands_import_and_export(tmp_path, capsys):
 
 def test_the_project_declares_the_plug_in():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
-    assert project["entry-points"][formats.GROUP] == {"mujoco": "crosscheck.engines.mujoco.files:FORMAT"}
+    assert project["entry-points"][formats.GROUP] == {
+        "mujoco": "crosscheck.engines.mujoco.files:FORMAT",
+        "sdf": "crosscheck.engines.sdf.reading:FORMAT",
+    }

@@ -1,0 +1,1 @@
+"""SDF files as scenes, read without an engine: their joints may close loops themselves."""

@@ -1,0 +1,288 @@
+"""The scene of an SDF file: links as bodies at their poses, joints at their frames, loops as they are."""
+
+from __future__ import annotations
+
+import math
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_others
+from crosscheck.engines.sdf.frames import MODEL, ORIGIN, WORLD, Frames, Pose, numbers, pose_of
+from mbref import rotations
+from mbref.formats import Imported, ImportOptions
+from mbref.scene import (
+    GROUND,
+    Body,
+    Coupling,
+    Cylindrical,
+    Fixed,
+    Joint,
+    Revolute,
+    Scene,
+    SceneError,
+    Spherical,
+    TorsionSpring,
+    Translational,
+    Universal,
+)
+
+GRAVITY = (0.0, 0.0, -9.8)  # m/s², of a file that gives none: the default of the format
+SQUARE = 1e-6  # cosine between the axes of a universal joint: a larger one is no rounding
+TYPES: dict[str, Any] = {
+    "fixed": Fixed,
+    "revolute": Revolute,
+    "continuous": Revolute,
+    "prismatic": Translational,
+    "ball": Spherical,
+    "universal": Universal,
+    "revolute2": Universal,
+    "screw": Cylindrical,
+}
+UNUSED = {"plugin": "plugins", "actor": "actors", "light": "lights", "gripper": "grippers"}
+
+
+def read(path: Path, options: ImportOptions) -> Imported:
+    """The scene of a .sdf file; raises SceneError, ValueError for an option, OSError."""
+    without = checked(options.without)
+    if options.keyframe or options.pose or options.close:
+        raise SceneError(
+            ["--keyframe, --pose, --close: an SDF file gives the poses and closes its own loops"]
+        )
+    try:
+        root = ET.fromstring(path.read_text(encoding="utf-8"))
+    except ET.ParseError as error:
+        raise SceneError([f"{path}: is no XML: {error}"]) from None
+    reader = _Reader()
+    world = root.find("world")
+    models = list((root if world is None else world).findall("model"))
+    if root.tag != "sdf" or not models:
+        raise SceneError([f"{path}: has no model"])
+    for model in models:
+        reader.read(model, f"{model.get('name')}::" if len(models) > 1 else "")
+    refuse_others(reader.parts, without)
+    given = world.find("gravity") if world is not None else None
+    gravity = GRAVITY if given is None else tuple(numbers(given, "gravity", 3).tolist())
+    scene = reader.scene(path.stem, gravity, options.hold)
+    wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
+    notes = [] if given is not None else ["gravity is 9.8 m/s² downwards, the default of SDF"]
+    return Imported(scene, (*wanted, *_unused(root)), tuple([*reader.notes, *notes]))
+
+
+def _unused(root: ET.Element) -> Iterator[str]:
+    """Sentences on parts that a scene does not have and that do not change a motion without contacts."""
+    counts = {name: len(list(root.iter(tag))) for tag, name in UNUSED.items()}
+    counts["limits of joints"] = sum(limit.find("lower") is not None for limit in root.iter("limit"))
+    counts["shapes that could touch others"] = len(list(root.iter("collision")))
+    counts["sensors"] = len(list(root.iter("sensor")))
+    yield from (f"{count} {what}" for what, count in counts.items() if count)
+
+
+@dataclass
+class _Reader:
+    """What was read of the models so far."""
+
+    bodies: list[Body] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)
+    couplings: list[Coupling] = field(default_factory=list)
+    loads: list[Any] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def scene(self, name: str, gravity: Any, hold: Any) -> Scene:
+        """The scene of all models, with some bodies fixed to the ground; SceneError for an unknown one."""
+        known = {body.name: body for body in self.bodies}
+        if unknown := [body for body in hold if body not in known]:
+            raise SceneError([f"--hold {unknown[0]}: no such link that moves; known: {', '.join(known)}"])
+        held = [Fixed.at(f"hold {body}", (GROUND, body), anchor=known[body].position) for body in hold]
+        return Scene(
+            name=name,
+            gravity=gravity,
+            body=tuple(self.bodies),
+            joint=(*self.joints, *held),
+            coupling=tuple(self.couplings),
+            load=tuple(self.loads),
+        )
+
+    def read(self, model: ET.Element, prefix: str) -> None:
+        """Read a model; ``prefix`` begins the names of its links and joints."""
+        name = str(model.get("name"))
+        for tag in ("include", "model"):
+            if model.find(tag) is not None:
+                raise SceneError(
+                    [f"model {name!r}: contains <{tag}>, which is not read; give one flat model"]
+                )
+        frames = Frames(model, pose_of(model, f"model {name!r}: pose"))
+        self.fixed = {WORLD}
+        if _is_true(model.find("static")):
+            self.fixed |= {str(link.get("name")) for link in model.findall("link")}
+        self.name_of = {link: GROUND for link in self.fixed}
+        for link in model.findall("link"):
+            if (own := str(link.get("name"))) not in self.fixed:
+                self.name_of[own] = prefix + own
+                self.bodies.append(self._body(link, own, frames))
+        for joint in model.findall("joint"):
+            self._joint(joint, prefix, frames)
+
+    def _body(self, link: ET.Element, own: str, frames: Frames) -> Body:
+        inertial = link.find("inertial")
+        at, place = frames.world(own), ORIGIN
+        mass, inertia = 1.0, np.eye(3)  # the defaults of the format
+        if inertial is None:
+            self.notes.append(f"link {own!r} has no inertial: 1 kg and 1 kg m², the defaults of SDF")
+        else:
+            place = pose_of(inertial, f"link {own!r}: inertial pose")
+            mass = _number(inertial.find("mass"), f"link {own!r}: mass", 1.0)
+            inertia = _inertia(inertial.find("inertia"), own)
+            if inertial.find("fluid_added_mass") is not None:
+                self.parts.append(Part("fluid", f"the added mass of link {own!r} in a fluid"))
+        if link.find("gravity") is not None and not _is_true(link.find("gravity")):
+            self.parts.append(Part("gravity-compensation", f"link {own!r} without weight"))
+        centre = at.then(place)
+        turn = place.turn
+        return Body(
+            name=self.name_of[own],
+            mass=mass,
+            inertia=_plain(turn @ inertia @ turn.T),
+            position=centre.position.tolist(),
+            orientation=rotations.from_matrix(at.turn).tolist(),
+        )
+
+    def _joint(self, joint: ET.Element, prefix: str, frames: Frames) -> None:
+        name, kind = str(joint.get("name")), str(joint.get("type"))
+        if kind not in TYPES:
+            raise SceneError([f"joint {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
+        ends = [joint.findtext(side, "").strip() for side in ("parent", "child")]
+        first, second = (self.name_of[frames.link_of(end)] for end in ends)
+        if first == second:
+            self.notes.append(f"joint {name!r}: both sides are fixed to the ground")
+            return
+        at = frames.world(name)
+        axes = [_axis(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
+        places = {
+            "anchor": at.position.tolist(),
+            "axis": axes[0].tolist(),
+            "axes": [a.tolist() for a in axes],
+        }
+        if TYPES[kind] is Universal and abs(axes[0] @ axes[1]) > SQUARE:
+            raise SceneError([f"joint {name!r}: the axes of a universal joint must be perpendicular"])
+        made: Joint = TYPES[kind].at(prefix + name, (first, second), **places)
+        self.joints.append(made)
+        if kind == "screw":
+            self._screw(joint, made)
+        for tag in ("axis", "axis2"):
+            if (axis := joint.find(tag)) is not None:
+                self._dynamics(axis, made)
+                self._mimic(axis, made, prefix)
+
+    def _screw(self, joint: ET.Element, made: Joint) -> None:
+        if joint.find("screw_thread_pitch") is None:
+            raise SceneError([f"joint {made.name!r}: a screw needs screw_thread_pitch (m a turn)"])
+        pitch = _number(joint.find("screw_thread_pitch"), f"joint {made.name!r}: screw_thread_pitch", 0.0)
+        pair = made.name, made.name
+        self.couplings.append(Coupling(name=f"{made.name} thread", joints=pair, ratio=pitch / (2 * math.pi)))
+
+    def _dynamics(self, axis: ET.Element, made: Joint) -> None:
+        """A torsion spring and damper of a hinge; friction and others are parts to leave out."""
+        found = axis.find("dynamics")
+        if found is None:
+            return
+        damping, friction, angle, stiffness = (
+            _number(found.find(tag), f"joint {made.name!r}: {tag}", 0.0)
+            for tag in ("damping", "friction", "spring_reference", "spring_stiffness")
+        )
+        if friction:
+            self.parts.append(Part("friction", f"dry friction of joint {made.name!r}"))
+        if made.facts.takes_torsion_spring and made.type == "revolute":
+            if damping or stiffness:
+                load = TorsionSpring(
+                    joint=made.name, stiffness=stiffness, damping=damping, natural_angle=angle
+                )
+                self.loads.append(load)
+            return
+        for kind, number in (("damping", damping), ("springs", stiffness)):
+            if number:
+                self.parts.append(Part(kind, f"{kind} of joint {made.name!r}"))
+
+    def _mimic(self, axis: ET.Element, made: Joint, prefix: str) -> None:
+        mimic = axis.find("mimic")
+        if mimic is None:
+            return
+        other, where = str(mimic.get("joint")), f"joint {made.name!r}: mimic"
+        ratio, offset, reference = (
+            _number(mimic.find(tag), f"{where} {tag}", default)
+            for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
+        )
+        if offset != ratio * reference:
+            raise SceneError(
+                [f"{where}: its offset contradicts the poses of the file, where all joints are 0"]
+            )
+        pair = prefix + other, made.name
+        self.couplings.append(Coupling(name=f"{made.name} mimics {other}", joints=pair, ratio=ratio))
+
+
+def _axis(axis: ET.Element | None, name: str, at: Pose, frames: Frames) -> np.ndarray:
+    """Return the world direction (3,) of a joint's axis."""
+    if axis is None:
+        return np.array(at.turn[:, 2])
+    where = f"joint {name!r}: axis"
+    xyz = axis.find("xyz")
+    direction = np.array([0.0, 0.0, 1.0]) if xyz is None else numbers(xyz, where, 3)
+    size = float(np.linalg.norm(direction))
+    if not size:
+        raise SceneError([f"{where}: has no length"])
+    expressed = xyz.get("expressed_in") if xyz is not None else None
+    if _is_true(axis.find("use_parent_model_frame")):
+        expressed = MODEL
+    turn = at.turn if expressed is None else frames.world(expressed).turn
+    return np.asarray(turn @ direction / size)
+
+
+def _number(element: ET.Element | None, where: str, default: float) -> float:
+    return default if element is None else float(numbers(element, where, 1)[0])
+
+
+def _is_true(element: ET.Element | None) -> bool:
+    return element is not None and (element.text or "").strip().lower() in ("true", "1")
+
+
+def _inertia(element: ET.Element | None, link: str) -> np.ndarray:
+    """Return the inertia matrix (3, 3) of an element, with ones in the diagonal where it gives none."""
+    if element is None:
+        return np.eye(3)
+
+    def entry(i: int, j: int) -> float:
+        tag = f"i{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}"
+        return _number(element.find(tag), f"link {link!r}: {tag}", float(i == j))
+
+    return np.array([[entry(i, j) for j in range(3)] for i in range(3)])
+
+
+def _plain(inertia: np.ndarray) -> Any:
+    """Return principal moments where the matrix is diagonal, else the matrix."""
+    inertia = (inertia + inertia.T) / 2
+    diagonal = np.diag(inertia)
+    is_diagonal = np.abs(inertia - np.diag(diagonal)).max() <= 1e-15 * np.abs(inertia).max()
+    return (diagonal if is_diagonal else inertia).tolist()
+
+
+class SdfFiles:
+    """Files of Gazebo and others: read only."""
+
+    reads = (".sdf",)
+    writes = ()
+
+    def read(self, path: Path, options: ImportOptions) -> Imported:
+        """The scene of a .sdf file; raises SceneError, ValueError, OSError."""
+        return read(path, options)
+
+    def write(self, scene: Scene) -> Any:
+        """Refuse: no scene is written as SDF."""
+        raise SceneError(["SDF: is read only; export as .xml"])
+
+
+FORMAT = SdfFiles()

@@ -1,0 +1,207 @@
+"""SDF files / the scenes that they were written from, with links and joints in frames of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engines.sdf.reading import FORMAT
+from crosscheck.judge.constraints import closure, inertia_matrices, initial_poses
+from crosscheck.judge.gauss_principle import gauss, rank
+from mbref import rotations
+from mbref.formats import ImportOptions
+from mbref.scene import GROUND, SceneError
+from mbref.scenes import SCENES
+
+NAMES = {
+    "revolute": "revolute",
+    "spherical": "ball",
+    "universal": "universal",
+    "translational": "prismatic",
+    "fixed": "fixed",
+}
+LOOPS = ("four_bar_gravity", "five_bar_gravity", "spatial_slider_crank_gravity", "bennett", "sarrus")
+
+
+def roll_pitch_yaw(turn) -> list[float]:
+    return [
+        np.arctan2(turn[2, 1], turn[2, 2]),
+        np.arcsin(np.clip(-turn[2, 0], -1, 1)),
+        np.arctan2(turn[1, 0], turn[0, 0]),
+    ]
+
+
+def pose_text(base, inner, more: str = "") -> str:
+    """The pose of a frame in another one, both (position, turn) in the world."""
+    place, turn = base[1].T @ (inner[0] - base[0]), base[1].T @ inner[1]
+    values = " ".join(repr(float(v)) for v in (*place, *roll_pitch_yaw(turn)))
+    return f"<pose{more}>{values}</pose>"
+
+
+def random_frame(random):
+    q = random.normal(size=4)
+    return random.normal(size=3) * 0.3, rotations.to_matrix(q / np.linalg.norm(q))
+
+
+def written(scene, random) -> str:
+    """A scene as SDF: random frames of the model, of links, of joints and of inertias."""
+    model, world = random_frame(random), (np.zeros(3), np.eye(3))
+    frame, text = {}, ""
+    for body in scene.body:
+        frame[body.name] = random_frame(random)
+        text += f'<frame name="of {body.name}">{pose_text(model, frame[body.name])}</frame>'
+    for body, inertia in zip(scene.body, inertia_matrices(scene), strict=True):
+        link, centre = frame[body.name], (np.array(body.position), random_frame(random)[1])
+        turn = centre[1].T @ rotations.to_matrix(np.array(body.orientation))
+        own = turn @ inertia @ turn.T
+        entries = "".join(
+            f"<i{'xyz'[i]}{'xyz'[j]}>{float(own[i, j])!r}</i{'xyz'[i]}{'xyz'[j]}>"
+            for i in range(3)
+            for j in range(i, 3)
+        )
+        place = pose_text(frame[body.name], link, f' relative_to="of {body.name}"')
+        text += (
+            f'<link name="{body.name}">{place}<inertial>{pose_text(link, centre)}<mass>{body.mass!r}</mass>'
+            f"<inertia>{entries}</inertia></inertial></link>"
+        )
+    for joint in scene.joint:
+        first, second = (name.replace(GROUND, "world") for name in joint.bodies)
+        at = np.array(joint.anchor_pair[0]), random_frame(random)[1]
+        child = world if second == "world" else frame[second]
+        others = [("", child), (' relative_to="__model__"', model)]
+        others += [(f' relative_to="{first}"', frame[first])] if first in frame else []
+        more, base = others[int(random.integers(len(others)))]
+        axes = ""
+        for tag, axis in zip(("axis", "axis2"), joint.directions, strict=False):
+            expressed, turn = [("", at[1]), (' expressed_in="__model__"', model[1])][int(random.integers(2))]
+            xyz = " ".join(repr(float(v)) for v in turn.T @ np.array(axis))
+            axes += f"<{tag}><xyz{expressed}>{xyz}</xyz></{tag}>"
+        text += (
+            f'<joint name="{joint.name}" type="{NAMES[joint.type]}"><parent>{first}</parent>'
+            f"<child>{second}</child>{pose_text(base, at, more)}{axes}</joint>"
+        )
+    gravity = " ".join(map(repr, scene.gravity))
+    return (
+        f'<sdf version="1.9"><world name="w"><gravity>{gravity}</gravity><model name="m">'
+        f"{pose_text(world, model)}{text}</model></world></sdf>"
+    )
+
+
+def at_rest(scene):
+    still = {"velocity": None, "angular_velocity": None}
+    return scene.with_(body=[body.model_copy(update=still) for body in scene.body])
+
+
+def read(tmp_path, text: str, **options):
+    path = tmp_path / "model.sdf"
+    path.write_text(text)
+    return FORMAT.read(path, ImportOptions(**options))
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_scene_comes_back_from_frames_of_all_kinds(name, tmp_path):
+    scene, random = at_rest(SCENES[name]()), np.random.default_rng(len(name))
+    for _ in range(3):
+        found = read(tmp_path, written(scene, random)).scene
+        assert [j.type for j in found.joint] == [j.type for j in scene.joint]
+        for ours, theirs in zip(scene.body, found.body, strict=True):
+            assert np.allclose(ours.position, theirs.position, atol=1e-12)
+        for ours, theirs in zip(scene.joint, found.joint, strict=True):
+            assert np.allclose(ours.anchor_pair, theirs.anchor_pair, atol=1e-12)
+        assert rank(found) == rank(scene)
+        assert np.abs(gauss(found) - gauss(scene)).max() < 1e-9 * np.abs(gauss(scene)).max()
+        assert max(np.abs(r).max() for r in closure(found, 0.0, *initial_poses(found)).values()) < 1e-12
+
+
+LINK = """<link name="{name}"><pose>{pose}</pose><inertial><pose>{centre} 0 0 0</pose><mass>0.5</mass>
+<inertia><ixx>0.002</ixx><iyy>0.003</iyy><izz>0.004</izz></inertia></inertial></link>"""
+HINGE = """<joint name="{name}" type="{kind}"><parent>{parent}</parent><child>{child}</child>
+<axis><xyz>0 1 0</xyz>{more}</axis></joint>"""
+
+
+def pair(kind: str = "revolute", more: str = "", joint: str = "", link: str = "") -> str:
+    links = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0") + link
+    links += LINK.format(name="b", pose="0.3 0 1 0 0 0", centre="0.1 0 0")
+    first = HINGE.format(name="A", kind="revolute", parent="world", child="a", more="")
+    second = HINGE.format(name="B", kind=kind, parent="a", child="b", more=more)
+    return f'<sdf version="1.7"><model name="m">{links}{first}{second}{joint}</model></sdf>'
+
+
+def test_springs_mimic_joints_and_screws(tmp_path):
+    dynamics = (
+        "<dynamics><damping>0.1</damping><spring_stiffness>2</spring_stiffness>"
+        "<spring_reference>0.3</spring_reference></dynamics>"
+    )
+    found = read(tmp_path, pair(more=dynamics))
+    (spring,) = found.scene.load
+    assert (spring.joint, spring.stiffness, spring.damping, spring.natural_angle) == ("B", 2.0, 0.1, 0.3)
+    assert found.scene.gravity == (0.0, 0.0, -9.8) and "gravity is 9.8" in found.notes[0]
+    mimic = '<mimic joint="A"><multiplier>-2</multiplier><offset>0</offset><reference>0</reference></mimic>'
+    (coupling,) = read(tmp_path, pair(more=mimic)).scene.coupling
+    assert (coupling.joints, coupling.ratio) == (("A", "B"), -2.0)
+    screw = pair("screw").replace("</joint></model>", "</joint></model>")
+    screw = screw.replace('type="screw">', 'type="screw"><screw_thread_pitch>0.02</screw_thread_pitch>')
+    turned = read(tmp_path, screw).scene
+    assert turned.joint[1].type == "cylindrical"
+    assert turned.coupling[0].ratio == pytest.approx(0.02 / (2 * np.pi))
+
+
+def test_static_models_links_without_inertial_and_several_models(tmp_path):
+    text = pair(link='<link name="lamp"/>').replace(
+        "</model></sdf>",
+        '</model><model name="floor"><static>true</static><link name="plate"/></model></sdf>',
+    )
+    found = read(tmp_path, text)
+    assert [body.name for body in found.scene.body] == ["m::a", "m::lamp", "m::b"]
+    assert found.scene.body[1].mass == 1.0 and any("'lamp' has no inertial" in note for note in found.notes)
+    assert found.scene.joint[0].bodies == (GROUND, "m::a")
+
+
+def test_a_link_is_held_on_request(tmp_path):
+    held = read(tmp_path, pair(), hold=["b"]).scene
+    assert held.joint[-1].type == "fixed" and held.joint[-1].bodies == (GROUND, "b")
+    with pytest.raises(SceneError, match="--hold c: no such link that moves; known: a, b"):
+        read(tmp_path, pair(), hold=["c"])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<sdf>", "is no XML"),
+        ("<sdf><world name='w'/></sdf>", "has no model"),
+        (pair("gearbox"), "joint 'B': type 'gearbox' is none of"),
+        (pair("screw"), "joint 'B': a screw needs screw_thread_pitch"),
+        (pair(more="<dynamics><friction>1</friction></dynamics>"), "dry friction of joint 'B': it changes"),
+        (pair("prismatic", "<dynamics><damping>1</damping></dynamics>"), "damping of joint 'B': it changes"),
+        (pair().replace("<parent>a<", "<parent>c<"), "frame 'c': is attached to no link"),
+        (
+            pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="q">0 0 1 0 0 0<'),
+            "frame 'q': the model has",
+        ),
+        (
+            pair().replace("<pose>0 0 1 0 0 0<", "<pose>0 0 1<"),
+            "link 'a': pose: must be 6 numbers, got '0 0 1'",
+        ),
+        (
+            pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="a">0 0 1 0 0 0<'),
+            "relative to itself, by a → a",
+        ),
+        (pair(joint="<include><uri>x</uri></include>"), "contains <include>, which is not read"),
+        (
+            pair(more='<mimic joint="A"><multiplier>1</multiplier><offset>1</offset></mimic>'),
+            "its offset contradicts the poses",
+        ),
+    ],
+)
+def test_faulty_files_are_refused_by_name(text, says, tmp_path):
+    with pytest.raises(SceneError, match=says.replace("(", r"\(")):
+        read(tmp_path, text)
+
+
+def test_parts_without_effect_are_listed_and_others_left_out_on_request(tmp_path):
+    more = "<limit><lower>-1</lower></limit><dynamics><friction>1</friction></dynamics>"
+    found = read(tmp_path, pair(more=more), without=["friction"])
+    assert any("1 limits of joints" in part for part in found.left_out)
+    assert any("--without friction" in part for part in found.left_out)
+    with pytest.raises(SceneError, match="an SDF file gives the poses"):
+        read(tmp_path, pair(), keyframe="home")
