@@ -84,7 +84,7 @@ def _unused(root: ET.Element) -> Iterator[str]:
 
 @dataclass
 class _Reader:
-    """What was read of the models so far."""
+    """Collects bodies, joints, couplings and loads of the models of a file."""
 
     bodies: list[Body] = field(default_factory=list)
     joints: list[Joint] = field(default_factory=list)
