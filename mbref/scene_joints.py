@@ -12,6 +12,7 @@ from mbref.scene_fields import Entry, Name, NotNegative, Pair, Point, PointPair,
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # cosine between the axes of a universal joint that is no rounding of a right angle
+RIGHT_ANGLE = 1e-15  # the same of axes that are perpendicular to the rounding of their numbers
 Coordinate = Literal["angle", "displacement"]
 ANGLE: Coordinate = "angle"
 DISPLACEMENT: Coordinate = "displacement"
@@ -132,12 +133,21 @@ class Universal(_AnchorJoint):
     @field_validator("axes")
     @classmethod
     def _axes_have_length_and_are_perpendicular(cls, axes: tuple[Vector, Vector]) -> tuple[Vector, ...]:
+        """Return the first axis, and the part of the second that is perpendicular to it."""
         lengths = [math.hypot(*direction(axis)) for axis in axes]
         cosine = sum(a / lengths[0] * (b / lengths[1]) for a, b in zip(*axes, strict=True))
         if abs(cosine) > SKEW:
             angle = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
             raise ValueError(f"must be perpendicular, but enclose {angle:.3g} degrees")
-        return axes
+        if abs(cosine) <= RIGHT_ANGLE:
+            return axes
+        first, second = axes
+        along = cosine * lengths[1] / lengths[0]
+        return first, (
+            second[0] - along * first[0],
+            second[1] - along * first[1],
+            second[2] - along * first[2],
+        )
 
     @property
     def directions(self) -> tuple[Vector, ...]:

@@ -32,6 +32,7 @@ PERPENDICULAR = {
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
 """Axes of the first body's frame along which the anchors do not part; all three of the world's elsewhere."""
 EYE = np.eye(3)
+RIGHT_ANGLE = 1e-15  # cosine of axes that are perpendicular to the rounding of their numbers
 Sampled = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -68,6 +69,12 @@ class NaturalCoordinates:
         self.mass = self._mass()
         self.joints = JointCoordinates(self)
         self.count = len(self.c) + len(self.joints.couplings)  # number of rows, the last ones of couplings
+
+    def take_right_angles(self) -> None:
+        """Let axes of universal joints that are perpendicular to rounding enclose a right angle; with many
+        digits the scene's numbers are exact."""
+        if not self.arithmetic.digits:
+            self.c = np.where(np.abs(doubles(self.c)) <= RIGHT_ANGLE, 0 * self.c, self.c)
 
     def lengths(self, values: Any) -> np.ndarray:
         """Lengths, or what is proportional to them, in the unit of the coordinates."""

@@ -115,6 +115,7 @@ class Stepper:
         """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
         if not seed:
             return np.ones(self.of.count)
+        self.of.take_right_angles()
         rng, joints = np.random.default_rng(seed), slice(6 * self.of.nb, None)
         moved = displaced * self._size() * rng.uniform(-1, 1, len(self.of.c[joints]))
         self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)

@@ -1,0 +1,72 @@
+"""Axes of a universal joint that are perpendicular to rounding, or less / one reading in all engines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.judge.constraints import closure, initial_poses
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.model_identity import gate, gate_times
+from crosscheck.judge.reference.arithmetic import EXTENDED
+from crosscheck.judge.reference.taylor import Stepper
+from crosscheck.processes.serve import run_once
+from mbref.scene import Body, Scene, Universal
+
+FIRST = np.array([1.0, 0.2, -0.3])
+ACROSS = np.array([0.2, -1.0, 0.0])  # perpendicular to FIRST
+SETTINGS = {
+    "mbref": Setting("taylor", {"rtol": 1e-9}),
+    "mujoco": Setting("tuned", {"step": 1e-5, "beta": 100.0, "hard": 1e-7}),
+    "pinocchio": Setting("baumgarte", {"step": 1e-5}),
+    "exudyn": Setting("trapezoidal", {"step": 1e-5}),
+}
+
+
+def pendulum(cosine: float) -> Scene:
+    """A body on a universal joint whose second axis leans by a cosine towards the first."""
+    first, across = FIRST / np.linalg.norm(FIRST), ACROSS / np.linalg.norm(ACROSS)
+    second = 2.0 * (across + cosine * first)
+    joint = Universal(
+        name="U", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axes=(tuple(FIRST), tuple(second))
+    )
+    body = Body(name="b", mass=1.0, inertia=(0.01, 0.02, 0.03), position=(0.3, 0.1, 0.0))
+    return Scene(name="u", body=(body,), joint=(joint,), gravity=(0.0, 0.0, -9.81), duration=0.2)
+
+
+@pytest.mark.parametrize("cosine", [1e-14, 1e-6, 0.04, -0.04])
+def test_the_second_axis_is_read_across_the_first(cosine):
+    """The first axis stays as given, and the second is the one without the lean, of its length 2."""
+    first, second = map(np.array, pendulum(cosine).joint[0].axes)
+    assert tuple(first) == tuple(FIRST)
+    assert abs(first @ second) <= 1e-15 * np.linalg.norm(first) * np.linalg.norm(second)
+    assert second == pytest.approx(2.0 * ACROSS / np.linalg.norm(ACROSS), abs=1e-14)
+    gap = closure(pendulum(cosine), np.zeros(1), *(a[None] for a in initial_poses(pendulum(cosine))))["U"]
+    assert np.abs(gap).max() <= 1e-15, "the pose is not moved"
+
+
+def test_axes_that_are_perpendicular_to_rounding_stay_as_given():
+    scene = pendulum(1e-16)
+
+    again = Universal(**dict(scene.joint[0]))
+    assert again.axes == scene.joint[0].axes
+    skewed = pendulum(0.04).joint[0]
+    assert Universal(**dict(skewed)).axes == skewed.axes, "read twice it is what it was"
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_every_engine_has_the_reading_of_the_judge(name):
+    scene = pendulum(0.04)
+    exact = gauss_motion(scene, tuple(gate_times(scene)))
+    assert gate(scene, [exact, run_once(name, scene, gate_times(scene), SETTINGS[name])]) is None
+
+
+def test_the_second_run_of_a_reference_has_right_angles():
+    """The cosine of the given numbers, 1e-17 or so, is kept by the first run and zero in the second."""
+    scene, found = pendulum(1e-16), []
+    for seed in (0, 1):
+        stepper = Stepper(scene, EXTENDED, 24, float(EXTENDED.eps), (seed, 0.0))
+        constants = np.abs(np.asarray(stepper.of.c[6 * stepper.of.nb :], dtype=float))
+        found.append(constants[constants > 0].min(initial=1.0))
+    assert 0 < found[0] <= 1e-15 < found[1], found
