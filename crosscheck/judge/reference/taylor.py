@@ -116,9 +116,8 @@ class Stepper:
         if not seed:
             return np.ones(self.of.count)
         self.of.take_right_angles()
-        rng, joints = np.random.default_rng(seed), slice(6 * self.of.nb, None)
-        moved = displaced * self._size() * rng.uniform(-1, 1, len(self.of.c[joints]))
-        self.of.c[joints] = self.of.c[joints] + self.of.arithmetic.array(moved)
+        rng, constants = np.random.default_rng(seed), self.of.c[6 * self.of.nb :]
+        constants += self.of.arithmetic.array(displaced * self._size() * rng.uniform(-1, 1, len(constants)))
         return 1 + PREFERENCE * rng.random(self.of.count)
 
     def samples(self, times: Times, progress: Progress) -> Iterator[Sample]:
