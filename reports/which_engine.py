@@ -19,6 +19,7 @@ from crosscheck.study.record_view import ended, error_text, is_completed
 from crosscheck.study.speed_sentences import LEVEL, SAID, title
 from crosscheck.study.verdict import Grade, Judged
 from mbref.records import strict_json
+from mbref.trajectory import Outcome
 from reports.runs import SceneRuns, duration, plain
 from reports.stored import groups, verified
 
@@ -83,6 +84,11 @@ KINDS = (
         "Gravity or forces move the mechanism through positions at which the motion could branch.",
         ("planar_slider_crank_equal",),
     ),
+    Kind(
+        "Stiff springs and dampers",
+        "A spring or damper acts much faster than the motion: explicit integrators need short steps.",
+        ("flyball_governor",),
+    ),
 )
 
 
@@ -139,7 +145,12 @@ def _bad_defaults(group: Judged) -> str:
 
 
 def _end(record: Record) -> str:
-    return f"error {error_text(record)}" if is_completed(record) else ended(record)
+    return f"error {error_text(record)}" if is_completed(record) else _failed(record)
+
+
+def _failed(record: Record) -> str:
+    limit = f" (limit {record['time_limit']:g} s)" if record["outcome"] == Outcome.TIMED_OUT.label else ""
+    return ended(record) + limit
 
 
 def _section(kind: Kind, found: Sequence[SceneRuns]) -> Iterator[str]:
@@ -156,7 +167,7 @@ def _answers(group: Judged) -> Iterator[str]:
         f"`{name}` over {_end_time(group):g} s: {_count(len(group.scene.body), 'body', 'bodies')}, "
         f"{_count(counts.degrees_of_freedom, 'degree', 'degrees')} of freedom, "
         f"{_count(counts.redundant, 'redundant row', 'redundant rows')}. "
-        f"`crosscheck compare '{name}'` repeats it.\n"
+        f"`crosscheck compare '{name}'` repeats it.{_known(group)}\n"
     )
     yield f"| engine | fastest run within {SAID} | time | error | least error | library defaults |"
     yield "|---|---|--:|--:|--:|---|"
@@ -168,6 +179,15 @@ def _answers(group: Judged) -> Iterator[str]:
         default = _default(defaults[engine]) if engine in defaults else "no such settings"
         yield f"| {title(engine)} | {' | '.join(cells)} | {_least(best)} | {default} |"
     yield from _lines(group)
+
+
+def _known(group: Judged) -> str:
+    until = float(group.truth["until"])
+    return (
+        f" Errors are of the part up to {until:.3g} s, where the truth ends."
+        if until < _end_time(group)
+        else ""
+    )
 
 
 def _end_time(group: Judged) -> float:
@@ -188,11 +208,11 @@ def _run_cells(record: Record) -> tuple[str, str, str]:
 
 
 def _least(record: Record) -> str:
-    return error_text(record) if is_completed(record) else ended(record)
+    return error_text(record) if is_completed(record) else _failed(record)
 
 
 def _default(record: Record) -> str:
-    return _end(record) if is_completed(record) else f"no run completes: {ended(record)}"
+    return _end(record) if is_completed(record) else f"no run completes: {_failed(record)}"
 
 
 def _lines(group: Judged) -> Iterator[str]:

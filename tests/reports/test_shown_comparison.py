@@ -1,0 +1,36 @@
+"""The extract of a comparison in docs/compare.md: its lines and those that a comparison prints."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli.comparison import Comparison
+from reports.stored import groups
+from reports.which_engine import FOLDERS, judged
+
+PAGE = Path(__file__).parents[2] / "docs" / "compare.md"
+HEADINGS = re.compile(
+    r"^(Who is right|How fast|Where each breaks|How the truth is known|runs|settings to use|to copy)"
+)
+
+
+@pytest.fixture(scope="module")
+def printed() -> str:
+    """Return the output for the plane slider-crank of the reference report."""
+    group = next(group for group in groups(FOLDERS[0]) if group.scene.name == "planar_slider_crank")
+    return str(Comparison(judged(group), "planar_slider_crank", None))
+
+
+def test_headings_of_the_extract_are_printed_in_its_order(printed):
+    _, extract, _ = re.split("<!-- /?compare -->", PAGE.read_text())
+    shown = [line for line in extract.splitlines() if HEADINGS.match(line)]
+    starts = [line[:12].strip() for line in printed.splitlines() if HEADINGS.match(line)]
+    assert len(shown) == 7 and [line[:12].strip() for line in shown] == starts
+
+
+def test_columns_of_the_extract_are_columns_of_the_table(printed):
+    [columns] = re.findall(r"^ +engine, family .* ratio$", PAGE.read_text(), re.M)
+    assert columns.split() in [line.split() for line in printed.splitlines()]
