@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.published import PUBLISHED, Published
 from crosscheck.judge.reference import certify
-from crosscheck.judge.reference.arithmetic import EXTENDED
 from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion

@@ -25,9 +25,9 @@ from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.hard_mechanisms import HARD
 from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference import cache
-from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.reference import Reference, judged, runs

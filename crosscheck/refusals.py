@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 from mbref.scene import Scene
 
+TABLE, FACTOR = "table", "factor"  # of a driver, of a load
+
 
 class Owner(enum.Enum):
     """The owner of a gap: the adapter, the engine or the engine's model would have to change to run a
@@ -50,6 +52,9 @@ class Supports:
         Joint coordinates that can be driven, coupled or have an armature: ``"angle"``, ``"displacement"``.
     loads : collection of str
         Load types, as in scene files.
+    over_time : collection of str
+        What can follow a function of time beyond polynomial and sine of a driver: ``"table"`` of a driver,
+        ``"factor"`` of a load.
     """
 
     joints: Collection[str] = ()
@@ -57,6 +62,7 @@ class Supports:
     loads: Collection[str] = ()
     couplings: Collection[str] = ()
     armatures: Collection[str] = ()
+    over_time: Collection[str] = ()
 
     def missing(self, scene: Scene) -> Cannot | None:
         """Return the refusal of the first joint, coupling, driver or load that is not declared, or None."""
@@ -77,6 +83,10 @@ class Supports:
             coordinate = scene.joint_named(driver.joint).facts.driven
             if coordinate not in self.drivers:
                 yield f"the driver of joint {driver.joint!r} prescribes its {coordinate}"
+            if driver.table and TABLE not in self.over_time:
+                yield f"the driver of joint {driver.joint!r} follows a table"
         for k, load in enumerate(scene.load):
             if load.type not in self.loads:
                 yield f"load[{k}] is of type {load.type!r}"
+            if load.over_time and FACTOR not in self.over_time:
+                yield f"load[{k}] changes with time"

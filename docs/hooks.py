@@ -57,6 +57,11 @@ LOADS = {
         "natural_length": 1.0,
     },
     "torsion_spring": {"type": "torsion_spring", "joint": "J", "stiffness": 1.0},
+    "joint_torque": {"type": "joint_torque", "joint": "J", "torque": 1.0},
+}
+OF_SLIDES = {
+    "slide_spring": {"type": "slide_spring", "joint": "J", "stiffness": 1.0},
+    "joint_force": {"type": "joint_force", "joint": "J", "force": 1.0},
 }
 
 
@@ -102,6 +107,8 @@ def figures() -> dict[str, str]:
     found = {f"joint_{name}": still(joint_scene(name), OBLIQUE, 360) for name in JOINT_TYPES}
     pair = Scene(name="pair", body=BODIES, joint=[HOLD, HINGE])
     found |= {f"load_{name}": still(pair.with_(load=[load]), OBLIQUE, 360) for name, load in LOADS.items()}
+    sliding = joint_scene("translational")
+    found |= {f"load_{n}": still(sliding.with_(load=[x]), OBLIQUE, 360) for n, x in OF_SLIDES.items()}
     driven = pair.with_(driver=[{"joint": "J", "polynomial": [0.0, 1.0]}])
     found["driver"] = still(driven, View.parse("xz"), 360)
     for name in MOVING:

@@ -1,4 +1,4 @@
-"""Forces, torques and powers of the drivers, springs and torsion springs of a motion."""
+"""Forces, torques and powers of the drivers, springs and loads of joints of a motion."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.joint_motion import JointMotion, joint_motion, place_of, turned_since_start, velocity_of
-from mbref.scene import Scene, Spring
+from mbref.scene import JointLoad, Scene, Spring
 from mbref.trajectory import Trajectory
 
 
@@ -43,9 +43,9 @@ class DriverMotion:
 
 @dataclass(frozen=True)
 class LoadMotion:
-    """Length or angle, rate, force or torque, and power of a load at k sample times.
+    """Length, angle or displacement, rate, force or torque, and power of a load at k sample times.
 
-    Numbers that a load of this type does not have are None; forces and moments that are constant have none.
+    Numbers that a load of this type does not have are None; forces and moments on bodies have none.
 
     Attributes
     ----------
@@ -55,13 +55,16 @@ class LoadMotion:
         Distance of the points of a spring, m, and its rate, m/s.
     force : ndarray, shape (k,), or None
         Force of spring and damper, N: stiffness (length - natural length) + damping rate. It is positive
-        where it pulls its points together.
+        where it pulls its points together. Of a load along a joint's axis, the force on the second body.
     angle, rate : ndarray, shape (k,), or None
-        Angle of a torsion spring's joint since t = 0, rad, and its rate, rad/s.
+        Angle, since t = 0, of the joint of a load about its axis, rad, and its rate, rad/s.
+    displacement, displacement_rate : ndarray, shape (k,), or None
+        Displacement, since t = 0, of the joint of a load along its axis, m, and its rate, m/s.
     torque : ndarray, shape (k,), or None
-        Torque of a torsion spring and damper on the second body about the joint's axis, N m.
+        Torque on the second body about the joint's axis, N m.
     power : ndarray, shape (k,), or None
-        Power of spring and damper into the bodies, W: -force times length rate, or torque times rate.
+        Power into the bodies, W: -force times length rate of a spring between points; otherwise torque times
+        rate, or force times rate of the displacement.
     """
 
     place: int
@@ -70,6 +73,8 @@ class LoadMotion:
     force: np.ndarray | None = None
     angle: np.ndarray | None = None
     rate: np.ndarray | None = None
+    displacement: np.ndarray | None = None
+    displacement_rate: np.ndarray | None = None
     torque: np.ndarray | None = None
     power: np.ndarray | None = None
 
@@ -91,18 +96,26 @@ def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
 
 
 def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
-    """Return length or angle, rate and force or torque of a load by its place; raises IndexError."""
+    """Return length, angle or displacement, rate and force or torque of a load by its place; raises
+    IndexError."""
     if not 0 <= place < len(scene.load):
         raise IndexError(f"no load {place}; the scene has {len(scene.load)} loads, counted from 0")
     load = scene.load[place]
     if load.type == "spring":
         return _spring(scene, motion, place, load)
-    if load.type != "torsion_spring":
-        return LoadMotion(place)
-    found = joint_motion(scene, motion, load.joint)
-    angle, rate = np.asarray(found.angle), _rate(found)
-    torque = -load.stiffness * (angle - load.natural_angle) - load.damping * rate
-    return LoadMotion(place, angle=angle, rate=rate, torque=torque, power=torque * rate)
+    return _of_joint(scene, motion, place, load) if isinstance(load, JointLoad) else LoadMotion(place)
+
+
+def _of_joint(scene: Scene, motion: Trajectory, place: int, load: JointLoad) -> LoadMotion:
+    found, action = joint_motion(scene, motion, load.joint), load.action
+    turns = load.coordinate == "angle"
+    moved = np.asarray(found.angle if turns else found.displacement)
+    rate = np.asarray(found.rate if turns else found.displacement_rate)
+    factor = 1.0 if load.over_time is None else load.over_time.values(motion.times)
+    size = action.amount * factor - action.stiffness * (moved - action.natural) - action.damping * rate
+    if turns:
+        return LoadMotion(place, angle=moved, rate=rate, torque=size, power=size * rate)
+    return LoadMotion(place, force=size, displacement=moved, displacement_rate=rate, power=size * rate)
 
 
 def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadMotion:

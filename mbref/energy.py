@@ -6,7 +6,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.joint_motion import joint_motion, place_of
-from mbref.scene import Scene
+from mbref.scene import JointLoad, Scene
 from mbref.trajectory import Trajectory
 
 
@@ -32,10 +32,11 @@ def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
 
 
 def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
-    """Return the potential energy (k,), J, of gravity (zero at the origin), springs and torsion springs.
+    """Return the potential energy (k,), J, of gravity (zero at the origin), of springs and springs of joints.
 
-    Constant forces and moments have none here: their work changes the energy.  Raises ValueError where a
-    body has no mass.
+    Forces, moments and torques have no potential here: their work changes the energy.
+
+    Raises ValueError where a body has no mass.
     """
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])
@@ -45,9 +46,10 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
             ends = [place_of(scene, motion, b, p) for b, p in zip(load.bodies, load.points, strict=True)]
             stretch = np.linalg.norm(ends[1] - ends[0], axis=1) - load.natural_length
             total = total + load.stiffness * stretch**2 / 2
-        elif load.type == "torsion_spring":
-            twist = np.asarray(joint_motion(scene, motion, load.joint).angle) - load.natural_angle
-            total = total + load.stiffness * twist**2 / 2
+        elif isinstance(load, JointLoad) and load.action.stiffness:
+            found = joint_motion(scene, motion, load.joint)
+            moved = found.angle if load.coordinate == "angle" else found.displacement
+            total = total + load.action.stiffness * (np.asarray(moved) - load.action.natural) ** 2 / 2
     return np.asarray(total)
 
 

@@ -26,6 +26,9 @@ ACCELERATIONS = "accelerations, which the engine does not give"
 SECOND_RUN = "a second run: mbref run without --estimate no, or motion.error_estimate before"
 TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
+ABOUT_AXIS = "a load about a joint's axis"
+ALONG_AXIS = "a load along a joint's axis"
+PULLING = f"a spring, or {ALONG_AXIS}"
 
 
 class Output(NamedTuple):
@@ -96,20 +99,13 @@ OUTPUTS = (
     ),
     Output("load", "length", "m", "", "length of a spring", "a spring"),
     Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
-    Output("load", "force", "N", "", "force of spring and damper, positive where it pulls", "a spring"),
-    Output("load", "angle", "rad", "", "angle of a torsion spring since t = 0", "a torsion spring"),
-    Output("load", "rate", "rad/s", "", "rate of the angle of a torsion spring", "a torsion spring"),
-    Output(
-        "load",
-        "torque",
-        "N m",
-        "",
-        "torque of a torsion spring and damper on the second body",
-        "a torsion spring",
-    ),
-    Output(
-        "load", "power", "W", "", "power of spring and damper into the bodies", "a spring or a torsion spring"
-    ),
+    Output("load", "force", "N", "", "pull of a spring; force on the second body along an axis", PULLING),
+    Output("load", "angle", "rad", "", "angle of its joint since t = 0", ABOUT_AXIS),
+    Output("load", "rate", "rad/s", "", "rate of the angle of its joint", ABOUT_AXIS),
+    Output("load", "displacement", "m", "", "displacement of its joint since t = 0", ALONG_AXIS),
+    Output("load", "displacement_rate", "m/s", "", "rate of the displacement of its joint", ALONG_AXIS),
+    Output("load", "torque", "N m", "", "torque on the second body about the axis", ABOUT_AXIS),
+    Output("load", "power", "W", "", "power into the bodies", "a spring or a load of a joint"),
     Output("mechanism", "position_violation", "m or rad", "", "largest violation of a constraint row"),
     Output("mechanism", "velocity_violation", "m/s or rad/s", "", "largest violation at velocity level"),
     Output(

@@ -18,18 +18,16 @@ from pydantic import Field, Strict, ValidationError, field_validator, model_vali
 
 from mbref.scene_couplings import Coupling
 from mbref.scene_fields import (
-    Angle,
     Entry,
-    LengthOrAngle,
     Name,
     Point,
     Positive,
     Quaternion,
-    Real,
     Reals,
     Vector,
     as_list,
 )
+from mbref.scene_functions import Factor, Sine, TimeFunction
 from mbref.scene_joints import (
     JOINT_TYPES,
     Coordinate,
@@ -46,7 +44,18 @@ from mbref.scene_joints import (
     Universal,
 )
 from mbref.scene_lines import toml_hint, with_lines
-from mbref.scene_loads import LOAD_TYPES, Force, Load, Moment, Spring, TorsionSpring
+from mbref.scene_loads import (
+    LOAD_TYPES,
+    Force,
+    JointForce,
+    JointLoad,
+    JointTorque,
+    Load,
+    Moment,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+)
 from mbref.scene_paths import replaced_at
 from mbref.scene_services import SERVICES, Counts
 from mbref.scene_text import scene_text
@@ -68,11 +77,15 @@ __all__ = [
     "Cylindrical",
     "Distance",
     "Driver",
+    "Factor",
     "Fixed",
     "Force",
     "Inline",
     "Joint",
     "JointFacts",
+    "JointForce",
+    "JointLoad",
+    "JointTorque",
     "Load",
     "Moment",
     "Planar",
@@ -80,8 +93,10 @@ __all__ = [
     "Scene",
     "SceneError",
     "Sine",
+    "SlideSpring",
     "Spherical",
     "Spring",
+    "TimeFunction",
     "TorsionSpring",
     "Translational",
     "Universal",
@@ -124,24 +139,19 @@ class Body(Entry):
         return q if abs(norm - 1) <= 1e-15 else tuple(x / norm for x in q)
 
 
-class Sine(Entry):
-    """amplitude · sin(frequency · t + phase); frequency in rad/s."""
-
-    amplitude: LengthOrAngle = 0.0
-    frequency: Real = 1.0
-    phase: Angle = 0.0
-
-
-class Driver(Entry):
+class Driver(TimeFunction):
     """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
 
-    value(t) = c0 + c1 t + c2 t² + … (+ sine): the angle of a revolute or cylindrical joint about its
+    value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute or cylindrical joint about its
     axis (rad), or the displacement of a translational one along it (m).  value(0) must be zero.
     """
 
     joint: Name
     polynomial: Reals = (0.0,)
-    sine: Sine | None = None
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        return self.polynomial
 
 
 class Scene(Entry):
@@ -253,7 +263,13 @@ class Scene(Entry):
 
 TABLES = {"": tuple(Scene.model_fields)} | {
     name: tuple(table.model_fields)
-    for name, table in (("body", Body), ("coupling", Coupling), ("driver", Driver), ("sine", Sine))
+    for name, table in (
+        ("body", Body),
+        ("coupling", Coupling),
+        ("driver", Driver),
+        ("sine", Sine),
+        ("factor", Factor),
+    )
 }
 
 

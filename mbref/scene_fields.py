@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
 from reprlib import Repr
 from typing import Annotated, Any
@@ -31,6 +31,8 @@ OTHER_WORDS = {  # words of other programs and books → our words
     "in_line": "inline",
     "torque": "moment",
     "motor": "driver",
+    "actuator": "joint_force",
+    "linear_spring": "slide_spring",
     "spring_damper": "spring",
     "rotational_spring": "torsion_spring",
     "world": "ground",
@@ -92,6 +94,11 @@ def checked_length(value: float) -> float:
 def as_list(value: Any) -> Any:
     """Arrays are accepted wherever the file has a list."""
     return value.tolist() if hasattr(value, "tolist") else value
+
+
+def field_of(entry: Any, key: str) -> Any:
+    """A field of an entry that may still be a raw table, or already a model."""
+    return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)
 
 
 Sized = AfterValidator(checked_size)

@@ -27,14 +27,20 @@ class JointFacts:
     motion relative to the first, in the joint's frame on the first body; its third axis is along the
     joint's axis.  ``condition`` is one further equation: the axes of both bodies stay perpendicular, or
     the anchors keep their distance.  ``driven`` is the coordinate a driver prescribes: the angle about or
-    the displacement along the axis, None where the joint cannot be driven.
+    the displacement along the axis, None where the joint cannot be driven.  ``loaded`` are the coordinates
+    along which springs, forces and torques of the joint can act.
     """
 
     forbidden_translations: tuple[int, ...] = ()
     forbidden_rotations: tuple[int, ...] = ()
     condition: Condition | None = None
     driven: Coordinate | None = None
-    takes_torsion_spring: bool = False
+    loaded: tuple[Coordinate, ...] = ()
+
+    @property
+    def takes_torsion_spring(self) -> bool:
+        """Whether a torsion spring or a torque about the axis can act."""
+        return ANGLE in self.loaded
 
     @property
     def rows(self) -> int:
@@ -119,7 +125,7 @@ class Fixed(_AnchorJoint):
 class Revolute(_DrivenJoint):
     """Rotation about ``axis`` through ``anchor``; ``armature`` is the reflected inertia of a rotor."""
 
-    facts = JointFacts((X, Y, Z), (X, Y), driven="angle", takes_torsion_spring=True)
+    facts = JointFacts((X, Y, Z), (X, Y), driven="angle", loaded=(ANGLE,))
     type: Literal["revolute"] = "revolute"
 
 
@@ -164,14 +170,14 @@ class Spherical(_AnchorJoint):
 class Translational(_DrivenJoint):
     """Displacement along ``axis``, no rotation; ``armature`` is the reflected mass of a motor."""
 
-    facts = JointFacts((X, Y), (X, Y, Z), driven="displacement")
+    facts = JointFacts((X, Y), (X, Y, Z), driven="displacement", loaded=(DISPLACEMENT,))
     type: Literal["translational"] = "translational"
 
 
 class Cylindrical(_DrivenJoint):
     """Displacement along and rotation about ``axis``; ``armature`` is of the rotation."""
 
-    facts = JointFacts((X, Y), (X, Y), driven="angle", takes_torsion_spring=True)
+    facts = JointFacts((X, Y), (X, Y), driven="angle", loaded=(ANGLE, DISPLACEMENT))
     type: Literal["cylindrical"] = "cylindrical"
 
 

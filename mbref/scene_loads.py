@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal, get_args
+from typing import Annotated, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Discriminator, ValidationInfo, field_validator
 
-from mbref.scene_fields import Angle, Entry, Extent, Name, NotNegative, Pair, Point, PointPair, Vector
+from mbref.scene_fields import (
+    Angle,
+    Entry,
+    Extent,
+    Length,
+    Name,
+    NotNegative,
+    Pair,
+    Point,
+    PointPair,
+    Real,
+    Vector,
+)
+from mbref.scene_functions import Factor
+from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
 
 class LoadEntry(Entry):
@@ -20,24 +34,31 @@ class LoadEntry(Entry):
         """Whether the load takes energy out of the mechanism."""
         return getattr(self, "damping", 0.0) > 0
 
+    @property
+    def over_time(self) -> Factor | None:
+        """The function of time that multiplies the load; None for a load that does not depend on time."""
+        return getattr(self, "factor", None)
+
 
 class Moment(LoadEntry):
-    """Constant moment on a body (N m, world axes)."""
+    """Moment on a body (N m, world axes), constant or times a ``factor``."""
 
     acts_on = "body"
     type: Literal["moment"] = "moment"
     body: Name
     moment: Vector
+    factor: Factor | None = None
 
 
 class Force(LoadEntry):
-    """Constant force (N, world axes) at a body-fixed point (given in the world at t = 0)."""
+    """Force (N, world axes) at a body-fixed point (world at t = 0), constant or times a ``factor``."""
 
     acts_on = "body"
     type: Literal["force"] = "force"
     body: Name
     point: Point
     force: Vector
+    factor: Factor | None = None
 
 
 class Spring(LoadEntry):
@@ -60,18 +81,88 @@ class Spring(LoadEntry):
         return length
 
 
-class TorsionSpring(LoadEntry):
-    """Spring and damper about a joint's axis; N m/rad, N m s/rad; angle measured from t = 0."""
+class Action(NamedTuple):
+    """Force or torque ``amount`` - stiffness (q - natural) - damping q' along a joint coordinate q.
+
+    It acts on the second body, and with the opposite sign on the first; N m, N m/rad, … or N, N/m, ….
+    """
+
+    stiffness: float = 0.0
+    damping: float = 0.0
+    natural: float = 0.0
+    amount: float = 0.0
+
+
+class JointLoad(LoadEntry):
+    """A load along one coordinate of a joint."""
 
     acts_on = "joint"
-    type: Literal["torsion_spring"] = "torsion_spring"
+    coordinate: ClassVar[Coordinate]
     joint: Name
+
+    @property
+    def action(self) -> Action:
+        """The numbers of the force or torque."""
+        raise NotImplementedError
+
+
+class TorsionSpring(JointLoad):
+    """Spring and damper about a joint's axis; N m/rad, N m s/rad; angle measured from t = 0."""
+
+    coordinate = ANGLE
+    type: Literal["torsion_spring"] = "torsion_spring"
     stiffness: NotNegative
     damping: NotNegative = 0.0
     natural_angle: Angle = 0.0
 
+    @property
+    def action(self) -> Action:
+        return Action(self.stiffness, self.damping, self.natural_angle)
 
-Load = Annotated[Moment | Force | Spring | TorsionSpring, Discriminator("type")]
+
+class SlideSpring(JointLoad):
+    """Spring and damper along a joint's axis; N/m, N s/m; displacement measured from t = 0."""
+
+    coordinate = DISPLACEMENT
+    type: Literal["slide_spring"] = "slide_spring"
+    stiffness: NotNegative
+    damping: NotNegative = 0.0
+    natural_displacement: Length = 0.0
+
+    @property
+    def action(self) -> Action:
+        return Action(self.stiffness, self.damping, self.natural_displacement)
+
+
+class JointTorque(JointLoad):
+    """Torque (N m) about a joint's axis, constant or times a ``factor``: a motor of known torque."""
+
+    coordinate = ANGLE
+    type: Literal["joint_torque"] = "joint_torque"
+    torque: Real
+    factor: Factor | None = None
+
+    @property
+    def action(self) -> Action:
+        return Action(amount=self.torque)
+
+
+class JointForce(JointLoad):
+    """Force (N) along a joint's axis, constant or times a ``factor``: an actuator of known force."""
+
+    coordinate = DISPLACEMENT
+    type: Literal["joint_force"] = "joint_force"
+    force: Real
+    factor: Factor | None = None
+
+    @property
+    def action(self) -> Action:
+        return Action(amount=self.force)
+
+
+Load = Annotated[
+    Moment | Force | Spring | TorsionSpring | SlideSpring | JointTorque | JointForce, Discriminator("type")
+]
 LOAD_TYPES: dict[str, type[Load]] = {
     load.model_fields["type"].default: load for load in get_args(get_args(Load)[0])
 }

@@ -156,10 +156,7 @@ def _far_drivers(scene: Scene) -> Iterator[str]:
     """Drivers that turn a joint by many turns before the end of the motion."""
     times = np.linspace(0.0, scene.duration, INSTANTS)
     for driver in scene.driver:
-        value = sum(c * times**k for k, c in enumerate(driver.polynomial))
-        if sine := driver.sine:
-            value = value + sine.amplitude * np.sin(sine.frequency * times + sine.phase)
-        furthest = float(np.abs(value).max())
+        furthest = float(np.abs(driver.values(times)).max())
         if scene.joint_named(driver.joint).facts.driven == "angle" and furthest > FURTHEST:
             yield (
                 f"driver[{driver.joint}].polynomial: turns the joint by {furthest:.4g} rad, "

@@ -11,22 +11,28 @@ import numpy as np
 from pydantic import ValidationError
 
 from mbref.scene_couplings import default_coordinates
-from mbref.scene_fields import LARGEST, SMALLEST, checked_length, checked_size, meant, shown
+from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, meant, shown
+from mbref.scene_function_faults import factor_faults, initial_value, rows_of, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate
-from mbref.scene_loads import LOAD_TYPES
-from mbref.scene_units import dimension_of, in_si
+from mbref.scene_loads import LOAD_TYPES, JointLoad
+from mbref.scene_units import dimension_of
 
 GROUND = "ground"
 Faults = Iterator[tuple[str, str]]  # path and message
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
 DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
-TORSIONAL = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.takes_torsion_spring)
+LOADED = {  # load type → joint types along whose coordinate it can act
+    kind: tuple(name for name, joint in JOINT_TYPES.items() if load.coordinate in joint.facts.loaded)
+    for kind, load in LOAD_TYPES.items()
+    if issubclass(load, JointLoad)
+}
 COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
 COORDINATES = get_args(Coordinate)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → what its list holds; of all others three numbers
     "orientation": "four numbers (w, x, y, z)",
     "polynomial": "numbers, such as [0.0, 6.0]",
+    "table": "rows of time and value, such as [[0.0, 0.0], [0.5, 1.0], [1.0, 2.0], [1.5, 1.0]]",
     "bodies": "two names of bodies",
     "anchors": "two points of three numbers each",
     "axes": "two axes of three numbers each",
@@ -123,6 +129,8 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
 def _must_hold(location: Sequence[str | int], got: str) -> str:
     """The message for a list of the wrong length, or no list, at a location."""
     field = location[-1] if location else ""
+    if isinstance(field, int) and location[-2:-1] == ("table",):
+        return f"must be a time and a value, got {got}"
     return f"must be {NUMBERS.get(str(field), 'three numbers')}, got {got}"
 
 
@@ -170,11 +178,6 @@ def _path(location: Sequence[str | int]) -> str:
     return text or "scene"
 
 
-def _get(entry: Any, key: str) -> Any:
-    """A field of an entry that may still be a raw table, or already a model."""
-    return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)
-
-
 def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
     value = data.get(key, ())
     return list(value) if isinstance(value, list | tuple) else []
@@ -182,7 +185,7 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
 
 def _text(entry: Any, key: str) -> str:
     """A text of an entry, empty where there is none."""
-    return found if isinstance(found := _get(entry, key), str) else ""
+    return found if isinstance(found := field_of(entry, key), str) else ""
 
 
 def _names(entries: Sequence[Any]) -> list[str]:
@@ -198,7 +201,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
     yield from _duplicates("body", _names(bodies), reserved=RESERVED)
     yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
     for i, body in enumerate(bodies):
-        mass, inertia = _get(body, "mass"), _get(body, "inertia")
+        mass, inertia = field_of(body, "mass"), field_of(body, "inertia")
         if (mass is None) != (inertia is None):
             missing = "inertia" if inertia is None else "mass"
             yield (
@@ -207,23 +210,26 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
             )
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
-        yield from _pair_faults(f"joint[{i}].bodies", _get(joint, "bodies"), known)
+        yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
     types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
     yield from _coupling_faults(data, types)
     yield from _driver_faults(data, types)
     for i, load in enumerate(_entries(data, "load")):
         acts_on = ACTS_ON.get(_text(load, "type"))
         if acts_on == "body":
-            name = _get(load, "body")
+            name = field_of(load, "body")
             if name == GROUND:
                 yield f"load[{i}].body", "the ground cannot be loaded"
             elif isinstance(name, str) and name not in known:
                 yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
         elif acts_on == "bodies":
-            yield from _pair_faults(f"load[{i}].bodies", _get(load, "bodies"), known)
+            yield from _pair_faults(f"load[{i}].bodies", field_of(load, "bodies"), known)
         elif acts_on == "joint":
-            name = _get(load, "joint")
-            yield from _joint_faults(f"load[{i}].joint", name, types, TORSIONAL, "carry a torsion spring")
+            kind = _text(load, "type")
+            yield from _joint_faults(
+                f"load[{i}].joint", field_of(load, "joint"), types, LOADED[kind], f"carry a {kind}"
+            )
+        yield from factor_faults(f"load[{i}].factor", field_of(load, "factor"), data)
 
 
 def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
@@ -233,7 +239,7 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
     for i, coupling in enumerate(couplings):
         if (own := _text(coupling, "name")) and own in types:
             yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
-        names = _get(coupling, "joints")
+        names = field_of(coupling, "joints")
         if not isinstance(names, list | tuple) or len(names) != 2:
             continue  # reported as a field fault
         path = f"coupling[{i}].joints"
@@ -246,7 +252,7 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
 def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Mapping[str, str]) -> Faults:
     """Coupled coordinates that joints of these types have not, or that are one and the same."""
     first, second = (JOINT_TYPES[types[name]].facts for name in names)
-    asked = _get(coupling, "coordinates")
+    asked = field_of(coupling, "coordinates")
     given = isinstance(asked, list | tuple) and len(asked) == 2
     chosen = asked if given else default_coordinates((first, second), names[0] == names[1])
     for name, facts, coordinate in zip(names, (first, second), chosen, strict=True):
@@ -261,15 +267,18 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
     """Drivers of unknown or wrong joints, second ones of a joint, and values that do not begin at 0."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
-        name = _get(driver, "joint")
+        name = field_of(driver, "joint")
         yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
         if isinstance(name, str):
             if name in driven:
                 yield f"driver[{i}].joint", f"{name!r} already has a driver"
             driven.add(name)
-            yield from _unit_faults(f"driver[{i}].sine.amplitude", _get(driver, "sine"), types.get(name))
-        if start := _initial_value(driver):
+            yield from _unit_faults(f"driver[{i}].sine.amplitude", field_of(driver, "sine"), types.get(name))
+        yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
+        if start := initial_value(driver):
             message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
+            if rows_of(driver):
+                message = f"the value at t = 0 must be 0, motion is measured from there; got {start:g}"
             yield f"driver[{i}].polynomial", message
 
 
@@ -277,25 +286,9 @@ def _unit_faults(path: str, sine: Any, joint: Any) -> Faults:
     """The fault of an amplitude whose unit does not suit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
     needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
-    amplitude = _get(sine, "amplitude")
+    amplitude = field_of(sine, "amplitude")
     if needed and dimension_of(amplitude) not in (None, needed):
         yield path, f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {amplitude!r}"
-
-
-def _initial_value(driver: Any) -> float:
-    """value(0) of a driver; 0 where rounding or where its fields are themselves faulty."""
-    polynomial, sine = _get(driver, "polynomial"), _get(driver, "sine")
-    first = polynomial[0] if isinstance(polynomial, list | tuple) and polynomial else 0.0
-    amplitude, phase = _number(_get(sine, "amplitude")), _number(_get(sine, "phase"))
-    start = _number(first) + amplitude * math.sin(phase)
-    return start if abs(start) > 1e-12 else 0.0
-
-
-def _number(value: Any) -> float:
-    """A number of a size that a scene can have, or 0, where a field's own fault is reported."""
-    if dimension := dimension_of(value):
-        value = in_si(value, dimension)
-    return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:

@@ -12,12 +12,16 @@ from mbref.scene import (
     JOINT_TYPES,
     Body,
     Driver,
+    Factor,
     Force,
     Joint,
+    JointForce,
+    JointTorque,
     Load,
     Moment,
     Scene,
     Sine,
+    SlideSpring,
     Spring,
     TorsionSpring,
 )
@@ -51,6 +55,16 @@ LOADS: Mapping[str, Load] = {
         natural_length=0.5,
     ),
     "torsion_spring": TorsionSpring(joint="J", stiffness=4.0, damping=0.1, natural_angle=0.4),
+    "slide_spring": SlideSpring(joint="J", stiffness=60.0, damping=0.8, natural_displacement=-0.1),
+    "joint_torque": JointTorque(joint="J", torque=0.7),
+    "joint_force": JointForce(joint="J", force=-5.0),
+}
+ROWS = ((0.0, 0.0), (0.03, 0.8), (0.08, -0.5), (0.15, 0.4), (0.9, 2.0), (1.6, 1.0))
+FACTORS: Mapping[str, Factor] = {
+    "polynomial": Factor(polynomial=(0.5, -8.0, 60.0)),
+    "sine": Factor(sine=Sine(amplitude=1.5, frequency=20.0, phase=0.3)),
+    "table": Factor(table=ROWS),
+    "switched": Factor(start=0.02, stop=0.11),
 }
 POLYNOMIAL, WAVE = (0.0, 0.8, -0.5), Sine(amplitude=0.2, frequency=6.0)
 DRIVERS = {
@@ -70,7 +84,13 @@ def feature_scenes() -> dict[str, Scene]:
         f"{kind} driver": _probe(f"{kind}_driver", JOINTS[kind], driver=(d,)) for kind, d in DRIVERS.items()
     }
     probes |= {f"{kind} load": _probe(kind, _carrier(load), load=(load,)) for kind, load in LOADS.items()}
+    every = tuple(LOADS[kind] for kind in ("moment", "force", "joint_torque", "joint_force"))
+    for kind, factor in FACTORS.items():
+        loads = tuple(load.model_copy(update={"factor": factor}) for load in every)
+        probes[f"{kind} loads over time"] = _probe(f"{kind}_loads", TURNS, load=loads)
+    follower = Driver(joint="J", table=ROWS, polynomial=(0.0, 0.4))
     return probes | {
+        "driver by a table": _probe("table_driver", PIVOTED, driver=(follower,)),
         "free body": _probe("free_body"),
         "loop": _short("spatial_slider_crank_gravity", 0.1),
         "redundant loop": _short("planar_slider_crank_gravity", 0.1),

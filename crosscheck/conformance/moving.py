@@ -289,7 +289,7 @@ def _load(kind: str) -> Load:
 
 
 def _carrier(load: str) -> Joint:
-    return JOINTS["cylindrical" if load == "torsion_spring" else "spherical"]
+    return JOINTS["cylindrical" if LOADS[load].acts_on == "joint" else "spherical"]
 
 
 def _turn(rng: np.random.Generator) -> tuple[float, ...]:

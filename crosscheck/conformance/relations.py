@@ -3,9 +3,9 @@ unknown."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -25,10 +25,11 @@ from crosscheck.conformance.rewritings import (
 from crosscheck.conformance.trial import Outside
 from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
-from mbref.scene import Driver, Scene
+from mbref.scene import JointLoad, Scene, TimeFunction
 from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
+Function = TypeVar("Function", bound=TimeFunction)
 HEAVIER = 2.5
 # reflects the body frames of a mirrored scene, so that they stay right-handed
 FLIP = np.diag([1.0, -1.0, 1.0])
@@ -108,8 +109,16 @@ class Isometry:
             gravity=self.polar(scene.gravity),
             body=tuple(mapped(body, fields) for body in scene.body),
             joint=tuple(joints),
-            load=tuple(mapped(load, fields) for load in scene.load),
+            load=tuple(self._load(scene, load, fields) for load in scene.load),
         )
+
+    def _load(self, scene: Scene, load: Any, fields: Mapping[str, Mapped]) -> Any:
+        """A load moved as a whole; a mirror turns displacements along the axis of a rotation round."""
+        if not isinstance(load, JointLoad):
+            return mapped(load, fields)
+        is_axial = scene.joint_named(load.joint).facts.driven != load.coordinate
+        turned = times(float(np.sign(np.linalg.det(self.matrix))) if is_axial else 1.0)
+        return mapped(load, dict.fromkeys(("force", "natural_displacement"), turned))
 
     def expect(self, motion: Trajectory) -> Trajectory:
         """Return the motion moved as a whole, including accelerations and reactions."""
@@ -148,7 +157,9 @@ def scaled(scene: Scene, factor: float) -> Scene:
     """Return the scene with masses, inertias, forces, stiffnesses and dampings times a factor; its motion is
     unchanged."""
 
-    fields = dict.fromkeys(("mass", "inertia", "force", "moment", "stiffness", "damping"), times(factor))
+    fields = dict.fromkeys(
+        ("mass", "inertia", "force", "moment", "torque", "stiffness", "damping"), times(factor)
+    )
     return scene.with_(
         body=tuple(mapped(body, fields) for body in scene.body),
         load=tuple(mapped(load, fields) for load in scene.load),
@@ -180,7 +191,8 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
     speed, push = length / time, length / time**2
 
     places = dict.fromkeys(
-        ("position", "anchor", "anchors", "point", "points", "natural_length"), times(length)
+        ("position", "anchor", "anchors", "point", "points", "natural_length", "natural_displacement"),
+        times(length),
     )
     bodies = {
         **places,
@@ -188,7 +200,8 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
         "angular_velocity": times(1 / time),
         "inertia": times(length**2),
     }
-    loads = {**places, "force": times(push), "moment": times(length * push)}
+    moments = dict.fromkeys(("moment", "torque"), times(length * push))
+    loads = {**places, **moments, "force": times(push), "factor": lambda factor: _slower(factor, 1.0, time)}
     linear = {"stiffness": times(1 / time**2), "damping": times(1 / time)}
     turning = {"stiffness": times(length * push), "damping": times(length * speed)}
     slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
@@ -198,16 +211,24 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
         body=tuple(mapped(body, bodies) for body in scene.body),
         joint=tuple(mapped(joint, places) for joint in scene.joint),
         driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
-        load=tuple(mapped(x, {**loads, **(linear if x.type == "spring" else turning)}) for x in scene.load),
+        load=tuple(
+            mapped(x, {**loads, **(turning if x.type == "torsion_spring" else linear)}) for x in scene.load
+        ),
     )
 
 
-def _slower(driver: Driver, amount: float, time: float) -> Driver:
-    polynomial = tuple(amount * c / time**k for k, c in enumerate(driver.polynomial))
-    wave = driver.sine and replaced(
-        driver.sine, amplitude=amount * driver.sine.amplitude, frequency=driver.sine.frequency / time
-    )
-    return replaced(driver, polynomial=polynomial, sine=wave)
+def _slower(function: Function, amount: float, time: float) -> Function:
+    """A function of time with its values and its times multiplied."""
+    fields = {
+        "polynomial": lambda c: tuple(amount * x / time**k for k, x in enumerate(c)),
+        "sine": lambda sine: replaced(
+            sine, amplitude=amount * sine.amplitude, frequency=sine.frequency / time
+        ),
+        "table": lambda rows: tuple((time * t, amount * x) for t, x in rows),
+        "start": times(time),
+        "stop": times(time),
+    }
+    return mapped(function, fields)
 
 
 def _other_units(about: str, length: float, time: float) -> Relation:

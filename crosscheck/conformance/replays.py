@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.changes import replaced
+from crosscheck.conformance.changes import mapped, replaced
 from crosscheck.conformance.trial import Outside
 from crosscheck.judge.constraints import joint_coordinates
-from crosscheck.judge.joint_residuals import driver_value
+from crosscheck.judge.joint_coordinates import COORDINATES
+from crosscheck.judge.time_functions import value
 from mbref import rotations
-from mbref.scene import GROUND, Driver, Joint, Load, Moment, Scene
+from mbref.scene import GROUND, Driver, Factor, Joint, Load, Moment, Scene
 from mbref.trajectory import Trajectory
 
 CONSTANT = 1e-6  # relative variation below which a driver's moment counts as constant
@@ -39,10 +40,10 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
     ]
     loads: list[Load] = []
     for load in scene.load:
-        if load.type == "torsion_spring":
-            loads.append(
-                replaced(load, natural_angle=load.natural_angle - float(angles[load.joint][sample, 0]))
-            )
+        if load.type in ("torsion_spring", "slide_spring"):
+            column, field = COORDINATES.index(load.coordinate), f"natural_{load.coordinate}"
+            moved = float(angles[load.joint][sample, column])
+            loads.append(replaced(load, **{field: load.action.natural - moved}))
         elif load.type == "spring":
             points = [carry.point(*end) for end in zip(load.bodies, load.points, strict=True)]
             loads.append(replaced(load, points=[point.tolist() for point in points]))
@@ -50,6 +51,7 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
             loads.append(replaced(load, point=carry.point(load.body, load.point)))
         else:
             loads.append(load)
+    loads = [replaced(load, factor=_shifted(load.over_time, t)) if load.over_time else load for load in loads]
     return scene.with_(
         body=tuple(bodies),
         joint=tuple(map(carry.joint, scene.joint)),
@@ -98,10 +100,23 @@ class _Carry:
 
 def _later(driver: Driver, t: float) -> Driver:
     """Return the driver as a function of the time since t, measured from its value at t."""
-    moved = np.polynomial.Polynomial(driver.polynomial)(np.polynomial.Polynomial([t, 1.0])).coef
-    wave = driver.sine and replaced(driver.sine, phase=driver.sine.phase + driver.sine.frequency * t)
-    moved[0] -= float(driver_value(driver, t))
-    return replaced(driver, polynomial=moved, sine=wave)
+    later = _shifted(driver, t)
+    first, *others = later.polynomial
+    return replaced(later, polynomial=(first - float(value(driver, t)), *others))
+
+
+def _shifted(function: Any, t: float) -> Any:
+    """Return a function of the time since t."""
+    if function.interval[1] <= t:
+        return Factor(polynomial=(0.0,))
+    fields = {
+        "polynomial": lambda c: np.polynomial.Polynomial(c)(np.polynomial.Polynomial([t, 1.0])).coef,
+        "sine": lambda sine: replaced(sine, phase=sine.phase + sine.frequency * t),
+        "table": lambda rows: tuple((time - t, x) for time, x in rows),
+        "start": lambda start: max(start - t, 0.0),
+        "stop": lambda stop: stop - t,
+    }
+    return mapped(function, fields)
 
 
 def _half_way(scene: Scene, motion: Trajectory) -> Scene:
@@ -116,8 +131,8 @@ def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
 
 
 def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
-    if scene.driver or any(getattr(load, "damping", 0.0) for load in scene.load):
-        return Outside("a driver or a damper acts, so the motion is not reversible")
+    if scene.driver or any(load.is_damped or load.over_time for load in scene.load):
+        return Outside("a driver, a damper or a load over time acts, so the motion is not reversible")
     return started(scene, motion, len(motion.times) - 1, -1.0)
 
 

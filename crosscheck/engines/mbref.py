@@ -11,7 +11,8 @@ import numpy as np
 
 from crosscheck.engine import BRANCHES, Cannot, Engine, FamilyParts, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
-from mbref.scene import Scene
+from crosscheck.refusals import FACTOR, TABLE
+from mbref.scene import LOAD_TYPES, Scene
 from mbref.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -49,7 +50,6 @@ OPTIONS = {
     "rtol": "relative tolerance of a step",
     BRANCHES: "pairs of a singular position and the branch to take there, from 1: [[2, 2]]",
 }
-LOADS = ("moment", "force", "spring", "torsion_spring")
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
@@ -66,7 +66,14 @@ class Mbref(Engine):
         from mbref.equations.joints import JOINTS
 
         both = ("angle", "displacement")
-        return Supports(tuple(JOINTS), drivers=both, loads=LOADS, couplings=both, armatures=both)
+        return Supports(
+            tuple(JOINTS),
+            drivers=both,
+            loads=tuple(LOAD_TYPES),
+            couplings=both,
+            armatures=both,
+            over_time=(TABLE, FACTOR),
+        )
 
     def version(self) -> str:
         from mbref import __version__

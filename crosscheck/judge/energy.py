@@ -17,16 +17,16 @@ from crosscheck.judge.joint_coordinates import COORDINATES, counted
 from crosscheck.judge.loads import attachment, world_inertia
 from crosscheck.judge.tolerances import AT_REST, PARALLEL
 from mbref import rotations
-from mbref.scene import GROUND, Force, Joint, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import GROUND, Force, Joint, JointLoad, Moment, Scene, Spring
 from mbref.trajectory import Trajectory
 
 
 def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return the drift (k,) of energy minus work since t = 0, divided by the largest energy of the motion.
 
-    None if a driver or a damper does work, if the scene has no masses, if the samples are too far apart to
-    count a body's turns, or if all energies are at rounding level. The drift is infinite if a state is not
-    finite.
+    None if a driver, a damper or a load over time does work, if the scene has no masses, if the samples are
+    too far apart to count a body's turns, or if all energies are at rounding level. The drift is infinite if
+    a state is not finite.
     """
     balance = _balance(scene, trajectory)
     if balance is None:
@@ -47,8 +47,8 @@ def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
 def _balance(scene: Scene, trajectory: Trajectory) -> tuple[np.ndarray, float] | None:
     """Return the drift (k,) in J, and the largest energy of the motion (J); None if there is no energy
     balance."""
-    damped = any(load.is_damped for load in scene.load)
-    if scene.driver or damped or not scene.has_mass() or not len(trajectory.times):
+    works = any(load.is_damped or load.over_time for load in scene.load)
+    if scene.driver or works or not scene.has_mass() or not len(trajectory.times):
         return None
     if not all(np.isfinite(array).all() for array in _motion(trajectory)):
         return np.full(len(trajectory.times), np.inf), float(np.finfo(float).max)
@@ -124,9 +124,10 @@ def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarra
         if isinstance(load, Force):
             moved = _point(scene, load.body, load.point, position, orientation) - np.array(load.point)
             yield -moved @ np.array(load.force)
-        elif isinstance(load, TorsionSpring):
-            twist = angles[load.joint][:, 0] - load.natural_angle
-            yield load.stiffness * (twist**2 - load.natural_angle**2) / 2
+        elif isinstance(load, JointLoad):
+            moved, action = angles[load.joint][:, COORDINATES.index(load.coordinate)], load.action
+            stretch = (moved - action.natural) ** 2 - action.natural**2
+            yield action.stiffness * stretch / 2 - action.amount * moved
         elif isinstance(load, Moment):
             yield -_work_of_moment(scene, load, trajectory)
 

@@ -8,7 +8,6 @@ the rank at the start, because rows that are redundant there stay redundant.
 from __future__ import annotations
 
 import functools
-from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -22,16 +21,18 @@ from crosscheck.judge.constraints import (
 from crosscheck.judge.energy import kinetic_energy
 from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
 from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.time_functions import next_end
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.rotations import cross
-from mbref.scene import Scene, TorsionSpring
+from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 NAME = "Gauss's principle"
 RTOL = 1e-10
-NO_AXIS = np.zeros(3)  # torsion springs are added later, about their joints' axes in the world
+NO_AXIS = np.zeros(3)  # loads of joints are added here, along their joints' coordinates
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
@@ -44,32 +45,56 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
     velocity, spin = initial_twists(scene)
     position = np.array([body.position for body in scene.body])
     orientation = np.array([body.orientation for body in scene.body])
-    parts = (position, orientation, velocity, spin, np.zeros(len(_springs(scene))))
+    parts = (position, orientation, velocity, spin, np.zeros(len(turning_loads(scene))))
     start = np.concatenate([np.ravel(part) for part in parts])
     rank = rank_at_start(scene)
     if times[-1] == 0:
         return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0), rank)
-    done = solve_ivp(
-        _rates, (0.0, times[-1]), start, "DOP853", np.array(times), rtol=rtol, atol=rtol, args=(scene, rank)
-    )
-    if not done.success:
-        raise RuntimeError(f"{scene.name}: {done.message}")
-    return _trajectory(scene, done.t, done.y.T, rank)
+    return _trajectory(scene, np.array(times), _samples(scene, np.array(times), start, rtol, rank), rank)
 
 
-def accelerations(scene: Scene, t: float, state: State, rank: int | None = None) -> np.ndarray:
+def _samples(scene: Scene, times: np.ndarray, y: np.ndarray, rtol: float, rank: int) -> np.ndarray:
+    """Return states (k, n) at times (k,), integrated from one end of a function's piece to the next.
+
+    Raises RuntimeError where the integration ends before.
+    """
+    t, found = 0.0, [y for _ in times[times == 0.0]]
+    while t < times[-1]:
+        end = min(next_end(scene, t), float(times[-1]))
+        asked = times[(times > t) & (times <= end)]
+        done = solve_ivp(
+            _rates,
+            (t, end),
+            y,
+            "DOP853",
+            np.union1d(asked, [end]),
+            rtol=rtol,
+            atol=rtol,
+            args=(scene, rank, t),
+        )
+        if not done.success:
+            raise RuntimeError(f"{scene.name}: {done.message}")
+        found += [*done.y.T[: len(asked)]]
+        t, y = end, done.y[:, -1]
+    return np.array(found)
+
+
+def accelerations(
+    scene: Scene, t: float, state: State, rank: int | None = None, since: float | None = None
+) -> np.ndarray:
     """Return accelerations and angular accelerations (nb, 6), world, at a state.
 
-    The state is position (nb, 3), unit orientation (nb, 4), velocity, spin (nb, 3), and angles of the torsion
-    springs. Among all accelerations that joints and drivers allow, the result is the nearest to the
-    unconstrained ones in the mass metric. ``rank`` is the rank of the rows if it is known.
+    The state is position (nb, 3), unit orientation (nb, 4), velocity, spin (nb, 3), and angles of the loads
+    about joints' axes. Among all accelerations that joints and drivers allow, the result is the nearest to
+    the unconstrained ones in the mass metric. ``rank`` is the rank of the rows if it is known; functions of
+    time are of the piece that acts from ``since`` (s) on.
     """
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
-    force = applied(scene, state)
+    force = applied(scene, t, state, since)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
     if any(joint.reflected_inertia for joint in scene.joint):
-        return _with_armatures(scene, t, state, rank)
+        return _with_armatures(scene, t, state, force, rank)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
     roots[:, :3, :3] = np.sqrt([body.mass or 0.0 for body in scene.body])[:, None, None] * np.eye(3)
     roots[:, 3:, 3:] = np.swapaxes(np.linalg.cholesky(inertia), 1, 2)
@@ -85,7 +110,7 @@ def accelerations(scene: Scene, t: float, state: State, rank: int | None = None)
     return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
 
 
-def _with_armatures(scene: Scene, t: float, state: State, rank: int | None) -> np.ndarray:
+def _with_armatures(scene: Scene, t: float, state: State, force: np.ndarray, rank: int | None) -> np.ndarray:
     """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix."""
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
@@ -96,7 +121,7 @@ def _with_armatures(scene: Scene, t: float, state: State, rank: int | None) -> n
         mass[at[0], at[0]] += (body.mass or 0.0) * np.eye(3)
         mass[at[1], at[1]] += turn[b] @ inertia_matrices(scene)[b] @ turn[b].T
     inverse = np.linalg.inv(np.linalg.cholesky(mass).T)
-    unbound = inverse.T @ (applied(scene, state).ravel() + armatures.force)
+    unbound = inverse.T @ (force.ravel() + armatures.force)
     rows, _ = jacobian(scene, t, position, orientation)
     still = np.zeros_like(position)
     bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
@@ -116,23 +141,24 @@ def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarr
     return vt[:r].T @ (u[:, :r].T @ wanted / s[:r])
 
 
-def applied(scene: Scene, state: State) -> np.ndarray:
+def applied(scene: Scene, t: float, state: State, since: float | None = None) -> np.ndarray:
     """Return forces and moments about the centres of mass (nb, 6), world: gravity, loads, gyroscopic
     moments."""
     position, orientation, velocity, spin, angles = state
     turn = rotations.to_matrix(orientation)
     still = np.zeros((1, len(position)))
     motion = Motion(position[None], turn[None], velocity[None], spin[None], still)
-    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
+    force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS, t, since))
+    of_joints = joint_wrenches(scene, t, (position, orientation), (velocity, spin), angles, since)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
     gyroscopic = cross(spin, np.einsum("bij,bj->bi", inertia, spin))
-    return np.hstack([force, moment - gyroscopic + _torsion(scene, orientation, spin, angles)])
+    return np.hstack([force, moment - gyroscopic]) + of_joints
 
 
-def power(scene: Scene, state: State) -> float:
-    """Return the power (W) of gravity and loads at a state."""
+def power(scene: Scene, t: float, state: State) -> float:
+    """Return the power (W) of gravity and loads at a state at time t (s)."""
     twist = np.hstack([state[2], state[3]])
-    return float(np.sum(applied(scene, state) * twist))  # gyroscopic moments have no power
+    return float(np.sum(applied(scene, t, state) * twist))  # gyroscopic moments have none
 
 
 def kinetic(scene: Scene, state: State) -> float:
@@ -140,47 +166,19 @@ def kinetic(scene: Scene, state: State) -> float:
     return float(kinetic_energy(scene, *(part[None] for part in state[:4]))[0])
 
 
-def _springs(scene: Scene) -> list[TorsionSpring]:
-    return [load for load in scene.load if isinstance(load, TorsionSpring)]
-
-
-def _axes(scene: Scene, orientation: np.ndarray) -> np.ndarray:
-    """Return the world axes (springs, 3) of the torsion springs' joints, which the first bodies carry."""
-    found = np.zeros((len(_springs(scene)), 3))
-    for k, load in enumerate(_springs(scene)):
-        joint: Any = next(j for j in scene.joint if j.name == load.joint)
-        first = scene.body_index(joint.bodies[0])
-        axis = np.array(joint.axis) / np.linalg.norm(joint.axis)
-        start = np.array(scene.body[first].orientation)
-        turned = rotations.multiply(orientation[first], rotations.conjugate(start))
-        found[k] = axis if first < 0 else rotations.rotate(turned, axis)
-    return found
-
-
 def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """Return the rates (springs,) of the torsion springs' angles."""
-    spins = np.vstack([spin, np.zeros(3)])
-    pairs = [next(j.bodies for j in scene.joint if j.name == load.joint) for load in _springs(scene)]
-    parting = [spins[scene.body_index(b)] - spins[scene.body_index(a)] for a, b in pairs]
-    return np.array([axis @ w for axis, w in zip(_axes(scene, orientation), parting, strict=True)])
-
-
-def _torsion(scene: Scene, orientation: np.ndarray, spin: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Return the moments (nb, 3), world, of the torsion springs."""
-    moment = np.zeros((len(scene.body) + 1, 3))  # the last entry is the ground's
-    found = zip(
-        _springs(scene),
-        _axes(scene, orientation),
-        _rates_about(scene, orientation, spin),
-        angles,
-        strict=True,
-    )
-    for load, axis, rate, angle in found:
-        joint = next(j for j in scene.joint if j.name == load.joint)
-        resistance = (load.stiffness * (angle - load.natural_angle) + load.damping * rate) * axis
-        moment[scene.body_index(joint.bodies[1])] -= resistance
-        moment[scene.body_index(joint.bodies[0])] += resistance
-    return moment[:-1]
+    """Return the rates (l,) of the angles of loads about joints' axes, which the first bodies carry."""
+    found = []
+    for load in turning_loads(scene):
+        joint = scene.joint_named(load.joint)
+        first, second = (scene.body_index(name) for name in joint.bodies)
+        axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+        if first >= 0:
+            start = rotations.conjugate(np.array(scene.body[first].orientation))
+            axis = rotations.rotate(rotations.multiply(orientation[first], start), axis)
+        spins = np.vstack([spin, np.zeros(3)])
+        found.append(axis @ (spins[second] - spins[first]))
+    return np.array(found)
 
 
 def _state(scene: Scene, y: np.ndarray) -> State:
@@ -192,10 +190,10 @@ def _state(scene: Scene, y: np.ndarray) -> State:
     return position, unit, velocity, spin, rest[10 * n :]
 
 
-def _rates(t: float, y: np.ndarray, scene: Scene, rank: int) -> np.ndarray:
+def _rates(t: float, y: np.ndarray, scene: Scene, rank: int, since: float) -> np.ndarray:
     state = _state(scene, y)
     _, orientation, velocity, spin, _ = state
-    second = accelerations(scene, t, state, rank)
+    second = accelerations(scene, t, state, rank, since)
     pure = np.concatenate([np.zeros((len(spin), 1)), spin], axis=1)
     n = len(spin)
     turning = rotations.multiply(pure, y[3 * n : 7 * n].reshape(n, 4)) / 2

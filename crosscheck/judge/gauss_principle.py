@@ -14,15 +14,16 @@ from crosscheck.judge.constraints import (
     scene_length,
 )
 from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.joint_loads import joint_wrenches
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
-from mbref.scene import Scene, TorsionSpring
+from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 # relative residual of the accelerations; a larger one means that the mobility is infinitesimal only
 CONTINUES = 1e-8
-NO_AXIS = np.zeros(3)  # there is no common axis of turning: torsion springs are added here
+NO_AXIS = np.zeros(3)  # no shared axis of turning: loads of joints are added here
 
 
 def gauss(scene: Scene) -> np.ndarray:
@@ -66,29 +67,16 @@ def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     force, moment = (w[0] for w in wrenches(scene, motion, NO_AXIS))
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
     momentum = np.einsum("bij,bj->bi", inertia, angular_velocity)
-    moment = moment + _torsion(scene, angular_velocity) - np.cross(angular_velocity, momentum)
+    moment = moment - np.cross(angular_velocity, momentum)
     mass = np.zeros((6 * len(position), 6 * len(position)))
     for b, body in enumerate(scene.body):
         mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)
         mass[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = inertia[b]
     armatures = reflected(scene, position, orientation, velocity, angular_velocity)
-    return mass + armatures.mass, np.hstack([force, moment]).ravel() + armatures.force
-
-
-def _torsion(scene: Scene, angular_velocity: np.ndarray) -> np.ndarray:
-    """Return the moments (nb, 3), world, of the torsion springs at t = 0, when their angles are zero."""
-    moment = np.zeros((len(scene.body) + 1, 3))  # the last entry is the ground's
-    turning = np.vstack([angular_velocity, np.zeros(3)])
-    for load in scene.load:
-        if isinstance(load, TorsionSpring):
-            joint = scene.joint_named(load.joint)
-            axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
-            first, second = (scene.body_index(name) for name in joint.bodies)
-            rate = (turning[second] - turning[first]) @ axis
-            resistance = (load.damping * rate - load.stiffness * load.natural_angle) * axis
-            moment[second] -= resistance
-            moment[first] += resistance
-    return moment[:-1]
+    pose, twist, angles = (position, orientation), (velocity, angular_velocity), np.zeros(len(scene.load))
+    of_joints = joint_wrenches(scene, 0.0, pose, twist, angles)
+    total = np.hstack([force, moment]) + of_joints
+    return mass + armatures.mass, total.ravel() + armatures.force
 
 
 def singular_values(scene: Scene) -> np.ndarray:

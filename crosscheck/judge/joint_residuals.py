@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.judge import time_functions
 from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import GROUND, Driver, Joint, JointFacts, Scene
@@ -87,18 +88,6 @@ def _frame(axis: Sequence[float]) -> np.ndarray:
     return rotations.from_matrix(np.column_stack([x, cross(z, x), z]))
 
 
-def driver_value(driver: Driver, t: np.ndarray | float, derivative: int = 0) -> np.ndarray:
-    """Return the value of a driver, or its first or second time derivative, at times t (…)."""
-    t = np.asarray(t, dtype=float)
-    polynomial = np.polynomial.Polynomial(driver.polynomial)
-    total = np.asarray((polynomial.deriv(derivative) if derivative else polynomial)(t)) + np.zeros_like(t)
-    if driver.sine is None:
-        return total
-    w = driver.sine.frequency
-    angle = w * t + driver.sine.phase + derivative * np.pi / 2
-    return total + driver.sine.amplitude * w**derivative * np.sin(angle)
-
-
 def are_lengths(joint: JointFrames) -> np.ndarray:
     """Return the mask (rows,) of a joint's residuals: True for lengths (m), False for angles (rad)."""
     facts = joint.facts
@@ -124,7 +113,7 @@ def position_rows(
     elif joint.facts.forbidden_rotations:
         rows.append(_tilt(relative) if joint.facts.free_rotations else _rotation_vector(relative))
     if joint.driver:
-        value = driver_value(joint.driver, t)
+        value = time_functions.value(joint.driver, t)
         rows.append((local[..., 2] - value if joint.slides else wrapped(twist(relative) - value))[..., None])
     return np.concatenate(rows, axis=-1)
 
@@ -246,7 +235,7 @@ def _rows(
     rows += crossing
     if joint.driver:
         moved = (linear if joint.slides else angular)[..., 2:]
-        rows.append(moved - driver_value(joint.driver, t, derivative)[..., None])
+        rows.append(moved - time_functions.value(joint.driver, t, derivative)[..., None])
     return np.concatenate(rows, axis=-1)
 
 

@@ -7,10 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from crosscheck.judge.constraints import inertia_matrices, initial_poses
+from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.scene import GROUND, Force, Moment, Scene, Spring, TorsionSpring
 
@@ -31,17 +33,31 @@ class Motion:
     turn: np.ndarray
 
 
-def wrenches(scene: Scene, motion: Motion, axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def wrenches(
+    scene: Scene, motion: Motion, axis: np.ndarray, t: float = 0.0, since: float | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """Return force and moment about the centre of mass (k, nb, 3), world, on every body, gravity included.
 
-    ``axis`` (3,) is the unit vector of the rotation axis of ``motion.turn``.
+    ``axis`` (3,) is the unit vector of the rotation axis of ``motion.turn``; without one, loads along joint
+    coordinates are left out (``joint_loads``).  Functions of time are at ``t`` (s), of the piece that acts
+    from ``since`` (s) on.
     """
     mass = np.array([body.mass for body in scene.body])
     force = motion.position * 0 + mass[:, None] * np.array(scene.gravity)
     moment = np.zeros_like(force)
     for load in scene.load:
-        ACTIONS[type(load)](scene, load, motion, axis, force, moment)
+        if isinstance(load, Moment | Force | Spring) or (isinstance(load, TorsionSpring) and axis.any()):
+            ACTIONS[type(load)](scene, at_time(load, t, since), motion, axis, force, moment)
     return force, moment
+
+
+def at_time(load: Any, t: float, since: float | None = None) -> Any:
+    """The constant force or moment that a load has at a time (s)."""
+    if load.over_time is None:
+        return load
+    factor, field = value(load.over_time, t, since=since), "force" if isinstance(load, Force) else "moment"
+    size = tuple((factor * np.array(getattr(load, field))).tolist())
+    return load.model_copy(update={field: size, "factor": None})
 
 
 def attachment(scene: Scene, name: str, point: Sequence[float]) -> tuple[int, np.ndarray]:

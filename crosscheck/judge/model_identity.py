@@ -17,8 +17,9 @@ import numpy as np
 from crosscheck.judge.constraints import initial_twists, jacobian, joint_coordinates, scene_length
 from crosscheck.judge.energy import kinetic_energy, potential_energy
 from crosscheck.judge.gauss_motion import accelerations
-from crosscheck.judge.joint_residuals import driver_value
+from crosscheck.judge.joint_loads import turning_loads
 from crosscheck.judge.metrics import in_scene_order
+from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import (
     GATE_TIME,
     LEAST_CHANGE,
@@ -29,7 +30,8 @@ from crosscheck.judge.tolerances import (
     SAME_START,
 )
 from mbref import rotations
-from mbref.scene import Force, Load, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Force, Load, Moment, Scene, Spring
+from mbref.scene_joints import ANGLE
 from mbref.trajectory import Trajectory
 
 ALONG = 6  # number of samples at which the accelerations of a run are compared
@@ -90,7 +92,7 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
         return None
     pose = run.times, run.position, run.orientation, run.angular_velocity
     angles = joint_coordinates(scene, *pose)
-    twisted = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
+    twisted = [load.joint for load in turning_loads(scene)]
     chosen = np.unique(np.linspace(0, len(run.times) - 1, ALONG).round().astype(int)).tolist()
     for k in _regular(scene, run, chosen if len(run.times) else []):
         turned = np.array([angles[name][k, 0] for name in twisted])
@@ -116,14 +118,20 @@ def acceleration_scale(scene: Scene) -> float:
     for driver in scene.driver:
         of_length = 1.0 if scene.joint_named(driver.joint).facts.driven == "displacement" else length
         times = np.linspace(0.0, scene.duration, DRIVEN_SAMPLES)
-        rate, change = (of_length * np.abs(driver_value(driver, times, k)).max() for k in (1, 2))
+        rate, change = (of_length * np.abs(value(driver, times, k)).max() for k in (1, 2))
         parts += [float(change), float(rate) ** 2 / length]
     if mass > 0:
-        parts += [_force(scene, load, length, speed) / mass for load in scene.load]
+        parts += [_force(load, length, speed) * _most(scene, load) / mass for load in scene.load]
     return max(parts)
 
 
-def _force(scene: Scene, load: Load, length: float, speed: float) -> float:
+def _most(scene: Scene, load: Load) -> float:
+    """Return the largest size of the function of time that multiplies a load; 1 without."""
+    times = np.linspace(0.0, scene.duration, DRIVEN_SAMPLES)
+    return 1.0 if load.over_time is None else float(np.abs(value(load.over_time, times)).max())
+
+
+def _force(load: Load, length: float, speed: float) -> float:
     """Return the size (N) of a load at the start; moments are divided by the scene's length."""
     if isinstance(load, Force):
         return math.hypot(*load.force)
@@ -132,7 +140,9 @@ def _force(scene: Scene, load: Load, length: float, speed: float) -> float:
     if isinstance(load, Spring):
         stretch = abs(math.dist(*load.points) - load.natural_length)
         return load.stiffness * stretch + load.damping * speed
-    return (load.stiffness * abs(load.natural_angle) + load.damping * speed / length) / length
+    arm, action = length if load.coordinate == ANGLE else 1.0, load.action
+    resistance = action.stiffness * abs(action.natural) + action.damping * speed / arm
+    return (resistance + abs(action.amount)) / arm
 
 
 def _initial_speed(scene: Scene) -> float:

@@ -22,9 +22,12 @@ def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return the drift (k,) since t = 0 of the momentum minus the impulse of gravity and loads, over Σ m |v|.
 
     The drift of the angular momentum, over that times the scene's length plus Σ |J ω|, is returned if it is
-    larger. None if a joint or a spring is fixed to the ground, without masses, or if nothing moves.
+    larger. None if a joint or a spring is fixed to the ground, if a force or moment changes with time,
+    without masses, or if nothing moves.
     """
     if not scene.has_mass() or any(GROUND in item.bodies for item in _links(scene)):
+        return None
+    if any(load.over_time for load in scene.load if load.acts_on == "body"):
         return None
     start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=-1)
     state = (trajectory.position, trajectory.orientation, trajectory.velocity, trajectory.angular_velocity)

@@ -15,8 +15,8 @@ import numpy as np
 
 from crosscheck.judge import constraints
 from crosscheck.judge import published_measures as measures
+from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.published_measures import Measure
-from crosscheck.judge.reference.arithmetic import doubles
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.motion import Motion
 from mbref.scene import Scene

@@ -9,6 +9,7 @@ import numpy as np
 from crosscheck.judge.constraints import jacobian, joint_coordinates, scene_length
 from crosscheck.judge.gauss_motion import applied
 from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.joint_loads import turning_loads
 from crosscheck.judge.joint_reactions import (
     LEAST,
     along_coordinate,
@@ -19,7 +20,7 @@ from crosscheck.judge.joint_reactions import (
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
-from mbref.scene import Scene, TorsionSpring
+from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 ABSURD = 10.0  # multiple of the largest exact force above which a reaction is implausible
@@ -99,7 +100,7 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
         raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
     coordinates = joint_coordinates(scene, *pose)
-    springs = [load.joint for load in scene.load if isinstance(load, TorsionSpring)]
+    springs = [load.joint for load in turning_loads(scene)]
     mass = np.array([body.mass for body in scene.body])[:, None]
     found = []
     for k in range(len(exact.times)):
@@ -107,7 +108,9 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
         state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k], angles
         inertia = world_inertia(scene, rotations.to_matrix(exact.orientation[k]))
         turning = np.einsum("bij,bj->bi", inertia, exact.angular_acceleration[k])
-        found.append(np.hstack([mass * exact.acceleration[k], turning]) - applied(scene, state))
+        found.append(
+            np.hstack([mass * exact.acceleration[k], turning]) - applied(scene, float(exact.times[k]), state)
+        )
     return np.array(found)
 
 

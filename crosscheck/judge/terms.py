@@ -16,6 +16,7 @@ from crosscheck.judge.constraints import (
 )
 from crosscheck.judge.gauss_motion import State, applied
 from crosscheck.judge.gauss_principle import of_least_constraint
+from crosscheck.judge.joint_loads import turning_loads
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -64,7 +65,7 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
         for name, found in closure_accelerations(scene, t, position, orientation, *[still] * 4).items()
         for _ in found
     )
-    return Terms(_mass(scene, orientation), _forces(scene, state), rows, names, driven - moved, -driven)
+    return Terms(_mass(scene, orientation), _forces(scene, t, state), rows, names, driven - moved, -driven)
 
 
 def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
@@ -103,11 +104,11 @@ CHANGES = {"{} left out": 0.0, "{} of opposite sign": -1.0, "{} counted twice": 
 
 
 def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
-    """Return the state at a sample, with the angles of the torsion springs."""
+    """Return the state at a sample, with the angles of loads about joints' axes."""
     place = motion.position[sample], motion.orientation[sample]
     whole = motion.times, motion.position, motion.orientation, motion.angular_velocity
     coordinates = joint_coordinates(scene, *whole)
-    angles = [coordinates[load.joint][sample, 0] for load in scene.load if load.type == "torsion_spring"]
+    angles = [coordinates[load.joint][sample, 0] for load in turning_loads(scene)]
     return *place, motion.velocity[sample], motion.angular_velocity[sample], np.array(angles)
 
 
@@ -125,21 +126,23 @@ def _residuals(
     return np.concatenate([np.zeros(0), *found.values()])
 
 
-def _forces(scene: Scene, state: State) -> dict[str, np.ndarray]:
+def _forces(scene: Scene, t: float, state: State) -> dict[str, np.ndarray]:
     """Return forces and moments (6 nb,) by name: gravity, gyroscopic moments, each load and each damper."""
     bare = scene.with_(load=[], gravity=(0.0, 0.0, 0.0))
     plain = (*state[:4], np.zeros(0))
-    gyroscopic = applied(bare, plain).ravel()
-    found = {GRAVITY: applied(scene.with_(load=[]), plain).ravel() - gyroscopic, GYRATION: gyroscopic}
+    gyroscopic = applied(bare, t, plain).ravel()
+    found = {GRAVITY: applied(scene.with_(load=[]), t, plain).ravel() - gyroscopic, GYRATION: gyroscopic}
     springs = 0
     for k, load in enumerate(scene.load):
-        angles = state[4][springs : springs + 1] if load.type == "torsion_spring" else np.zeros(0)
-        springs += load.type == "torsion_spring"
+        turns = len(turning_loads(bare.with_(load=[load])))
+        angles = state[4][springs : springs + turns]
+        springs += turns
         own = (*state[:4], angles)
-        name, force = f"load[{k}] ({load.type})", applied(bare.with_(load=[load]), own).ravel() - gyroscopic
+        name = f"load[{k}] ({load.type})"
+        force = applied(bare.with_(load=[load]), t, own).ravel() - gyroscopic
         if load.is_damped:
             undamped = load.model_copy(update={"damping": 0.0})
-            elastic = applied(bare.with_(load=[undamped]), own).ravel() - gyroscopic
+            elastic = applied(bare.with_(load=[undamped]), t, own).ravel() - gyroscopic
             found[f"the damping of {name}"], force = force - elastic, elastic
         found[name] = force
     return found

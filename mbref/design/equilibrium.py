@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -164,10 +165,13 @@ def _refuse(scene: Scene) -> None:
         without = next(body.name for body in scene.body if body.mass is None)
         raise SceneError([f"body[{without}].mass: is missing; an equilibrium needs the mass of every body"])
     for driver in scene.driver:
-        if any(driver.polynomial[1:]) or (driver.sine and driver.sine.amplitude):
+        if not driver.is_constant:
             raise SceneError(
                 [f"driver[{driver.joint}]: moves; an equilibrium needs drivers that stand still"]
             )
+    for k, load in enumerate(scene.load):
+        if load.over_time and not load.over_time.is_constant:
+            raise SceneError([f"load[{k}].factor: varies; an equilibrium needs loads that stay the same"])
     if scene.counts().degrees_of_freedom == 0:
         raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
 
@@ -271,21 +275,19 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
 
 
 def _with_angles(scene: Scene, model: Model, q: np.ndarray) -> Scene:
-    """Return the scene with torsion springs whose natural angles are measured from the pose q."""
+    """Return the scene with springs of joints whose natural angles and displacements are measured from the
+    pose q."""
     zeros = np.zeros((1, model.nb, 6))
     names = tuple(body.name for body in model.scene.body)
     own = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
     motion = Trajectory(scene.name, "mbref", "", "", {}, np.zeros(1), names, **own)
-    loads = [
-        load
-        if load.type != "torsion_spring"
-        else load.model_copy(
-            update={"natural_angle": load.natural_angle - _angle(model.scene, motion, load.joint)}
-        )
-        for load in scene.load
-    ]
-    return scene.with_(load=loads)
+    return scene.with_(load=[_measured_from(load, model.scene, motion) for load in scene.load])
 
 
-def _angle(scene: Scene, motion: Trajectory, joint: str) -> float:
-    return float(np.asarray(joint_motion(scene, motion, joint).angle)[0])
+def _measured_from(load: Any, scene: Scene, motion: Trajectory) -> Any:
+    """Return the load with its natural angle or displacement measured from the first pose of a motion."""
+    if load.type not in ("torsion_spring", "slide_spring"):
+        return load
+    found, field = joint_motion(scene, motion, load.joint), f"natural_{load.coordinate}"
+    moved = found.angle if load.coordinate == "angle" else found.displacement
+    return load.model_copy(update={field: load.action.natural - float(np.asarray(moved)[0])})

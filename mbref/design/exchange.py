@@ -12,7 +12,7 @@ from mbref.design.along_motion import ROUNDING, general_pose
 from mbref.design.placed import placed
 from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
-from mbref.scene import JOINT_TYPES, Joint, Scene
+from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
 
 WEAKER = {  # types that allow the motion of the first and more, those that keep most rows first
     "revolute": ("cylindrical", "universal", "spherical", "inline"),
@@ -168,11 +168,11 @@ def _rank(rows: Iterable[np.ndarray]) -> int:
 
 
 def _bearing(scene: Scene, name: str) -> list[str]:
-    """The types that can bear the driver and the torsion springs of the joint of that name."""
+    """The types that can bear the driver and the loads of the joint of that name."""
     driven = scene.joint_named(name).facts.driven if name in {d.joint for d in scene.driver} else None
-    is_sprung = any(load.type == "torsion_spring" and load.joint == name for load in scene.load)
+    acting = {load.coordinate for load in scene.load if isinstance(load, JointLoad) and load.joint == name}
     facts = {kind: joint.facts for kind, joint in JOINT_TYPES.items()}
-    return [k for k, f in facts.items() if driven in (None, f.driven) and f.takes_torsion_spring >= is_sprung]
+    return [k for k, f in facts.items() if driven in (None, f.driven) and acting <= {*f.loaded}]
 
 
 def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Sequence[str]) -> Choices:

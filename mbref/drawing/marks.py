@@ -170,7 +170,7 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
 
 
 def load_mark(stage: Stage, load: Load) -> str:
-    """The sign of a load: an arrow, a turn, a zigzag between its ends, or a spiral at its joint."""
+    """The sign of a load: an arrow, a turn, a zigzag, or a spiral at its joint."""
     if load.type == "force":
         return svg.follow(
             stage.place(load.body, load.point),
@@ -186,7 +186,22 @@ def load_mark(stage: Stage, load: Load) -> str:
         look = f'stroke="{ACTION}" stroke-width="1.6" fill="none"'
         return svg.line(_zigzag(first, second), look, stage.timeline)
     joint = stage.scene.joint_named(load.joint)
-    return svg.follow(stage.place(joint.bodies[1], joint.anchor_pair[1]), _spiral(), stage.timeline)
+    at, axis = stage.place(joint.bodies[1], joint.anchor_pair[1]), _unit(joint.directions[0])
+    sense = axis * np.copysign(1.0, load.action.amount)
+    signs = {
+        "torsion_spring": _spiral,
+        "slide_spring": lambda: _short_zigzag(stage, axis),
+        "joint_torque": lambda: _turning(stage, sense, 15.0),
+        "joint_force": lambda: _arrow_from_origin(stage, sense),
+    }
+    return svg.follow(at, signs[load.type](), stage.timeline)
+
+
+def _short_zigzag(stage: Stage, axis: np.ndarray) -> str:
+    """A spring along an axis from the origin."""
+    end = ARROW * stage.page.directions(axis)
+    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in _zigzag(np.zeros((1, 2)), end[None], 8)[0])
+    return f'<polyline points="{path}" stroke="{ACTION}" stroke-width="1.6" fill="none"/>'
 
 
 def _unit_or_zero(vector: tuple[float, ...]) -> np.ndarray:

@@ -27,7 +27,7 @@ def active_entries(
     q (7 nb,) and v (6 nb,) are the start.  Entries have the columns of ``layout.System.blocks``.
     The states at which equations are read are added to ``read``.
     """
-    states = random_states(1, STATES, model.n)
+    states, steady = random_states(1, STATES, model.n), _steady(model)
     moving = np.zeros(model.n, dtype=bool)
     entries, start_rows, start_columns = patterns(model, at_start(model, q, v))
     start_columns |= v != 0
@@ -36,11 +36,24 @@ def active_entries(
         if read is not None:
             read.append(sample)
         others, rows, columns = patterns(model, model.at(q, sample))
+        if steady is not None:
+            columns |= patterns(steady, steady.at(q, sample))[2]
         entries |= others
         found, driven = reached(model, entries, rows | start_rows, columns | start_columns)
         if np.array_equal(found, moving):
             return moving, entries & driven[:, None]
         moving = found
+
+
+def _steady(model: Model) -> Model | None:
+    """The model with loads at their full value, which may be switched off at all states that are read; None
+    where no load depends on time."""
+    if not any(load.over_time for load in model.scene.load):
+        return None
+    loads = [
+        load.model_copy(update={"factor": None}) if load.over_time else load for load in model.scene.load
+    ]
+    return Model(model.scene.with_(load=loads))
 
 
 def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:

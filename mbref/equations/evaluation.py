@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from mbref.equations.functions import select_pieces
 from mbref.equations.loads import forces
 from mbref.equations.primitives import constraints
 from mbref.equations.static_multipliers import add_static_multipliers
@@ -73,7 +74,7 @@ def evaluate(t, q, v, equations):
     set_poses(q, equations.frames)
     set_velocities(v, equations.frames)
     constraints(t, equations.scene.moving, equations)
-    forces(equations)
+    forces(t, equations)
 
 
 @entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
@@ -84,6 +85,7 @@ def evaluate_along(times, q, v, blocks, rows, forces, equations):
     """
     count, m = times.shape[0], equations.rows.phi.shape[0]
     for k in range(count):
+        select_pieces(times[k], equations)
         evaluate(times[k], q[k], v[k], equations)
         found = equations.system.blocks.reshape(-1)
         copy(found, blocks[k])

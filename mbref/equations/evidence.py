@@ -80,7 +80,9 @@ class Evidence:
 
     def _agree(self, model: Model, answers: Answers) -> np.ndarray:
         """Return which of s scenes give equal answers; rows and columns may differ if they reach equal
-        ones."""
+        ones.  None does with loads over time, which may be switched off at all states that are read."""
+        if any(load.over_time for load in model.scene.load):
+            return np.zeros(len(answers.decisive), dtype=bool)
         same: np.ndarray = (answers.decisive == self._found.decisive).all(axis=1)
         differ = (answers.acting != self._found.acting).any(axis=(1, 2))
         for k in np.flatnonzero(same & differ):

@@ -1,4 +1,4 @@
-"""Generalised forces g: gravity, gyroscopic terms, moments, forces at points, springs, torsion springs.
+"""Generalised forces g: gravity, gyroscopic terms, moments, forces at points, springs, loads of joints.
 
 g has 6 entries per body: force in the world frame, moment about the centre of mass in the body frame
 (Eq. 4 of the paper); the gyroscopic term is -ω' × J ω'.
@@ -10,9 +10,10 @@ from math import pi
 
 from numpy import arctan2, floor, sqrt
 
+from mbref.equations.functions import function_value
 from mbref.equations.primitives import joint_angle
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import FORCE, MOMENT, SPRING
+from mbref.kernels.scene_layout import ABOUT_AXIS, FORCE, MOMENT, SPRING
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -27,7 +28,7 @@ from mbref.linear_algebra.vectors import (
 
 
 @inlined
-def forces(equations):
+def forces(t, equations):
     """g at the state in ``equations.frames``, into ``equations.system.force``."""
     scene, frames, g = equations.scene, equations.frames, equations.system.force
     mass, inertia, gravity = scene.bodies.mass, scene.bodies.inertia, scene.gravity
@@ -40,14 +41,20 @@ def forces(equations):
     loads = scene.loads
     for k in range(loads.kind.shape[0]):
         kind, body = loads.kind[k], loads.first[k]
+        factor = 1.0
+        if loads.function[k] >= 0:
+            factor = function_value(loads.function[k], t, equations)[0]
+        force = scale(factor, vector(loads.force, k))
         if kind == MOMENT:
-            accumulate(g, 6 * body + 3, to_body(frames.rotation, body, vector(loads.force, k)))
+            accumulate(g, 6 * body + 3, to_body(frames.rotation, body, force))
         elif kind == FORCE:
-            push(body, vector(loads.point_first, k), vector(loads.force, k), frames, g)
+            push(body, vector(loads.point_first, k), force, frames, g)
         elif kind == SPRING:
             spring(k, loads, frames, g)
+        elif kind == ABOUT_AXIS:
+            act_about_axis(k, force[0], loads, frames, equations.angles, g)
         else:
-            torsion_spring(k, loads, frames, equations.angles, g)
+            act_along_axis(k, force[0], loads, frames, g)
 
 
 @kernel
@@ -94,15 +101,17 @@ def relative_angle(k, reference, loads, rotation):
 
 
 @kernel
-def torsion_spring(k, loads, frames, angles, g):
-    """Moment -stiffness (φ - natural angle) - damping φ' on the second body, the opposite on the first."""
+def act_about_axis(k, torque, loads, frames, angles, g):
+    """Moment torque - stiffness (φ - natural angle) - damping φ' on the second body, the opposite on the
+    first."""
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     axis = to_world(rotation, i, vector(loads.axis, k))
     angle = relative_angle(k, angles[loads.angle[k]], loads, rotation)
     w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
     w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
     rate = dot(subtract(w_j, w_i), axis)
-    moment = scale(-(loads.stiffness[k] * (angle - loads.natural[k]) + loads.damping[k] * rate), axis)
+    resistance = loads.stiffness[k] * (angle - loads.natural[k]) + loads.damping[k] * rate
+    moment = scale(torque - resistance, axis)
     if 6 * j < g.shape[0]:
         accumulate(g, 6 * j + 3, to_body(rotation, j, moment))
     if 6 * i < g.shape[0]:
@@ -110,8 +119,25 @@ def torsion_spring(k, loads, frames, angles, g):
 
 
 @kernel
+def act_along_axis(k, force, loads, frames, g):
+    """Force ``force`` - stiffness (x - natural displacement) - damping x' on the second body along the axis a
+    of the first, x = a · d; the opposite at the same place on the first body."""
+    i, j, rotation = loads.first[k], loads.second[k], frames.rotation
+    s_i, s_j = vector(loads.point_first, k), vector(loads.point_second, k)
+    p_i, v_i = point_motion(i, s_i, frames)
+    p_j, v_j = point_motion(j, s_j, frames)
+    axis, d = to_world(rotation, i, vector(loads.axis, k)), subtract(p_j, p_i)
+    turning = cross(to_world(rotation, i, vector(frames.angular_velocity, i)), axis)
+    rate = dot(axis, subtract(v_j, v_i)) + dot(turning, d)
+    resistance = loads.stiffness[k] * (dot(axis, d) - loads.natural[k]) + loads.damping[k] * rate
+    size = force - resistance
+    push(j, s_j, scale(size, axis), frames, g)
+    push(i, add(s_i, to_body(rotation, i, d)), scale(-size, axis), frames, g)
+
+
+@kernel
 def remember_angles(equations):
-    """Keep the angles of torsion springs and couplings at the accepted state, from which they unwrap."""
+    """Keep the angles of loads about axes and of couplings at the accepted state, from which they unwrap."""
     loads, angles, primitives = equations.scene.loads, equations.angles, equations.scene.primitives
     for k in range(loads.angle.shape[0]):
         slot = loads.angle[k]

@@ -107,12 +107,13 @@ class Model:
         evaluations."""
         for mine, theirs in zip(equations.scene.numbers, data.numbers, strict=True):
             mine[...] = theirs
+        equations.piece[:] = data.functions.first[:-1]
         equations.system.mass[:] = self.mass
         equations.system.inverse_root[:] = self._packs.inverse_root[self._place]
 
     @property
     def has_angles(self) -> bool:
-        """Whether a torsion spring or a coupling unwraps its angle."""
+        """Whether a load about a joint's axis or a coupling unwraps its angle."""
         return self.structure.has_angles
 
     def start(self) -> np.ndarray:

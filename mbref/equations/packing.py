@@ -6,6 +6,7 @@ array counts the scenes.  An entry that scenes share, as variants share most, is
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
@@ -14,18 +15,20 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
+from mbref.equations.functions import functions_of, numbers_of, pieces_of
 from mbref.equations.joints import driver_primitive, primitives_of
 from mbref.equations.joints.base import Primitive, frame
 from mbref.equations.parts import FRAME, NONE, all_parts
 from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
 from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
+    ABOUT_AXIS,
+    ALONG_AXIS,
     FORCE,
     MOMENT,
     SPRING,
-    TORSION_SPRING,
     Bodies,
-    Drivers,
+    Functions,
     Loads,
     Primitives,
     SceneData,
@@ -33,20 +36,18 @@ from mbref.kernels.scene_layout import (
 from mbref.scene import (
     GROUND,
     Body,
-    Driver,
     Force,
     Joint,
+    JointLoad,
     Load,
     Moment,
     Scene,
     SceneError,
-    Sine,
     Spring,
-    TorsionSpring,
 )
+from mbref.scene_joints import ANGLE
 
 Numbers = tuple[float, ...]
-AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)  # the fixed frame, as ``_of_body``
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
@@ -94,7 +95,7 @@ class Packs:
             moving=self._all(np.arange(self.structure.kind.size)),
             resting=self._all(np.zeros(0, dtype=np.int64)),
             row_bodies=self._all(self.structure.row_bodies),
-            drivers=self._drivers(),
+            functions=self._functions(),
             loads=loads,
         )
 
@@ -121,7 +122,8 @@ class Packs:
         the first scene's couplings."""
         scene, joints = self.scenes[0], self.joints[0]
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
-        loads = () if self.kinematic else scene.load
+        loads, functions = () if self.kinematic else scene.load, functions_of(scene)
+        factor = itertools.count(len(scene.driver))
         return Places(
             nb=self.nb,
             primitives=tuple(
@@ -130,10 +132,13 @@ class Packs:
                 for p in found
             )
             + tuple(self._of_couplings(coupled)),
-            loads=tuple(self._load_place(k, load) for k, load in enumerate(loads)),
+            loads=tuple(
+                self._load_place(k, load, next(factor) if load.over_time else -1)
+                for k, load in enumerate(loads)
+            ),
             anchored=tuple(body for bodies in ends for body in bodies),
-            drivers=len(scene.driver),
-            terms=max((len(driver.polynomial) for driver in scene.driver), default=1),
+            functions=tuple(len(function.pieces()) for function in functions),
+            terms=max((len(function.coefficients) for function in functions), default=1),
         )
 
     def _of_couplings(self, primitives: Sequence[tuple[Primitive, ...]]) -> Iterator[PrimitivePlace]:
@@ -143,16 +148,17 @@ class Packs:
                 first, second = map(self.index.__getitem__, joint.bodies)
                 yield PrimitivePlace(p.kind, coupling.name, first, second, -1, k + 1, joint.name)
 
-    def _load_place(self, place: int, load: Load) -> LoadPlace:
-        """Kind and bodies of load[place]; SceneError for a type without equations."""
+    def _load_place(self, place: int, load: Load, function: int) -> LoadPlace:
+        """Kind, bodies and function of time of load[place]; SceneError for a type without equations."""
         if isinstance(load, Moment | Force):
-            return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0)
+            return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0, function)
         if isinstance(load, Spring):
-            return LoadPlace(SPRING, *map(self.index.__getitem__, load.bodies))
-        if not isinstance(load, TorsionSpring):
+            return LoadPlace(SPRING, *map(self.index.__getitem__, load.bodies), function)
+        if not isinstance(load, JointLoad):
             raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
         bodies = self.scenes[0].joint_named(load.joint).bodies
-        return LoadPlace(TORSION_SPRING, *map(self.index.__getitem__, bodies))
+        kind = ABOUT_AXIS if load.coordinate == ANGLE else ALONG_AXIS
+        return LoadPlace(kind, *map(self.index.__getitem__, bodies), function)
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """An array that is the same for all scenes."""
@@ -223,14 +229,16 @@ class Packs:
         origins = self._centres[:, self.structure.vector_origin]
         return self.directions(self.structure.vector_body, vectors - origins)
 
-    def _drivers(self) -> Drivers:
-        """All drivers, their polynomials filled up with zeros to the highest degree."""
-        drivers, terms = (
-            [driver for scene in self.scenes for driver in scene.driver],
-            self.structure.places.terms,
-        )
-        numbers = self._rows(_once(partial(_driver, terms=terms), drivers), 3 + terms)
-        return Drivers(numbers[..., 0], numbers[..., 1], numbers[..., 2], numbers[..., 3:])
+    def _functions(self) -> Functions:
+        """All functions of time, their polynomials filled up with zeros to the highest degree."""
+        functions = [function for scene in self.scenes for function in functions_of(scene)]
+        terms, count = self.structure.places.terms, self.structure.places.functions
+        numbers = self._rows(_once(partial(numbers_of, terms=terms), functions), 3 + terms)
+        found = _once(pieces_of, functions)
+        pieces = self._rows((piece for rows in found for piece in rows), 6)
+        first = self._all(np.cumsum([0, *count], dtype=np.int64))
+        waves = (numbers[..., k] for k in range(3))
+        return Functions(first, *waves, numbers[..., 3:], pieces[..., 0], pieces[..., 1], pieces[..., 2:])
 
     def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """World vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""
@@ -305,12 +313,6 @@ def _numbers(p: Primitive) -> Numbers:
     return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
 
 
-def _driver(driver: Driver, terms: int) -> tuple[float, ...]:
-    """Amplitude, frequency, phase and polynomial."""
-    sine, open_ = driver.sine or AT_REST, terms - len(driver.polynomial)
-    return sine.amplitude, sine.frequency, sine.phase, *driver.polynomial, *(0.0,) * open_
-
-
 def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
     """Seven world vectors at t = 0 (force, two points, axis, x and y on the first body, x on the second),
     stiffness, damping, natural length or angle; zero for those that a load has not."""
@@ -321,5 +323,7 @@ def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
     if isinstance(load, Spring):
         first, second = load.points
         return *NONE, *first, *second, *NONE * 4, load.stiffness, load.damping, load.natural_length
-    x, y, z = frame(scene.joint_named(load.joint).directions[0])
-    return *NONE * 3, *z, *x, *y, *x, load.stiffness, load.damping, load.natural_angle
+    joint, action = scene.joint_named(load.joint), load.action
+    x, y, z = frame(joint.directions[0])
+    numbers = action.stiffness, action.damping, action.natural
+    return action.amount, 0.0, 0.0, *_anchors(joint), *z, *x, *y, *x, *numbers

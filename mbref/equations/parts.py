@@ -6,7 +6,7 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 from mbref.equations.couplings import Coupled, rotors_of
-from mbref.scene import GROUND, Body, Fixed, Joint, Scene
+from mbref.scene import GROUND, Body, Fixed, Joint, Scene, TimeFunction
 
 FRAME = "the fixed frame"  # holds a modelled ground and the rotors of armatures
 NONE = (0.0, 0.0, 0.0)
@@ -19,9 +19,17 @@ def shape_of(scene: Scene) -> Hashable:
         tuple((body.name, _shape_of_inertia(body)) for body in scene.body),
         tuple((j.name, j.type, j.bodies, j.reflected_inertia > 0.0) for j in scene.joint),
         tuple((coupling.name, coupling.joints, coupling.coordinates) for coupling in scene.coupling),
-        tuple((driver.joint, len(driver.polynomial)) for driver in scene.driver),
-        tuple((load.type, getattr(load, load.acts_on)) for load in scene.load),
+        tuple((driver.joint, *_shape_of_function(driver)) for driver in scene.driver),
+        tuple(
+            (load.type, getattr(load, load.acts_on), *_shape_of_function(load.over_time))
+            for load in scene.load
+        ),
     )
+
+
+def _shape_of_function(function: TimeFunction | None) -> tuple[int, ...]:
+    """Numbers of coefficients and of pieces; none without a function."""
+    return (len(function.coefficients), len(function.pieces())) if function else ()
 
 
 def _shape_of_inertia(body: Body) -> bool | None:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from numpy import arctan2, cos, floor, pi, sin
 
+from mbref.equations.functions import function_value
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT
 from mbref.linear_algebra.vectors import (
@@ -40,22 +41,6 @@ from mbref.linear_algebra.vectors import (
 )
 
 NOTHING = (0.0, 0.0, 0.0)
-
-
-@kernel
-def driver_value(drivers, d, t):
-    """Value, rate and acceleration at time t of driver d: polynomial plus sine."""
-    amplitude, frequency, polynomial = drivers.amplitude[d], drivers.frequency[d], drivers.polynomial
-    value, rate, acceleration = 0.0, 0.0, 0.0
-    for k in range(polynomial.shape[1] - 1, -1, -1):  # Horner, with both derivatives
-        acceleration = acceleration * t + 2.0 * rate
-        rate = rate * t + value
-        value = value * t + polynomial[d, k]
-    argument = frequency * t + drivers.phase[d]
-    value += amplitude * sin(argument)
-    rate += amplitude * frequency * cos(argument)
-    acceleration -= amplitude * frequency * frequency * sin(argument)
-    return value, rate, acceleration
 
 
 @kernel
@@ -102,13 +87,14 @@ def put_translations(row, blocks):
 
 
 @kernel
-def turned_direction(p, t, scene):
+def turned_direction(p, t, equations):
     """The direction on the first body, turned by its driver where there is one; its rate and second rate."""
-    x, d = vector(scene.primitives.direction_first, p), scene.primitives.driver[p]
+    primitives = equations.scene.primitives
+    x, d = vector(primitives.direction_first, p), primitives.driver[p]
     if d < 0:
         return x, NOTHING, NOTHING
-    y = vector(scene.primitives.turning_first, p)
-    value, rate, acceleration = driver_value(scene.drivers, d, t)
+    y = vector(primitives.turning_first, p)
+    value, rate, acceleration = function_value(d, t, equations)
     along = add(scale(cos(value), x), scale(sin(value), y))
     direction = subtract(scale(cos(value), y), scale(sin(value), x))
     second = subtract(scale(-acceleration, along), scale(rate * rate, direction))
@@ -121,7 +107,7 @@ def dot1(p, t, equations):
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
-    a, a_rate, a_second = turned_direction(p, t, equations.scene)
+    a, a_rate, a_second = turned_direction(p, t, equations)
     b = vector(primitives.direction_second, p)
     w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
     a_world, b_world = to_world(rotation, i, a), to_world(rotation, j, b)
@@ -174,7 +160,7 @@ def dot2(p, t, equations):
     rows.nu[row] = 0.0
     rows.gamma[row] = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
     if primitives.driver[p] >= 0:
-        value, rate, acceleration = driver_value(equations.scene.drivers, primitives.driver[p], t)
+        value, rate, acceleration = function_value(primitives.driver[p], t, equations)
         rows.phi[row] -= value
         rows.nu[row] = rate
         rows.gamma[row] += acceleration

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.joints.base import ROWS_OF
-from mbref.kernels.scene_layout import ANGLE, FORCE, SPRING, TORSION_SPRING
+from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, ANGLE, FORCE, SPRING
 
 MOST_KEPT = 256  # structures
 
@@ -35,20 +35,21 @@ class LoadPlace(NamedTuple):
     kind: int
     first: int  # body
     second: int  # 0 without
+    function: int  # of time, -1 without
 
 
 class Places(NamedTuple):
-    """Kinds and bodies of all primitives, loads and drivers, without numbers; body nb is the fixed frame.
+    """Kinds and bodies of all primitives and loads, without numbers; body nb is the fixed frame.
 
-    ``anchored`` are the bodies of the joints' anchors, ``terms`` is the length of the longest driver
-    polynomial.
+    ``anchored`` are the bodies of the joints' anchors, ``functions`` the numbers of pieces of the functions
+    of time, ``terms`` is the length of the longest polynomial among them.
     """
 
     nb: int
     primitives: tuple[PrimitivePlace, ...]
     loads: tuple[LoadPlace, ...]
     anchored: tuple[int, ...]
-    drivers: int
+    functions: tuple[int, ...]
     terms: int
 
 
@@ -71,8 +72,8 @@ class Structure:
     row_bodies: np.ndarray  # (m, sides), filled up with the fixed frame
     entry_columns: np.ndarray  # (m, width)
     row_joint: tuple[str, ...]  # (m,) names
-    load: np.ndarray  # (3, l): kind, first and second body
-    angle: np.ndarray  # (l,) index of the unwrapped angle of a torsion spring, else -1
+    load: np.ndarray  # (4, l): kind, first and second body, function of time
+    angle: np.ndarray  # (l,) index of the unwrapped angle of a load about a joint's axis, else -1
     anchored: np.ndarray  # (e,) bodies of the joints' anchors
     vector_body: np.ndarray  # (5 p + 6 l,) in whose frame each vector is fixed
     vector_origin: np.ndarray  # (5 p + 6 l,) from whose centre of mass; directions have the fixed frame
@@ -88,6 +89,7 @@ class Structure:
             "n": 6 * self.nb,
             "m": m,
             "angles": angles,
+            "f": len(self.places.functions),
             "dense_rows": 0,
             "sides": sides,
             "width": 6 * sides,
@@ -95,7 +97,7 @@ class Structure:
 
     @functools.cached_property
     def has_angles(self) -> bool:
-        """Whether a torsion spring or a coupling unwraps its angle."""
+        """Whether a load about a joint's axis or a coupling unwraps its angle."""
         return bool((self.angle >= 0).any() or (self.places_in_row[3] >= 0).any())
 
     @functools.cached_property
@@ -143,8 +145,8 @@ def structure_of(places: Places) -> Structure:
     kind, first, second, driver = (
         np.array([place[k] for place in primitives], dtype=np.int64) for k in (0, 2, 3, 4)
     )
-    load = np.array(places.loads, dtype=np.int64).reshape(-1, 3).T.copy()
-    is_angle = load[0] == TORSION_SPRING
+    load = np.array(places.loads, dtype=np.int64).reshape(-1, 4).T.copy()
+    is_angle = load[0] == ABOUT_AXIS
     rows = np.array([ROWS_OF[place.kind] * (place.part != 1) for place in primitives], dtype=np.int64)
     coupled, columns = _coupled_bodies(places)
     sides = 4 if coupled else 2
@@ -204,6 +206,6 @@ def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:
 
 def _origins(load: LoadPlace, nb: int) -> tuple[int, ...]:
     """The bodies from whose centres of mass the vectors of a load are: two points, then directions."""
-    first = load.first if load.kind in (FORCE, SPRING) else nb
-    second = load.second if load.kind == SPRING else nb
+    first = load.first if load.kind in (FORCE, SPRING, ALONG_AXIS) else nb
+    second = load.second if load.kind in (SPRING, ALONG_AXIS) else nb
     return first, second, nb, nb, nb, nb

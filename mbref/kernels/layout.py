@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, pointer_to
 from mbref.kernels.named_memory import (
     Address,
+    Indices,
     Kernel,
     Matrix,
     Named,
@@ -98,6 +99,7 @@ class Equations(NamedTuple):
     rows: Rows
     system: System
     angles: Annotated[Vector, "angles"]  # rad, at the last accepted step, unwrapped
+    piece: Annotated[Indices, "f"]  # selected of each function of time
 
 
 class State(NamedTuple):

@@ -1,6 +1,7 @@
-"""A scene as kernels read it: bodies, primitive constraints, drivers and loads as named arrays.
+"""A scene as kernels read it: bodies, primitive constraints, functions of time and loads as named arrays.
 
-Sizes: nb bodies, m constraint rows, p primitives, d drivers, l loads.  Body ``nb`` is the fixed frame.
+Sizes: nb bodies, m constraint rows, p primitives, f functions of time, l loads.  Body ``nb`` is the fixed
+frame.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
 POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitives
-MOMENT, FORCE, SPRING, TORSION_SPRING = range(4)  # kinds of loads
+MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two of joints
 
 
 class Bodies(NamedTuple):
@@ -30,7 +31,7 @@ class Primitives(NamedTuple):
     kind: Annotated[Indices, "p"]
     first: Annotated[Indices, "p"]
     second: Annotated[Indices, "p"]
-    driver: Annotated[Indices, "p"]  # -1 without
+    driver: Annotated[Indices, "p"]  # index of the driver's function of time, -1 without
     row: Annotated[Indices, "p"]
     begins: Annotated[Indices, "p"]  # 0 of the second coordinate in the row of a coupling, else 1
     column_first: Annotated[Indices, "p"]  # in the blocks, where the columns of the first body stand
@@ -44,13 +45,20 @@ class Primitives(NamedTuple):
     length: Annotated[Vector, "p"]  # of a distance (m), or the factor of a joint coordinate
 
 
-class Drivers(NamedTuple):
-    """amplitude sin(frequency t + phase) + Σ polynomial[k] t^k, in rad or m."""
+class Functions(NamedTuple):
+    """Functions of time, drivers' first (rad or m), then factors of loads.
 
-    amplitude: Annotated[Vector, "d"]
-    frequency: Annotated[Vector, "d"]
-    phase: Annotated[Vector, "d"]
-    polynomial: Annotated[Matrix, "d", "terms"]
+    On a piece: part (amplitude sin(frequency t + phase) + Σ polynomial[k] t^k) + Σ cubic[k] (t - begin)^k.
+    """
+
+    first: Annotated[Indices, "f + 1"]  # index of the first piece of each function
+    amplitude: Annotated[Vector, "f"]
+    frequency: Annotated[Vector, "f"]
+    phase: Annotated[Vector, "f"]
+    polynomial: Annotated[Matrix, "f", "terms"]
+    begin: Annotated[Vector, "pieces"]  # s
+    part: Annotated[Vector, "pieces"]  # 1, or 0 where the function is switched off
+    cubic: Annotated[Matrix, "pieces", 4]
 
 
 class Loads(NamedTuple):
@@ -59,17 +67,18 @@ class Loads(NamedTuple):
     kind: Annotated[Indices, "l"]
     first: Annotated[Indices, "l"]
     second: Annotated[Indices, "l"]
-    angle: Annotated[Indices, "l"]  # index of the unwrapped angle of a torsion spring, else -1
-    force: Annotated[Matrix, "l", 3]  # N, or the moment in N m
+    function: Annotated[Indices, "l"]  # index of the function of time that multiplies the load, else -1
+    angle: Annotated[Indices, "l"]  # index of the unwrapped angle of a load about a joint's axis, else -1
+    force: Annotated[Matrix, "l", 3]  # N, or the moment in N m; along a joint coordinate the first number
     point_first: Annotated[Matrix, "l", 3]
     point_second: Annotated[Matrix, "l", 3]
-    axis: Annotated[Matrix, "l", 3]  # of a torsion spring, in the first body, with x and y across it
+    axis: Annotated[Matrix, "l", 3]  # of a joint, in the first body, with x and y across it
     x_first: Annotated[Matrix, "l", 3]
     y_first: Annotated[Matrix, "l", 3]
     x_second: Annotated[Matrix, "l", 3]  # x_first at t = 0, in the second body
     stiffness: Annotated[Vector, "l"]
     damping: Annotated[Vector, "l"]
-    natural: Annotated[Vector, "l"]  # length (m) or angle (rad)
+    natural: Annotated[Vector, "l"]  # length or displacement (m) or angle (rad)
 
 
 FIRST_NUMBERS = Primitives._fields.index("point_first")  # earlier fields belong to the structure
@@ -87,11 +96,19 @@ class SceneData(NamedTuple):
     moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
     resting: Annotated[Indices, "resting"]  # rows that only give multipliers
     row_bodies: Annotated[IndexTable, "m", "sides"]  # the bodies of each row, filled up with the fixed frame
-    drivers: Drivers
+    functions: Functions
     loads: Loads
 
     @property
     def numbers(self) -> tuple[Any, ...]:
         """The arrays in which scenes of one structure differ."""
         primitives, loads = self.primitives[FIRST_NUMBERS:], self.loads[FIRST_OF_LOADS:]
-        return self.gravity, self.lengths, self.metric_root, *self.bodies, *primitives, *self.drivers, *loads
+        return (
+            self.gravity,
+            self.lengths,
+            self.metric_root,
+            *self.bodies,
+            *primitives,
+            *self.functions[1:],
+            *loads,
+        )

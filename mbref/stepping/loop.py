@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbref.equations.coordinates import copy_state, fastest_turn
+from mbref.equations.functions import end_of_pieces, select_pieces
 from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
@@ -128,6 +129,7 @@ def evaluate_state(y, y_rate, memory):
     """Evaluate y' at the present time, with outputs at a sample time; check and remember the state."""
     clock, kernels = memory.loop.clock, memory.kernels
     t = clock.time
+    select_pieces(t, memory.equations)
     if t >= memory.loop.times[clock.sample]:
         status = kernels.rates_with_outputs(t, y, y_rate, memory)
     else:
@@ -175,9 +177,13 @@ def accept_step(now, h, suggested, ratio, memory):
 
 @kernel
 def advance(target, y, y_rate, memory):
-    """One accepted step towards the target time (s), as many attempts as it takes."""
+    """One accepted step towards the target time (s), as many attempts as it takes.
+
+    It ends at the end of a piece of a function of time, where a new smooth piece of the motion begins.
+    """
     loop, control, counts = memory.loop, memory.control, memory.equations.system.counts
-    propose, clock = memory.kernels.propose, loop.clock
+    propose, clock, end = memory.kernels.propose, loop.clock, end_of_pieces(memory.equations)
+    target = min(target, end)
     t, interval, y_new = clock.time, target - clock.time, loop.y_new[: clock.y_size]
     suggested = propose(clock.length, clock.suggested, clock.ratio, y, y_rate, memory)
     clock.share = share(suggested, memory)
@@ -195,6 +201,8 @@ def advance(target, y, y_rate, memory):
         if status == OK and ratio <= 1.0:
             status = accept_step(target if h == interval else t + h, h, suggested, ratio, memory)
             if status == OK or status == CHANGED:  # noqa: SIM109 - no containers in kernels
+                if clock.time >= end:
+                    clock.restart = counts.steps
                 return OK
             if status == SINGULAR_AHEAD:
                 return status

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from mbref.taylor.layout import PoseMaps
+from mbref.taylor.polynomial_layout import PoseMaps
 
 NO_DRIVER = -1
 

@@ -31,8 +31,11 @@ from mbref.taylor.stepping import (
     LOST_ROWS,
     SHORTER,
     begin_once,
+    begin_pieces,
+    end_of_step,
     end_step,
     expand_at,
+    is_last,
     longest_step,
     save_start,
 )
@@ -104,17 +107,18 @@ def take_predictor_step(memory):
     )  # fmt: skip
     fall = (step.start_pivot - least_pivot(memory)) / max(clock.length, control.smallest_step)
     save_start(memory)
-    left = memory.progress.end - clock.time
+    stop = end_of_step(memory)
+    left = stop - clock.time
     h = min(longest_predictor_step(memory), left)
     if h * fall > step.start_pivot:
-        return start_accurate_steps(step.start_pivot / fall, left, memory)
+        return start_accurate_steps(step.start_pivot / fall, stop, memory)
     while True:
-        status = attempt_predictor_step(h, h >= left, memory)
+        status = attempt_predictor_step(h, is_last(h, stop, memory), memory)
         if status == OK:
-            end_step(h, left, memory)
-            return OK
+            end_step(h, stop, memory)
+            return begin_pieces(stop, memory)
         if status == SINGULAR_AHEAD:
-            return start_accurate_steps(time_to_singular_position(h, memory), left, memory)
+            return start_accurate_steps(time_to_singular_position(h, memory), stop, memory)
         counts.rejected += 1
         h *= SHORTER
         return_to_start(memory)
@@ -171,7 +175,7 @@ def continues_motion(h, memory):
 
 
 @kernel
-def start_accurate_steps(ahead, left, memory):
+def start_accurate_steps(ahead, stop, memory):
     """Start high-accuracy steps before a singular position, a time ``ahead`` (s) away.
 
     If it is far, first take a predictor step to the distance from which one step crosses it.  Return
@@ -180,9 +184,9 @@ def start_accurate_steps(ahead, left, memory):
     h = length_before(ahead, memory)
     return_to_start(memory)
     memory.step.crossed = 0
-    if 0.0 < h < left:
+    if 0.0 < h < stop - memory.run.loop.clock.time:
         if attempt_predictor_step(h, True, memory) == OK:
-            end_step(h, left, memory)
+            end_step(h, stop, memory)
             ahead -= h
         else:
             return_to_start(memory)

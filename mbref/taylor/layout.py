@@ -12,106 +12,7 @@ from typing import Annotated, NamedTuple
 from mbref.kernels.compilation import FLOAT, INT
 from mbref.kernels.layout import Memory
 from mbref.kernels.named_memory import Indices, Kernel, Matrix, Named, Vector
-
-
-class PoseMaps(NamedTuple):
-    """Variables as linear forms of their bodies' poses: position (m) and rotation matrix by rows.
-
-    A direction that a driver turns by ψ is cos ψ along - sin ψ across.
-    """
-
-    body: Annotated[Indices, "nz"]  # nb for the ground
-    driver: Annotated[Indices, "nz"]  # -1 for none
-    along: Annotated[Matrix, "nz", 12]
-    across: Annotated[Matrix, "nz", 12]
-
-
-class Rows(NamedTuple):
-    """Constraint rows Φ: products of two lanes (each of them twice), linear terms and constants."""
-
-    row: Annotated[Indices, "twofold"]
-    lane: Annotated[Indices, "twofold"]
-    other: Annotated[Indices, "twofold"]
-    weight: Annotated[Vector, "twofold"]
-    linear_row: Annotated[Indices, "onefold"]
-    linear_lane: Annotated[Indices, "onefold"]
-    linear_weight: Annotated[Vector, "onefold"]
-    constant: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
-
-
-class Products(NamedTuple):
-    """Products of two series in the equations: of the force on a lane's variable, or of a lane's row.
-
-    A block of lanes has room for its lane with the most products."""
-
-    left: Annotated[Indices, "slots"]  # lanes
-    right: Annotated[Indices, "slots"]
-    weight: Annotated[Vector, "slots"]
-    start: Annotated[Indices, "blocks + 1"]  # slots where each block of lanes begins
-
-
-class Inertia(NamedTuple):
-    """Mass matrix, constant force, and the force of constant moments, linear in the variables."""
-
-    mass: Annotated[Matrix, "nz", "lanes"]
-    coupled: Annotated[Indices, "couplings"]  # variables with an inertia in common with one, itself included
-    first: Annotated[Indices, "nz + 1"]  # index in ``coupled`` of the first variable coupled with each
-    force: Annotated[Vector, "lanes"]
-    source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
-    weight: Annotated[Vector, "moments"]
-    start: Annotated[Indices, "blocks + 1"]
-
-
-class Poses(NamedTuple):
-    """Position (m) and rotation matrix by rows of each body, 12 numbers, affine in the variables."""
-
-    constant: Annotated[Vector, "12*nb"]
-    start: Annotated[Indices, "12*nb + 1"]
-    variable: Annotated[Indices, "places"]
-    weight: Annotated[Vector, "places"]
-
-
-class Given(NamedTuple):
-    """The functions that drivers prescribe: a driver's value over ``unit``, its cosine or its sine."""
-
-    driver: Annotated[Indices, "ng"]
-    function: Annotated[Indices, "ng"]
-    unit: Annotated[Vector, "ng"]
-
-
-class Springs(NamedTuple):
-    """Springs between points: their vectors, affine in the variables, and constants."""
-
-    constant: Annotated[Matrix, "springs", 3]
-    form: Annotated[Matrix, "3*springs", "nz"]
-    stiffness: Annotated[Vector, "springs"]
-    damping: Annotated[Vector, "springs"]
-    natural: Annotated[Vector, "springs"]
-
-
-class Torsions(NamedTuple):
-    """Angles of joints: two directions across the axis on the first body, one on the second."""
-
-    constant: Annotated[Matrix, "torsions", 9]
-    form: Annotated[Matrix, "9*torsions", "nz"]
-    stiffness: Annotated[Vector, "torsions"]
-    damping: Annotated[Vector, "torsions"]
-    natural: Annotated[Vector, "torsions"]
-    slot: Annotated[Indices, "torsions"]  # of the unwrapped angle among the model's
-    row: Annotated[Indices, "torsions"]  # of the coupling to which the angle belongs; -1 of a torsion spring
-    factor: Annotated[Vector, "torsions"]  # of the angle in that row
-
-
-class Polynomials(NamedTuple):
-    """A scene's equations."""
-
-    rows: Rows
-    products: Products
-    inertia: Inertia
-    poses: Poses
-    given: Given
-    springs: Springs
-    torsions: Torsions
+from mbref.taylor.polynomial_layout import Polynomials, PoseMaps
 
 
 class Series(NamedTuple):
@@ -123,6 +24,8 @@ class Series(NamedTuple):
     driven: Annotated[Vector, "orders"]  # of one driver
     springs: Annotated[Matrix, "7*springs", "orders"]  # vector (3), length, inverse, rate, pull
     torsions: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
+    slides: Annotated[Matrix, "8*slides", "orders"]  # axis (3), vector (3), displacement, force
+    factors: Annotated[Matrix, "f", "orders"]  # functions of time that multiply loads
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]
     sums: Annotated[Matrix, "orders", "lanes"]  # sums of products of known orders, minus the forces

@@ -1,4 +1,4 @@
-"""Springs, torsion springs and drivers as Taylor series, by the recurrences of quotients and square roots."""
+"""Loads and functions of time as Taylor series, by the recurrences of quotients and square roots."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from math import pi
 
 from numpy import arctan2, cos, floor, inf, sin, sqrt
 
+from mbref.equations.functions import expand_function
 from mbref.kernels.compilation import inlined, kernel
 
 VALUE, COSINE, SINE = range(3)  # functions of a driver's value
@@ -22,6 +23,7 @@ E1, E2, F, COS, SIN, ANGLE, MOMENT, MOMENT_COS, MOMENT_SIN, TORSION_SERIES = (
     14,
     15,
 )
+AXIS, BETWEEN, ALONG, FORCE, SLIDE_SERIES = 0, 3, 6, 7, 8
 
 
 @inlined
@@ -47,15 +49,35 @@ def start_loads(memory):
     """Compute the orders 0 of all loads."""
     grow_springs(0, memory)
     grow_torsions(0, memory)
+    grow_slides(0, memory)
 
 
 @inlined
 def add_loads(k, memory):
-    """Add order k of the forces of springs and torsion springs, the variables being known to order k + 1."""
+    """Add order k of the forces of all loads that are not constant, the variables being known to order
+    k + 1."""
     grow_springs(k + 1, memory)
     grow_torsions(k + 1, memory)
+    grow_slides(k + 1, memory)
     add_springs(k, memory)
     add_torsions(k, memory)
+    add_slides(k, memory)
+    add_timed_forces(k, memory)
+
+
+@inlined
+def has_varying_loads(polynomials):
+    """Return whether a scene has loads other than constant forces and moments, or couplings of angles."""
+    loads = polynomials.springs.damping.shape[0] + polynomials.torsions.damping.shape[0]
+    return loads + polynomials.slides.damping.shape[0] + polynomials.timed.function.shape[0] > 0
+
+
+@inlined
+def applied_order(amount, function, k, factors):
+    """Return order k of a force or torque that a function of time multiplies, or that is constant."""
+    if function >= 0:
+        return amount * factors[function, k]
+    return amount if k == 0 else 0.0
 
 
 @inlined
@@ -168,12 +190,13 @@ def grow_torsions(k, memory):
 
 @kernel
 def add_torsions(k, memory):
-    """Compute order k of their forces: -(stiffness (θ - natural) + damping θ') times C δS - S δC."""
+    """Compute order k of their forces: (torque - stiffness (θ - natural) - damping θ') (C δS - S δC)."""
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
         of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
+        of[MOMENT, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
         if torsions.row[s] >= 0:
             of[MOMENT, k] = 0.0
             add_coupled_angle(s, k, of, memory)
@@ -216,16 +239,67 @@ def add_coupled_angle(s, k, of, memory):
 
 
 @kernel
-def expand_drivers(t, memory):
-    """Compute the functions that drivers prescribe, as series about time t."""
+def grow_slides(k, memory):
+    """Compute order k of axes, of vectors between the anchors, and of displacements a · d."""
+    slides, variables = memory.polynomials.slides, memory.series.terms
+    for s in range(slides.stiffness.shape[0]):
+        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
+        along = 0.0
+        for c in range(6):
+            grow_form(slides.constant[s, c], slides.form[6 * s + c], k, variables, of[c])
+        for c in range(3):
+            along += product_order(of[AXIS + c], of[BETWEEN + c], k)
+        of[ALONG, k] = along
+
+
+@kernel
+def add_slides(k, memory):
+    """Compute order k of their forces: (force - stiffness (x - natural) - damping x') (a δd + d δa)."""
+    slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
+    for s in range(slides.stiffness.shape[0]):
+        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
+        along = of[ALONG, k] - slides.natural[s] if k == 0 else of[ALONG, k]
+        of[FORCE, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[ALONG, k + 1]
+        of[FORCE, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)
+        for c in range(3):
+            on_vector = product_order(of[FORCE], of[AXIS + c], k)
+            on_axis = product_order(of[FORCE], of[BETWEEN + c], k)
+            axis, between = slides.form[6 * s + AXIS + c], slides.form[6 * s + BETWEEN + c]
+            for i in range(nz):
+                sums[k, i] += on_vector * between[i] + on_axis * axis[i]
+
+
+@kernel
+def add_timed_forces(k, memory):
+    """Compute order k of forces and moments that functions of time multiply."""
+    timed, sums, terms = memory.polynomials.timed, memory.series.sums, memory.series.terms
+    nz = memory.solver.pivot_columns.shape[0]
+    for s in range(timed.function.shape[0]):
+        factor = memory.series.factors[timed.function[s]]
+        for i in range(nz):
+            value, linear = factor[k] * timed.constant[s, i], timed.linear[nz * s + i]
+            for j in range(nz):
+                if linear[j] != 0.0:
+                    for order in range(k + 1):
+                        value += factor[order] * linear[j] * terms[k - order, j]
+            sums[k, i] -= value
+
+
+@kernel
+def expand_functions(t, memory):
+    """Compute the factors of loads, and the functions that drivers prescribe, as series about time t."""
+    equations, loads = memory.run.equations, memory.run.equations.scene.loads
+    for l in range(loads.function.shape[0]):
+        if loads.function[l] >= 0:
+            expand_function(t, loads.function[l], equations, memory.series.factors[loads.function[l]])
     given, functions, n = (
         memory.polynomials.given,
         memory.series.terms,
         memory.solver.pivot_columns.shape[0] + memory.solver.pivot_rows.shape[0],
     )
-    driven, drivers = memory.series.driven, memory.run.equations.scene.drivers
+    driven = memory.series.driven
     for g in range(given.driver.shape[0]):
-        expand_driver(t, given.driver[g], drivers, driven)
+        expand_function(t, given.driver[g], equations, driven)
         if given.function[g] == VALUE:
             for k in range(driven.shape[0]):
                 functions[k, n + g] = driven[k] / given.unit[g]
@@ -246,24 +320,3 @@ def expand_angle(driven, functions, g):
             cosine -= i * driven[i] * functions[k - i, g + 1]
             sine += i * driven[i] * functions[k - i, g]
         functions[k, g], functions[k, g + 1] = inverse * cosine, inverse * sine
-
-
-@kernel
-def expand_driver(t, d, drivers, series):
-    """Compute a driver's value as a series about time t: its polynomial shifted, and its sine."""
-    terms, size = drivers.polynomial.shape[1], series.shape[0]
-    for k in range(size):
-        value, binomial = 0.0, 1.0
-        power = 1.0
-        for i in range(k, terms):  # Σ c_i binom(i, k) t^(i - k)
-            value += drivers.polynomial[d, i] * binomial * power
-            power *= t
-            binomial *= (i + 1.0) / (i + 1.0 - k)
-        series[k] = value
-    if drivers.amplitude[d] == 0.0:
-        return
-    frequency, argument = drivers.frequency[d], drivers.frequency[d] * t + drivers.phase[d]
-    sine, cosine = drivers.amplitude[d] * sin(argument), drivers.amplitude[d] * cos(argument)
-    for k in range(size):
-        series[k] += sine
-        sine, cosine = cosine * frequency / (k + 1), -sine * frequency / (k + 1)

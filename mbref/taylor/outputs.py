@@ -8,6 +8,7 @@ Multipliers balance the forces in the metric of a projection, so that bodies may
 from __future__ import annotations
 
 from mbref.equations.evaluation import evaluate
+from mbref.equations.functions import select_pieces
 from mbref.equations.primitives import constraints
 from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.kernels.compilation import INT, entry, exchangeable, kernel
@@ -18,7 +19,7 @@ from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.projection import ALPHA
 from mbref.stepping.samples import take_sample
 from mbref.taylor.layout import SAMPLE, SERIES
-from mbref.taylor.loads import expand_drivers
+from mbref.taylor.loads import expand_functions
 from mbref.taylor.samples import find_poses, put_state
 from mbref.taylor.saved_state import restore_state, save_state
 from mbref.taylor.simd import WIDTH, load, store
@@ -55,6 +56,7 @@ def complete_until(end, memory):
     mode.order, mode.tolerance = 2, memory.options.accurate_tolerance
     while progress.completed < end and status == OK:
         loop.clock.sample, loop.clock.time = progress.completed, loop.times[progress.completed]
+        select_pieces(loop.clock.time, memory.run.equations)
         status = memory.kernels.sample(memory)
         progress.completed = loop.clock.sample
     mode.order, mode.tolerance = order, tolerance
@@ -140,6 +142,7 @@ def return_to_series(memory):
     for order in range(2):
         copy(here.terms[order], terms[order])
     copy(here.angles, memory.angles)
-    expand_drivers(memory.run.loop.clock.time, memory)
+    select_pieces(memory.run.loop.clock.time, memory.run.equations)
+    expand_functions(memory.run.loop.clock.time, memory)
     memory.kernels.partition(memory)
     memory.kernels.terms(memory)

@@ -18,8 +18,8 @@ def freedoms(memory):
 
 @kernel
 def is_undriven(memory):
-    """Return whether the scene has no drivers."""
-    return memory.run.equations.scene.drivers.polynomial.shape[0] == 0
+    """Return whether nothing in the scene depends on time: it has no drivers and no factors of loads."""
+    return memory.run.equations.piece.shape[0] == 0
 
 
 @kernel

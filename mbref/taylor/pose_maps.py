@@ -5,7 +5,7 @@ from __future__ import annotations
 from numpy import cos, sin
 
 from mbref.equations.evaluation import set_poses, set_velocities
-from mbref.equations.primitives import driver_value
+from mbref.equations.functions import function_value
 from mbref.kernels.compilation import kernel
 
 
@@ -23,7 +23,7 @@ def read_variables(t, memory):
         x, x_rate = value_and_rate(i, pose_maps.along, body, frames)
         if driver >= 0:
             y, y_rate = value_and_rate(i, pose_maps.across, body, frames)
-            angle, speed, _ = driver_value(run.equations.scene.drivers, driver, t)
+            angle, speed, _ = function_value(driver, t, run.equations)
             c, s = cos(angle), sin(angle)
             turned = s * x + c * y
             x, x_rate = c * x - s * y, c * x_rate - s * y_rate - speed * turned

@@ -13,7 +13,7 @@ from mbref.kernels.layout import OK
 from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
 from mbref.taylor.layout import TERMS
-from mbref.taylor.loads import add_loads, start_loads
+from mbref.taylor.loads import add_loads, has_varying_loads, start_loads
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 
@@ -91,15 +91,15 @@ def solve_order(k, last, memory):
 
 
 @kernel
-def expand_without_springs(last, memory):
-    """Compute orders 0 … last without springs, by code short enough for the registers."""
+def expand_without_loads(last, memory):
+    """Compute orders 0 … last with constant loads only, by code short enough for the registers."""
     for k in range(last + 1):
         solve_order(k, last, memory)
 
 
 @kernel
-def expand_with_springs(last, memory):
-    """Compute orders 0 … last with springs."""
+def expand_with_loads(last, memory):
+    """Compute orders 0 … last with springs and other loads that vary."""
     start_loads(memory)
     for k in range(last + 1):
         add_loads(k, memory)
@@ -146,7 +146,7 @@ def turns_back_in(h, memory):
 @exchangeable(TERMS)
 def expand_with_multipliers(memory):
     """Compute all orders of the variables and multipliers from the first two."""
-    springs, torsions, code = memory.polynomials.springs, memory.polynomials.torsions, memory.code
+    code = memory.code
     memory.step.deceleration = 0.0
     if code.expand_by_power != 0:
         memory.kernels.respond(memory)
@@ -158,8 +158,8 @@ def expand_with_multipliers(memory):
         )  # fmt: skip
         return OK
     start_sums(memory)
-    if springs.damping.shape[0] + torsions.damping.shape[0] == 0:
-        expand_without_springs(memory.mode.order - 2, memory)
+    if has_varying_loads(memory.polynomials):
+        expand_with_loads(memory.mode.order - 2, memory)
     else:
-        expand_with_springs(memory.mode.order - 2, memory)
+        expand_without_loads(memory.mode.order - 2, memory)
     return OK

@@ -11,8 +11,9 @@ from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
 from mbref.kernels.named_memory import allocate
 from mbref.stepping.run import Run
 from mbref.taylor.crossing.detection import contains_singular_position
-from mbref.taylor.layout import Polynomials, Series, SeriesKernels, TaylorMemory
+from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
 from mbref.taylor.outputs import complete_sample
+from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.series import expand_series, expand_with_multipliers
 from mbref.taylor.simd import padded_size
@@ -36,6 +37,7 @@ def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order
         "lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,
         "twofold": polynomials.rows.row.size, "kept": KEPT, "k": run.times.size,
         "springs": polynomials.springs.natural.size, "torsions": polynomials.torsions.slot.size,
+        "slides": polynomials.slides.function.size, "timed": polynomials.timed.function.size,
         **run.model.sizes,
     }  # fmt: skip
     shapes = shapes_of_equations(geometry, polynomials)

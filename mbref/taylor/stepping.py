@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from numpy import exp, isfinite, log
 
+from mbref.equations.functions import end_of_pieces, select_pieces
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
@@ -31,7 +32,7 @@ from mbref.taylor.crossing.thresholds import (
     OVERSHOOT,
 )
 from mbref.taylor.layout import BEGIN, EXPAND, STEP
-from mbref.taylor.loads import expand_drivers, part_behind_no_length, time_to_no_length
+from mbref.taylor.loads import expand_functions, part_behind_no_length, time_to_no_length
 from mbref.taylor.mode import is_accurate
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.pose_maps import read_variables
@@ -49,8 +50,10 @@ SHORTER = 0.7  # length of the next attempt, relative to the one that failed
 
 @exchangeable(EXPAND)
 def expand_from(t, memory):
-    """Correct the state at time t and expand it; return OK or the failure status."""
-    expand_drivers(t, memory)
+    """Correct the state at time t and expand it, functions of time by their pieces at the start of the step;
+    return OK or the failure status."""
+    select_pieces(memory.run.loop.clock.time, memory.run.equations)
+    expand_functions(t, memory)
     status = correct_state(memory)
     if status == OK:
         memory.kernels.terms(memory)
@@ -211,10 +214,10 @@ def attempt_step(h, last, memory):
 @exchangeable(STEP)
 def take_step(memory):
     """Take one step in as many attempts as it needs, and its samples; return OK or the failure status."""
-    clock, counts, state, left = (
-        memory.run.loop.clock, memory.run.equations.system.counts, memory.step,
-        memory.progress.end - memory.run.loop.clock.time,
+    clock, counts, state, stop = (
+        memory.run.loop.clock, memory.run.equations.system.counts, memory.step, end_of_step(memory),
     )  # fmt: skip
+    left = stop - clock.time
     save_start(memory)
     state.start_violation = 0.0
     regular, h = first_lengths(left, memory)
@@ -226,7 +229,7 @@ def take_step(memory):
         clock.attempt_end = clock.time + h
         return SINGULAR_AHEAD
     while True:
-        status = attempt_step(h, h >= left, memory)
+        status = attempt_step(h, is_last(h, stop, memory), memory)
         if status == OK and (state.crossed or h <= regular):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
@@ -237,17 +240,39 @@ def take_step(memory):
         return_to_start(memory)
         if not h >= memory.run.control.smallest_step:
             return status
-    end_step(h, left, memory)
+    end_step(h, stop, memory)
     put_angles(h, memory)
     counts.crossings += count_crossings(h, memory) if state.crossed else 0
-    return OK
+    return begin_pieces(stop, memory)
 
 
 @kernel
-def end_step(h, left, memory):
-    """Keep the samples of a step of h seconds, and end it."""
+def end_of_step(memory):
+    """Return the time (s) at which the next step ends at the latest: at the end of the run or of a piece of a
+    function of time."""
+    return min(memory.progress.end, end_of_pieces(memory.run.equations))
+
+
+@kernel
+def is_last(h, stop, memory):
+    """Return whether a step of h seconds ends the run."""
+    return h >= stop - memory.run.loop.clock.time and stop >= memory.progress.end
+
+
+@kernel
+def begin_pieces(stop, memory):
+    """Expand anew where a step has ended with a piece of a function; return OK or the failure status."""
+    t = memory.run.loop.clock.time
+    if t < stop or t >= memory.progress.end:
+        return OK
+    return memory.kernels.expand(t, memory)
+
+
+@kernel
+def end_step(h, stop, memory):
+    """Keep the samples of a step of h seconds, and end it, at the time ``stop`` (s) at the latest."""
     clock, times = memory.run.loop.clock, memory.run.loop.times
-    now = memory.progress.end if h >= left else clock.time + h
+    now = stop if h >= stop - clock.time else clock.time + h
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
         keep_sample(times[clock.sample] - clock.time, memory)
     memory.run.equations.system.counts.steps += 1
@@ -269,8 +294,9 @@ def begin_series(memory):
     t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
     for s in range(slot.shape[0]):
         memory.angles[s] = memory.run.equations.angles[slot[s]]
+    select_pieces(t, memory.run.equations)
     read_variables(t, memory)
-    expand_drivers(t, memory)
+    expand_functions(t, memory)
     memory.kernels.partition(memory)
     memory.step.crossed, memory.progress.leaving, memory.progress.rests_near = 0, 0, 0
     status = memory.kernels.expand(t, memory)

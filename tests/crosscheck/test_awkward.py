@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
+from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.metrics import error_series
-from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import judged, runs
 from crosscheck.judge.reference.taylor import natural_motion

@@ -12,9 +12,9 @@ from crosscheck.engine import Setting, engine
 from crosscheck.engines import sampling
 from crosscheck.engines.driver_motion import motion
 from crosscheck.judge.constraints import closure_accelerations
-from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.metrics import METRICS
 from crosscheck.judge.reference.bound import bounds
+from crosscheck.judge.time_functions import value
 from crosscheck.study.difference import _is_changed
 from crosscheck.study.fair_timing import _with_cost
 from mbref.scene import Body, Distance, Driver, Scene, Sine
@@ -37,7 +37,7 @@ def driven(t: float) -> tuple[float, float, float]:
 @pytest.mark.parametrize("t", [0.0, 0.3, 1.7])
 def test_driver_with_a_phase_in_the_adapters_and_in_the_judge(t: float):
     assert motion(DRIVER, t) == pytest.approx(driven(t), abs=1e-14)
-    assert [float(driver_value(DRIVER, t, k)) for k in range(3)] == pytest.approx(driven(t), abs=1e-14)
+    assert [float(value(DRIVER, t, k)) for k in range(3)] == pytest.approx(driven(t), abs=1e-14)
 
 
 def test_units_and_labels_of_the_metrics():

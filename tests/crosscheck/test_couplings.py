@@ -10,12 +10,12 @@ from crosscheck.conformance.geared_mechanisms import geared_mechanism
 from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines import terms
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.metrics import measure, violation_series
 from crosscheck.judge.model_identity import along
 from crosscheck.judge.reaction_balance import balance, idle
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import closed_form, truth_for

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.deadline import TimeIsUp, ask, within
-from crosscheck.judge.reference.arithmetic import EXTENDED
 from crosscheck.judge.reference.certify import NotCertified, certified
 from crosscheck.judge.reference.motion import OVER
 from crosscheck.judge.reference.reference import runs

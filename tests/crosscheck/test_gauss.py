@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.closed_forms import free_fall, oscillator, torsion
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene

@@ -7,8 +7,8 @@ import pytest
 
 import mbref
 from crosscheck.engine import engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import truth_for

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.judge import constraints
+from crosscheck.judge import constraints, time_functions
 from mbref import rotations
 from mbref.scene import JOINT_TYPES, Body, Driver, Scene, SceneError, Sine, Spherical
 from mbref.scenes import SCENES
@@ -206,13 +206,13 @@ def test_driver_derivatives_are_finite_differences(order):
     t, h = np.linspace(0, 2, 5), 1e-5
     if order == 0:
         got, wanted = (
-            constraints.joint_residuals.driver_value(driver, t),
+            time_functions.value(driver, t),
             t - 2 * t**2 + 0.5 * t**3 + 0.3 * np.sin(3 * t),
         )
     else:
-        ends = [constraints.joint_residuals.driver_value(driver, t + s * h, order - 1) for s in (1, -1)]
+        ends = [time_functions.value(driver, t + s * h, order - 1) for s in (1, -1)]
         got, wanted = (
-            constraints.joint_residuals.driver_value(driver, t, order),
+            time_functions.value(driver, t, order),
             (ends[0] - ends[1]) / (2 * h),
         )
     assert np.allclose(got, wanted, atol=1e-8), f"order {order}: {got} against {wanted}"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.published import BY_SCENE, PUBLISHED
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.motion import Motion
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion

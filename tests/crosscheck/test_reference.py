@@ -19,12 +19,12 @@ from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import ASKEW, Isometry
 from crosscheck.engine import engine
 from crosscheck.judge import constraints, metrics
+from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.deadline import GivenUp, given_up
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference import cache, tree_loads
 from crosscheck.judge.reference import reference as module
-from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import NotCertified, certified, digest
 from crosscheck.judge.reference.isostatic import isostatic, replaced

@@ -5,7 +5,7 @@ import pytest
 
 from crosscheck.conformance.hard_mechanisms import HARD
 from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.judge.reference.arithmetic import EXTENDED, many_digits
+from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import judged, runs
 from crosscheck.judge.reference.start_velocities import least_squares, null_space, start_velocities

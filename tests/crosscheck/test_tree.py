@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from crosscheck.judge.reference.arithmetic import DOUBLE, EXTENDED, doubles
+from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 from crosscheck.judge.reference.panels import Panels
 from crosscheck.judge.reference.taylor import natural_motion

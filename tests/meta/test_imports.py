@@ -26,6 +26,8 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
             "scene",
             "scene_couplings",
             "scene_fields",
+            "scene_functions",
+            "scene_function_faults",
             "scene_joints",
             "scene_lines",
             "scene_loads",
@@ -157,11 +159,11 @@ def test_the_program_asks_crosscheck_s_command_line_for_its_records():
 
 
 def test_the_formulations_of_the_reference_share_no_equations():
-    """Both have the judge's joint equations for start velocities and units, and numbers, and no more."""
+    """Both have the judge's equations of joints for start velocities, its functions of time, and numbers."""
     arrows = graph("crosscheck")
     natural, tree = (reached(arrows, f"crosscheck.judge.reference.{name}") for name in ("taylor", "tree"))
     shared = {name.removeprefix("crosscheck.judge.") for name in natural & tree}
-    numbers = {"reference.arithmetic", "reference.motion", "reference.start_velocities"}
+    numbers = {"arithmetic", "time_functions", "reference.motion", "reference.start_velocities"}
     without_equations = {"constraints", "deadline", "joint_coordinates", "joint_residuals", "tolerances"}
     assert shared == numbers | without_equations, sorted(shared)
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.constraints import scene_length
-from crosscheck.judge.reference.arithmetic import doubles
 from crosscheck.judge.reference.motion import Motion
 from mbref.scene import Scene
 

@@ -24,9 +24,11 @@ SOURCES = (
         for path in sorted((JUDGE / "reference").glob("*.py"))
         if path.stem not in ("certify", "isostatic")
     ),
+    JUDGE / "arithmetic.py",
     JUDGE / "constraints.py",
     JUDGE / "joint_residuals.py",
     JUDGE / "joint_coordinates.py",
+    JUDGE / "time_functions.py",
 )
 DIGEST = hashlib.sha256().digest_size
 

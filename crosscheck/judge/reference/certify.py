@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.deadline import TimeIsUp, within
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles, many_digits
 from crosscheck.judge.reference.bound import SAFETY, differences
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.isostatic import Pose, isostatic, replaced

@@ -23,7 +23,7 @@ LEAST_TERMS = 6  # smallest number of terms of a series
 
 
 class Expansion:
-    """The series about a time t: coordinates ``x`` (order + 3, 3, n), angles of torsion springs, and joint
+    """The series about a time t: coordinates ``x`` (order + 3, 3, n), angles of loads of joints, and joint
     coordinates of couplings and armatures."""
 
     def __init__(
@@ -40,7 +40,7 @@ class Expansion:
         terms, zeros = order + 3, of.arithmetic.zeros
         m, p = len(held.numbers), len(held.products)
         self._held, self._drives = held, held.drives(t, terms)
-        self._loads: LoadSeries = loads.series(angles, terms)
+        self._loads: LoadSeries = loads.series(t, angles, terms)
         self._gears = GearSeries(of.joints, held.gears, turned, terms, zeros)
         rows = held.all_gradients(start[0], self._drives)
         self._system = SaddlePoint(of.mass, rows, held.compliance(zeros), of.arithmetic)
@@ -56,8 +56,8 @@ class Expansion:
 
     @property
     def angles(self) -> list[np.ndarray]:
-        """The series of the torsion springs' angles."""
-        return [torsion.angle for torsion in self._loads.torsions]
+        """The series of the angles of loads about joints' axes."""
+        return [load.value for load in self._loads.turned]
 
     @property
     def turned(self) -> list[np.ndarray]:

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_joints import convolved
 from crosscheck.judge.reference.saddle_point import Sparse
+from crosscheck.judge.time_functions import piece_of
 from crosscheck.judge.tolerances import RANK
-from mbref.scene import Driver
+from mbref.scene import TimeFunction
 
 
 class HeldRows:
@@ -49,8 +50,8 @@ class HeldRows:
         value = self._arithmetic.zeros(terms, len(self.numbers))
         value[0] = self._c
         for at, driver in self._moved:
-            value[:, at] = value[:, at] + driver_series(driver, t, terms, self._arithmetic) / self._length
-        angles = [(at, to, driver_series(d, t, terms, self._arithmetic)) for at, to, d in self._turned]
+            value[:, at] = value[:, at] + function_series(driver, t, terms, self._arithmetic) / self._length
+        angles = [(at, to, function_series(d, t, terms, self._arithmetic)) for at, to, d in self._turned]
         return Drives(value, [(at, to, *cos_sin_series(angle)) for at, to, angle in angles])
 
     def gradient(self, x: np.ndarray, drives: Drives) -> np.ndarray:
@@ -116,18 +117,18 @@ def independent(rows: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.n
     return np.sort(order[: int((pivots > RANK).sum())]), pivots
 
 
-def driver_series(driver: Driver, t: Any, terms: int, arithmetic: Arithmetic) -> np.ndarray:
-    """Taylor coefficients (terms,) of a driver's value about t."""
-    c = list(arithmetic.array(driver.polynomial))
-    for i in range(len(c)):  # Horner's scheme, again and again: the polynomial of t + s
-        for j in range(len(c) - 2, i - 1, -1):
-            c[j] = c[j] + t * c[j + 1]
-    series = arithmetic.zeros(terms)
-    series[: len(c)] = c[:terms]
-    if driver.sine:
-        amplitude, frequency, phase = arithmetic.array(
-            [driver.sine.amplitude, driver.sine.frequency, driver.sine.phase]
-        )
+def function_series(function: TimeFunction, t: Any, terms: int, arithmetic: Arithmetic) -> np.ndarray:
+    """Taylor coefficients (terms,) about t of the piece of a function that acts from t on."""
+    piece, series = piece_of(function, float(t), arithmetic), arithmetic.zeros(terms)
+    for coefficients, d in ((piece.cubic, t - piece.knot), (arithmetic.array(function.coefficients), t)):
+        c = list(coefficients) if piece.acts else []
+        for i in range(len(c)):  # Horner's scheme, again and again: the polynomial of d + s
+            for j in range(len(c) - 2, i - 1, -1):
+                c[j] = c[j] + d * c[j + 1]
+        series[: len(c)] = series[: len(c)] + c[:terms]
+    if function.sine and piece.acts:
+        sine = function.sine
+        amplitude, frequency, phase = arithmetic.array([sine.amplitude, sine.frequency, sine.phase])
         angle = frequency * t + phase
         sine, cosine = amplitude * np.sin(angle), amplitude * np.cos(angle)
         for k in range(terms):

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge import constraints
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.natural_joints import JointCoordinates
 from crosscheck.judge.reference.start_velocities import given
 from mbref.scene import Body, Driver, Scene

@@ -11,19 +11,25 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.reference.held_rows import function_series
 from crosscheck.judge.reference.natural import NaturalCoordinates, skew
-from crosscheck.judge.reference.natural_joints import AngleForm, convolved
-from mbref.scene import Force, Moment, Spring, TorsionSpring
+from crosscheck.judge.reference.natural_joints import AngleForm, SlideForm, convolved
+from mbref.scene import Factor, Force, JointLoad, Moment, Spring
+from mbref.scene_joints import ANGLE
 
 
 class Loads:
-    """Gravity and the loads of a scene; ``turned`` are the angles of the torsion springs at the start."""
+    """Gravity and the loads of a scene; ``turned`` are loads about joints' axes, ``slid`` along them."""
 
     def __init__(self, of: NaturalCoordinates):
         self.constant = of.arithmetic.zeros(3, 4 * of.nb + 4)
+        self.arithmetic = of.arithmetic
         self.moments: list[tuple[slice, np.ndarray]] = []
+        self.timed: list[tuple[Factor, np.ndarray]] = []
+        self.timed_moments: list[tuple[Factor, slice, np.ndarray]] = []
         self.springs: list[SpringForm] = []
-        self.torsions: list[TorsionForm] = []
+        self.turned: list[JointForm] = []
+        self.slid: list[JointForm] = []
         for b, body in enumerate(of.scene.body if of.scene.has_mass() else ()):
             self.constant[:, 4 * b] = of.lengths(of.scene.gravity) * of.arithmetic.number(body.mass)
         for load in of.scene.load if of.scene.has_mass() else ():
@@ -32,32 +38,55 @@ class Loads:
     def _add(self, of: NaturalCoordinates, load: Any) -> None:
         if isinstance(load, Moment):
             b = of.scene.body_index(load.body)
-            moment = of.arithmetic.array(load.moment) / of.length**2
-            self.moments.append((slice(4 * b + 1, 4 * b + 4), skew(moment) / 2))
+            half = skew(of.arithmetic.array(load.moment) / of.length**2) / 2
+            axes = slice(4 * b + 1, 4 * b + 4)
+            if load.factor:
+                self.timed_moments.append((load.factor, axes, half))
+            else:
+                self.moments.append((axes, half))
         elif isinstance(load, Force):
             form = of.point(of.scene.body_index(load.body), load.point)
-            self.constant = self.constant + of.lengths(load.force)[:, None] * form
+            force = of.lengths(load.force)[:, None] * form
+            if load.factor:
+                self.timed.append((load.factor, force))
+            else:
+                self.constant = self.constant + force
         elif isinstance(load, Spring):
             self.springs.append(SpringForm(of, load))
         else:
-            self.torsions.append(TorsionForm(of, load))
+            (self.turned if load.coordinate == ANGLE else self.slid).append(JointForm(of, load))
 
-    def series(self, angles: Sequence[Any], terms: int) -> LoadSeries:
-        """The loads as series of so many terms, from the torsion springs' angles at the time of expansion."""
-        return LoadSeries(self, angles, terms)
+    def series(self, t: Any, angles: Sequence[Any], terms: int) -> LoadSeries:
+        """The loads as series of so many terms about t, from the angles of ``turned`` there."""
+        return LoadSeries(self, t, angles, terms)
+
+    def factor(self, factor: Factor | None, t: Any, terms: int) -> np.ndarray:
+        """Taylor coefficients (terms,) about t of a factor, 1 without."""
+        if factor is not None:
+            return function_series(factor, t, terms, self.arithmetic)
+        found = self.arithmetic.zeros(terms)
+        found[0] = self.arithmetic.number(1.0)
+        return found
 
 
 class LoadSeries:
     """The loads about one time."""
 
-    def __init__(self, loads: Loads, angles: Sequence[Any], terms: int):
+    def __init__(self, loads: Loads, t: Any, angles: Sequence[Any], terms: int):
         self._loads = loads
-        self.torsions = [
-            TorsionSeries(form, angle, terms) for form, angle in zip(loads.torsions, angles, strict=True)
+        self._timed = [(loads.factor(f, t, terms), force) for f, force in loads.timed]
+        self._timed_moments = [
+            (loads.factor(f, t, terms), axes, half) for f, axes, half in loads.timed_moments
         ]
-        self._all: list[SpringSeries | TorsionSeries] = [
+        starts = [*angles, *(0 * loads.constant[0, 0] for _ in loads.slid)]
+        pushes = [
+            JointSeries(form, start, form.amount * loads.factor(form.over_time, t, terms))
+            for form, start in zip([*loads.turned, *loads.slid], starts, strict=True)
+        ]
+        self.turned = pushes[: len(loads.turned)]
+        self._all: list[SpringSeries | JointSeries] = [
             *(SpringSeries(form, terms) for form in loads.springs),
-            *self.torsions,
+            *pushes,
         ]
 
     def grow(self, k: int, x: np.ndarray) -> None:
@@ -70,9 +99,13 @@ class LoadSeries:
         force = self._loads.constant if k == 0 else 0 * self._loads.constant
         for load in self._all:
             force = force + load.order(k)
+        for factor, constant in self._timed:
+            force = force + factor[k] * constant
+        force = force.copy()
         for axes, half in self._loads.moments:
-            force = force.copy()
             force[:, axes] = force[:, axes] + half @ x[k][:, axes]
+        for factor, axes, half in self._timed_moments:
+            force[:, axes] = force[:, axes] + half @ convolved(factor[:, None, None], x[:, :, axes], k)
         return force
 
 
@@ -118,34 +151,39 @@ class SpringSeries:
         return -convolved(self._pull[:, None], self._d, k)[:, None] * form.vector
 
 
-class TorsionForm(AngleForm):
-    """A torsion spring: its joint's angle, stiffness, damping, natural angle."""
+class JointForm:
+    """A load along a joint coordinate: the coordinate, stiffness, damping, natural value, applied amount."""
 
-    def __init__(self, of: NaturalCoordinates, load: TorsionSpring):
-        super().__init__(of, of.scene.joint_named(load.joint))
-        self.stiffness, self.damping = of.arithmetic.array([load.stiffness, load.damping]) / of.length**2
-        self.rest = of.arithmetic.number(load.natural_angle)
+    def __init__(self, of: NaturalCoordinates, load: JointLoad):
+        joint, turns = of.scene.joint_named(load.joint), load.coordinate == ANGLE
+        self.coordinate = (AngleForm if turns else SlideForm)(of, joint)
+        action, number = load.action, of.arithmetic.number
+        unit = 1 if turns else of.length
+        self.stiffness, self.damping = (number(x) * unit**2 / of.length**2 for x in action[:2])
+        self.rest, self.amount = number(action.natural) / unit, number(action.amount) * unit / of.length**2
+        self.over_time = load.over_time
 
 
-class TorsionSeries:
-    """Its moment by the angle, which unwraps."""
+class JointSeries:
+    """Its force or torque along the coordinate, an angle of which unwraps; ``applied`` (terms,)."""
 
-    def __init__(self, form: TorsionForm, angle: Any, terms: int):
-        self._form, self._moment = form, form.zeros(terms)
-        self._turned = form.series(angle, terms)
+    def __init__(self, form: JointForm, start: Any, applied: np.ndarray):
+        self._form, self._applied, self._moment = form, applied, 0 * applied
+        self._moved = form.coordinate.series(start, len(applied))
 
     @property
-    def angle(self) -> np.ndarray:
-        """The angle (terms,)."""
-        return self._turned.value
+    def value(self) -> np.ndarray:
+        """The coordinate (terms,)."""
+        return self._moved.value
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of the angle."""
-        self._turned.grow(k, x)
+        """Order k of the coordinate."""
+        self._moved.grow(k, x)
 
     def order(self, k: int) -> np.ndarray:
-        """Order k (3, n) of the force: -moment × (C δS - S δC)."""
+        """Order k (3, n) of the force: (amount - stiffness (q - rest) - damping q') times the gradient."""
         form = self._form
-        elastic = self.angle[k] - form.rest if k == 0 else self.angle[k]
-        self._moment[k] = form.stiffness * elastic + form.damping * (k + 1) * self.angle[k + 1]
-        return -self._turned.pull(self._moment, k)
+        elastic = self.value[k] - form.rest if k == 0 else self.value[k]
+        resistance = form.stiffness * elastic + form.damping * (k + 1) * self.value[k + 1]
+        self._moment[k] = resistance - self._applied[k]
+        return -self._moved.pull(self._moment, k)

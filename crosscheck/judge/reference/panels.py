@@ -13,8 +13,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 
 SWEEPS = 60  # Picard iterations before a panel is shortened

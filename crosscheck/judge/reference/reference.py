@@ -14,8 +14,8 @@ from threading import Lock
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference import cache
-from crosscheck.judge.reference.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.bound import USEFUL, bounds, differences, rounding
 from crosscheck.judge.reference.motion import OVER, Motion, Times
 from crosscheck.judge.reference.taylor import DATA, natural_motion

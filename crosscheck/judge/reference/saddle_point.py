@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg.lapack import dgetrf, dgetrs
 
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 
 ROUNDS = 40  # refinement steps at most
 FIRST = 4.0  # initial correction size, so that the first step is never the last

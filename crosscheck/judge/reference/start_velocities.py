@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge import constraints
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 

@@ -14,8 +14,8 @@ from typing import Any, Protocol
 import numpy as np
 from scipy.linalg import lu_factor, lu_solve
 
+from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.reference.arithmetic import doubles
 from crosscheck.judge.reference.crossing import singular_time
 from crosscheck.judge.reference.panels import (
     LAST,

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from crosscheck.judge.arithmetic import Arithmetic, doubles, largest
 from crosscheck.judge.deadline import TimeIsUp, ask, within
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles, largest
 from crosscheck.judge.reference.expansion import Expansion, Series, value
 from crosscheck.judge.reference.held_rows import HeldRows, independent
 from crosscheck.judge.reference.motion import Motion, Progress, Times, no_progress
@@ -23,6 +23,7 @@ from crosscheck.judge.reference.natural import NaturalCoordinates
 from crosscheck.judge.reference.natural_loads import Loads
 from crosscheck.judge.reference.saddle_point import SaddlePoint
 from crosscheck.judge.reference.start_velocities import start_velocities
+from crosscheck.judge.time_functions import next_end
 from mbref.scene import Scene
 
 ORDER = 28
@@ -43,8 +44,6 @@ LEAST_STEP = 1e-6  # s, where no time is left
 SHORTEST = 1e-9  # step / time reached: a shorter step ends the run
 STEPS_END = "its steps end: its series cannot be continued over a singular position there"
 WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia: smaller ones count as zero
-
-Sample = tuple[np.ndarray, ...]
 
 
 class Ended(ArithmeticError):
@@ -105,7 +104,7 @@ class Stepper:
         self._loads = Loads(self.of)
         self._order, self._tolerance = order, tolerance
         self._x, self._v = self.of.start()
-        self._angles = [arithmetic.number(0.0) for _ in self._loads.torsions]
+        self._angles = [arithmetic.number(0.0) for _ in self._loads.turned]
         self._turned = self.of.joints.start()
         self._weights = self._varied(*way)
         self._every, self._lost = HeldRows(self.of, range(self.of.count)), np.inf
@@ -120,7 +119,7 @@ class Stepper:
         constants += self.of.arithmetic.array(displaced * self._size() * rng.uniform(-1, 1, len(constants)))
         return 1 + PREFERENCE * rng.random(self.of.count)
 
-    def samples(self, times: Times, progress: Progress) -> Iterator[Sample]:
+    def samples(self, times: Times, progress: Progress) -> Iterator[tuple[np.ndarray, ...]]:
         """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
         self._held = self._choice(self._x, self.t)[0]
         self._conditioning = [self._sharp(self._x, self.t)]
@@ -129,11 +128,12 @@ class Stepper:
         pending = list(times)
         while pending:
             ask()
-            expansion, h = self._step(2 * (float(times[-1]) - float(self.t)))
+            left = next_end(self.of.scene, float(self.t)) - float(self.t)
+            expansion, h = self._step(min(2 * (float(times[-1]) - float(self.t)), left), left)
             series = expansion.x[: Series(expansion.x).terms(h)]
             if not self.steps:
                 self._refuse_singular_start(series, self.of.arithmetic.number(h / 2))
-            while pending and pending[0] <= float(self.t) + h:
+            while pending and (pending[0], h >= left) <= (float(self.t) + h, False):
                 d = self.of.arithmetic.number(pending.pop(0)) - self.t
                 yield tuple(self.of.arithmetic.settled(value(series, d, n)) for n in range(3))
             self._advance(expansion, series, h)
@@ -252,22 +252,22 @@ class Stepper:
         if not np.isfinite(doubles(np.stack([self._x, self._v]))).all():
             raise Ended("a pivot of its equations is zero to the digits of the arithmetic")
 
-    def _step(self, most: float) -> tuple[Expansion, float]:
-        """A series and the length (s) of its step, at most ``most``, which does not end much nearer to a
-        singular position."""
+    def _step(self, most: float, left: float) -> tuple[Expansion, float]:
+        """A series and the length (s) of its step, at most ``most``, and no more than is ``left`` (s) of a
+        piece of a function of time; it does not end much nearer to a singular position."""
         expansion = self._expansion(self._order)
         series = Series(expansion.x)
         h = series.reach(self._tolerance)
         if h <= SHORTEST * max(1e-3, float(self.t)):
             raise Ended(STEPS_END)
-        h, now = min(h, max(most, LEAST_STEP)), self._conditioning[-1]
+        h, now = min(h, max(most, LEAST_STEP), left), self._conditioning[-1]
         ahead = self._ahead(expansion.x, series, h)
         if ahead < now < NEAR * max(self._conditioning[-USUAL:]):
             middle = self._crossing(expansion.x, series, h)
             if middle and self._others_serve(expansion.x[: series.terms(h)], middle):
-                return self._step(most)
+                return self._step(most, left)
             longer = self._expansion(2 * self._order) if middle else expansion
-            if middle and self._may_step_across(Series(longer.x).left_out(2 * middle)):
+            if middle and 2 * middle <= left and self._may_step_across(Series(longer.x).left_out(2 * middle)):
                 self.crossings.append(float(self.t) + middle)
                 return longer, 2 * middle
         return expansion, self._shortened(expansion.x, series, h, ahead)

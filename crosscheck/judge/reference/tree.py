@@ -12,13 +12,14 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import Arithmetic
 from crosscheck.judge.deadline import TimeIsUp, ask, within
-from crosscheck.judge.reference.arithmetic import Arithmetic
 from crosscheck.judge.reference.motion import Motion, Progress, no_progress
 from crosscheck.judge.reference.panels import Panel, Panels
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 from crosscheck.judge.reference.tree_equations import OPEN, TreeEquations
 from crosscheck.judge.reference.vectors import apply, product, unit
+from crosscheck.judge.time_functions import NEAR, next_end
 from mbref.scene import Scene
 
 NODES_PER_DIGIT = 2.1
@@ -91,7 +92,8 @@ class _Run:
         length = self.arithmetic.number(FIRST * end or 1.0)
         while self.taken < len(self.times):
             ask()
-            panel = self._tried(panel, self._before_singular(length))
+            self.equations.since = float(self.t)
+            panel = self._tried(panel, self._before_end(self._before_singular(length)))
             is_shortened = panel.settled and panel.length < length
             length = length if is_shortened else panel.length * panel.factor
             if not panel.settled or self.foreseen <= float(self.t):
@@ -102,6 +104,11 @@ class _Run:
                 return "rows that were redundant at the start are not later: it is a singular position"
             progress(float(self.t))
         return ""
+
+    def _before_end(self, length: Any) -> Any:
+        """A length with which no panel passes the end of a piece of a function of time."""
+        left = next_end(self.equations.scene, float(self.t))
+        return length if self.t + length <= left else self.arithmetic.number(left) - self.t
 
     def _tried(self, last: Panel | None, length: Any) -> Panel:
         """Solve a panel of the given length; after several failures, one across a singular position."""
@@ -146,6 +153,8 @@ class _Run:
         short = self._panel(length, self._guess(None, length))
         if not short.settled:
             return None
+        if short.start + short.length * (1 + BEYOND) > next_end(self.equations.scene, float(self.t)):
+            return None
         panel, lost = self.panels.continued(short, 1 + BEYOND, singular)
         before, self.lost = self.lost, lost
         if lost > MOST_LOST or LEAST_LOST * self.arithmetic.eps < lost < before:
@@ -162,7 +171,9 @@ class _Run:
         return guess
 
     def _sample(self, panel: Panel) -> None:
-        stop = int(np.searchsorted(self.times, float(panel.start + panel.length), side="right"))
+        end = float(panel.start + panel.length)
+        ends = end * (1 + NEAR) >= next_end(self.equations.scene, float(panel.start)) and end < self.times[-1]
+        stop = int(np.searchsorted(self.times, end, side="left" if ends else "right"))
         if stop > self.taken:
             at = self.arithmetic.array(self.times[self.taken : stop])
             self.samples.append(self.panels.sampled(panel, at))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.reference.arithmetic import Arithmetic, doubles
+from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 

@@ -1,7 +1,7 @@
 """The equations of motion of a scene on its spanning tree: rates of states, and states that obey the joints.
 
 A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the coordinates of
-joints outside the tree that a driver, a torsion spring, a coupling or an armature uses, and the joint rates.
+joints outside the tree that a driver, a load, a coupling or an armature uses, and the joint rates.
 """
 
 from __future__ import annotations
@@ -13,14 +13,15 @@ import numpy as np
 from scipy.linalg import qr
 
 from crosscheck.judge import constraints
-from crosscheck.judge.reference.arithmetic import DOUBLE, Arithmetic, doubles
+from crosscheck.judge.arithmetic import DOUBLE, Arithmetic, doubles
 from crosscheck.judge.reference.start_velocities import given, start_velocities
 from crosscheck.judge.reference.tree_closures import Closures, Measured, Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree, used_coordinates
 from crosscheck.judge.reference.tree_loads import Loads
 from crosscheck.judge.reference.vectors import apply, product, saddle_solve, unit
+from crosscheck.judge.time_functions import values
 from crosscheck.judge.tolerances import RANK
-from mbref.scene import Driver, Scene
+from mbref.scene import Scene
 from mbref.scene_joints import ANGLE, DISPLACEMENT
 
 COORDINATES = (ANGLE, DISPLACEMENT)
@@ -70,6 +71,7 @@ class TreeEquations:
         self.ends = np.cumsum([self.tree.scalars, 4 * len(self.tree.balls), len(away), self.nv])
         self.light, self.length = int(self.ends[1]), constraints.scene_length(scene)
         self.kept: np.ndarray | None = None
+        self.since = 0.0  # s, from which the pieces of functions of time act
         self._doubles: TreeEquations | None = None
         self._varied(*way)
 
@@ -100,7 +102,7 @@ class TreeEquations:
     def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Rates (K, ·) of angles and joint rates at times t (K,), and the distance (K,) from singularity."""
         at = self.at(t, y)
-        mass, force = self.loads.terms(at.placed, at.coordinates, at.rate)
+        mass, force = self.loads.terms(at.placed, at.coordinates, at.rate, t, self.since)
         jacobian, drift = at.rows.jacobian[:, self.kept], at.rows.drift[:, self.kept]
         acceleration, distance = saddle_solve(mass, jacobian, force, -1 * drift)
         turning = apply(at.coordinates.jacobian[:, self.tree.scalars :], at.rate)
@@ -110,7 +112,7 @@ class TreeEquations:
         """Return the equations, with equal rows, in double precision."""
         if self._doubles is None:
             self._doubles = TreeEquations(self.scene, DOUBLE)
-        self._doubles.kept = self.kept
+        self._doubles.kept, self._doubles.since = self.kept, self.since
         return self._doubles
 
     def at(self, t: np.ndarray, y: np.ndarray) -> Instant:
@@ -239,27 +241,13 @@ class TreeEquations:
 
     def _wanted(self, t: np.ndarray) -> np.ndarray:
         """(3, K, drivers) values of the drivers at times (K,), their rates and second rates."""
-        values = [_driver(self.arithmetic, driver, t) for driver in self.scene.driver]
-        return np.stack(values, axis=-1) if values else self.arithmetic.zeros(3, len(t), 0)
+        found = [
+            np.stack([values(driver, t, self.since, n, self.arithmetic) for n in range(3)])
+            for driver in self.scene.driver
+        ]
+        return np.stack(found, axis=-1) if found else self.arithmetic.zeros(3, len(t), 0)
 
 
 def _least(rows: np.ndarray) -> float:
     """Least singular value; infinite without rows."""
     return float(np.linalg.svd(rows, compute_uv=False).min(initial=np.inf))
-
-
-def _driver(arithmetic: Arithmetic, driver: Driver, t: np.ndarray) -> np.ndarray:
-    """(3, K) value, rate and second rate of a driver at times (K,)."""
-    coefficients, out = arithmetic.array(driver.polynomial), []
-    for _ in range(3):
-        value = 0 * t
-        for c in coefficients[::-1]:
-            value = value * t + c
-        out.append(value)
-        coefficients = coefficients[1:] * np.arange(1, len(coefficients))
-    if driver.sine is not None:
-        sine = driver.sine
-        amplitude, frequency, phase = arithmetic.array((sine.amplitude, sine.frequency, sine.phase))
-        wave, slope = amplitude * np.sin(frequency * t + phase), amplitude * np.cos(frequency * t + phase)
-        out = [out[0] + wave, out[1] + frequency * slope, out[2] - frequency * frequency * wave]
-    return np.stack(out)

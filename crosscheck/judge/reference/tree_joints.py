@@ -13,10 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judge.reference.arithmetic import Arithmetic
+from crosscheck.judge.arithmetic import Arithmetic
 from crosscheck.judge.reference.vectors import apply, cross, matrices, product, unit
-from mbref.scene import Scene
-from mbref.scene_joints import ANGLE
+from mbref.scene import JointLoad, Scene
 
 AXES = np.eye(3)
 RIGIDITY = {
@@ -168,11 +167,11 @@ class Tree:
 
 
 def used_coordinates(scene: Scene) -> set[tuple[str, str]]:
-    """Kind and joint of the coordinates that drivers, torsion springs, couplings and armatures use."""
+    """Kind and joint of the coordinates that drivers, loads of joints, couplings and armatures use."""
     acting = [driver.joint for driver in scene.driver]
     acting += [joint.name for joint in scene.joint if joint.reflected_inertia]
     found = {(str(scene.joint_named(name).facts.driven), name) for name in acting}
-    found |= {(ANGLE, load.joint) for load in scene.load if load.type == "torsion_spring"}
+    found |= {(load.coordinate, load.joint) for load in scene.load if isinstance(load, JointLoad)}
     return found | {(kind, joint.name) for c in scene.coupling for joint, kind in scene.coupled(c)}
 
 

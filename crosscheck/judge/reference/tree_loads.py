@@ -1,7 +1,7 @@
 """Inertia and loads of a scene in the joint coordinates of its tree, by d'Alembert's principle.
 
 A body's part of the mass matrix is columnᵀ · inertia · column and its part of the generalised force is
-columnᵀ · (load - inertia · drift); a torsion spring works on its joint's angle alone.
+columnᵀ · (load - inertia · drift); a load of a joint works on the joint's coordinate alone.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ from crosscheck.judge.constraints import inertia_matrices
 from crosscheck.judge.reference.tree_closures import Rows
 from crosscheck.judge.reference.tree_joints import Placed, Tree
 from crosscheck.judge.reference.vectors import apply, cross, dot, matrices, unit
-from mbref.scene import Force, Moment, Spring, TorsionSpring
-from mbref.scene_joints import ANGLE
+from crosscheck.judge.time_functions import values
+from mbref.scene import Force, JointLoad, Moment, Spring
 
 
 class Loads:
@@ -37,9 +37,10 @@ class Loads:
             kind: [l for l in scene.load if massive and isinstance(l, kind)] for kind in LOADS
         }
         self.moments, self.forces, self.springs = of[Moment], of[Force], of[Spring]
-        self.torsion = np.array([measured[ANGLE, load.joint] for load in of[TorsionSpring]], dtype=int)
-        values = [(l.stiffness, l.damping, l.natural_angle) for l in of[TorsionSpring]]
-        self.stiffness, self.damping, self.natural = numbers.array(values).reshape(-1, 3).T
+        self.along = of[JointLoad]
+        self.acting = np.array([measured[load.coordinate, load.joint] for load in self.along], dtype=int)
+        numbers_of = numbers.array([load.action for load in self.along]).reshape(-1, 4)
+        self.stiffness, self.damping, self.natural, self.amount = numbers_of.T
         geared = [joint for joint in scene.joint if massive and joint.reflected_inertia]
         self.geared = np.array([measured[str(j.facts.driven), j.name] for j in geared], dtype=int)
         self.armature = numbers.array([joint.reflected_inertia for joint in geared])
@@ -48,20 +49,25 @@ class Loads:
         """(K, nv, nv)."""
         return self._mass_matrix(placed, coordinates, self._world_inertia(placed))
 
-    def terms(self, placed: Placed, coordinates: Rows, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def terms(
+        self, placed: Placed, coordinates: Rows, rate: np.ndarray, t: np.ndarray, since: float
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the mass matrix, and forces (K, nv) of loads minus inertia forces without joint
-        accelerations."""
+        accelerations.  Functions of time are at times t (K,), of the piece that acts from ``since`` (s) on.
+        """
         spin, inertia = placed.spin[:, :-1], self._world_inertia(placed)
         turning = cross(spin, apply(inertia, spin)) + apply(inertia, placed.spin_drift[:, :-1])
         force = self.mass * (self.gravity - placed.drift[:, :-1])
         wrench = self._with_ground(np.concatenate([force, -1 * turning], axis=-1))
-        self._act(placed, wrench)
+        self._act(placed, wrench, t, since)
         total = self._project(placed, wrench)
-        if len(self.torsion):
-            jacobian = coordinates.jacobian[:, self.torsion]
-            resisting = self.stiffness * (coordinates.value[:, self.torsion] - self.natural)
-            resisting = resisting + self.damping * apply(jacobian, rate)
-            total = total - apply(np.swapaxes(jacobian, 1, 2), resisting)
+        if len(self.acting):
+            jacobian = coordinates.jacobian[:, self.acting]
+            acting = -1 * self.stiffness * (coordinates.value[:, self.acting] - self.natural)
+            acting = acting - self.damping * apply(jacobian, rate)
+            factors = [self._factor(load, t, since) for load in self.along]
+            acting = acting + self.amount * np.stack(factors, axis=1)
+            total = total + apply(np.swapaxes(jacobian, 1, 2), acting)
         if len(self.geared):
             turned = coordinates.among(self.geared)
             total = total - apply(np.swapaxes(turned.jacobian, 1, 2), self.armature * turned.drift)
@@ -87,16 +93,24 @@ class Loads:
         rows = coordinates.jacobian[:, self.geared]
         return found + np.swapaxes(rows, 1, 2) @ (self.armature[:, None] * rows)
 
-    def _act(self, placed: Placed, wrench: np.ndarray) -> None:
+    def _factor(self, load: Any, t: np.ndarray, since: float) -> np.ndarray:
+        """(K,) the function of time that multiplies a load, at times t (K,)."""
+        if load.over_time is None:
+            return 0 * t + 1
+        return values(load.over_time, t, since, arithmetic=self.tree.arithmetic)
+
+    def _act(self, placed: Placed, wrench: np.ndarray, t: np.ndarray, since: float) -> None:
         """Adds the loads, each of them a force at a point of a body or a moment."""
         scene = self.tree.scene
         for load in self.moments:
             body = scene.body_index(load.body)
-            wrench[:, body, 3:] = wrench[:, body, 3:] + self.tree.arithmetic.array(load.moment)
+            factor = self._factor(load, t, since)[:, None]
+            wrench[:, body, 3:] = wrench[:, body, 3:] + factor * self.tree.arithmetic.array(load.moment)
         for load in self.forces:
             body = scene.body_index(load.body)
             arm, _, _ = self._point(placed, body, load.point)
-            _push(wrench, body, arm, 0 * arm + self.tree.arithmetic.array(load.force))
+            factor = self._factor(load, t, since)[:, None]
+            _push(wrench, body, arm, factor * self.tree.arithmetic.array(load.force))
         for load in self.springs:
             self._pull(placed, load, wrench)
 
@@ -128,7 +142,7 @@ class Loads:
         return rotation @ self.inertia @ np.swapaxes(rotation, -1, -2)
 
 
-LOADS = (Moment, Force, Spring, TorsionSpring)
+LOADS = (Moment, Force, Spring, JointLoad)
 
 
 def _over_bodies(columns: np.ndarray) -> np.ndarray:

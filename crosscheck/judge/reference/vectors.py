@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.deadline import ask
-from crosscheck.judge.reference.arithmetic import doubles
 
 COLUMN = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
 SIGN = np.array([[1, -1, -1, -1], [1, 1, -1, 1], [1, 1, 1, -1], [1, -1, 1, 1]])

@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.time_functions import ends
 from crosscheck.judge.truth.crankshaft import crankshaft
 from crosscheck.judge.truth.free_body import free_body
 from crosscheck.judge.truth.locked import locked
@@ -23,7 +24,7 @@ from crosscheck.judge.truth.planar_slider_crank import planar_slider_crank
 from crosscheck.judge.truth.reference_truth import ReferenceTruth
 from crosscheck.judge.truth.slider import slider
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
-from mbref.scene import Scene
+from mbref.scene import JointLoad, Scene, TorsionSpring
 from mbref.trajectory import Trajectory
 
 PATHS: tuple[Callable[[Scene], Path | None], ...] = (
@@ -83,9 +84,11 @@ def closed_form(scene: Scene) -> Truth | None:
     """Return the truth of a scene of a known family, or None. It is cached with the part of the motion that
     is already solved.
 
-    No family has couplings or armatures.
+    No family has couplings, armatures, tables, loads over time or, except torsion springs, loads of joints.
     """
-    if scene.coupling or any(joint.reflected_inertia for joint in scene.joint):
+    varies = any(load.over_time for load in scene.load) or any(ends(driver) for driver in scene.driver)
+    pushed = any(isinstance(load, JointLoad) and not isinstance(load, TorsionSpring) for load in scene.load)
+    if varies or pushed or scene.coupling or any(joint.reflected_inertia for joint in scene.joint):
         return None
     for family in PATHS:
         if truth := one_dof(scene, family(scene)):

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge import constraints
-from crosscheck.judge.joint_residuals import driver_value
 from crosscheck.judge.loads import Motion, world_inertia, wrenches
 from crosscheck.judge.reference.start_velocities import given
+from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.judge.truth.picard import REAL, NoSolution, Solution
 from mbref import rotations
@@ -104,7 +104,7 @@ class OneDof:
         if self._reduced is None:
             driver = self._scene.driver[0]
             sign = self._path.driven_sign(driver)
-            return tuple(sign * driver_value(driver, times, order) for order in (0, 1, 2))
+            return tuple(sign * value(driver, times, order) for order in (0, 1, 2))
         return self._reduced(times)
 
 

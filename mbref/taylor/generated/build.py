@@ -18,6 +18,7 @@ from mbref.taylor.generated.instructions import Instructions
 from mbref.taylor.generated.multiplier_orders import MultiplierOrders
 from mbref.taylor.generated.power_orders import PowerOrders
 from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.loads import has_varying_loads
 from mbref.taylor.simd import WIDTH
 
 EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
@@ -54,13 +55,13 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
 
 
 def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
-    """Return the names of a scene's functions: loads of springs are no sums of products of series, and
+    """Return the names of a scene's functions: loads that vary are no sums of products of series, and
     elimination of many rows is left to the kernels' loops."""
-    springs = taylor.polynomials.springs.damping.size + taylor.polynomials.torsions.damping.size
+    varies = bool(has_varying_loads(taylor.polynomials))
     rank, nr, nz = rank_of_rows(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
     by_power = power_orders.serves(taylor)
-    names = {EXPAND: not springs, POWER: not springs and by_power, FACTORISE: is_short}
+    names = {EXPAND: not varies, POWER: not varies and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *corrections.POINTERS
 
 

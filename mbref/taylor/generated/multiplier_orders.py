@@ -9,7 +9,8 @@ from llvmlite import ir
 
 from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant
 from mbref.taylor.generated.orders import Factors, Newest, Orders, Sums
-from mbref.taylor.layout import Products, TaylorMemory
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.polynomial_layout import Products
 from mbref.taylor.simd import WIDTH
 
 POINTERS = 7  # terms, response, left, right, scale, growth, sums

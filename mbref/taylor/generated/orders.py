@@ -16,7 +16,8 @@ import numpy as np
 from llvmlite import ir
 
 from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant
-from mbref.taylor.layout import Products, TaylorMemory
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.polynomial_layout import Products
 from mbref.taylor.simd import WIDTH
 
 Sums = dict[int, ir.Value]

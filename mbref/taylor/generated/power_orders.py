@@ -20,7 +20,8 @@ from llvmlite import ir
 
 from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant, levels
 from mbref.taylor.generated.orders import Factors, Orders, Sums, terms_of_rows
-from mbref.taylor.layout import Inertia, Products, TaylorMemory
+from mbref.taylor.layout import TaylorMemory
+from mbref.taylor.polynomial_layout import Inertia, Products
 from mbref.taylor.polynomials import products_of_lanes
 from mbref.taylor.simd import WIDTH, padded_size
 

@@ -1,0 +1,54 @@
+"""Loads along joint coordinates by the judge: a coordinate's row times spring, damper and applied force."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian, coordinates
+from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
+from crosscheck.judge.time_functions import value
+from mbref.scene import JointLoad, Scene
+from mbref.scene_joints import ANGLE
+
+
+def joint_loads(scene: Scene) -> list[JointLoad]:
+    """Return the loads along joint coordinates."""
+    return [load for load in scene.load if isinstance(load, JointLoad)]
+
+
+def turning_loads(scene: Scene) -> list[JointLoad]:
+    """Return the loads about joints' axes, whose angles a state contains."""
+    return [load for load in joint_loads(scene) if load.coordinate == ANGLE]
+
+
+def joint_wrenches(
+    scene: Scene,
+    t: float,
+    pose: tuple[np.ndarray, np.ndarray],
+    twist: tuple[np.ndarray, np.ndarray],
+    angles: np.ndarray,
+    since: float | None = None,
+) -> np.ndarray:
+    """Return forces and moments (nb, 6), world, of the loads along joint coordinates.
+
+    At a pose and twist (nb, ·), with the ``angles`` of ``turning_loads``; functions of time are of the piece
+    that acts from ``since`` (s) on, by default of the one at t.
+    """
+    found = np.zeros(6 * len(scene.body))
+    rates, turned = np.hstack(twist).ravel(), iter(angles)
+    for load in joint_loads(scene):
+        row = coordinate_jacobian(scene, load.joint, *pose)[COORDINATES.index(load.coordinate)]
+        moved = next(turned) if load.coordinate == ANGLE else _displacement(scene, load.joint, pose)
+        action, factor = load.action, 1.0
+        if load.over_time is not None:
+            factor = float(value(load.over_time, t, since=since))
+        resistance = action.stiffness * (moved - action.natural) + action.damping * (row @ rates)
+        found += (action.amount * factor - resistance) * row
+    return found.reshape(-1, 6)
+
+
+def _displacement(scene: Scene, name: str, pose: tuple[np.ndarray, np.ndarray]) -> float:
+    joint = next(joint for joint in joint_frames(scene) if joint.name == name)
+    position, orientation = (part[None] for part in with_ground(*pose))
+    still = grounded(np.zeros((1, len(pose[0]), 3)))
+    return float(coordinates(joint, np.zeros(1), position, orientation, still)[0, 1])

@@ -1,0 +1,70 @@
+"""Faults of functions of time that fields alone do not show: gaps of tables, units, values at t = 0."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from mbref.scene_fields import LARGEST, field_of
+from mbref.scene_functions import Factor
+from mbref.scene_units import dimension_of, in_si
+
+Faults = Iterator[tuple[str, str]]  # path and message
+
+
+def factor_faults(path: str, factor: Any, data: Mapping[str, Any]) -> Faults:
+    """A factor of a load whose amplitude has a unit, or whose table leaves a gap."""
+    if dimension_of(amplitude := field_of(field_of(factor, "sine"), "amplitude")) is not None:
+        yield f"{path}.sine.amplitude", f"multiplies the load, so it has no unit, got {amplitude!r}"
+    start, stop = _number(field_of(factor, "start")), _number(field_of(factor, "stop")) or math.inf
+    yield from table_faults(f"{path}.table", factor, data, start, stop)
+
+
+def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float, stop: float) -> Faults:
+    """The fault of a table that does not reach over the times (s) in which its function acts."""
+    rows, duration = rows_of(function), field_of(data, "duration")
+    if not rows:
+        return
+    end = min(stop, _number(1.0 if duration is None else duration))
+    if rows[0][0] > start:
+        yield path, f"leaves a gap: its first row is at {rows[0][0]:g} s, but it acts from {start:g} s on"
+    if rows[-1][0] < end:
+        yield path, f"leaves a gap: its last row is at {rows[-1][0]:g} s, but it acts until {end:g} s"
+
+
+def rows_of(function: Any) -> list[tuple[float, float]]:
+    """The rows of a table; none of a table that is itself faulty."""
+    table = field_of(function, "table")
+    given = list(table) if isinstance(table, list | tuple) else []
+    rows = [tuple(row) for row in given if isinstance(row, list | tuple) and len(row) == 2]
+    numbers = all(isinstance(x, int | float) for row in rows for x in row)
+    return rows if numbers and len(rows) == len(given) else []
+
+
+def initial_value(driver: Any) -> float:
+    """value(0) of a driver; 0 where rounding or where its fields are themselves faulty."""
+    polynomial, sine = field_of(driver, "polynomial"), field_of(driver, "sine")
+    first = polynomial[0] if isinstance(polynomial, list | tuple) and polynomial else 0.0
+    amplitude, phase = _number(field_of(sine, "amplitude")), _number(field_of(sine, "phase"))
+    start = _number(first) + amplitude * math.sin(phase) + _table_at_start(rows_of(driver))
+    return start if abs(start) > 1e-12 else 0.0
+
+
+def _table_at_start(rows: Sequence[tuple[float, float]]) -> float:
+    """The value of a table at t = 0; 0 where it is itself faulty."""
+    if not rows:
+        return 0.0
+    try:
+        return Factor(table=rows).pieces()[0].cubic[0]
+    except ValidationError:
+        return 0.0
+
+
+def _number(value: Any) -> float:
+    """A number of a size that a scene can have, or 0, where a field's own fault is reported."""
+    if dimension := dimension_of(value):
+        value = in_si(value, dimension)
+    return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0

@@ -1,0 +1,157 @@
+"""Loads of a scene in natural coordinates, as the arrays that the kernels of the series read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from mbref import rotations
+from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, FORCE, MOMENT, SPRING, Loads, SceneData
+from mbref.taylor.forms import Forms, sum_of_products
+from mbref.taylor.numbers import array_of
+from mbref.taylor.polynomial_layout import Slides, Springs, TimedForces, Torsions
+
+
+def constant_forces(data: SceneData, forms: Forms) -> tuple[np.ndarray, np.ndarray]:
+    """Return forces on the variables: constant ones (…, d), and the matrix (…, d, d) of linear ones."""
+    of, loads, d = forms.of, data.loads, forms.d
+    weight = data.bodies.mass[..., None] * (data.gravity / of.length)[..., None, :]
+    by_weight = weight[..., None] * forms.centres
+    force = by_weight.reshape(*by_weight.shape[:-3], 3 * of.nb, d).sum(axis=-2)
+    linear = np.zeros((*force.shape, d))
+    for k, kind in enumerate(loads.kind.tolist()):
+        if kind in (FORCE, MOMENT) and loads.function[k] < 0:
+            constant, matrix = _force_of(k, loads, forms)
+            force, linear = force + constant, linear + matrix
+    return force, linear
+
+
+def _force_of(k: int, loads: Loads, forms: Forms) -> tuple[np.ndarray, np.ndarray]:
+    """Return constant (…, d) and linear (…, d, d) force of a force at a point or a moment, load k."""
+    of, body = forms.of, int(loads.first[k])
+    if loads.kind[k] == MOMENT:
+        return _moment(forms, body, loads.force[..., k, :] / of.length**2)
+    if body >= of.nb:
+        return np.zeros(forms.d), np.zeros(())
+    point = forms.spread(forms(of.point(body, loads.point_first[k]))[1])
+    pushed = sum_of_products((loads.force[..., k, :] / of.length)[..., None], point)[..., 0, :]
+    return pushed, np.zeros(())
+
+
+def _moment(forms: Forms, body: int, moment: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return constant (…, d) and linear (…, d, d) force of a moment (…, 3): ½ Σ (moment × R e) · δ(R e) over
+    three axes."""
+    at_rest, moving = map(forms.spread, forms.of_axes(body))
+    constant, matrix = np.zeros(()), np.zeros(())
+    for k in range(0, 9, 3):
+        form = moving[..., k : k + 3, :]
+        turned = rotations.cross(moment, at_rest[..., k : k + 3])
+        turning = rotations.cross(moment[..., None, :], form.swapaxes(-1, -2)).swapaxes(-1, -2)
+        constant = constant + 0.5 * sum_of_products(turned[..., None], form)[..., 0, :]
+        matrix = matrix + 0.5 * sum_of_products(form, turning)
+    return constant, matrix
+
+
+def springs_of(loads: Loads, forms: Forms) -> Springs:
+    """Return the springs between points."""
+    of, rows = forms.of, []
+    for k in np.flatnonzero(loads.kind == SPRING):
+        one, other = (
+            forms(of.point(int(body[k]), point[k]))
+            for body, point in ((loads.first, loads.point_first), (loads.second, loads.point_second))
+        )
+        rows.append(
+            (
+                other[0] - one[0],
+                other[1] - one[1],
+                loads.stiffness[k],
+                loads.damping[k],
+                loads.natural[k] / of.length,
+            )
+        )
+    return Springs(*_stacked(rows, 3, forms.d))
+
+
+def coupled_angles(forms: Forms) -> list[tuple[Any, ...]]:
+    """Return the angles in the rows of couplings, as rows of ``Torsions`` without stiffness."""
+    of, rows = forms.of, []
+    table = of.model.data.primitives
+    for p, (row, factor) in of.angles.items():
+        first, second = int(table.first[p]), int(table.second[p])
+        across = (of.direction(first, w[p]) for w in (table.direction_first, table.turning_first))
+        directions = *across, of.direction(second, table.direction_second[p])
+        constant, form = forms([e for direction in directions for e in direction])
+        rows.append((constant, form, 0.0, 0.0, 0.0, -1, table.angle[p], row, factor))
+    return rows
+
+
+def torsions_of(loads: Loads, forms: Forms, angles: Sequence[tuple[Any, ...]]) -> Torsions:
+    """Return the loads about joints' axes, then the coupled angles."""
+    of, rows, places = forms.of, [], np.flatnonzero(loads.kind == ABOUT_AXIS)
+    for k in places:
+        first, second = int(loads.first[k]), int(loads.second[k])
+        direction_vectors = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),
+                  of.direction(second, loads.x_second[k]))  # fmt: skip
+        constant, form = forms([e for direction_vector in direction_vectors for e in direction_vector])
+        stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
+        indices = loads.function[k], loads.angle[k], -1
+        rows.append((constant, form, stiffness, damping, loads.natural[k], *indices, 0.0))
+    rows += angles
+    constant, form, stiffness, damping, natural, function, slot, row, factor = _stacked(rows, 9, forms.d, 7)
+    amount = loads.force[..., places, 0] / of.length**2
+    amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(angles)))], axis=-1)
+    indices = (number.astype(np.int64) for number in (function, slot, row))
+    return Torsions(constant, form, stiffness, damping, natural, amount, *indices, factor)
+
+
+def slides_of(loads: Loads, forms: Forms) -> Slides:
+    """Return the loads along joints' axes."""
+    of, rows, places = forms.of, [], np.flatnonzero(loads.kind == ALONG_AXIS)
+    for k in places:
+        first, second = int(loads.first[k]), int(loads.second[k])
+        axis = forms(of.direction(first, loads.axis[k]))
+        one, other = (
+            forms(of.point(first, loads.point_first[k])),
+            forms(of.point(second, loads.point_second[k])),
+        )
+        constant, form = (np.concatenate([axis[c], other[c] - one[c]]) for c in range(2))
+        natural = loads.natural[k] / of.length
+        rows.append((constant, form, loads.stiffness[k], loads.damping[k], natural, loads.function[k]))
+    *numbers, function = _stacked(rows, 6, forms.d, 4)
+    return Slides(*numbers, loads.force[..., places, 0] / of.length, function.astype(np.int64))
+
+
+def no_springs(d: int) -> Springs:
+    """Return springs of a scene of d variables that has none."""
+    return Springs(*_stacked([], 3, d))
+
+
+def no_slides(d: int) -> Slides:
+    """Return loads along joints' axes of a scene of d variables that has none."""
+    none = np.zeros(0)
+    return Slides(*_stacked([], 6, d), none, none.astype(np.int64))
+
+
+def timed_forces(loads: Loads, forms: Forms) -> TimedForces:
+    """Return the forces and moments on bodies that functions of time multiply."""
+    places = [k for k in np.flatnonzero(loads.function >= 0) if loads.kind[k] in (FORCE, MOMENT)]
+    found, lead, d = [_force_of(k, loads, forms) for k in places], loads.force.shape[:-2], forms.d
+    constant = np.array([np.broadcast_to(c, (*lead, d)) for c, _ in found]).reshape(len(found), *lead, d)
+    linear = np.array([np.broadcast_to(m, (*lead, d, d)) for _, m in found])
+    linear = np.moveaxis(linear.reshape(len(found), *lead, d, d), 0, len(lead))
+    function = np.array([int(loads.function[k]) for k in places], dtype=np.int64)
+    return TimedForces(
+        function, np.moveaxis(constant, 0, len(lead)), linear.reshape(*lead, len(found) * d, d)
+    )
+
+
+def _stacked(rows: Sequence[tuple[Any, ...]], width: int, d: int, numbers: int = 3) -> list[np.ndarray]:
+    """Return constants (k, width), forms (k width, d) and columns of numbers (k,)."""
+    columns = [[row[i] for row in rows] for i in range(2 + numbers)]
+    return [
+        np.array(columns[0]).reshape(-1, width),
+        np.array(columns[1]).reshape(width * len(rows), d),
+        *map(array_of, columns[2:]),
+    ]

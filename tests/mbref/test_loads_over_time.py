@@ -1,0 +1,213 @@
+"""Loads of joints and functions of time: closed forms, methods that agree, switching, faults, numbers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref.ensembles.simulate_all import simulate_all
+from mbref.equations.model import Model
+from mbref.scene import Driver, Factor, JointForce, Scene, SceneError, Sine
+from tests import loads_over_time as scenes
+from tests.loads_over_time import AXIS, CUBIC, WAVY
+
+METHODS = ("taylor", "alf-dual+projection/dop853", "lm1+none/adams")
+CLOSED_FORM = 1e-12  # relative to the largest value
+TIMES = np.linspace(0.0, 2.0, 17)
+
+
+def run(scene: Scene, method: str, times=TIMES) -> mbref.Motion:
+    motion = mbref.simulate(scene, method=method, times=times, rtol=1e-13)
+    assert motion.outcome.name == "COMPLETED", motion.message
+    return motion
+
+
+def agree(found: np.ndarray, exact: np.ndarray) -> None:
+    off = np.abs(found - exact).max() / np.abs(exact).max()
+    assert off <= CLOSED_FORM, f"{off:.1e} from the closed form"
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_mass_on_a_slide_with_spring_and_damper_swings_as_its_closed_form(method):
+    motion = run(scenes.sprung_slide(), method)
+    agree(motion.joint("J").displacement, scenes.sprung_displacement(TIMES))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_wheel_turns_as_the_integral_of_a_sinusoidal_torque(method):
+    agree(run(scenes.wheel(), method).joint("J").angle, scenes.turned(TIMES))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_force_by_a_table_of_a_cubic_acts_between_its_times(method):
+    moved = run(scenes.thrown(), method).position[:, 0] @ AXIS
+    agree(moved, scenes.switched(TIMES))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_polynomial_force_along_a_slide_starts_and_stops(method):
+    factor = Factor(polynomial=tuple(CUBIC.coef), start=0.25, stop=1.9)
+    found = run(scenes.pushed(factor), method).joint("J").displacement
+    agree(found, scenes.switched(TIMES, 0.25, 1.9))
+
+
+@pytest.mark.parametrize("method", ("taylor", "lm1+projection"))
+def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
+    motion = run(scenes.driven_wheel(), method)
+    agree(motion.joint("J").angle, CUBIC(TIMES) - CUBIC(0.0))
+    agree(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES))
+
+
+@pytest.mark.parametrize("make", (scenes.arm, scenes.driven_arm), ids=lambda make: make.__name__)
+def test_methods_agree_on_loads_of_every_kind_over_time(make):
+    times = [0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0]
+    runs = [run(make(), method, times) for method in ("taylor", "mpi-qr+projection/dop853")]
+    assert np.abs(runs[0].position - runs[1].position).max() < 1e-11
+    assert np.abs(runs[0].acceleration - runs[1].acceleration).max() < 1e-9
+    assert np.abs(runs[0].reactions["R"] - runs[1].reactions["R"]).max() < 1e-9
+
+
+def test_acceleration_at_a_time_of_switching_is_that_after_it():
+    for method in METHODS:
+        motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])
+        along = motion.acceleration[:, 0] @ AXIS
+        assert np.allclose(along, [0.0, 1.0, 1.0, 0.0], atol=1e-12), method
+
+
+def test_steps_end_where_pieces_do():
+    """Between the times of a table the motion is a polynomial, which one step of the series crosses."""
+    motion = run(scenes.pushed(Factor(table=WAVY)), "taylor", [0.0, 2.0])
+    assert motion.cost.steps == 4  # the pieces end at 0.7, 1.1 and 1.6 s, and the first knot is none
+
+
+def test_a_load_that_acts_late_moves_what_rests_until_then():
+    for start in (1.999, 1e-3):
+        scene = scenes.pushed(Factor(start=start)).with_(duration=2.0)
+        moved = run(scene, "taylor", [0.0, 2.0]).joint("J").displacement[-1]
+        assert moved == pytest.approx((2.0 - start) ** 2 / 2, rel=1e-9)
+
+
+def test_terms_are_of_the_piece_at_their_time():
+    model = Model(scenes.pushed(Factor(table=WAVY, start=0.5)))
+    q, v = model.start(), np.zeros(model.n)
+    for t in (1.2, 0.1, 0.5, 0.7):
+        factor = Factor(table=WAVY, start=0.5).values(np.array([t]))[0]
+        assert model.terms(t, q, v).force[:3] @ AXIS == pytest.approx(2.0 * factor, abs=1e-14)
+
+
+def test_table_is_a_twice_differentiable_spline_through_its_rows():
+    factor, e = Factor(table=WAVY), 1e-4
+    times, values = np.array(WAVY).T
+    assert np.allclose(factor.values(times), values, atol=1e-14)
+    for t in times[1:-1]:
+        second = [np.diff(factor.values(t + side * e * np.arange(3)), 2)[0] / e**2 for side in (1.0, -1.0)]
+        assert second[0] == pytest.approx(second[1], abs=0.1)
+
+
+def test_load_numbers_are_of_the_joint():
+    motion = run(scenes.arm(), "taylor")
+    names = list(motion.columns(["load(0)"]))
+    assert names == [
+        "time",
+        *(f"load(0).{n}" for n in ("force", "displacement", "displacement_rate", "power")),
+    ]
+    assert np.allclose(motion.load_at(0).force, 2.0 * Factor(table=WAVY).values(TIMES))
+    assert np.allclose(motion.load_at(2).torque, -0.3)
+    spring, joint = motion.load_at(1), motion.joint("C")
+    assert np.allclose(spring.force, -30.0 * (joint.displacement - 0.05) - 0.7 * joint.displacement_rate)
+
+
+def test_work_of_loads_over_time_is_the_change_of_energy():
+    times = np.linspace(0.0, 2.0, 4001)
+    scene = scenes.arm()
+    scene = scene.with_(load=[load for load in scene.load if hasattr(load, "joint")])
+    motion = mbref.simulate(scene, method="taylor", times=times)
+    springs = [k for k, load in enumerate(scene.load) if load.action.stiffness]
+    dampers = sum(
+        -scene.load[k].damping
+        * np.asarray(
+            motion.load_at(k).displacement_rate if motion.load_at(k).rate is None else motion.load_at(k).rate
+        )
+        ** 2
+        for k in springs
+    )
+    power = dampers + sum(motion.load_at(k).power for k in range(len(scene.load)) if k not in springs)
+    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(times))])
+    assert np.abs(motion.energy - motion.energy[0] - work).max() < 2e-6 * np.abs(work).max()
+
+
+def test_generated_code_and_ensembles_move_loads_over_time():
+    scene = scenes.wheel()
+    plain = run(scene, "taylor")
+    coded = mbref.simulate(scene, method="taylor", times=TIMES, rtol=1e-13, code="generated")
+    assert np.abs(plain.position - coded.position).max() < 1e-14
+    many = [scene.with_("load[0].torque", torque) for torque in (0.7, 1.4, -0.7)]
+    found = simulate_all(many, times=TIMES, rtol=1e-13)
+    for factor, motion in zip((1.0, 2.0, -1.0), found, strict=True):
+        agree(motion.joint("J").angle, factor * scenes.turned(TIMES))
+
+
+def test_equilibrium_refuses_what_varies_and_measures_slide_springs_from_its_pose():
+    with pytest.raises(SceneError, match=r"load\[0\].factor: varies"):
+        mbref.equilibria(scenes.wheel())
+    found = mbref.equilibria(scenes.sprung_slide())
+    assert [load.natural_displacement for load in found[0].scene.load] == [pytest.approx(0.0, abs=1e-9)]
+    assert found[0].frequencies[0] == pytest.approx(np.sqrt(50.0 / 2.0) / 2 / np.pi)
+
+
+FAULTS = {
+    "must have at least 4 rows": {"table": [[0.0, 0.0], [1.0, 1.0], [3.0, 2.0]]},
+    "row 2 is at 0.5 s and row 1 at 1 s": {"table": [[0.0, 0.0], [1.0, 1.0], [0.5, 2.0], [3.0, 2.0]]},
+    "its first row is at 0.5 s, but it acts from 0 s on": {
+        "table": [[0.5, 0.0], [1.0, 1.0], [1.5, 2.0], [3.0, 2.0]]
+    },
+    "its last row is at 1.5 s, but it acts until 2 s": {
+        "table": [[0.0, 0.0], [1.0, 1.0], [1.2, 2.0], [1.5, 2.0]]
+    },
+    "must be a time and a value": {"table": [[0.0, 0.0], [1.0], [1.5, 2.0], [3.0, 2.0]]},
+    "must be later than start": {"start": 1.0, "stop": 0.5},
+    "has no unit": {"sine": {"amplitude": "3 deg"}},
+    "did you mean 'table'": {"tabel": []},
+}
+
+
+@pytest.mark.parametrize("message", FAULTS)
+def test_faulty_functions_are_refused_by_path_and_line(message, tmp_path):
+    text = scenes.pushed(Factor()).to_dict()
+    text["load"][0]["factor"] = FAULTS[message]
+    from mbref.scene_text import scene_text
+
+    path = tmp_path / "slide.toml"
+    path.write_text(scene_text(text))
+    with pytest.raises(SceneError) as error:
+        Scene.from_file(path)
+    (fault,) = error.value.faults
+    line = next(n for n, row in enumerate(path.read_text().splitlines(), 1) if row.startswith("factor"))
+    assert fault.startswith("load[0].factor") and message in fault and fault.endswith(f"(line {line})")
+
+
+def test_table_that_is_switched_off_needs_no_rows_there():
+    rows = [[0.5, 0.0], [1.0, 1.0], [1.2, 2.0], [1.5, 2.0]]
+    assert scenes.pushed(Factor(table=rows, start=0.5, stop=1.5)).load[0].factor.table is not None
+
+
+def test_driver_by_a_table_begins_at_zero():
+    with pytest.raises(SceneError, match="value at t = 0 must be 0"):
+        scenes.wheel().with_(driver=[Driver(joint="J", table=scenes.TABLE)])
+
+
+def test_loads_of_a_joint_need_its_coordinate():
+    with pytest.raises(SceneError, match="only translational, cylindrical joints can carry a joint_force"):
+        scenes.wheel().with_(load=[JointForce(joint="J", force=1.0)])
+
+
+def test_functions_are_kept_by_a_file(tmp_path):
+    for scene in (scenes.arm(), scenes.driven_arm()):
+        scene.save(tmp_path / "arm.toml")
+        assert Scene.from_file(tmp_path / "arm.toml") == scene
+
+
+def test_sine_of_zero_amplitude_is_constant():
+    assert Factor(sine=Sine(), polynomial=(2.0,)).is_constant
+    assert not Factor(start=1.0).is_constant
