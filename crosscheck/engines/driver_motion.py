@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
+import bisect
+import functools
 import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from mbref.scene import Driver, Scene, Spring, TorsionSpring
+from crosscheck.judge import time_functions
+from crosscheck.judge.arithmetic import DOUBLE
+from mbref.scene import Driver, JointLoad, Scene, Spring
+from mbref.scene_joints import ANGLE
 from mbref.trajectory import Outcome, Trajectory
 
 SCOUT = (2000, 16000)  # numbers of steps of the coarse run that measures the scene's fastest rate
 SCOUT_TURN = 0.5  # rad; largest rotation in a step of the coarse run
 
 
-def motion(driver: Driver, t: float) -> tuple[float, float, float]:
-    """Return value, rate and acceleration of a driver at time t (rad or m, and per second)."""
+def motion(driver: Driver, t: float, since: float | None = None) -> tuple[float, float, float]:
+    """Return value, rate and acceleration of a driver at time t (rad or m, and per second).
+
+    Of the piece of a table that acts from ``since`` (s) on, by default of the one at t.
+    """
     value = rate = acceleration = 0.0
     for c in reversed(driver.polynomial):
         acceleration = acceleration * t + 2 * rate
@@ -26,7 +34,29 @@ def motion(driver: Driver, t: float) -> tuple[float, float, float]:
         value += sine.amplitude * math.sin(phase)
         rate += sine.amplitude * w * math.cos(phase)
         acceleration -= sine.amplitude * w * w * math.sin(phase)
+    if driver.table:
+        knot, (a, b, c, d) = _cubic(driver, t if since is None else since)
+        s = t - knot
+        value += a + s * (b + s * (c + s * d))
+        rate += b + s * (2 * c + 3 * s * d)
+        acceleration += 2 * c + 6 * s * d
     return value, rate, acceleration
+
+
+def _cubic(driver: Driver, since: float) -> tuple[float, tuple[float, ...]]:
+    """Knot and coefficients of the piece of a driver's table that acts from a time (s) on."""
+    begins, pieces = _pieces(driver)
+    return pieces[bisect.bisect_right(begins, since)]
+
+
+@functools.lru_cache(maxsize=64)
+def _pieces(driver: Driver) -> tuple[tuple[float, ...], list[tuple[float, tuple[float, ...]]]]:
+    """The ends of pieces, and knot and coefficients of each."""
+    ends, found = time_functions.ends(driver), []
+    for begin in (0.0, *ends):
+        piece = time_functions.piece_of(driver, begin, DOUBLE)
+        found.append((float(piece.knot), tuple(piece.cubic.tolist())))
+    return ends, found
 
 
 def mean_rate(driver: Driver, t: float, h: float) -> float:
@@ -65,8 +95,10 @@ def stated_rate(scene: Scene) -> float:
     for load in scene.load:
         if isinstance(load, Spring):
             rates += [math.sqrt(load.stiffness / mass), load.damping / mass]
-        elif isinstance(load, TorsionSpring) and inertia > 0:
-            rates += [math.sqrt(load.stiffness / inertia), load.damping / inertia]
+        elif isinstance(load, JointLoad) and (of := inertia if load.coordinate == ANGLE else mass) > 0:
+            rates += [math.sqrt(load.action.stiffness / of), load.action.damping / of]
+        if load.over_time and load.over_time.sine:
+            rates += [abs(load.over_time.sine.frequency)]
     return max(rates)
 
 

@@ -17,10 +17,10 @@ from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
 from mbref.scene import (
     Fixed,
     Joint,
+    JointLoad,
     Revolute,
     Scene,
     Spherical,
-    TorsionSpring,
     Translational,
     Universal,
 )
@@ -73,7 +73,7 @@ def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
 def _closed_by_points(scene: Scene) -> Scene:
     """Return the scene whose cut hinges are replaced by points."""
     acting = {driver.joint for driver in scene.driver}
-    acting |= {load.joint for load in scene.load if isinstance(load, TorsionSpring)}
+    acting |= {load.joint for load in scene.load if isinstance(load, JointLoad)}
     acting |= {name for coupling in scene.coupling for name in coupling.joints}
     acting |= {joint.name for joint in scene.joint if joint.reflected_inertia}
     cut = {closure.joint for closure in spanning_tree(scene).closures if closure.kind == "weld"}

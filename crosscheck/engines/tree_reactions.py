@@ -14,9 +14,12 @@ import numpy as np
 
 from crosscheck.engines.sampling import UNKNOWN, Sample
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from crosscheck.judge.loads import at_time
+from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.rotations import cross
-from mbref.scene import Distance, Force, Load, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import Distance, Force, JointLoad, Load, Moment, Scene, Spring
+from mbref.scene_joints import ANGLE
 
 ZERO = np.zeros(3)
 
@@ -37,6 +40,7 @@ class LinkMotion:
     angular_acceleration: np.ndarray
     coordinates: np.ndarray
     rates: np.ndarray
+    time: float = 0.0  # s, at which loads over time act
 
 
 def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> np.ndarray:
@@ -140,6 +144,9 @@ def _point(
 
 def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[tuple[int, np.ndarray]]:
     """Return the links on which a load acts, each with the wrench on it."""
+    if isinstance(load, JointLoad):
+        return _along_joint(scene, tree, motion, load)
+    load = at_time(load, motion.time)
     if isinstance(load, Moment):
         return [(tree.link_of(scene.body_index(load.body)), np.array([*ZERO, *load.moment]))]
     if isinstance(load, Force):
@@ -152,21 +159,26 @@ def _applied(scene: Scene, tree: Tree, motion: LinkMotion, load: Load) -> list[t
         along = (q - p) / length
         tension = load.stiffness * (length - load.natural_length) + load.damping * (v - u) @ along
         return [(links[0], wrench(tension * along, p)), (links[1], wrench(-tension * along, q))]
-    return _twisted(scene, tree, motion, load)
+    raise TypeError(f"no wrench of a load of type {load.type!r}")
 
 
-def _twisted(
-    scene: Scene, tree: Tree, motion: LinkMotion, load: TorsionSpring
+def _along_joint(
+    scene: Scene, tree: Tree, motion: LinkMotion, load: JointLoad
 ) -> list[tuple[int, np.ndarray]]:
-    i = tree.coordinate(scene, load.joint)
+    i, action, factor = tree.coordinate(scene, load.joint, load.coordinate), load.action, 1.0
+    if load.over_time is not None:
+        factor = float(value(load.over_time, motion.time))
     child = next(
         k for k, n in enumerate(tree.links) if n.joint >= 0 and scene.joint[n.joint].name == load.joint
     )
-    angle, rate = motion.coordinates[i], motion.rates[i]
-    back = -(load.stiffness * (angle - load.natural_angle) + load.damping * rate)
-    axis = motion.rotation[child] @ tree.links[child].axes[0]
-    moment = np.concatenate([ZERO, back * axis])
-    return [(child, moment), (tree.links[child].parent, -moment)]
+    moved, rate = motion.coordinates[i], motion.rates[i]
+    size = action.amount * factor - action.stiffness * (moved - action.natural) - action.damping * rate
+    along = size * (motion.rotation[child] @ tree.links[child].axes[0])
+    if load.coordinate == ANGLE:
+        on_child = np.concatenate([ZERO, along])
+    else:
+        on_child = wrench(along, _point(tree, motion, child, tree.links[child].anchor)[0])
+    return [(child, on_child), (tree.links[child].parent, -on_child)]
 
 
 def _at_second_anchor(

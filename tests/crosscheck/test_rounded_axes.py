@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
+from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.model_identity import gate, gate_times
-from crosscheck.judge.reference.arithmetic import EXTENDED
 from crosscheck.judge.reference.taylor import Stepper
 from crosscheck.processes.serve import run_once
 from mbref.scene import Body, Scene, Universal

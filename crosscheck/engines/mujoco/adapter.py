@@ -39,6 +39,7 @@ from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, run_through, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
+from crosscheck.judge.time_functions import next_end
 from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -125,7 +126,8 @@ class _MujocoSimulation:
         self._configure(setting, scene)
         self.data = mujoco.MjData(self.model)
         self.data.qvel[:] = self.compiled.rates
-        self.data.xfrc_applied[:] = self.compiled.applied
+        self.data.xfrc_applied[:], self.data.qfrc_applied[:] = self.compiled.applied, self.compiled.pushed
+        self.since = 0.0  # s, from which the pieces of functions of time act
 
     def _configure(self, setting: Setting, scene: Scene) -> None:
         model, options, mujoco = self.model, setting.options, self.mujoco
@@ -173,7 +175,7 @@ class _MujocoSimulation:
         # MuJoCo would write warnings to the terminal and to MUJOCO_LOG.TXT
         mujoco.set_mju_user_warning(lambda _: None)
         try:
-            if self.compiled.drivers:
+            if self.compiled.drivers or self.compiled.timed:
                 mujoco.set_mjcb_control(self._drive)
             yield
         finally:
@@ -198,17 +200,22 @@ class _MujocoSimulation:
         return [(int(row), d) for equality, d in self.compiled.drivers for row in self._rows(equality)[:1]]
 
     def _drive(self, model: Any, data: Any) -> None:
-        """Add the prescribed motion to the reference accelerations of the drivers' rows."""
+        """Add drivers' motion to the reference accelerations of their rows; apply loads over time."""
+        if self.compiled.timed:
+            self.compiled.apply(data, self.since)
         reference, gains = data.efc_aref, data.efc_KBIP
         for row, driver in self._driven():
-            value, rate, acceleration = motion(driver, data.time)
+            value, rate, acceleration = motion(driver, data.time, self.since)
             stiffness, damping, impedance, _ = gains[row]
             reference[row] += acceleration + damping * rate + stiffness * impedance * value
 
     def advance(self, t0: float, t1: float) -> None:
-        """Move the data from t0 to t1; raises Failed."""
+        """Move the data from t0 to t1, with pieces of functions of time in turn; raises Failed."""
         try:
-            self.step(t0, t1)
+            while t0 < t1:
+                self.since, stop = t0, min(t1, next_end(self.scene, t0))
+                self.step(t0, stop)
+                t0 = self.since = self.data.time = stop
         except self.mujoco.FatalError as error:
             raise Failed(Outcome.STEP_FAILED, t0, f"MuJoCo stopped after {t0:.6g} s: {error}") from error
         self.data.time = t1
@@ -261,6 +268,7 @@ class _MujocoSimulation:
 
     def sample(self, t: float) -> Sample:
         """Return poses, velocities and reactions of the scene's bodies and joints."""
+        self.since = t
         scene, tree = self.scene, self.compiled.tree
         motion = self.link_motion()
         own = list(tree.own)
@@ -294,6 +302,7 @@ class _MujocoSimulation:
             angular_acceleration=changes[:, :3],
             coordinates=self._coordinates(),
             rates=data.qvel.copy(),
+            time=float(data.time),
         )
 
     def _coordinates(self) -> np.ndarray:

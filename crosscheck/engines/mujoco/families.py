@@ -93,6 +93,11 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
     ]
 
 
+def depends_on_pieces(scene: Scene) -> bool:
+    """Return whether a load changes with time or a driver follows a table."""
+    return any(load.over_time for load in scene.load) or any(driver.table for driver in scene.driver)
+
+
 def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
     least, stiff = _rounded(LEAST_TURN / rate), _rounded(BETA * rate)
     of_rate, of_duration = COMPILED_BETA
@@ -101,6 +106,8 @@ def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
     hard = COMPILED_HARD["weld" if welded else "point"]
     for family, factor in ADAPTIVE.items():
         yield from _by_rtol(family, RTOLS, least, factor, stiff)
+    if depends_on_pieces(scene):
+        return  # the code of the compiled families has polynomial and sine of drivers only
     yield from _by_rtol(FORWARD_COMPILED, COMPILED_RTOLS, least, hard, slow)
     yield from _by_rtol(PROJECTED_COMPILED, COMPILED_RTOLS, least, hard, None)
     if scene.driver and not may_move_freely(scene):

@@ -25,8 +25,10 @@ from crosscheck.engines.spanning_tree import (
     Tree,
     spanning_tree,
 )
+from crosscheck.judge.time_functions import value
+from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
-from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import LOAD_TYPES, Coupling, Driver, Factor, Force, JointLoad, Moment, Scene, Spring
 
 SUPPORTS = Supports(
     joints=(
@@ -41,9 +43,10 @@ SUPPORTS = Supports(
         "distance",
     ),
     drivers=("angle", "displacement"),
-    loads=("moment", "force", "spring", "torsion_spring"),
+    loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),
     armatures=("angle", "displacement"),
+    over_time=(TABLE, FACTOR),
 )
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 UNIT = (1.0, 0.0, 0.0, 0.0)
@@ -61,7 +64,19 @@ class Compiled:
     single: tuple[Any, ...]  # types of MuJoCo joints with one coordinate
     drivers: list[tuple[int, Driver]]  # equality and motion of each driver
     applied: np.ndarray  # (nbody, 6) constant world forces and moments at the centres of mass
+    pushed: np.ndarray  # (nv,) constant forces and torques along joint coordinates
+    timed: list[tuple[Factor, int, np.ndarray]]  # factor, body or joint velocity, force on it
     rates: np.ndarray  # joint velocities at t = 0
+
+    def apply(self, data: Any, since: float) -> None:
+        """Set the forces on bodies and along joint coordinates to those at the time of the data.
+
+        Functions of time are of the piece that acts from ``since`` (s) on.
+        """
+        data.xfrc_applied[:], data.qfrc_applied[:] = self.applied, self.pushed
+        for factor, number, force in self.timed:
+            target = data.xfrc_applied if force.ndim else data.qfrc_applied
+            target[number] += force * float(value(factor, data.time, since=since))
 
 
 def compiled(scene: Scene) -> Compiled:
@@ -72,13 +87,24 @@ def compiled(scene: Scene) -> Compiled:
     built = _built(mujoco, scene, tree)
     model = built.spec.compile()
     _write_masses(mujoco, model, tree)
-    applied = np.zeros((model.nbody, 6))
-    for name, wrench in built.applied:
-        applied[model.body(name).id] += wrench
+    applied, pushed, timed = np.zeros((model.nbody, 6)), np.zeros(model.nv), []
+    for name, wrench, factor in built.applied:
+        if factor is None:
+            applied[model.body(name).id] += wrench
+        else:
+            timed.append((factor, model.body(name).id, wrench))
+    for name, amount, factor in built.pushed:
+        velocity = int(model.joint(name).dofadr[0])
+        if factor is None:
+            pushed[velocity] += amount
+        else:
+            timed.append((factor, velocity, np.array(amount)))
     return Compiled(
         model=model,
         tree=tree,
         applied=applied,
+        pushed=pushed,
+        timed=timed,
         rates=initial_rates(scene, tree),
         links=np.array([model.body(_name(k)).id for k in range(len(tree.links))]),
         single=(mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
@@ -126,7 +152,8 @@ class _Builder:
         self.mujoco, self.scene, self.tree, self.spec = mujoco, scene, tree, spec
         self.body = {GROUND_LINK: spec.worldbody}
         self.joint: dict[int, Any] = {}  # keyed by first joint velocity
-        self.applied: list[tuple[str, np.ndarray]] = []
+        self.applied: list[tuple[str, np.ndarray, Factor | None]] = []
+        self.pushed: list[tuple[str, float, Factor | None]] = []
 
     def centre(self, link: int) -> np.ndarray:
         """Return the origin of a link's frame (world) at t = 0."""
@@ -184,18 +211,24 @@ class _Builder:
     def add_load(self, k: int, load: Any) -> None:
         if isinstance(load, Moment):
             wrench = np.concatenate([np.zeros(3), load.moment])
-            self.applied.append((_name(self.link_of(load.body)), wrench))
+            self.applied.append((_name(self.link_of(load.body)), wrench, load.factor))
         elif isinstance(load, Force):
             self._force(k, load)
         elif isinstance(load, Spring):
             self._spring(k, load)
-        elif isinstance(load, TorsionSpring):
-            joint = self.joint[self.tree.coordinate(self.scene, load.joint)]
-            before, added = joint.stiffness[0], load.stiffness
-            if added > 0:  # two springs act as one; its natural angle is their mean, weighted by stiffness
-                moment = before * joint.springref + added * load.natural_angle
-                joint.stiffness[0], joint.springref = before + added, moment / (before + added)
-            joint.damping[0] += load.damping
+        else:
+            self._along(load)
+
+    def _along(self, load: JointLoad) -> None:
+        """Add spring, damper and force along a joint coordinate."""
+        joint, action = self.joint[self.tree.coordinate(self.scene, load.joint, load.coordinate)], load.action
+        before, added = joint.stiffness[0], action.stiffness
+        if added > 0:  # two springs act as one; its natural value is their mean, weighted by stiffness
+            moment = before * joint.springref + added * action.natural
+            joint.stiffness[0], joint.springref = before + added, moment / (before + added)
+        joint.damping[0] += action.damping
+        if action.amount:
+            self.pushed.append((joint.name, action.amount, load.over_time))
 
     def link_of(self, body: str) -> int:
         """Return the link of a scene's body, by name."""
@@ -207,7 +240,7 @@ class _Builder:
         link = self.link_of(load.body)
         body = self.body[link].add_body(name=f"force {k}", pos=np.array(load.point) - self.centre(link))
         _inertial(body, 0.0, np.zeros(3), np.zeros(3), UNIT)
-        self.applied.append((f"force {k}", np.concatenate([load.force, np.zeros(3)])))
+        self.applied.append((f"force {k}", np.concatenate([load.force, np.zeros(3)]), load.factor))
 
     def _spring(self, k: int, load: Spring) -> None:
         tendon = self.spec.add_tendon(name=f"spring {k}", springlength=[load.natural_length] * 2)
