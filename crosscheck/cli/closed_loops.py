@@ -12,7 +12,7 @@ from rich.table import Table
 from crosscheck.cli import request
 from crosscheck.cli.running import COMPLETED, console, notice
 from crosscheck.closed_loops import document, records
-from crosscheck.closed_loops.matrix import LEGEND, Cell, matrix, shown
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
 from crosscheck.study.progress import shown as progress_of
 
 LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
@@ -35,7 +35,7 @@ def closed_loops(arguments: argparse.Namespace) -> int:
 
 def _measure(arguments: argparse.Namespace, path: Path) -> None:
     engines = request.find_engines(arguments.engine or ["all"], notice)
-    wanted, unable = records.cases(engines, arguments.family)
+    wanted, unable = records.cases(engines, arguments.family, path)
     with progress_of("measuring", len(wanted)) as progress:
         records.measure(wanted, unable, path, progress)
 
@@ -46,8 +46,8 @@ def _table(cells: dict[str, dict[str, Cell]], is_best: bool) -> Table:
     table = Table("engine", *headings, title=title, box=SIMPLE)
     for name, row in cells.items():
         found = [cell.best() if is_best else cell.defaults() for cell in row.values()]
-        texts = [shown(record) for record in found]
-        if is_best or any(texts):
+        if is_best or any(map(is_run, found)):
+            texts = [shown(record) for record in found]
             table.add_row(name, *(f"[{LOOKS.get(t[:1], 'dim')}]{t}[/]" if t else "" for t in texts))
     return table
 

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, matrix, rerun, sentence, shown
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, is_run, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.closed_loops.records import TIME_LIMIT
 from crosscheck.study.grid import Record
 
 HEAD = """# Who closes a loop
 
-This page helps to choose an engine for a mechanism with closed loops. Each row is an engine, each column a
-mechanism that is hard in one way. A cell is the largest error of any body at any sample, against a closed
-form or the [reference solution](reference.md). A cell leads to its settings, its reason and its command.
+This page helps to choose an engine for a mechanism with closed loops. An engine closes a loop where the last
+joint of the loop stays closed and the motion is right. Each row is an engine, each column a mechanism that
+is hard in one way. A cell has the largest error of any body at any sample, against a closed form or the
+[reference solution](reference.md). Its link leads to the settings, the reason and the command.
 
 ```sh
 crosscheck closed-loops                        # print this matrix; nothing is simulated
@@ -20,7 +22,9 @@ crosscheck closed-loops --run --engine drake   # measure an engine that is insta
 crosscheck closed-loops --page docs/closed-loops.md
 ```
 """
-BEST = "Each engine by its best family of settings, at the finest setting of each family:"
+BEST = f"""Each engine by its best family of settings, at the finest setting of each family that ends within
+{TIME_LIMIT:g} s of CPU time. In rows with *terms* the engine gives mass matrix, bias forces and Jacobians.
+There crosscheck closes the loops and integrates:"""
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
 Cells = Mapping[str, Mapping[str, Cell]]
 
@@ -46,9 +50,9 @@ def _table(cells: Cells, is_best: bool) -> Iterator[str]:
     yield "| engine | " + " | ".join(headings) + " |"
     yield "| --- |" + " :-: |" * len(headings)
     for name, row in cells.items():
-        texts = [_linked(cell, cell.best() if is_best else cell.defaults()) for cell in row.values()]
-        if is_best or any(texts):
-            yield f"| {name} | " + " | ".join(texts) + " |"
+        found = {cell: cell.best() if is_best else cell.defaults() for cell in row.values()}
+        if is_best or any(map(is_run, found.values())):
+            yield f"| {name} | " + " | ".join(_linked(*pair) for pair in found.items()) + " |"
     yield ""
 
 

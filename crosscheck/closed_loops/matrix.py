@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.closed_loops.records import REFUSED
-from crosscheck.engine import engine_names
+from crosscheck.engine import Owner, engine_names
+from crosscheck.engines.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
@@ -18,6 +19,7 @@ from mbref.trajectory import Outcome
 
 SIGNS = {Grade.RIGHT: "✓", Grade.INACCURATE: "≈", Grade.WRONG: "✗", Grade.FAILED: "!", Grade.UNJUDGED: "?"}
 REFUSES, NOT_RUN = "–", ""
+NO_FAMILY = "no family of the engine's own steps serves this mechanism here"
 LEGEND = {
     "✓ 3e-12": f"right: the largest error, at most {FLOOR:g} of the mechanism's length or rad",
     "≈ 3e-05": f"accurate to this error, at most {FALSE_SUCCESS:g}",
@@ -28,11 +30,11 @@ LEGEND = {
 PLACES = {column.scene: column.place() for column in DIFFICULTIES}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Cell:
     """An engine on a mechanism: the records of its runs, or its refusal alone; none where nothing ran."""
 
-    engine: str
+    row: str
     column: Difficulty
     records: Sequence[Record]
 
@@ -53,7 +55,7 @@ class Cell:
     @property
     def place(self) -> str:
         """The id of the cell's records in a page."""
-        return f"{self.engine}-{self.column.scene}".replace("_", "-")
+        return f"{self.row} {self.column.scene}".replace("_", "-").replace(" ", "-").replace(",", "")
 
 
 def is_refusal(record: Record) -> bool:
@@ -61,25 +63,43 @@ def is_refusal(record: Record) -> bool:
     return bool(record["outcome"] == REFUSED)
 
 
+def is_run(record: Record | None) -> bool:
+    """Return whether there is a record, and it is of a run."""
+    return record is not None and not is_refusal(record)
+
+
 def _order(record: Record) -> tuple[bool, float, float]:
     return rank(record) if not is_refusal(record) else (True, 0.0, 0.0)
 
 
 def matrix(records: Sequence[Record]) -> dict[str, dict[str, Cell]]:
-    """Return the cells by engine and by heading of the column; engines in the order of the engine table."""
-    measured = {record["engine"] for record in records}
-    ordered = [name for name in engine_names() if name in measured]
+    """Return the cells by row and by heading of the column; rows in the order of the engine table.
+
+    A row is an engine, or its terms in crosscheck's integrator, which closes the loops itself.
+    """
+    found: dict[str, list[Record]] = {}
+    for name in engine_names():
+        of_engine = [record for record in records if record["engine"] == name]
+        on_terms = [record for record in of_engine if record.get("family") == TERMS]
+        own = [record for record in of_engine if record.get("family") != TERMS]
+        found[name] = own + _unserved(own, on_terms)
+        found[f"{name}, terms"] = [*on_terms, *filter(is_refusal, own)] if on_terms else []
     return {
-        name: {
-            column.heading: Cell(name, column, [r for r in records if _is_of(r, name, column)])
-            for column in DIFFICULTIES
-        }
-        for name in ordered
+        row: {column.heading: Cell(row, column, _of(group, column)) for column in DIFFICULTIES}
+        for row, group in found.items()
+        if group
     }
 
 
-def _is_of(record: Record, name: str, column: Difficulty) -> bool:
-    return bool(record["engine"] == name and record["scene"] == column.scene)
+def _of(records: Sequence[Record], column: Difficulty) -> list[Record]:
+    return [record for record in records if record["scene"] == column.scene]
+
+
+def _unserved(own: Sequence[Record], on_terms: Sequence[Record]) -> list[Record]:
+    """Return refusals of the scenes that an engine runs by its terms alone."""
+    served = {record["scene"] for record in own}
+    reason = {"outcome": REFUSED, "message": NO_FAMILY, "owner": Owner.ADAPTER.value}
+    return [{**record, **reason} for record in on_terms if record["scene"] not in served]
 
 
 def shown(record: Record | None) -> str:

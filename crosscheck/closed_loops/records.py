@@ -13,6 +13,7 @@ import numpy as np
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import engine
 from crosscheck.study.grid import Case, Record, Unable, default_cases, key, made_by, study
+from mbref.trajectory import Outcome
 
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 21
@@ -51,16 +52,24 @@ def write(records: Sequence[Record], path: Path = FILE) -> None:
 
 
 def cases(
-    engines: Sequence[str], families: Sequence[str] | None, columns: Sequence[Difficulty] = DIFFICULTIES
+    engines: Sequence[str],
+    families: Sequence[str] | None,
+    path: Path = FILE,
+    columns: Sequence[Difficulty] = DIFFICULTIES,
 ) -> tuple[list[Case], list[Unable]]:
-    """Return the finest setting of every family of the engines on each scene, and the refusals."""
+    """Return the finest setting of every family of the engines on each scene, and the refusals.
+
+    A setting that ran out of time by the file's records is left out, so that the next coarser one follows.
+    """
+    slow = {record["key"] for record in read(path) if record["outcome"] == Outcome.TIMED_OUT.label}
     wanted: list[Case] = []
     unable: list[Unable] = []
     for column in columns:
         scene = column.make()
         times = np.linspace(0.0, column.end, SAMPLES)
         found, refused = default_cases(scene, engines, families, times, TIME_LIMIT)
-        wanted += {(case.engine, case.setting.family): case for case in found}.values()  # the last one stays
+        ended = [case for case in found if key(case) not in slow]
+        wanted += {(case.engine, case.setting.family): case for case in ended}.values()  # the last one stays
         unable += refused
     return wanted, unable
 

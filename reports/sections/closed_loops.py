@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 
-from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, matrix, rerun, sentence, shown
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, is_run, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error
@@ -19,6 +19,10 @@ ABOUT = (
     "Each row is an engine, each column a mechanism with closed loops that is hard in one way. A cell is "
     "the largest error of any body at any sample, as a fraction of the mechanism's length or in rad. A cell "
     "leads to its settings and its command."
+)
+BEST = (
+    "Each engine by its best family of settings, at the finest setting of each family. In rows with terms "
+    "the engine gives mass matrix, bias forces and Jacobians, and crosscheck closes the loops and integrates."
 )
 Cells = Mapping[str, Mapping[str, Cell]]
 
@@ -43,9 +47,9 @@ def render(records: Sequence[Record]) -> list[Block]:
 def _map(cells: Cells, is_best: bool, caption: str) -> HeatMap:
     rows = {}
     for name, row in cells.items():
-        found = [_shown(cell, cell.best() if is_best else cell.defaults()) for cell in row.values()]
-        if is_best or any(cell.text for cell in found):
-            rows[name] = found
+        found = {cell: cell.best() if is_best else cell.defaults() for cell in row.values()}
+        if is_best or any(map(is_run, found.values())):
+            rows[name] = [_shown(*pair) for pair in found.items()]
     return HeatMap(caption, "engine", [column.heading for column in DIFFICULTIES], rows)
 
 
@@ -53,10 +57,15 @@ def _shown(cell: Cell, record: Record | None) -> Shown:
     if record is None:
         return Shown("", "")
     if is_refusal(record):
-        return Shown(shown(record), "", href=f"#{cell.engine}")
+        return Shown(shown(record), "", href=_place(cell))
     digits = -math.log10(max(error(record), 1e-16)) if grade(record) is not Grade.FAILED else 0.0
     depth = min(1.0, max(0.0, digits / MOST_DIGITS))
-    return Shown(shown(record), KINDS.get(grade(record), ""), depth, f"#{cell.engine}")
+    return Shown(shown(record), KINDS.get(grade(record), ""), depth, _place(cell))
+
+
+def _place(cell: Cell) -> str:
+    """Return the place of the row's heading in the page."""
+    return f"#{cell.row.replace(', ', '-')}"
 
 
 def _mechanisms() -> list[tuple[str, ...]]:

@@ -12,7 +12,7 @@ from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, show
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
 from crosscheck.engine import Cannot, Owner
 from crosscheck.judge.truth import truth_for
-from crosscheck.study.grid import Unable
+from crosscheck.study.grid import Unable, key
 from mbref.scenes import find_scene
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "closed-loops.md"
@@ -101,6 +101,23 @@ def test_a_refusal_is_shown_with_its_owner_and_has_no_command() -> None:
     assert rerun(cell.records[0]) == "" and not cell.families()
 
 
+def test_terms_of_an_engine_have_a_row_of_their_own() -> None:
+    """An engine whose loops crosscheck closes does not count as closing them."""
+    driven = next(c for c in DIFFICULTIES if c.heading == "driven")
+    found = [
+        run(1e-3, "discrete", engine="drake"),
+        run(1e-11, "terms", engine="drake"),
+        run(1e-12, "terms", engine="drake", scene=driven.scene),
+    ]
+    rows = matrix(found)
+    assert list(rows) == ["drake", "drake, terms"]
+    assert rows["drake"]["four-bar"].best() is found[0]
+    assert rows["drake, terms"]["four-bar"].best() is found[1]
+    assert shown(rows["drake"]["driven"].best()) == "–"
+    assert shown(rows["drake, terms"]["driven"].best()) == "✓ 1e-12"
+    assert len({cell.place for row in rows.values() for cell in row.values()}) == 2 * len(DIFFICULTIES)
+
+
 def test_new_records_supersede_old_ones() -> None:
     new = run(1e-9)
     assert records.supersedes(new, run(1e-9)), "the same key"
@@ -113,7 +130,11 @@ def test_new_records_supersede_old_ones() -> None:
 def test_measuring_stores_each_run_and_resumes(tmp_path, monkeypatch) -> None:
     path = tmp_path / "records.jsonl"
     column = next(c for c in DIFFICULTIES if c.heading == "redundant")
-    wanted, unable = records.cases(["mujoco"], ["tuned"], [column])
+    wanted, unable = records.cases(["mujoco"], ["tuned"], path, [column])
+    records.write([run(None, outcome="TIMED_OUT", key=key(wanted[0]))], path)
+    coarser, _ = records.cases(["mujoco"], ["tuned"], path, [column])
+    assert coarser[0].setting.options["step"] > wanted[0].setting.options["step"]
+    path.unlink()
     assert [case.setting.family for case in wanted] == ["tuned"] and not unable
     refused = Unable(column.make().with_(name="another"), "mujoco", Cannot(Owner.ENGINE, "no hinge"))
     records.measure(wanted, [refused], path)
