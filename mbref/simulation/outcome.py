@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mbref import __version__
-from mbref.equations.branches import Passed
+from mbref.equations.branches import Passed, tangents
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_reactions import Balance
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
@@ -27,7 +27,7 @@ from mbref.stepping.loop import (
 )
 from mbref.stepping.ranks import Ranks
 from mbref.stepping.run import NEARLY, Run
-from mbref.stepping.singular_start import begins_at_rest, fits_no_branch
+from mbref.stepping.singular_start import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.trajectory import Cost, Crossing, Outcome
 
 OUTCOMES = {
@@ -52,6 +52,11 @@ DEAD_POSITION = (
 REST_POSITION = (
     "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
     "computed; give the bodies velocities along the branch"
+)
+
+LEAVES_REST = (
+    "the motion begins at rest on a singular position and takes, of the {} branches that meet there, the "
+    "branch of Gauss's principle of least constraint"
 )
 
 NO_BRANCH = (
@@ -162,7 +167,15 @@ def _message(run: Run, status: int) -> str:
         return NO_BRANCH
     if status != DONE:
         return "; ".join(filter(None, (_cause(run, status), _rounded(run.ranks), _remedy(run, status))))
-    return report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))
+    found = report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))
+    return "; ".join(filter(None, (_left_from_rest(run), found)))
+
+
+def _left_from_rest(run: Run) -> str:
+    """The choice of a branch at a start at rest; empty where there is one, or no force acts along any."""
+    if not begins_at_rest(run) or leaving_acceleration(run) is None:
+        return ""
+    return LEAVES_REST.format(len(tangents(run.model, run.start.q)))
 
 
 def report_of(start: Start, ranks: Ranks, crossings: int) -> str:

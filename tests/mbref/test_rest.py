@@ -36,6 +36,8 @@ def test_a_flat_parallelogram_turns_as_its_crank_is_pushed():
     assert run.outcome.label == "COMPLETED" and len(run.times) == len(TIMES)
     assert measure(scene, run, closed_form(scene))["error"] < 1e-11
     assert np.allclose(run.angular_acceleration[0, :2, 2], 5.0 / 1.7, rtol=1e-12, atol=0)
+    choice = "begins at rest on a singular position and takes, of the 2 branches that meet there"
+    assert choice in run.message, run.message
 
 
 def test_first_sample_behind_the_start():
@@ -47,6 +49,7 @@ def test_first_sample_behind_the_start():
 def test_a_flat_parallelogram_without_a_push_stays():
     run = simulate(flat_parallelogram(5.0).with_(load=()), times=TIMES)
     assert run.outcome.label == "COMPLETED" and np.ptp(run.position, axis=0).max() < 1e-14
+    assert "begins at rest" not in run.message, "nothing is chosen where nothing pushes"
 
 
 def test_other_methods_do_not_complete_on_another_motion():
