@@ -44,8 +44,8 @@ crosscheck tune mujoco my.toml     # the cheapest settings of one engine
 
 Times are CPU time of stepping, of one machine; compare them within a table only. `crosscheck list settings`
 explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
-crosscheck, not by the engine. Which engines close a loop of which joints at all: [Who closes a
-loop](closed-loops.md). [Compare engines](compare.md#verdicts) explains errors and grades, and the
+crosscheck, not by the engine. The [matrix of closed loops](closed-loops.md) has more
+kinds (redundant spatial loops, long runs, couplings) and more engines, by their errors alone. [Compare engines](compare.md#verdicts) explains errors and grades, and the
 [support table](engines.md#support) has the joints and loads of each engine.
 """
 
