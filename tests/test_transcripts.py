@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.printed_commands import PAGES, ROOT
-from tests.transcripts import blocks, commands, filled, shape
+from tests.transcripts import BLOCK, OUTPUT, blocks, commands, filled, shape
 
 SHOWING = {str(page.relative_to(ROOT)): page for page in PAGES if blocks(page.read_text())}
 RENEW = "python -m tests.transcripts {} renews the outputs"
@@ -31,7 +31,7 @@ def test_commands_print_what_pages_show(name):
 
 def test_every_command_of_a_page_has_its_output():
     for name, page in SHOWING.items():
-        for block in blocks(page.read_text()):
+        for block in BLOCK.findall(page.read_text()):
             lines = block.splitlines()
             bare = [a for a, b in zip(lines, [*lines[1:], "$ "], strict=True) if a[:2] == b[:2] == "$ "]
             assert lines[0].startswith("$ ") and not bare, f"{name}: {bare}; {RENEW.format(name)}"
@@ -44,3 +44,9 @@ def test_outputs_are_filled_in_and_compared_without_numbers():
     assert shape(page) == shape(page.replace("0.25", "< 1e-13")) != shape(page.replace("two\n", "three\n"))
     with pytest.raises(RuntimeError, match="printed nothing, with exit status 3"):
         filled("```console\n$ exit 3\n```\n")
+
+
+def test_outputs_of_python_are_filled_in():
+    text = f"```python\nprint(1 + 1)\n```\n\n{OUTPUT}\n```text\n```\n"
+    assert filled(text) == text.replace("```text\n", "```text\n2\n")
+    assert blocks(filled(text)) == ["2\n"]

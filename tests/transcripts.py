@@ -1,6 +1,7 @@
-"""Commands that README and docs show with their outputs, in blocks named ``console``.
+"""Commands and Python that README and docs show with their outputs.
 
-``python -m tests.transcripts PAGE …`` runs the commands of pages and writes their outputs into them.
+Commands stand in blocks named ``console``. Python with an output is followed by OUTPUT and a block of text.
+``python -m tests.transcripts PAGE …`` runs both and writes their outputs into the pages.
 """
 
 from __future__ import annotations
@@ -14,13 +15,15 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.S | re.M)
+OUTPUT = "<!-- output -->"
+PYTHON = re.compile(rf"^```python\n(.*?)^```\n\n{OUTPUT}\n```text\n(.*?)^```$", re.S | re.M)
 WIDTH = 100  # columns of the terminal in which commands run
 PROMPT = "$ "
 
 
 def blocks(text: str) -> list[str]:
-    """Return the console blocks of a page, in order, without their fences."""
-    return list(BLOCK.findall(text))
+    """Return the console blocks of a page and the outputs of its Python, in order, without their fences."""
+    return [*BLOCK.findall(text), *(output for _, output in PYTHON.findall(text))]
 
 
 def commands(block: str) -> list[str]:
@@ -37,7 +40,8 @@ def filled(text: str) -> str:
         A command printed nothing.
     """
     with tempfile.TemporaryDirectory() as folder:
-        return BLOCK.sub(lambda block: f"```console\n{_transcript(block[1], Path(folder))}```", text)
+        text = BLOCK.sub(lambda block: f"```console\n{_transcript(block[1], Path(folder))}```", text)
+        return PYTHON.sub(lambda found: _shown(found[1], Path(folder)), text)
 
 
 def shape(text: str) -> str:
@@ -48,6 +52,12 @@ def shape(text: str) -> str:
 
 def _transcript(block: str, folder: Path) -> str:
     return "".join(f"{PROMPT}{command}\n{_output(command, folder)}\n" for command in commands(block))
+
+
+def _shown(code: str, folder: Path) -> str:
+    """Return the blocks of Python and of its output."""
+    (folder / "code.py").write_text(code)
+    return f"```python\n{code}```\n\n{OUTPUT}\n```text\n{_output('python code.py', folder)}\n```"
 
 
 def _output(command: str, folder: Path) -> str:
