@@ -1,6 +1,6 @@
 """mbref: reference implementation of the constraint-handling methods of multibody dynamics.
 
-The names below are loaded when they are first used, so that ``import mbref`` costs nothing.
+The public names are imported at first access, so that ``import mbref`` takes little time.
 """
 
 from __future__ import annotations

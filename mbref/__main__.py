@@ -1,4 +1,4 @@
-"""python -m mbref"""
+"""Entry point of ``python -m mbref``, which runs the command ``mbref``."""
 
 import sys
 

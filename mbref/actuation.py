@@ -18,8 +18,8 @@ class DriverMotion:
 
     The driver acts on the second body of its joint and with the opposite sign on the first. A positive
     torque turns the second body about the joint's axis, a positive force pushes it along the axis. It is the
-    share of the joint's reaction about or along the axis, on the second body: springs at the joint act in
-    addition, a motor also accelerates its armature, and a coupling at the joint takes part of it.
+    component of the joint's reaction about or along the axis, on the second body. Springs at the joint act in
+    addition. A motor must also accelerate its armature, and a coupling at the joint transmits a part of it.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""The parser of command lines: its messages are sentences, with the word that was probably meant."""
+"""The parser of command lines: its messages are sentences that suggest the word that was probably meant."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got 
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose commands answer for options that they do not have."""
+    """A parser whose commands report their own unknown options."""
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the options; the command refuses an unknown one and names the option that was probably
@@ -33,7 +33,7 @@ class Parser(argparse.ArgumentParser):
         return found
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the message, or where no command is named all commands, and exit with 2."""
+        """Print the usage and the message, or all commands if none is named, and exit with 2."""
         if message.endswith("required: COMMAND"):
             self.print_help(sys.stderr)
             self.exit(2)
@@ -41,7 +41,8 @@ class Parser(argparse.ArgumentParser):
 
 
 def commands(parser: argparse.ArgumentParser, **names: Any) -> Any:
-    """The object that commands are added to; each is the ``parser_of_command`` of its options."""
+    """Return the object to which commands are added; each command's parser is in its options as
+    ``parser_of_command``."""
     return parser.add_subparsers(parser_class=_Command, **names)
 
 
@@ -54,6 +55,6 @@ class _Command(Parser):
 
 
 def _known(found: re.Match[str]) -> str:
-    """``unknown 'rnu'; known: run, list; did you mean 'run'?``."""
+    """Return a message such as ``unknown 'rnu'; known: run, list; did you mean 'run'?``."""
     known: Sequence[str] = re.findall(r"[^',\s]+", found[2])
     return f"unknown {found[1]!r}; known: {', '.join(known)}{meant(found[1], known)}"

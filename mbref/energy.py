@@ -11,9 +11,9 @@ from mbref.trajectory import Trajectory
 
 
 def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
-    """Σ (m v·v + ω·J ω)/2 over the bodies and Σ I q'²/2 over armatures (k,), J.
+    """Return the kinetic energy (k,), J: Σ (m v·v + ω·J ω)/2 over the bodies plus Σ I q'²/2 over armatures.
 
-    Raises ValueError where a body has no mass.
+    Raises ValueError if a body has no mass.
     """
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-RATIO, LEAST = 1e3, 1e-6  # of an error to the relative tolerance, and of an error: above both, a warning
+RATIO, LEAST = 1e3, 1e-6  # error / relative tolerance, and error: a warning is given if both are exceeded
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""Other programs' files as scenes, and scenes as such files, by plug-ins of the group ``mbref.formats``."""
+"""Import of scenes from files of other programs and export to them, by plug-ins of the entry-point group
+``mbref.formats``."""
 
 from __future__ import annotations
 

@@ -49,7 +49,7 @@ class JointMotion:
 
 
 def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
-    """The motion in the joint of that name; raises KeyError that lists the joints."""
+    """Return the motion in the joint of a name; raises KeyError that lists the joints."""
     if name not in {joint.name for joint in scene.joint}:
         raise KeyError(f"no joint {name!r}; joints: {', '.join(joint.name for joint in scene.joint)}")
     joint = scene.joint_named(name)
@@ -66,7 +66,8 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
 
 
 def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
-    """World places (k, 3) of a point (world, t = 0) that moves with a body, or stays on the ground."""
+    """Return world positions (k, 3) of a point (world, t = 0) that moves with a body, or is fixed to the
+    ground."""
     b = scene.body_index(name)
     if b < 0:
         return np.tile(np.array(point), (len(motion.times), 1))
@@ -75,8 +76,8 @@ def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, fl
 
 
 def velocity_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
-    """Return world velocities (k, 3), m/s, of a point (world, t = 0) that moves with a body, or stands on the
-    ground."""
+    """Return world velocities (k, 3), m/s, of a point (world, t = 0) that moves with a body, or is fixed to
+    the ground."""
     b = scene.body_index(name)
     if b < 0:
         return np.zeros((len(motion.times), 3))
@@ -101,7 +102,8 @@ def _axis(joint: Joint) -> np.ndarray:
 def _angle(
     scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray, relative: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The angle about the axis, its full turns found by the mean rate between samples; and the rate."""
+    """Return the angle about the axis, with full turns counted by the mean rate between samples, and its
+    rate."""
     axis = _axis(joint)
     spins = [_angular_velocity(scene, motion, name) for name in joint.bodies]
     rate = np.einsum("ki,ki->k", spins[1] - spins[0], rotations.rotate(first, axis[None]))

@@ -1,4 +1,4 @@
-"""Method: formulation + stabilisation / integrator, as a name with options and as objects.
+"""Method: a formulation, a stabilisation and an integrator, as a name with options and as objects.
 
 mpi-svd+projection            lm1+baumgarte[alpha=10,beta=10]            lm1+none/rk4[step=1e-4]
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mbref.scene import Scene
 
 MOST_NAMES = 256  # names whose parsed methods are cached
-SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # the default methods of few and of many bodies
+SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # default methods for few and for many bodies
 MOST_BODIES = 100  # up to here `taylor`, whose matrix is dense, is the default, because it crosses singular
 # positions.  ``benchmarks/default_method.py``: it costs 6.3 times as much as the sparse method on a chain of
 # four-bars with 81 bodies, and 0.05 times as much on a chain of slider-cranks with 90
@@ -41,8 +41,10 @@ Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 
 
 def default_method(scene: Scene) -> str:
-    """Return the name of the method of a scene for which none is asked: ``taylor``, which crosses singular
-    positions; for more than MOST_BODIES bodies the sparse ``alf-dual+projection/dop853``, which does not.
+    """Return the name of the default method for a scene.
+
+    It is ``taylor``, which crosses singular positions, and for more than MOST_BODIES bodies the sparse method
+    ``alf-dual+projection/dop853``, which does not cross them.
     """
     return SERIES if len(scene.body) <= MOST_BODIES else SPARSE
 
@@ -78,27 +80,27 @@ class Method:
 
     @property
     def parts(self) -> tuple[Formulation, Stabilisation, Integrator]:
-        """Formulation, stabilisation, integrator."""
+        """Formulation, stabilisation and integrator."""
         return self.formulation, self.stabilisation, self.integrator
 
     @property
     def crosses(self) -> Literal["no", "by regularisation", "by series"]:
-        """Whether a run integrates across a singular position, and how."""
+        """Strategy for crossing singular positions, or None if the method does not cross them."""
         if self.integrator.crosses != "no":
             return self.integrator.crosses
         return "no" if self.stabilisation.watches_rank else self.formulation.crosses
 
     @property
     def is_series(self) -> bool:
-        """Whether the method integrates by Taylor series instead of an explicit integrator."""
+        """True if the method integrates by Taylor series instead of an explicit integrator."""
         return self.integrator.step is None
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
-        """A part's options, its defaults overridden by the name's."""
+        """Return the options of a part: its defaults, overridden by the options in the name."""
         return {**part.options, **self.options.get(part.name, {})}
 
     def settings(self, rank_tolerance: float) -> Settings:
-        """The numbers that all kernels share, the feedback gains of both parts added."""
+        """Return the numbers that all kernels share; the feedback gains of both parts are added."""
         gains = np.zeros(2)
         for part in (self.formulation, self.stabilisation):
             if part.feedback is not None:
@@ -107,7 +109,7 @@ class Method:
         return Settings(velocity_gain, position_gain, rank_tolerance)
 
     def packed_options(self, part: Formulation | Stabilisation) -> Packed | None:
-        """A part's own numbers for its kernels."""
+        """Return the numbers that only this part's kernels need."""
         return packed(record(part.numbers(**self.options_of(part)))) if part.options else None
 
     @staticmethod
@@ -124,7 +126,7 @@ class Method:
         Raises
         ------
         MethodError
-            If a part or an option is unknown (the message lists the known ones), or parts do not go together.
+            If a part or an option is unknown (the message lists the known ones), or parts cannot be combined.
         """
         short, bracket, rest = name.strip().partition("[")
         name = SHORT[short] + bracket + rest if short in SHORT else name
@@ -144,7 +146,7 @@ class Method:
 
 
 def _split_outside_brackets(text: str) -> tuple[str, str, str]:
-    """Split at the + that joins two parts, not at one inside an option such as [1e+5]."""
+    """Split at the + that joins two parts, but not at a + inside an option such as [1e+5]."""
     depth = 0
     for k, character in enumerate(text):
         depth += (character == "[") - (character == "]")
@@ -158,7 +160,7 @@ def _text(name: str, options: Mapping[str, float]) -> str:
 
 
 def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, dict[str, float]]) -> Part:
-    """The table's entry, its bracketed options put into ``options``."""
+    """Return the table's entry, and put its bracketed options into ``options``."""
     match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", text.strip())
     name = match[1] if match else text
     if name not in table:

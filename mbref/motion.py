@@ -1,4 +1,5 @@
-"""Motion: a trajectory together with its scene: joints, energies, tables, files and pictures."""
+"""Motion: a trajectory together with its scene, from which joint motions, energies, tables, files and
+pictures follow."""
 
 from __future__ import annotations
 
@@ -29,7 +30,8 @@ from mbref.trajectory import Trajectory
 
 @dataclass(frozen=True, repr=False)
 class Motion(Trajectory):
-    """A trajectory together with its scene: joints, energies, tables, files and pictures.
+    """A trajectory together with its scene, from which joint motions, energies, tables, files and pictures
+    follow.
 
     ``motion["rod"].position`` is the motion of a body, ``motion.joint("A").angle`` of a joint. All attributes
     of Trajectory are present.
@@ -89,7 +91,8 @@ class Motion(Trajectory):
         return driver_motion(self.mechanism, self, joint)
 
     def load_at(self, place: int) -> LoadMotion:
-        """Return length or angle, rate, force or torque, and power of the load at a place, from 0.
+        """Return length or angle, rate, force or torque, and power of a load, given by its index in the scene
+        from 0.
 
         Raises
         ------
@@ -152,13 +155,13 @@ class Motion(Trajectory):
         return replace(self, message=message)._keeping(estimate)
 
     def _keeping(self, estimate: ErrorEstimate) -> Motion:
-        """Return the motion, which has this error estimate from now on."""
+        """Return the motion with the given error estimate."""
         self.__dict__["error_estimate"] = estimate
         return self
 
     @property
     def known_estimate(self) -> ErrorEstimate | None:
-        """The error estimate, if it has been made."""
+        """Error estimate if it has been made, otherwise None."""
         return self.__dict__.get("error_estimate")
 
     def to_record(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Outputs: the names, units and meanings of all numbers that a motion has over time.
+"""Outputs: the names, units and meanings of all time-dependent numbers of a motion.
 
 ``Motion.columns``, CSV files, tables, plots, ``mbref list outputs`` and docs/outputs.md follow this table.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from mbref.scene_fields import meant
 
 Owner = Literal["body", "joint", "driver", "load", "mechanism"]
-PREFIXES: dict[Owner, str] = {  # of a column, by its owner
+PREFIXES: dict[Owner, str] = {  # prefix of a column, by its owner
     "body": "{}.",
     "joint": "{}.",
     "driver": "driver({}).",
@@ -32,9 +32,10 @@ PULLING = f"a spring, or {ALONG_AXIS}"
 
 
 class Output(NamedTuple):
-    """A number of a body, joint, driver, load or mechanism over time: name, unit, components and meaning.
+    """A time-dependent number of a body, joint, driver, load or mechanism: name, unit, components and
+    meaning.
 
-    ``needs`` says what a motion without this number lacks.
+    ``needs`` names the data that a motion without this number lacks.
     """
 
     owner: Owner
@@ -46,7 +47,7 @@ class Output(NamedTuple):
 
     @property
     def column(self) -> str:
-        """An example of the column's name, with all components."""
+        """Example of the column's name, with all components."""
         axes = f".{self.components[0]}…{self.components[-1]}" if self.components else ""
         return f"{PREFIXES[self.owner].format(EXAMPLES[self.owner])}{self.name}{axes}"
 
@@ -56,7 +57,7 @@ class Output(NamedTuple):
         return f"(k, {len(self.components)})" if self.components else "(k,)"
 
     def columns(self, owner: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
-        """Yield names and values (k,) of the columns of values (k,) or (k, components) of an owner."""
+        """Yield names and values (k,) of the columns for an owner's values (k,) or (k, components)."""
         name = f"{PREFIXES[self.owner].format(owner)}{self.name}"
         if not self.components:
             yield name, values
@@ -75,7 +76,9 @@ OUTPUTS = (
     Output("joint", "rate", "rad/s", "", "rate of the angle", TURNING),
     Output("joint", "displacement", "m", "", "displacement along the axis since t = 0", SLIDING),
     Output("joint", "displacement_rate", "m/s", "", "rate of the displacement", SLIDING),
-    Output("joint", "open", "", "", "number of reaction components that equilibrium leaves open", MASSES),
+    Output(
+        "joint", "open", "", "", "number of reaction components that equilibrium does not determine", MASSES
+    ),
     Output("joint", "force", "N", "xyz", "reaction on the second body at its anchor, world", MASSES),
     Output("joint", "moment", "N m", "xyz", "reaction moment on the second body, world", MASSES),
     Output(
@@ -126,7 +129,7 @@ UNITS = {output.name: output.unit for output in OUTPUTS}
 
 
 def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield the columns of an owner: its numbers over time that the table names and that are not None."""
+    """Yield the columns of an owner: its numbers that the table of outputs contains and that are not None."""
     for output in OUTPUTS:
         if output.owner == owner and (values := numbers.get(output.name)) is not None:
             yield from output.columns(name, values)
@@ -135,8 +138,8 @@ def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[
 def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:
     """Return the columns with these names or beginnings, such as ``rod.position``.
 
-    Raises ValueError for a name that fits none; the message says what it needs, what was meant or what there
-    is.
+    Raises ValueError for a name that fits no column. The message names the missing data, a similar name, or
+    the existing columns.
     """
     found: list[str] = []
     for name in names:
@@ -153,7 +156,7 @@ def quantity_of(column: str) -> str:
 
 
 def _hint(columns: Sequence[str], name: str) -> str:
-    """Return what the column needs, what was meant, or which columns there are."""
+    """Return the data that the column needs, a similar name, or the existing columns, as a clause."""
     parts = [column.split(".") for column in columns]
     beginnings = list(dict.fromkeys(".".join(p[:n]) for p in parts for n in range(1, len(p) + 1)))
     owner, _, quantity = name.rpartition(".")
@@ -165,7 +168,7 @@ def _hint(columns: Sequence[str], name: str) -> str:
 
 
 def _needs(owner: str, quantity: str) -> str:
-    """Return what a motion lacks that has no such quantity of an owner, by the owner's kind."""
+    """Return the data that the motion lacks for a quantity of an owner, by the owner's type."""
     own = ("mechanism",) if not owner else ("body", "joint")
     kinds = (owner.partition("(")[0],) if owner.endswith(")") else own
     return next((o.needs for o in OUTPUTS if o.name == quantity and o.owner in kinds), "")

@@ -1,7 +1,8 @@
 """Record files: results as JSON lines, each with a key; records in the file need not be computed again.
 
-A line is strict JSON (no NaN: null; an infinite number is 1e999) and is handed to the operating system in
-one write.  So only the last line can be cut short, by a kill or a power cut; reading the file takes it off.
+A line is strict JSON (NaN becomes null, an infinite number 1e999), written by one call of the operating
+system. So only the last line can be incomplete, after a kill or a power failure; it is removed when the file
+is read.
 """
 
 from __future__ import annotations
@@ -15,19 +16,18 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-INFINITE = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # stand for these until the text is made
+INFINITE = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
 
 
 class RecordsError(ValueError):
-    """A file that holds something else than records, and is left as it is."""
+    """A file contains something else than records; it is not changed."""
 
 
 def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Records of the file by ``key``, the last of each; none where there is no file.
+    """Return the records of the file by ``key``, the last one of each key; none if there is no file.
 
-    Lines that hold no record are reported by number on stderr and left alone.  Raises RecordsError where
-    no line
-    holds one, OSError where the file cannot be read.
+    Lines that contain no record are reported by number on stderr and not changed. Raises RecordsError if no
+    line contains a record, OSError if the file cannot be read.
     """
     records, whole, size = _parsed(path)
     if path is not None and whole < size:
@@ -36,12 +36,12 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
 
 
 def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Read records like ``stored``, without repairing a last line that is cut short."""
+    """Read records like ``stored``, without repairing an incomplete last line."""
     return _parsed(path)[0]
 
 
 def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, int]:
-    """The records of the file by ``key``, the size of its whole lines, and its own (bytes)."""
+    """Return the records of the file by ``key``, the size of its complete lines, and its own size (bytes)."""
     if path is None or not Path(path).exists():
         return {}, 0, 0
     text = Path(path).read_bytes()
@@ -57,7 +57,7 @@ def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, in
 
 
 def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Read records like ``stored`` from a file that can be appended to; make a missing file.  Raises
+    """Read records like ``stored`` from a file that can be appended to; a missing file is made. Raises
     OSError."""
     if path is not None:
         open(path, "ab").close()
@@ -65,9 +65,9 @@ def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
 
 
 def append(path: str | Path | None, record: dict[str, Any]) -> None:
-    """Add a record to the file, whole or not at all; nowhere without a path.
+    """Add a record to the file, completely or not at all; without a path nothing is written.
 
-    Raises OSError where the file cannot take it.
+    Raises OSError if the file cannot be written.
     """
     if path is None:
         return
@@ -75,16 +75,17 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
     with open(path, "ab", buffering=0) as file:
         before = os.fstat(file.fileno()).st_size
         try:
-            while line:  # usually one write; on a full disk the next one raises
+            while line:  # usually one write suffices; on a full disk the next one raises
                 line = line[file.write(line) :]
         except BaseException:
-            with contextlib.suppress(OSError):  # the first failure is the one reported
+            with contextlib.suppress(OSError):  # the first failure is the reported one
                 file.truncate(before)
             raise
 
 
 def strict_json(value: Any) -> str:
-    """The value as JSON that any reader takes: NaN is null, an infinite number one beyond every double."""
+    """Return the value as JSON that any reader accepts: NaN is null, and an infinite number is one beyond
+    every double."""
     text = json.dumps(_finite(value), allow_nan=False)
     for number, mark in INFINITE.items():
         text = text.replace(json.dumps(mark), f"{math.copysign(1, number):.0f}e999")
@@ -100,7 +101,7 @@ def _finite(value: Any) -> Any:
 
 
 def _record(line: bytes) -> dict[str, Any] | None:
-    """The record of a line, None where it holds none."""
+    """Return the record in a line, None if the line contains none."""
     try:
         found = json.loads(line, parse_constant=_refused)
     except (ValueError, RecursionError):

@@ -1,7 +1,7 @@
 """Euler parameters (unit quaternions w, x, y, z; body to world) and rotation vectors.
 
-Functions of arrays with any leading shape, for the door: reading scenes, writing trajectories,
-measuring angles.  The compiled kernels have their own scalar forms in ``kernels.py``.
+The functions accept arrays with any leading shape, and are used to read scenes, write trajectories and
+measure angles. Compiled kernels use the scalar forms in ``mbref.kernels``.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import numpy as np
 
 
 def to_matrix(p: np.ndarray) -> np.ndarray:
-    """Rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
+    """Return rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
     p = np.asarray(p, dtype=float)
     w, x, y, z = p[..., 0], p[..., 1], p[..., 2], p[..., 3]
     matrix = np.empty((*p.shape[:-1], 3, 3))
@@ -23,9 +23,9 @@ def to_matrix(p: np.ndarray) -> np.ndarray:
 
 
 def from_matrix(matrix: np.ndarray) -> np.ndarray:
-    """Unit quaternions (…, 4), w ≥ 0, of rotation matrices (…, 3, 3).
+    """Return unit quaternions (…, 4), w ≥ 0, of rotation matrices (…, 3, 3).
 
-    Takes the column of 4 p pᵀ with the largest diagonal, so that nothing cancels.
+    The column of 4 p pᵀ with the largest diagonal entry is used, so that no digits cancel.
     """
     a = np.asarray(matrix, dtype=float)
     trace = a[..., 0, 0] + a[..., 1, 1] + a[..., 2, 2]
@@ -43,7 +43,7 @@ def from_matrix(matrix: np.ndarray) -> np.ndarray:
 
 
 def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Hamilton products (…, 4): the rotation q followed by p."""
+    """Return Hamilton products (…, 4): the rotation q followed by p."""
     pw, px, py, pz = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
     qw, qx, qy, qz = np.moveaxis(np.asarray(q, dtype=float), -1, 0)
     return np.stack(
@@ -58,12 +58,12 @@ def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 
 
 def conjugate(p: np.ndarray) -> np.ndarray:
-    """The inverse rotations (…, 4) of unit quaternions."""
+    """Return the inverse rotations (…, 4) of unit quaternions."""
     return np.asarray(p, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Vector products (…, 3); for few vectors several times faster than NumPy's."""
+    """Return vector products (…, 3); for few vectors this is several times faster than NumPy's function."""
     product = np.empty(np.broadcast_shapes(a.shape, b.shape), np.result_type(a, b, float))
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
@@ -72,19 +72,20 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def rotate(p: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Vectors (…, 3) taken from the body frame to the world."""
+    """Return vectors (…, 3) transformed from the body frame to the world frame."""
     return np.einsum("...ij,...j->...i", to_matrix(p), v)
 
 
 def from_vector(v: np.ndarray) -> np.ndarray:
-    """Unit quaternions (…, 4) of rotation vectors (…, 3): axis times angle (rad)."""
+    """Return unit quaternions (…, 4) of rotation vectors (…, 3): axis times angle (rad)."""
     v = np.asarray(v, dtype=float)
     half = np.linalg.norm(v, axis=-1, keepdims=True) / 2
     return np.concatenate([np.cos(half), np.sinc(half / np.pi) * v / 2], axis=-1)
 
 
 def angle_between(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Geodesic angle (…,) between orientations: 2 atan2(|vector|, |w|) of the relative quaternion."""
+    """Return the geodesic angle (…,) between orientations: 2 atan2(|vector|, |w|) of the relative
+    quaternion."""
     relative = multiply(conjugate(p), q)
     return 2 * np.arctan2(np.linalg.norm(relative[..., 1:], axis=-1), np.abs(relative[..., 0]))
 

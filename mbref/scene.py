@@ -1,9 +1,9 @@
 """Scene: the mechanism as plain, validated, frozen data; reads and writes TOML. No numerics.
 
 Units are SI, angles radians; positions, axes and velocities are in the world frame at t = 0
-unless a field says otherwise.  ``"ground"`` names the fixed frame wherever a body is asked for.
-Field names are equal in Python and in the file, so that a fault's path (``body[2].mass``) is also the
-Python expression of the offending value.
+unless a field says otherwise.  ``"ground"`` names the fixed frame in fields that name a body. Field names are
+equal in Python and in the file, so that the path of a fault (``body[2].mass``) is also the Python expression
+of the faulty value.
 """
 
 from __future__ import annotations
@@ -102,7 +102,7 @@ __all__ = [
     "Universal",
 ]
 
-UNIT_TOLERANCE = 1e-6  # a quaternion further than this from unit length is a fault, nearer is rounding
+UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 
 
 Inertia = tuple[float, float, float] | tuple[Vector, Vector, Vector] | None
@@ -112,9 +112,9 @@ class Body(Entry):
     """A rigid body; its frame sits at the centre of mass.
 
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a
-    symmetric 3x3 (kg m²).  ``mass`` and ``inertia`` are omitted together when only kinematics is
-    wanted.  ``velocity`` and ``angular_velocity`` (world) are optional: velocities left out
-    are chosen consistent with the constraints and with the given ones.
+    symmetric 3x3 (kg m²).  ``mass`` and ``inertia`` are omitted together for a kinematic analysis.
+    ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed such that they
+    agree with the constraints and the given ones.
     """
 
     name: Name
@@ -157,8 +157,8 @@ class Driver(TimeFunction):
 class Scene(Entry):
     """A mechanism: ``body``, ``joint``, ``coupling``, ``driver`` and ``load`` tuples, gravity and end time.
 
-    ``ground = "body"`` adds the ground as a body held by six rows, as the paper counts it; the
-    default ``"frame"`` models no ground body.  Raises SceneError with every fault found.
+    ``ground = "body"`` models the ground as a body with six constraint rows, as the paper counts; the default
+    ``"frame"`` models no ground body.  Raises SceneError with every fault found.
     """
 
     name: Name
@@ -189,34 +189,34 @@ class Scene(Entry):
         return scene
 
     def body_index(self, name: str) -> int:
-        """Index of a body in ``body``; -1 for the ground."""
+        """Return the index of a body in ``body``; -1 for the ground."""
         return -1 if name == GROUND else [b.name for b in self.body].index(name)
 
     def joint_named(self, name: str) -> Joint:
-        """The joint of that name; raises KeyError where the scene has none."""
+        """Return the joint of a name; raises KeyError if the scene has no such joint."""
         for joint in self.joint:
             if joint.name == name:
                 return joint
         raise KeyError(name)
 
     def coupled(self, coupling: Coupling) -> tuple[tuple[Joint, Coordinate], ...]:
-        """Both joints of a coupling, each with its coupled coordinate."""
+        """Return both joints of a coupling, each with its coupled coordinate."""
         first, second = map(self.joint_named, coupling.joints)
         return coupling.pairs((first, second))
 
     def has_mass(self) -> bool:
-        """Whether every body has mass and inertia, as a dynamic analysis needs."""
+        """True if every body has mass and inertia, as a dynamic analysis needs."""
         return all(body.mass is not None for body in self.body)
 
     def counts(self) -> Counts:
-        """Coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0."""
+        """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0."""
         return SERVICES.counts(self)
 
     def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
-        """A validated copy with some top-level fields replaced, or with the value at a path.
+        """Return a validated copy with some top-level fields replaced, or with another value at a path.
 
-        ``scene.with_(duration=2.0)``, ``scene.with_("body[slider].mass", 2.0)``.  Raises SceneError where
-        the path leads nowhere or the copy is no valid scene.
+        ``scene.with_(duration=2.0)``, ``scene.with_("body[slider].mass", 2.0)``.  Raises SceneError if the
+        path does not exist or the copy is no valid scene.
         """
         data = {k: getattr(self, k) for k in type(self).model_fields}
         if path is not None:
@@ -227,7 +227,7 @@ class Scene(Entry):
         return SERVICES.picture(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """The scene as the file's nested tables; fields at their default are left out."""
+        """Return the scene as the nested tables of its file; fields with default values are left out."""
         data = self.model_dump(exclude_none=True, exclude_defaults=True)
         for key in ("joint", "load"):
             for item, source in zip(data.get(key, ()), getattr(self, key), strict=True):
@@ -236,7 +236,7 @@ class Scene(Entry):
         return lists
 
     def save(self, path: str | Path) -> None:
-        """Write the scene as TOML; ``Scene.from_file`` gives back an equal scene."""
+        """Write the scene as TOML; ``Scene.from_file`` returns an equal scene."""
         Path(path).write_text(scene_text(self.to_dict()), encoding="utf-8")
 
     @staticmethod
@@ -274,7 +274,7 @@ TABLES = {"": tuple(Scene.model_fields)} | {
 
 
 def _lists(value: Any) -> Any:
-    """Tuples as lists, as writers of TOML and JSON need them."""
+    """Return tuples as lists, as writers of TOML and JSON need them."""
     if isinstance(value, Mapping):
         return {k: _lists(v) for k, v in value.items()}
     return [_lists(v) for v in value] if isinstance(value, tuple | list) else value

@@ -1,4 +1,4 @@
-"""Couplings as data: two joint coordinates that move in a constant ratio, and the coordinates of joints."""
+"""Couplings as data: two joint coordinates that move in a constant ratio, such as the angles of two gears."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ CoordinatePair = tuple[Coordinate, Coordinate]
 class Coupling(Entry):
     """q₂ = ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
 
-    A coordinate is the angle about a joint's axis (rad, counted on over full turns) or the displacement along
-    it (m), of the second body relative to the first, zero at the poses that the scene gives.
-    ``coordinates`` says which coordinate of each joint; by default the one that a driver of the joint would
-    prescribe, and the angle and the displacement of one joint that is named twice.
+    A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
+    of the second body relative to the first. It is zero at the poses that the scene gives. ``coordinates``
+    names the coordinate of each joint. The default is the coordinate that a driver of the joint would
+    prescribe; for one joint named twice, its angle and its displacement.
     """
 
     name: Name
@@ -40,7 +40,8 @@ class Coupling(Entry):
 
 
 def default_coordinates(facts: tuple[JointFacts, JointFacts], of_one: bool) -> CoordinatePair:
-    """Return the coordinates that a coupling has where it names none, of two joints or ``of_one``."""
+    """Return the default coordinates of a coupling of two joints, or of one joint named twice
+    (``of_one``)."""
     if of_one:
         return ANGLE, DISPLACEMENT
     first, second = (each.driven or ANGLE for each in facts)

@@ -1,4 +1,4 @@
-"""Types of a scene's fields, the sizes of numbers, and the frozen table every entry of a scene is."""
+"""Types of a scene's fields, limits of numbers, and the base class of all entries of a scene."""
 
 from __future__ import annotations
 
@@ -12,8 +12,9 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Fie
 
 from mbref.scene_units import angle, length, length_or_angle
 
-LARGEST, SMALLEST = 1e40, 1e-40  # sizes of numbers whose products and squares are still numbers
-OTHER_WORDS = {  # words of other programs and books → our words
+# limits of numbers, whose products and squares then stay within double precision
+LARGEST, SMALLEST = 1e40, 1e-40
+OTHER_WORDS = {  # words of other programs and books → the words of scene files
     "hinge": "revolute",
     "pin": "revolute",
     "rotational": "revolute",
@@ -57,20 +58,21 @@ OTHER_WORDS = {  # words of other programs and books → our words
     "point": "anchor",
     "points": "anchors",
 }
-SHOWN = Repr()  # how a faulty value is quoted, however long or deep
+SHOWN = Repr()  # shortens the quotation of a faulty value
 SHOWN.maxstring = SHOWN.maxother = SHOWN.maxlong = 80
 
 
 def shown(value: Any) -> str:
-    """The value as Python writes it, cut short: for messages, whatever was given."""
+    """Return the value as Python writes it, shortened, for messages."""
     try:
         return SHOWN.repr(value)
-    except ValueError:  # Python writes no integers of so many digits
+    except ValueError:  # Python refuses to write integers of thousands of digits
         return "a number of thousands of digits"
 
 
 def meant(word: str, known: Iterable[str]) -> str:
-    """ "; did you mean 'rod'?" of the known word that is most alike or of the same meaning, or nothing."""
+    """Return "; did you mean 'rod'?" for the known word that is most similar or has an equal meaning, or an
+    empty text."""
     words = {k.lower(): k for k in known if k}
     other = OTHER_WORDS.get(word.lower(), "")
     alike = [other] if other in words else get_close_matches(word.lower(), words, n=1)
@@ -78,21 +80,21 @@ def meant(word: str, known: Iterable[str]) -> str:
 
 
 def checked_size(value: float) -> float:
-    """The number; ValueError where it is so large that its powers would overflow."""
+    """Return the number; raises ValueError if it is so large that its powers would overflow."""
     if abs(value) > LARGEST:
         raise ValueError(f"must be at most {LARGEST:g} in size, got {value:g}")
     return value
 
 
 def checked_length(value: float) -> float:
-    """The positive number; ValueError where its powers would overflow or vanish."""
+    """Return the positive number; raises ValueError if its powers would overflow or vanish."""
     if value < SMALLEST:
         raise ValueError(f"must be at least {SMALLEST:g} in size, got {value:g}")
     return checked_size(value)
 
 
 def as_list(value: Any) -> Any:
-    """Arrays are accepted wherever the file has a list."""
+    """Return an array as a list, so that arrays are accepted for lists."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -122,7 +124,7 @@ PointPair = Annotated[tuple[Point, Point], Strict(False), BeforeValidator(as_lis
 
 
 def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
-    """The vector itself; ValueError where it is zero or too short to be squared."""
+    """Return the vector; raises ValueError if it is zero or too short to be squared."""
     if (length := math.hypot(*v)) == 0:
         raise ValueError("must have a length, got the zero vector")
     checked_length(length)
@@ -130,6 +132,6 @@ def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
 
 
 class Entry(BaseModel):
-    """A frozen table without unknown fields."""
+    """Base class of the entries of a scene: a frozen table without unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -1,4 +1,5 @@
-"""Joints as data: the fields of every joint type, and its facts, from which all tables over types derive."""
+"""Joints as data: the fields of every joint type, and its facts, from which all tables of joint types
+follow."""
 
 from __future__ import annotations
 
@@ -49,23 +50,23 @@ class JointFacts:
 
     @property
     def free_translations(self) -> int:
-        """Number of relative translations that stay free."""
+        """Number of free relative translations."""
         return 3 - len(self.forbidden_translations) - (self.condition == "constant distance")
 
     @property
     def free_rotations(self) -> int:
-        """Number of relative rotations that stay free."""
+        """Number of free relative rotations."""
         return 3 - len(self.forbidden_rotations) - (self.condition == "perpendicular axes")
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """The joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
+        """Joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
         angle = (ANGLE,) if self.forbidden_rotations == (X, Y) else ()
         return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
 
 
 class JointEntry(Entry):
-    """The fields and facts that all joints have."""
+    """Fields and facts that all joints have."""
 
     facts: ClassVar[JointFacts]
     name: Name
@@ -73,23 +74,23 @@ class JointEntry(Entry):
 
     @classmethod
     def at(cls, name: str, bodies: tuple[str, str], **places: Any) -> Self:
-        """Return a joint of this type, with the ``places`` (anchor, anchors, axis, axes) that the type
+        """Return a joint of this type with the ``places`` (anchor, anchors, axis, axes) that the type
         needs."""
         return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
 
     @property
     def anchor_pair(self) -> tuple[Vector, Vector]:
-        """The anchors on the first and on the second body, world at t = 0 (m)."""
+        """Anchors on the first and on the second body, world at t = 0 (m)."""
         raise NotImplementedError
 
     @property
     def directions(self) -> tuple[Vector, ...]:
-        """The joint's axes, world at t = 0, of any length: none, one of both bodies, or one of each body."""
+        """Axes of the joint, world at t = 0, of any length: none, one of both bodies, or one of each body."""
         return ()
 
     @property
     def reflected_inertia(self) -> float:
-        """The ``armature`` of the driven coordinate, kg m² or kg; 0 of a joint that has no such field."""
+        """The ``armature`` of the driven coordinate, kg m² or kg; 0 for joints without this field."""
         return getattr(self, "armature", 0.0)
 
 
@@ -116,7 +117,7 @@ class _DrivenJoint(_AxisJoint):
 
 
 class Fixed(_AnchorJoint):
-    """No relative motion."""
+    """Joint that forbids all relative motion."""
 
     facts = JointFacts(forbidden_translations=(X, Y, Z), forbidden_rotations=(X, Y, Z))
     type: Literal["fixed"] = "fixed"
@@ -161,7 +162,7 @@ class Universal(_AnchorJoint):
 
 
 class Spherical(_AnchorJoint):
-    """Coincident ``anchor``, free rotation."""
+    """Joint with coincident ``anchor`` and free rotation."""
 
     facts = JointFacts(forbidden_translations=(X, Y, Z))
     type: Literal["spherical"] = "spherical"
@@ -206,7 +207,7 @@ class Distance(JointEntry):
     @classmethod
     def _anchors_are_apart(cls, anchors: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
         if math.dist(*anchors) == 0:
-            raise ValueError("must be two different points (coincident points are a spherical joint)")
+            raise ValueError("must be two different points (for coincident points use a spherical joint)")
         return anchors
 
     @property

@@ -1,4 +1,4 @@
-"""Lines of a scene file: where a faulty field stands."""
+"""Line numbers of faulty fields in a scene file."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ LINE = re.compile(r" \(line \d+\)$")
 AT = re.compile(r"at line (\d+)")
 PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
 
-Line = tuple[int, str, int, str]  # number from 1, table, its place among its kind, key ("" of a header)
+Line = tuple[int, str, int, str]  # number from 1, table, index in the table, key (empty for a header)
 
 
 def with_lines(text: str, faults: Sequence[str]) -> list[str]:
-    """The faults, each with the line of the file that its path leads to, where there is one."""
+    """Return the faults, each with the line of the file to which its path leads, if there is one."""
     lines = list(_lines(text))
     names = _names(text, lines)
     return [
@@ -26,7 +26,8 @@ def with_lines(text: str, faults: Sequence[str]) -> list[str]:
 
 
 def toml_hint(text: str, error: str) -> str:
-    """The hint after a TOML reader's message: entries with single brackets, else the line that it names."""
+    """Return the hint after a TOML reader's message: single brackets that must be double, otherwise the
+    faulty line."""
     lines = text.splitlines()
     for number, line in enumerate(lines, 1):
         if single := SINGLE.match(line):
@@ -41,7 +42,7 @@ def _said(line: int | None) -> str:
 
 
 def _lines(text: str) -> Iterator[Line]:
-    """Headers and keys."""
+    """Return the lines with headers and keys."""
     table, counts = "", {"": 0}
     for number, line in enumerate(text.splitlines(), 1):
         if header := TABLE.match(line):
@@ -53,7 +54,7 @@ def _lines(text: str) -> Iterator[Line]:
 
 
 def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
-    """Place of the first entry of each name (of a driver: its joint's), by table and name."""
+    """Return the index of the first entry of each name (for a driver: its joint's), by table and name."""
     rows, found = text.splitlines(), dict[tuple[str, str], int]()
     for number, table, place, key in lines:
         if key == ("joint" if table == "driver" else "name") and (name := NAME.match(rows[number - 1])):
@@ -62,7 +63,8 @@ def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
 
 
 def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: str) -> int | None:
-    """The line of the field, or of its entry's header where it is missing; None for other files' layouts."""
+    """Return the line of the field, or of its entry's header if the field is missing; None if it is not
+    found."""
     match = PATH.match(fault)
     if not match:
         return None

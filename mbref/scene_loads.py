@@ -24,14 +24,14 @@ from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
 
 class LoadEntry(Entry):
-    """The facts that all loads have: the field that names the one body, the two bodies or the joint a load
-    acts on."""
+    """Facts that all loads have: the field that names the body, the two bodies or the joint on which a load
+    acts."""
 
     acts_on: ClassVar[Literal["body", "bodies", "joint"]]
 
     @property
     def is_damped(self) -> bool:
-        """Whether the load takes energy out of the mechanism."""
+        """True if the load dissipates energy."""
         return getattr(self, "damping", 0.0) > 0
 
     @property

@@ -13,17 +13,18 @@ STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
 
 
 def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], Any]) -> dict[str, Any]:
-    """The fields of a scene with the value at a path changed; tables on the way become dictionaries.
+    """Return the fields of a scene with the value at a path changed; tables along the path become
+    dictionaries.
 
-    An entry is named by its place or its name (a driver by its joint's).  Raises SceneError where the path
-    leads nowhere.
+    An entry is given by its index or its name (a driver by its joint's). Raises SceneError if the path does
+    not exist.
     """
     first, *rest = _steps(fields, path)
     return {**fields, first: _replaced(fields[first], rest, change, path)}
 
 
 def _steps(fields: Mapping[str, Any], path: str) -> list[str]:
-    """The fields and entries that a path leads through."""
+    """Return the fields and entries along a path."""
     found = [name or entry for name, entry in STEP.findall(path)]
     if STEP.sub("", path) or not found or found[0] not in fields:
         raise SceneError([f"{path}: is not a path of a scene, such as body[0].mass or joint[B].anchor[0]"])
@@ -44,14 +45,15 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
 
 
 def _fields_of(value: Any) -> Mapping[str, Any]:
-    """The fields of a table, a dictionary where one of them was changed before; none of a number."""
+    """Return the fields of a table, which is a dictionary after an earlier change; none for a number."""
     if isinstance(value, dict):
         return value
     return {field: getattr(value, field) for field in getattr(type(value), "model_fields", {})}
 
 
 def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
-    """The index that a step names: a number, or the name of the entry (a driver has its joint's)."""
+    """Return the index for a step of a path: a number, or the name of the entry (for a driver its joint's
+    name)."""
     tables = map(_fields_of, entries)
     names = [table.get("name", table.get("joint")) for table in tables]
     if step in names:

@@ -1,6 +1,7 @@
-"""Services of a scene and its motion that higher parts do: constraint rows, drawing and second runs.
+"""Functions behind methods of scenes and motions that need other modules: constraint rows, drawing, error
+estimates.
 
-Scenes and motions are data and import none of them.  ``mbref/__init__`` binds them here.
+Scene and Motion are plain data and do not import these modules. ``mbref/__init__`` stores the functions here.
 """
 
 from __future__ import annotations
@@ -34,9 +35,10 @@ class Counts:
         Coordinates minus rank.
     """
 
-    coordinates: int  # 6 per body
+    coordinates: int  # six for each body
     rows: int
-    rows_by_joint: dict[str, int]  # drivers under their joint, a modelled ground under "ground"
+    # rows of drivers count under their joint, rows of a modelled ground under "ground"
+    rows_by_joint: dict[str, int]
     rank: int
     redundant: int
     degrees_of_freedom: int
@@ -61,7 +63,7 @@ class Violation(NamedTuple):
 
 
 class Services:
-    """Functions of a scene or a motion, bound when ``mbref`` is imported.
+    """Functions of a scene or a motion, stored here when ``mbref`` is imported.
 
     Attributes
     ----------

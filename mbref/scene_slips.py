@@ -1,4 +1,4 @@
-"""Numbers of a scene that are valid and yet probably slips: other units, a misdirected axis, no joints."""
+"""Valid numbers of a scene that are probably mistakes: other units, a misdirected axis, missing joints."""
 
 from __future__ import annotations
 
@@ -12,22 +12,25 @@ from mbref.scene import GROUND, Scene
 
 TURN = 2 * math.pi
 QUARTER = 90  # degrees; likely angles are multiples of it
-APART = 300.0  # multiple of the next shorter length: one in millimetres is not always the longest
-GYRATION = 30.0  # radius of gyration over the mechanism's length
-STRONGEST = 100.0  # m/s², of gravity
-FURTHEST = 100.0  # rad, of a driver: 16 turns, and degrees of most motions
-INSTANTS = 101  # of a motion at which a driver's value is looked at
-FLAT = 1e-6  # of the mechanism's size, of a point out of a plane; also the cosine of a right angle
+# ratio of neighbouring lengths in a sorted list above which one of them is probably in millimetres
+APART = 300.0
+GYRATION = 30.0  # largest plausible radius of gyration / length of the mechanism
+STRONGEST = 100.0  # m/s²; largest plausible gravity
+FURTHEST = 100.0  # rad; largest plausible angle of a driver (16 turns; an angle in degrees is usually larger)
+INSTANTS = 101  # number of times at which a driver's value is computed
+# distance of a point from a plane / size of the mechanism that counts as zero; also cosine of a right angle
+FLAT = 1e-6
 
 
 def probable_slips(scene: Scene) -> list[str]:
-    """One sentence for each, under the path of the field."""
+    """Return one sentence for each probable mistake, under the path of the field."""
     found = (_angles, _lengths, _inertias, _gravity, _axes, _no_joints, _far_drivers)
     return [sentence for each in found for sentence in each(scene)]
 
 
 def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
-    """Distances (m) between the joints of each body, ``{"rod": {"A–B": 0.5}}``; the ground's too."""
+    """Return distances (m) between the joints of each body, ``{"rod": {"A–B": 0.5}}``, also for the
+    ground."""
     found: dict[str, dict[str, float]] = {}
     for name in [*(body.name for body in scene.body), GROUND]:
         ends = [
@@ -60,7 +63,7 @@ def _degrees(path: str, angle: float) -> str:
 
 
 def _lengths(scene: Scene) -> Iterator[str]:
-    """A gap of a thousand between two neighbours among the lengths of links and guides."""
+    """Yield lengths of links and guides that are 300 times as large as the next smaller one."""
     every = sorted(
         (length, f"body[{body}]: {pair}")
         for body, lengths in link_lengths(scene).items()
@@ -73,7 +76,7 @@ def _lengths(scene: Scene) -> Iterator[str]:
 
 
 def _inertias(scene: Scene) -> Iterator[str]:
-    """Bodies whose radius of gyration is many times the mechanism."""
+    """Yield bodies whose radius of gyration is many times the size of the mechanism."""
     size = _size(scene)
     for body in scene.body:
         if body.mass is None or body.inertia is None or size == 0:
@@ -89,12 +92,12 @@ def _inertias(scene: Scene) -> Iterator[str]:
 
 
 def _size(scene: Scene) -> float:
-    """The extent of all anchors and centres of mass, m."""
+    """Return the extent of all anchors and centres of mass, m."""
     return float(np.ptp(np.array(_points(scene)), axis=0).max())
 
 
 def _points(scene: Scene) -> list[tuple[float, float, float]]:
-    """All anchors and centres of mass."""
+    """Return all anchors and centres of mass."""
     points = [body.position for body in scene.body]
     return points + [anchor for joint in scene.joint for anchor in joint.anchor_pair]
 
@@ -106,7 +109,7 @@ def _gravity(scene: Scene) -> Iterator[str]:
 
 
 def _axes(scene: Scene) -> Iterator[str]:
-    """Hinges of loops whose axes lie in the plane of a mechanism, where most hinges have axes across it."""
+    """Yield hinges in loops with axes in the plane of a mechanism, if most hinges have axes normal to it."""
     hinges = [(joint.name, _unit(joint.directions[0])) for joint in scene.joint if joint.type == "revolute"]
     for normal in [axis for _, axis in hinges[:2]]:
         turned = [abs(float(axis @ normal)) for _, axis in hinges]
@@ -119,7 +122,7 @@ def _axes(scene: Scene) -> Iterator[str]:
 
 
 def _is_in_loop(scene: Scene, name: str) -> bool:
-    """Whether the bodies of a joint are connected without it, too."""
+    """Return whether the bodies of a joint are also connected without it."""
     others = [joint.bodies for joint in scene.joint if joint.name != name]
     reached, last = {scene.joint_named(name).bodies[0]}, 0
     while len(reached) > last:
@@ -137,7 +140,7 @@ def _is_zero(cosine: float) -> bool:
 
 
 def _is_flat(scene: Scene, normal: np.ndarray) -> bool:
-    """Whether anchors and centres of mass lie in one plane across a direction."""
+    """Return whether anchors and centres of mass lie in one plane normal to a direction."""
     heights = np.array(_points(scene)) @ normal
     return float(np.ptp(heights)) <= FLAT * _size(scene)
 
@@ -149,11 +152,11 @@ def _unit(axis: tuple[float, float, float]) -> np.ndarray:
 def _no_joints(scene: Scene) -> Iterator[str]:
     if not scene.joint:
         names = ", ".join(body.name for body in scene.body)
-        yield f"joint: there is none, so nothing holds {names}"
+        yield f"joint: there is none, so nothing connects {names}"
 
 
 def _far_drivers(scene: Scene) -> Iterator[str]:
-    """Drivers that turn a joint by many turns before the end of the motion."""
+    """Yield drivers that turn a joint by many turns before the end of the motion."""
     times = np.linspace(0.0, scene.duration, INSTANTS)
     for driver in scene.driver:
         furthest = float(np.abs(driver.values(times)).max())

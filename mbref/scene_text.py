@@ -1,4 +1,4 @@
-"""A scene as the text of its file, laid out as a person writes it: entry by entry, a vector on a line."""
+"""A scene as the text of a TOML file in a readable layout: entry by entry, with each vector on one line."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 
 import tomli_w
 
-FIRST = ("name", "type", "joint", "joints", "bodies", "body")  # keys that stand first in an entry
+FIRST = ("name", "type", "joint", "joints", "bodies", "body")  # these keys come first in an entry
 
 
 def scene_text(data: Mapping[str, Any]) -> str:
-    """TOML of a scene's nested tables; lists of tables become entries such as [[joint]]."""
+    """Return the TOML text of a scene's nested tables; lists of tables become entries such as [[joint]]."""
     entries = {key: value for key, value in data.items() if _is_of_tables(value)}
     blocks = ["\n".join(_lines({key: value for key, value in data.items() if key not in entries}))]
     blocks += [f"[[{key}]]\n" + "\n".join(_lines(entry)) for key, found in entries.items() for entry in found]
@@ -23,13 +23,13 @@ def _is_of_tables(value: Any) -> bool:
 
 
 def _lines(table: Mapping[str, Any]) -> Iterator[str]:
-    """``key = value``, names and types first."""
+    """Return lines ``key = value``, names and types first."""
     for key in sorted(table, key=lambda key: FIRST.index(key) if key in FIRST else len(FIRST)):
         yield f"{key} = {_value(table[key])}"
 
 
 def _value(value: Any) -> str:
-    """A value on one line."""
+    """Return a value on one line."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(_lines(value)) + " }"
     if isinstance(value, list):

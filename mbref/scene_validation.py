@@ -29,7 +29,7 @@ LOADED = {  # load type → joint types along whose coordinate it can act
 COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
 COORDINATES = get_args(Coordinate)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
-NUMBERS = {  # field → what its list holds; of all others three numbers
+NUMBERS = {  # field → content of its list; all other lists contain three numbers
     "orientation": "four numbers (w, x, y, z)",
     "polynomial": "numbers, such as [0.0, 6.0]",
     "table": "rows of time and value, such as [[0.0, 0.0], [0.5, 1.0], [1.0, 2.0], [1.5, 1.0]]",
@@ -45,22 +45,22 @@ NUMBERS = {  # field → what its list holds; of all others three numbers
     "joints": "two names of joints",
     "coordinates": 'two of "angle" and "displacement"',
 }
-INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods meet the triangle inequality with equality
+INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods satisfy the triangle inequality with equality
 
 
 class SceneError(Exception):
-    """A scene that cannot be used; ``faults`` has one ``path: message`` per fault."""
+    """A scene that cannot be used; ``faults`` has one ``path: message`` for each fault."""
 
     def __init__(self, faults: Sequence[str]):
         self.faults = list(faults)
         super().__init__("\n".join(self.faults))
 
     def __reduce__(self) -> tuple[type[SceneError], tuple[list[str]]]:
-        return type(self), (self.faults,)  # so that the error can be pickled
+        return type(self), (self.faults,)  # allows the error to be pickled
 
 
 def checked_inertia(value: Any) -> tuple[Any, ...]:
-    """Three principal moments or a symmetric 3x3, as tuples; ValueError says which value is unphysical."""
+    """Return three principal moments or a symmetric 3x3 as tuples; raises ValueError for a faulty value."""
     try:
         array = np.array(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -88,10 +88,8 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
 
 
 def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Faults:
-    """(path, message) of every fault pydantic found, in the words of the file.
-
-    ``tables`` has the names of the fields by table; names of fields of joints and loads are known here.
-    """
+    """Yield (path, message) for every fault that pydantic found, in the words of scene files. ``tables`` has
+    the names of the fields by table; names of fields of joints and loads are known here."""
     for fault in error.errors(include_url=False):
         kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})
         expected = str(limit.get("expected_tags"))
@@ -118,7 +116,7 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
         }
         default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got}"
         if kind == "too_short" and fault["input"]:
-            continue  # entries are there, but faulty ones were left out
+            continue  # the entries exist, but faulty ones were left out
         if kind == "missing" and isinstance(fault["loc"][-1], int):  # the list is too short
             yield _path(fault["loc"][:-1]), _must_hold(fault["loc"][:-1], got)
             continue
@@ -127,7 +125,7 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
 
 
 def _must_hold(location: Sequence[str | int], got: str) -> str:
-    """The message for a list of the wrong length, or no list, at a location."""
+    """Return the message for a list of the wrong length, or a value that is no list."""
     field = location[-1] if location else ""
     if isinstance(field, int) and location[-2:-1] == ("table",):
         return f"must be a time and a value, got {got}"
@@ -135,7 +133,7 @@ def _must_hold(location: Sequence[str | int], got: str) -> str:
 
 
 def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[str]]) -> str:
-    """The suggestion for an unknown field at a location such as ("joint", 0, "revolute", "axsi")."""
+    """Return the suggestion for an unknown field at a location such as ("joint", 0, "revolute", "axsi")."""
     key, above = str(location[-1]), [part for part in location[:-1] if isinstance(part, str)]
     types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES}
     table = above[-1] if above else ""
@@ -144,7 +142,7 @@ def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[st
 
 
 def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
-    """``path: message`` of every fault, an entry by its name where it has one of its own: body[rod].mass."""
+    """Return ``path: message`` for every fault, with a unique name as index: body[rod].mass."""
     for path, message in faults.items():
         match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.)", path)
         name = _own_name(data, match[1], int(match[2])) if match else ""
@@ -154,7 +152,8 @@ def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[
 
 
 def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
-    """The name of an entry that no other has; empty where there is none, or a path could not hold it."""
+    """Return the name of an entry if no other entry has it and a path can contain it; otherwise an empty
+    text."""
     names = [_text(entry, "joint" if key == "driver" else "name") for entry in _entries(data, key)]
     name = names[place] if place < len(names) else ""
     fit = (
@@ -168,7 +167,8 @@ def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
 
 
 def _path(location: Sequence[str | int]) -> str:
-    """body[2].mass; the tag that a union of joint or load types adds to a location is dropped."""
+    """Return the path body[2].mass of a location, without the tag that a union of joint or load types
+    adds."""
     parts = list(location)
     if len(parts) > 2 and parts[0] in ("joint", "load") and isinstance(parts[2], str):
         del parts[2]
@@ -193,10 +193,8 @@ def _names(entries: Sequence[Any]) -> list[str]:
 
 
 def reference_faults(data: Mapping[str, Any]) -> Faults:
-    """Faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
-
-    Works on raw tables, so that these are found beside the faults of single fields.
-    """
+    """Yield faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
+    The arguments are raw tables, so that these faults are found together with the faults of single fields."""
     bodies, joints = _entries(data, "body"), _entries(data, "joint")
     yield from _duplicates("body", _names(bodies), reserved=RESERVED)
     yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
@@ -219,7 +217,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
         if acts_on == "body":
             name = field_of(load, "body")
             if name == GROUND:
-                yield f"load[{i}].body", "the ground cannot be loaded"
+                yield f"load[{i}].body", "a load cannot act on the ground"
             elif isinstance(name, str) and name not in known:
                 yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
         elif acts_on == "bodies":
@@ -233,7 +231,8 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
 
 
 def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
-    """Couplings with the name of another entry, of unknown joints, or of coordinates that a joint has not."""
+    """Yield couplings with the name of another entry, of unknown joints, or of coordinates that a joint
+    lacks."""
     couplings = _entries(data, "coupling")
     yield from _duplicates("coupling", _names(couplings))
     for i, coupling in enumerate(couplings):
@@ -241,7 +240,7 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
             yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
         names = field_of(coupling, "joints")
         if not isinstance(names, list | tuple) or len(names) != 2:
-            continue  # reported as a field fault
+            continue  # already reported as a fault of the field
         path = f"coupling[{i}].joints"
         for k, name in enumerate(names):
             yield from _joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
@@ -250,7 +249,7 @@ def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Fault
 
 
 def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Mapping[str, str]) -> Faults:
-    """Coupled coordinates that joints of these types have not, or that are one and the same."""
+    """Yield coupled coordinates that joints of these types lack, or that are equal."""
     first, second = (JOINT_TYPES[types[name]].facts for name in names)
     asked = field_of(coupling, "coordinates")
     given = isinstance(asked, list | tuple) and len(asked) == 2
@@ -264,7 +263,8 @@ def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Ma
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
-    """Drivers of unknown or wrong joints, second ones of a joint, and values that do not begin at 0."""
+    """Yield drivers of unknown or wrong joints, second drivers of a joint, and values that do not begin at
+    0."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
         name = field_of(driver, "joint")
@@ -283,7 +283,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
 
 
 def _unit_faults(path: str, sine: Any, joint: Any) -> Faults:
-    """The fault of an amplitude whose unit does not suit the coordinate that a driver prescribes."""
+    """Yield the fault of an amplitude whose unit does not fit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
     needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
     amplitude = field_of(sine, "amplitude")
@@ -306,7 +306,7 @@ def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
 
 def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:
     if not isinstance(pair, list | tuple) or len(pair) != 2:
-        return  # reported as a field fault
+        return  # already reported as a fault of the field
     for k, name in enumerate(pair):
         if isinstance(name, str) and name and name not in known:
             yield f"{path}[{k}]", _unknown("body", name, known)
@@ -316,7 +316,7 @@ def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:
 
 def _joint_faults(path: str, name: Any, types: Mapping[str, Any], able: Sequence[str], what: str) -> Faults:
     if not isinstance(name, str) or not name:
-        return  # reported as a field fault
+        return  # already reported as a fault of the field
     if name not in types:
         yield path, _unknown("joint", name, list(types))
     elif types[name] in JOINT_TYPES and types[name] not in able:

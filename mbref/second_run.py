@@ -22,13 +22,14 @@ from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import checked_run, finish_run
 from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
-ORDER = 24  # order of the second run; other runs use at most 22 at tolerances down to 1e-13
-RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # of the second run
-TIGHTER = 0.1  # of the motion's own tolerance, if that gives a smaller one
-TRIED = 1e-12  # relative tolerance that is tried for a motion with a warning
-UNIT = 2.0**-52  # relative distance of a number from the next one, at most
+# order of the Taylor series of the second run; other runs use at most 22 at tolerances down to 1e-13
+ORDER = 24
+RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # relative tolerances of the second run
+TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
+TRIED = 1e-12  # relative tolerance of a further run of a motion with a warning
+UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and motion.error_estimate have no time limit"
-STEPS_PER_CALL = 500  # of a second run, whose time limit is checked between calls
+STEPS_PER_CALL = 500  # steps of a second run between two checks of its time limit
 
 
 Progress = Callable[[float], None]
@@ -131,7 +132,7 @@ def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits
 
 @dataclass(frozen=True)
 class _Made:
-    """A run that was tried: its motion and the mechanism's length (m), and the reason of an early end."""
+    """A run of the second kind: its motion, the mechanism's length (m), and the reason of an early end."""
 
     motion: Motion | None
     length: float
@@ -143,11 +144,11 @@ class _Made:
         return 0 if self.motion is None else len(self.motion.times)
 
     def is_short(self, other: Motion) -> bool:
-        """Whether the run has fewer samples than another."""
+        """Return whether the run has fewer samples than another one."""
         return self.count < len(other.times)
 
     def distances(self, other: Motion) -> np.ndarray:
-        """Return the largest distance (k,) of a body from its place in another motion.
+        """Return the largest distance (k,) of a body from its position in another motion.
 
         Distances are over the mechanism's length, or angles, rad. They are NaN beyond the end of the run.
         """
@@ -161,18 +162,18 @@ class _Made:
 
 
 class _TooLong(Exception):
-    """Second runs that exceed their time limit."""
+    """A second run exceeds its time limit."""
 
 
 class _Check:
-    """Progress of second runs; raises _TooLong after a number of seconds of CPU time."""
+    """Progress callback of second runs; raises _TooLong after a number of CPU seconds."""
 
     def __init__(self, seconds: float, progress: Progress | None):
         self._seconds, self._progress = seconds, progress
         self._end = time.process_time() + seconds
 
     def __call__(self, reached: float) -> None:
-        """Report the time reached, s."""
+        """Report the reached time, s."""
         if time.process_time() > self._end:
             raise _TooLong(f"a second run takes longer than {self._seconds:g} s{LONGER}")
         if self._progress is not None:

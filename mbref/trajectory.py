@@ -1,4 +1,4 @@
-"""Trajectory, Outcome and Cost: what every engine and every method returns."""
+"""Trajectory, Outcome and Cost: the result of every engine and every method."""
 
 from __future__ import annotations
 
@@ -323,5 +323,5 @@ class Trajectory:
 
 
 def _lists(arrays: Mapping[str, np.ndarray]) -> dict[str, list[Any]]:
-    """Arrays by name as lists."""
+    """Return arrays by name as lists."""
     return {name: np.asarray(array).tolist() for name, array in arrays.items()}

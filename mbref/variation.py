@@ -1,4 +1,4 @@
-"""Variants of a scene: copies in which some of its numbers are drawn at random, for tolerance studies."""
+"""Variants of a scene: copies in which some numbers are random, for tolerance studies."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Variation:
     Attributes
     ----------
     path : str
-        Place of the number, as in messages: ``body[0].mass``, ``joint[B].anchor[0]``, ``gravity[1]``.
+        Path of the number, as in messages: ``body[0].mass``, ``joint[B].anchor[0]``, ``gravity[1]``.
     low, high : float
         Limits of the uniform distribution; mean and standard deviation if ``normal``.
     normal : bool
@@ -62,7 +62,7 @@ class Variation:
 
 
 def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: int = 0) -> Iterator[Scene]:
-    """Yield copies of a scene with independently drawn numbers.
+    """Yield copies of a scene with independent random numbers.
 
     Variant k depends on ``seed`` and k only.
 

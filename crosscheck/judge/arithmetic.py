@@ -1,8 +1,8 @@
 """The numbers of a reference: double, extended (long double), or of any number of digits (python-flint).
 
-Formulas are written once, with NumPy's operators and np.sqrt, np.sin, np.cos, for arrays of any kind; arrays
-of many digits hold objects.  There only the midpoints of Arb's balls are kept from step to step, so that
-the evidence for the digits is the agreement of two formulations, not an enclosure.
+Formulas are written once, with NumPy's operators and np.sqrt, np.sin, np.cos, for arrays of any type; arrays
+of many digits contain objects. Only the midpoints of Arb's intervals are passed from step to step. So the
+digits are proved by the agreement of two formulations, not by an enclosure.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Arithmetic:
-    """One element type of arrays; ``eps`` is its rounding unit, ``digits`` set where elements are objects."""
+    """Element type of arrays; ``eps`` is its rounding unit, ``digits`` is set if elements are objects."""
 
     name: str
     eps: float
@@ -23,7 +23,7 @@ class Arithmetic:
     digits: int = 0
 
     def array(self, values: Any) -> np.ndarray:
-        """An array (any shape) of the arithmetic from doubles or from its own numbers; the doubles count
+        """Return an array (any shape) of the arithmetic from doubles or from its own numbers; doubles count
         as exact."""
         if not self.digits:
             return np.array(values, dtype=self.dtype)
@@ -34,34 +34,37 @@ class Arithmetic:
         return _objects([x if isinstance(x, arb) else arb(float(x)) for x in given.ravel()], given.shape)
 
     def number(self, value: Any) -> Any:
-        """One number of the arithmetic."""
+        """Return one number of the arithmetic."""
         return self.array(value)[()]
 
     def zeros(self, *shape: int) -> np.ndarray:
-        """An array of zeros."""
+        """Return an array of zeros."""
         return np.full(shape, self.number(0.0), dtype=self.dtype)
 
     def settled(self, values: np.ndarray) -> np.ndarray:
-        """Return the numbers without the radii of their balls, which grow from operation to operation."""
+        """Return the midpoints of interval numbers, without their radii, which would grow from operation to
+        operation."""
         return _objects([x.mid() for x in np.ravel(values)], np.shape(values)) if self.digits else values
 
 
 DOUBLE = Arithmetic("double", float(np.finfo(float).eps), np.float64)
-EXTENDED = Arithmetic("long double", float(np.finfo(np.longdouble).eps), np.longdouble)  # double on some CPUs
+# on some CPUs a long double is a double
+EXTENDED = Arithmetic("long double", float(np.finfo(np.longdouble).eps), np.longdouble)
 
 
 def many_digits(digits: int) -> Arithmetic:
-    """The arithmetic of so many decimal digits; ImportError where python-flint is not installed."""
+    """Return the arithmetic of a number of decimal digits; raises ImportError if python-flint is not
+    installed."""
     return Arithmetic(f"{digits} digits", 10.0**-digits, object, digits)
 
 
 def doubles(values: np.ndarray) -> np.ndarray:
-    """The nearest doubles of an array of any arithmetic."""
+    """Return the nearest doubles of an array of any arithmetic."""
     return np.asarray(values).astype(float)
 
 
 def largest(values: np.ndarray) -> float:
-    """The largest size in an array of any arithmetic, as a double; 0 of an empty one."""
+    """Return the largest absolute value in an array of any arithmetic, as a double; 0 for an empty array."""
     return float(np.abs(doubles(values)).max(initial=0.0))
 
 

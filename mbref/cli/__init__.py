@@ -3,7 +3,7 @@
 import gc
 
 collects = gc.isenabled()
-gc.disable()  # no search for garbage among imported objects, which takes a fifth of the time of a short run
+gc.disable()  # garbage collection during the imports would take a fifth of the time of a short run
 from mbref.cli.commands import main  # noqa: E402
 
 gc.freeze()

@@ -1,4 +1,4 @@
-"""The motions of a scene along the branches that meet at one of its singular positions."""
+"""Motions of a scene along the branches that meet at one of its singular positions."""
 
 from __future__ import annotations
 
@@ -10,14 +10,15 @@ from mbref.motion import Motion
 from mbref.stepping.limits import Limits
 from mbref.trajectory import Outcome
 
-FRAMES = 101  # samples of a motion
-SMOOTH = 1  # the branch that is taken unless another is asked for
+FRAMES = 101  # number of samples of a motion
+SMOOTH = 1  # number of the smooth branch, which is taken unless the user chooses another
 
 
 def chosen(smooth: Motion, number: int | None) -> int:
-    """The number, from 1, of the singular position asked for, else of the first with several branches.
+    """Return the number, from 1, of the chosen singular position, otherwise of the first one with several
+    branches.
 
-    Raises MethodError where none was looked for, ValueError where there is none.
+    Raises MethodError if the method does not detect singular positions, ValueError if there is none.
     """
     if smooth.crossings is None:
         raise MethodError(
@@ -36,14 +37,14 @@ def chosen(smooth: Motion, number: int | None) -> int:
 
 
 def of_several_branches(motion: Motion) -> list[int]:
-    """The numbers, from 1, of the singular positions passed at which several branches meet."""
+    """Return the numbers, from 1, of the passed singular positions at which several branches meet."""
     return [k for k, crossing in enumerate(motion.crossings or (), 1) if len(crossing.velocity) > 1]
 
 
 def along_branches(
     simulate: Simulate, smooth: Motion, method: str, limits: Limits, number: int
 ) -> dict[str, Motion]:
-    """The motions by title, from before a singular position of the smooth one to behind it."""
+    """Return the motions by title, from before a singular position of the smooth motion to after it."""
     assert smooth.crossings is not None
     crossing = smooth.crossings[number - 1]
     times = crossing.instants(smooth.t_end, FRAMES)
@@ -55,17 +56,17 @@ def along_branches(
 
 
 def sentence(motion: Motion, number: int) -> str:
-    """One sentence on a singular position."""
+    """Return one sentence on a singular position."""
     assert motion.crossings is not None
     crossing = motion.crossings[number - 1]
     return f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}"
 
 
 def _quiet(time: float) -> None:
-    """Progress of runs that follow the long one."""
+    """Ignore the progress, for the short runs after the long one."""
 
 
 def _title(branch: int, motion: Motion) -> str:
-    """The branch's name and, where its run ended early, when."""
+    """Return the branch's name, with the end time if its run ended early."""
     name = f"branch {branch}{', smooth' * (branch == SMOOTH)}"
     return name if motion.outcome is Outcome.COMPLETED else f"{name}, ended at {motion.t_end:.4g} s"

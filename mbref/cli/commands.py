@@ -37,7 +37,7 @@ exit status: 0 done, 1 a run ended early, 2 bad input, 130 interrupted"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line; the exit status: 0 completed, 1 ended otherwise, 2 bad input."""
+    """Run a command line; returns the exit status: 0 completed, 1 ended otherwise, 2 bad input."""
     options = parser().parse_args(arguments)
     try:
         return int(options.action(options))
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print("mbref: interrupted", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # the reader closed the pipe, as `head` does
+    except BrokenPipeError:  # the reader closed the pipe, as in `mbref list | head`
         sys.stdout = None
         return INCOMPLETE
     except OSError as error:  # a file could not be written
@@ -56,7 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _with_lines(options: argparse.Namespace, faults: Sequence[str]) -> Sequence[str]:
-    """The faults with lines of the scene's file, also those found when it is moved."""
+    """Return the faults with line numbers of the scene's file, including faults found during the
+    simulation."""
     path = Path(getattr(options, "scene", ""))
     if path.suffix != ".toml" or not path.is_file():
         return faults
@@ -70,7 +71,7 @@ def _refuse(faults: Sequence[str]) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command line's grammar."""
+    """Return the parser of the command line."""
     whole = Parser(
         prog="mbref",
         formatter_class=TEXT,
@@ -102,7 +103,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Prints the versions, which are looked up only then, and exits."""
+    """Command-line action that prints the versions and exits; versions are looked up only then."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         print(_versions())
@@ -110,7 +111,7 @@ class _Version(argparse.Action):
 
 
 def _versions() -> str:
-    """This package and those its numbers depend on."""
+    """Return the versions of this package and of the packages that influence its numbers."""
     from importlib.metadata import version
 
     others = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))

@@ -1,4 +1,4 @@
-"""mbref diagnose: links, joints, redundancy at t = 0 and along the motion, singular positions."""
+"""mbref diagnose: links, joints, redundancy at t = 0 and along the motion, and singular positions."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion
     from mbref.equations.diagnosis import Diagnosis
 
-LISTED = 5  # singular positions of a motion
+LISTED = 5  # largest number of printed singular positions
 
 
 def add(commands: Any) -> None:
-    """The command's grammar."""
+    """Add the command's parser."""
     diagnose = commands.add_parser(
         "diagnose",
         help="links, redundant constraints, singular positions of a scene",
@@ -81,7 +81,7 @@ def _along(scene: Scene) -> AlongMotion | str:
 
 
 def along_redundant(along: AlongMotion | str | None) -> bool:
-    """Whether rows are redundant along the motion."""
+    """Return whether rows are redundant along the motion."""
     return along is not None and not isinstance(along, str) and along.redundant > 0
 
 
@@ -115,7 +115,7 @@ def _scene_lines(scene: Scene) -> list[str]:
 
 
 def _unit_lines(path: str) -> list[str]:
-    """Return the numbers with a unit in a scene's file, in SI."""
+    """Return lines with the numbers of a scene's file that have a unit, in SI."""
     if not path.endswith(".toml"):
         return []
     found = list(echoed(tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))))
@@ -198,7 +198,8 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
 
 
 def _driver_lines(scene: Scene) -> list[str]:
-    """A line where more drivers than freedoms make rows redundant, whatever the joints are."""
+    """Return a line if there are more drivers than degrees of freedom, so that rows are redundant for any
+    joints."""
     freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
     sentence = (
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
@@ -207,7 +208,7 @@ def _driver_lines(scene: Scene) -> list[str]:
 
 
 def _unique(found: Diagnosis) -> str:
-    """Return the joints whose whole reaction is unique."""
+    """Return the text with the joints whose whole reaction is unique."""
     return ", ".join(found.unique_reactions) or "none as a whole"
 
 

@@ -1,4 +1,4 @@
-"""mbref ensemble: variants of a scene on every core."""
+"""mbref ensemble: variants of a scene, simulated on all cores."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mbref.trajectory import Trajectory
 
 
 def add(commands: Any) -> None:
-    """The command's grammar."""
+    """Add the command's parser."""
     many = commands.add_parser(
         "ensemble",
         help="simulate variants of a scene on every core",
@@ -74,9 +74,9 @@ def _ensemble(options: argparse.Namespace) -> int:
 def _show_spread(
     scene: Scene, end: float, completed: Sequence[Trajectory], rate: float, options: argparse.Namespace
 ) -> None:
-    """Mean and standard deviation of every body over the completed runs, at the last time.
+    """Print mean and standard deviation of every body over the completed runs, at the last time.
 
-    ``rate`` is of runs per second of wall time, with the start of the processes.
+    ``rate`` is the number of runs per second of wall time, including the start of the processes.
     """
     last = {key: np.array([getattr(run, key)[-1] for run in completed]) for key in QUANTITIES.values()}
     if options.json:
@@ -98,7 +98,7 @@ def _show_spread(
 
 
 def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
-    """Return for every outcome except COMPLETED the number of runs and the cause of the first."""
+    """Return for every outcome except COMPLETED the number of runs and the cause of the first one."""
     ends: dict[str, list[int]] = {}
     for place, run in sorted(runs.items()):
         if run.outcome.name != "COMPLETED":

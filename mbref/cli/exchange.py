@@ -1,4 +1,4 @@
-"""mbref import and mbref export: other programs' files, such as MJCF and URDF."""
+"""mbref import and mbref export: files of other programs, such as MJCF and URDF."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from mbref.scenes import find_scene
 
 
 def add(commands: Any) -> None:
-    """The commands' grammar."""
+    """Add the parsers of both commands."""
     take = commands.add_parser(
         "import",
         help="a scene file from MJCF, URDF or SDF",
@@ -36,7 +36,7 @@ def add(commands: Any) -> None:
         "export",
         help="a scene as MJCF",
         formatter_class=TEXT,
-        description="Write a scene as a MuJoCo model (.xml); lists everything that it cannot hold.\n"
+        description="Write a scene as a MuJoCo model (.xml); lists everything that MJCF cannot describe.\n"
         "Needs the extra engines.",
         epilog="example:\n  mbref export four_bar_gravity --out four_bar.xml",
     )

@@ -1,8 +1,8 @@
-"""The first run on a machine: interpreted kernels give its result while the kernels are compiled.
+"""The first run on a machine: interpreted kernels compute its result while the kernels are being compiled.
 
 Compiling the kernels of a method takes half a minute, interpreting a short run a few seconds, with the same
-arithmetic.  So two processes race: one interprets the run, the other compiles.  Where compiling ends first,
-the run is made with compiled kernels.
+arithmetic.  So two processes work at once: one runs the interpreted kernels, the other compiles. If the
+compilation ends first, the run is made with compiled kernels.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ WAITING = (
     "(Ctrl-C stops it)"
 )
 
-Simulate = Callable[..., Motion]  # with the arguments of ``simulate``
+Simulate = Callable[..., Motion]  # function with the arguments of ``simulate``
 
 
 @contextmanager
 def simulator(method: str) -> Iterator[Simulate]:
-    """``simulate``, or where the method's kernels are not compiled, the race of both ways to its result.
+    """Return ``simulate``, or, if the method's kernels are not compiled, a function that runs and compiles at
+    once.
 
-    At the end the compilation is waited for.  Raises MethodError for an unknown method.
+    At the end it waits for the compilation. Raises MethodError for an unknown method.
     """
     if INTERPRETED in os.environ or (os.cpu_count() or 1) < 2 or are_compiled(Method.parse(method)):
         yield simulate
@@ -68,7 +69,7 @@ def _raced(
     limits: Limits,
     progress: Callable[[float], None],
 ) -> Motion:
-    """The motion by interpreted kernels, or by compiled ones where they are ready before."""
+    """Return the motion by interpreted kernels, or by compiled ones if these are ready first."""
     answers, answer = SPAWN.Pipe(duplex=False)
     interpreting = SPAWN.Process(target=_interpret, args=(answer, scene, method, times, limits))
     with _environment(INTERPRETED, "1"):
@@ -90,14 +91,14 @@ def _raced(
 
 
 def _compile(method: str) -> None:
-    """The work of the compiling process; an interrupt is its parent's affair."""
+    """Compile in a child process; its parent handles interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     sys.stderr = open(os.devnull, "w")  # noqa: SIM115 - its parent has reported that kernels are compiled
     prepare(Method.parse(method))
 
 
 def _interpret(answer: Connection, scene: Scene, method: str, times: np.ndarray, limits: Limits) -> None:
-    """The work of the interpreting process: times reached, then a motion or the error."""
+    """Run interpreted kernels in a child process; sends reached times, then a motion or the error."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         motion = simulate(scene, method, times, limits, answer.send)
@@ -108,7 +109,7 @@ def _interpret(answer: Connection, scene: Scene, method: str, times: np.ndarray,
 
 @contextmanager
 def _environment(name: str, value: str) -> Iterator[None]:
-    """The variable has the value for processes that are started meanwhile."""
+    """Set an environment variable for processes that are started in the ``with`` block."""
     os.environ[name] = value
     try:
         yield

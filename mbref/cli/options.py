@@ -1,4 +1,4 @@
-"""Options that commands share: the scene, the method, the times, the limits of a run."""
+"""Options that several commands share: the scene, the method, the times, the limits of a run."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ TEXT = argparse.RawDescriptionHelpFormatter
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
-    """The scene a command is about."""
+    """Add the argument for the scene."""
     parser.add_argument("scene", metavar="SCENE", help="a built-in name (mbref list scenes) or a .toml file")
 
 
 def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> None:
-    """Method, times and limits of a run; --json where the command prints its result."""
+    """Add options for method, times and limits of a run, and --json if the command prints its result."""
     parser.add_argument(
         "--method",
         help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT)};\n"
@@ -48,7 +48,7 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
 
 
 def add_time_options(parser: argparse.ArgumentParser) -> None:
-    """--times, or --samples over --duration."""
+    """Add --times, --samples and --duration."""
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", help="sample times in s, increasing, e.g. 0.1,0.2,0.4")
     when.add_argument("--samples", type=int, help="this many equally spaced times from 0 to the duration")
@@ -56,7 +56,7 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
-    """The sample times the options ask for; ValueError names the option that is wrong."""
+    """Return the sample times that the options request; raises ValueError that names the faulty option."""
     duration = scene.duration if options.duration is None else options.duration
     if not 0 < duration < np.inf:
         raise ValueError(f"--duration: must be positive, got {duration:g}")

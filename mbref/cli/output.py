@@ -18,33 +18,34 @@ from mbref.scene_slips import probable_slips
 if TYPE_CHECKING:
     from rich.table import Table
 
-PIPED_WIDTH = 80  # characters of a line where no terminal says otherwise
+PIPED_WIDTH = 80  # characters of a line without a terminal
 TIME = "s"
 HOUR = 3600.0  # s
-PAUSE = 10.0  # s between two lines of progress where stderr is no terminal
-QUANTITIES = {  # columns of a body in a table → field of a trajectory
+PAUSE = 10.0  # s between two progress lines if stderr is no terminal
+QUANTITIES = {  # column of a body in a table → field of a trajectory
     "position, m": "position",
     "velocity, m/s": "velocity",
     "angular velocity, rad/s": "angular_velocity",
 }
 
 
-SMALL = ("violation", "error_estimate")  # columns whose numbers are of the size of rounding errors
+SMALL = ("violation", "error_estimate")  # columns whose numbers may be of the size of rounding errors
 
 
 def console() -> Console:
-    """The standard output, as wide as the terminal, 80 columns in a pipe; names are never markup."""
+    """Return the console of the standard output: as wide as the terminal, 80 columns in a pipe; names are
+    never markup."""
     return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, highlight=False)
 
 
 def warn(scene: Scene) -> None:
-    """Tell on stderr of numbers in a scene that are probably slips."""
+    """Print warnings about numbers of a scene that are probably mistakes on stderr."""
     for slip in probable_slips(scene):
         print(f"warning: {slip}", file=sys.stderr)
 
 
 def rounded(vector: np.ndarray) -> np.ndarray:
-    """Without the rounding errors of zeros, for reading."""
+    """Return a vector in which rounding errors of zeros are zero, for printing."""
     return np.round(vector, 12) + 0.0
 
 
@@ -54,7 +55,8 @@ def body_table(
     justify: Literal["left", "right"],
     cells: Callable[[int, str], Iterable[str]],
 ) -> Table:
-    """A table with a row x, y, z of ``cells(body, field of QUANTITIES)`` for every body and quantity."""
+    """Return a table with rows x, y, z of ``cells(body, field of QUANTITIES)`` for every body and
+    quantity."""
     from rich.table import Table
 
     table = Table(title=title)
@@ -85,7 +87,7 @@ def column_table(columns: Mapping[str, np.ndarray]) -> Table:
 
 @contextmanager
 def progress_bar(what: str, end: float) -> Iterator[Callable[[float], None]]:
-    """Tells how far a long run is on stderr: a bar on a terminal, else a line every ten seconds."""
+    """Show the progress of a long run on stderr: a bar on a terminal, otherwise a line every ten seconds."""
     on_stderr = Console(stderr=True)
     if not on_stderr.is_terminal:
         yield Lines(what, end, time.monotonic)
@@ -98,7 +100,7 @@ def progress_bar(what: str, end: float) -> Iterator[Callable[[float], None]]:
 
 
 class Lines:
-    """Lines of progress by a clock (s): "simulating: 40 %, about 18 s left"."""
+    """Progress lines such as "simulating: 40 %, about 18 s left", written at times of a clock (s)."""
 
     def __init__(self, what: str, end: float, clock: Callable[[], float]):
         self._what, self._end, self._clock = what, end, clock

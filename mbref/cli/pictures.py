@@ -1,4 +1,4 @@
-"""mbref draw and mbref animate: a scene as a picture, still or moving."""
+"""mbref draw and mbref animate: a picture or an animation of a scene."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ default: perpendicular to the plane of a planar mechanism, otherwise oblique"""
 
 
 def add(commands: Any) -> None:
-    """The commands' grammar."""
+    """Add the parsers of both commands."""
     draw = commands.add_parser(
         "draw",
         help="a picture of a scene at t = 0",
@@ -39,7 +39,7 @@ def add(commands: Any) -> None:
 
     animate = commands.add_parser(
         "animate",
-        help="the moving mechanism as SVG, GIF or MP4",
+        help="an animation of the mechanism as SVG, GIF or MP4",
         formatter_class=TEXT,
         description="Simulate a scene and write its motion as an SVG that every browser plays,\n"
         "a GIF or an MP4.",
@@ -124,7 +124,10 @@ def _view(options: argparse.Namespace) -> View | None:
 
 
 def path_of(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
-    """The file asked for, or one here named as the scene or its file; ValueError for another kind of file."""
+    """Return the requested file, or a file in the working directory named after the scene or its file.
+
+    Raises ValueError for another kind of file.
+    """
     path = Path(options.out or f"{Path(options.scene).name.removesuffix('.toml')}{ending}.svg")
     if path.suffix not in suffixes:
         raise ValueError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")

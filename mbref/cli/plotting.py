@@ -1,4 +1,4 @@
-"""mbref plot: numbers of a motion over time as a picture."""
+"""mbref plot: numbers of a motion over time as a figure."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ NAMES = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for 
 
 
 def add(commands: Any) -> None:
-    """The command's grammar."""
+    """Add the command's parser."""
     plot = commands.add_parser(
         "plot",
         help="numbers of a motion over time as PNG or SVG",
@@ -51,7 +51,7 @@ def _plot(options: argparse.Namespace) -> int:
     warn(scene)
     method = options.method or default_method(scene)
     with simulator(method) as simulate, progress_bar("simulating", float(times[-1])) as progress:
-        if options.columns:  # refuses unknown names
+        if options.columns:  # raises an error for unknown names
             simulate(scene, method, times[:1], limits, progress).columns(*options.columns)
         motion = simulate(scene, method, times, limits, progress)
     try:

@@ -1,4 +1,4 @@
-"""mbref run: a scene by one method."""
+"""mbref run: simulate a scene by one method."""
 
 from __future__ import annotations
 
@@ -19,12 +19,13 @@ from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
-ESTIMATE_SECONDS = 5.0  # of CPU time, for a run and for its second run
-SHOWN = 10  # singular positions in the text; --json has all
+# CPU seconds of a run below which its error is estimated by default, and limit of the second run
+ESTIMATE_SECONDS = 5.0
+SHOWN = 10  # number of singular positions in the text; --json prints all
 
 
 def add(commands: Any) -> None:
-    """The command's grammar."""
+    """Add the command's parser."""
     run = commands.add_parser(
         "run",
         help="simulate a scene by one method",
@@ -84,7 +85,7 @@ def _run(options: argparse.Namespace) -> int:
     method = options.method or default_method(scene)
     with simulator(method) as simulate:
         with progress_bar("simulating", float(times[-1])) as progress:
-            if options.columns:  # refuses unknown names
+            if options.columns:  # raises an error for unknown names
                 first = simulate(scene, method, times[:1], limits, progress)
                 _estimated(first, options.estimate).columns(*options.columns)
             motion = simulate(scene, method, times, limits, progress)
@@ -99,7 +100,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _estimated(motion: Motion, wanted: str) -> Motion:
-    """Return the motion with its error estimate, where one is wanted."""
+    """Return the motion, with its error estimate if one is wanted."""
     if wanted == "no":
         return motion
     with progress_bar("estimating the error", motion.t_end) as progress:
@@ -107,7 +108,7 @@ def _estimated(motion: Motion, wanted: str) -> Motion:
 
 
 def _branches(words: list[str]) -> dict[int, int]:
-    """Branch by crossing; ValueError for a word that is no such pair."""
+    """Return the branch for each crossing; raises ValueError for a word that is no such pair."""
     try:
         pairs = [word.split("=") for word in words]
         return {int(crossing): int(branch) for crossing, branch in pairs}
@@ -124,7 +125,7 @@ def _writer(out: str | None) -> Any:
 
 
 def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
-    """Print how a run ended, its error estimate and cost, and its last state or the columns asked for."""
+    """Print the end of a run, its error estimate and cost, and its last state or the requested columns."""
     out, cost = console(), trajectory.cost
     out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
@@ -141,7 +142,7 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
         return
-    if "kernels" not in trajectory.settings:  # compiled: a first result does not wait for further kernels
+    if "kernels" not in trajectory.settings:  # a first result must not wait for further kernels
         out.print("\n".join(_largest(trajectory)))
     if columns:
         out.print(column_table(trajectory.columns(*columns)))
@@ -154,7 +155,8 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
 
 
 def _largest(motion: Motion) -> Iterator[str]:
-    """Yield the largest violations of constraint rows, and the largest reaction with its joint and time."""
+    """Yield sentences on the largest violations of constraint rows, and on the largest reaction with its
+    joint and time."""
     levels = [
         f"{float(rows.max()):.2g} {UNITS[f'{level}_violation']}"
         for level, rows in motion.violation._asdict().items()

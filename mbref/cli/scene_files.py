@@ -1,4 +1,4 @@
-"""mbref new, assemble and schema: scene files to start from, to close, and to check in an editor."""
+"""mbref new, assemble and schema: scene files to start from, closed loops, and the schema for editors."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from mbref.cli.options import TEXT, add_scene
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
-STILL = 1e-12  # m or rad, a smaller displacement is not reported
+STILL = 1e-12  # m or rad; smaller displacements are not reported
 
 
 def add(commands: Any) -> None:
-    """The commands' grammar."""
+    """Add the parsers of the three commands."""
     new = commands.add_parser(
         "new",
         help="a commented scene file to start from",
@@ -33,7 +33,7 @@ def add(commands: Any) -> None:
         help="close the loops of a scene with given lengths of its links",
         formatter_class=TEXT,
         description="Move the joints and bodies of a scene, as little as possible, so that its links have\n"
-        "the given lengths and every joint holds; says what moved.",
+        "the given lengths and every joint is satisfied; reports what moved.",
         epilog="example:\n  mbref assemble my.toml --length A-B=0.35 --length B-C=0.9 --out closed.toml",
     )
     add_scene(assemble)
@@ -74,7 +74,7 @@ def _new(options: argparse.Namespace) -> int:
 
 
 def template() -> str:
-    """The commented scene."""
+    """Return the text of the commented scene."""
     return (files("mbref") / "templates" / "scene.toml").read_text(encoding="utf-8")
 
 
@@ -99,7 +99,7 @@ def _assemble(options: argparse.Namespace) -> int:
 
 
 def _length(scene: Scene, text: str) -> tuple[tuple[str, str], float]:
-    """``A-B=0.35``; names of joints may themselves hold a hyphen."""
+    """Return joints and length of ``A-B=0.35``; names of joints may contain a hyphen."""
     pair, equals, number = text.rpartition("=")
     names = {joint.name for joint in scene.joint}
     parts = pair.split("-")
@@ -120,6 +120,6 @@ def _schema(options: argparse.Namespace) -> int:
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema of scene files, as shipped in mbref/templates/scene.schema.json."""
+    """Return the JSON schema of scene files, which is stored in mbref/templates/scene.schema.json."""
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": "mbref scene"}
     return {**Scene.model_json_schema(), **head}

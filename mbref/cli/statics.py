@@ -1,4 +1,4 @@
-"""mbref equilibrium and mbref modes: poses of rest, their stability, and vibrations about them."""
+"""mbref equilibrium and mbref modes: static equilibria, their stability, and vibrations about them."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ LIMITS = "Other equilibria may exist: the search begins at the scene's pose and 
 
 
 def add(commands: Any) -> None:
-    """The commands' grammar."""
+    """Add the parsers of both commands."""
     rest = commands.add_parser(
         "equilibrium",
-        help="poses at which a mechanism rests, their forces and stability",
+        help="static equilibria of a mechanism, with forces and stability",
         formatter_class=TEXT,
         description="Static equilibria under gravity, springs and constant loads, from several starts:\n"
         "pose, reactions and stability of each. " + LIMITS,
@@ -63,7 +63,7 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def _found(options: argparse.Namespace) -> list[Equilibrium]:
-    """Return the equilibria; raises ValueError where none is found, or none has the number asked for."""
+    """Return the equilibria; raises ValueError if none is found, or none has the requested number."""
     from mbref.design.equilibrium import equilibria
 
     if options.starts < 1:

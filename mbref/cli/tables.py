@@ -1,4 +1,4 @@
-"""mbref list and mbref completion: what there is to name, and a shell that completes it."""
+"""mbref list and mbref completion: available names, and completion of commands by the shell."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ MEANINGS = {  # meanings of stabilisations and integrators
 
 
 def add(commands: Any) -> None:
-    """The commands' grammar."""
+    """Add the parsers of both commands."""
     listing = commands.add_parser(
         "list",
-        help="the built-in scenes, the methods, the numbers of a motion",
+        help="the built-in scenes, the methods, the outputs of a motion",
         formatter_class=TEXT,
         description="The built-in scenes, the parts of a method with their options, or the numbers\n"
         "that a motion has over time.",

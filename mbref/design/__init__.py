@@ -1,1 +1,2 @@
-"""Questions of design about a scene: closing its loops, redundancy along its motion, exchanges of joints."""
+"""Analysis of a design: closing of its loops, redundancy along its motion, exchanges of joints,
+equilibria."""

@@ -19,12 +19,13 @@ from mbref.trajectory import Crossing, Outcome
 
 SAMPLES = 61
 ROUNDING = (
-    1e-5  # singular values below it (relative) at every pose are taken for rounding of the file's numbers
+    # relative singular values below this at every pose are attributed to rounding of the scene's numbers
+    1e-5
 )
-MOST_ROWS = 300  # constraint rows: for more, singular values at every pose take too long
+MOST_ROWS = 300  # constraint rows; for more, singular values at every pose take too long
 SAME = 1e-9  # relative difference below which two poses count as equal
 POSES = 5  # poses at which degrees of freedom are tested to second order
-MOST_STEPS = 20_000  # steps of the diagnosis; a longer motion is diagnosed in part
+MOST_STEPS = 20_000  # steps of the diagnosis; of a longer motion only the first part is diagnosed
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class AlongMotion:
 def along_motion(scene: Scene) -> AlongMotion:
     """Over the scene's duration by the default method.
 
-    Raises SceneError where the scene cannot be moved, or has more than 300 rows.
+    Raises SceneError if the scene cannot be simulated, or has more than 300 rows.
     """
     model = Model(scene)
     if model.m > MOST_ROWS:
@@ -74,7 +75,7 @@ def along_motion(scene: Scene) -> AlongMotion:
 def _singular_values(
     model: Model, times: np.ndarray, position: np.ndarray, orientation: np.ndarray
 ) -> np.ndarray:
-    """Relative singular values (k, min(m, n)), largest first, at poses of the scene's bodies."""
+    """Return relative singular values (k, min(m, n)), largest first, at poses of the scene's bodies."""
     found = []
     for t, q in zip(times, poses(model, position, orientation), strict=True):
         s = np.linalg.svd(scaled_jacobian(model, float(t), q), compute_uv=False)
@@ -83,7 +84,7 @@ def _singular_values(
 
 
 def _is_shaky(model: Model, motion: Motion) -> bool:
-    """Whether equations of second order restrict the freedoms of first order at every pose looked at."""
+    """Return whether equations of second order forbid all velocities at every tested pose."""
     if model.m > MOST_BRANCHED or model.closed_loops == 0:
         return False
     chosen = np.linspace(0, len(motion.times) - 1, POSES).round().astype(int)
@@ -118,7 +119,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
 
 
 def general_pose(model: Model, seed: int = 1) -> np.ndarray:
-    """Coordinates (7 nb,) of a pose of no special kind: the start, moved along its freedoms at random."""
+    """Return coordinates (7 nb,) of a random pose near the start that satisfies the joints."""
     q, random = consistent_start(model).q, np.random.default_rng(seed)
     if model.m > MOST_ROWS:
         return q

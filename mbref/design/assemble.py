@@ -1,4 +1,4 @@
-"""Assembly: a mechanism closed from approximate places and given lengths of its links."""
+"""Assembly: closes the loops of a mechanism from approximate positions and given lengths of its links."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from mbref.equations.parts import FRAME
 from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]
-SHARES = 20  # parts of a large change, so that the loops stay on their branch
-CLOSED = 1e-10  # fraction of the mechanism's length: smaller gaps are closed
+SHARES = 20  # parts into which a large change is divided, so that the loops stay on their branch
+CLOSED = 1e-10  # gap / mechanism's length; smaller gaps count as closed
 MOST_ITERATIONS = 50
 
 
 @dataclass(frozen=True)
 class Assembled:
-    """The closed scene; how far every joint (m) and body (m, rad) has moved; lengths before and after."""
+    """The closed scene; the displacement of every joint (m) and body (m, rad); lengths before and after."""
 
     scene: Scene
     joints: dict[str, float]
@@ -33,7 +33,7 @@ class Assembled:
 
 
 class _Reshaped(Packs):
-    """A scene whose bodies have some of their points (world, t = 0) elsewhere, by body and point."""
+    """A scene in which some body-fixed points (world, t = 0) are moved, by body and point."""
 
     def __init__(self, scene: Scene, elsewhere: Mapping[tuple[str, Point], np.ndarray]):
         self._elsewhere = elsewhere
@@ -48,7 +48,7 @@ class _Reshaped(Packs):
         return super().in_bodies(vectors)
 
     def _moved(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Where the points (k, 3) of bodies (k,) are."""
+        """Return the moved points (k, 3) of bodies (k,)."""
         names = [body.name for body in self.bodies]
         names.append(FRAME if GROUND in names else GROUND)
         pairs = zip(bodies.tolist(), points.tolist(), strict=True)
@@ -57,11 +57,11 @@ class _Reshaped(Packs):
 
 
 def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:
-    """The scene with the given distances (m) between pairs of joints on a link, its loops closed again.
+    """Return the scene with given distances (m) between pairs of joints on a link and with closed loops.
 
-    The points of a link move as little as gives it its lengths; then the bodies move, in the metric of
-    their masses, until every joint holds.  Masses, inertias and velocities stay.  Raises SceneError for
-    joints that share no link, or where the loops cannot be closed with these lengths.
+    The points of a link move as little as possible to get its lengths. Then the bodies move, by the least
+    mass-weighted displacement, until every joint is satisfied. Masses, inertias and velocities are unchanged.
+    Raises SceneError for joints that share no link, or if the loops cannot be closed with these lengths.
     """
     pairs = {pair: _shared(scene, *pair) for pair in lengths}
     shifts = _shifts(scene, lengths, pairs)
@@ -76,7 +76,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
 
 
 def _shared(scene: Scene, first: str, second: str) -> str:
-    """The link that two joints share."""
+    """Return the link that two joints share."""
     known = {joint.name for joint in scene.joint}
     for name in (first, second):
         if name not in known:
@@ -97,7 +97,8 @@ def _anchor(scene: Scene, joint: str, body: str) -> Point:
 def _shifts(
     scene: Scene, lengths: Mapping[tuple[str, str], float], pairs: Mapping[tuple[str, str], str]
 ) -> dict[tuple[str, Point], np.ndarray]:
-    """Changes (3,) of the points of each link, least in sum of squares, that give it its lengths."""
+    """Return the displacements (3,) of the points of each link that give it its lengths, with the least sum
+    of squares."""
     found: dict[tuple[str, Point], np.ndarray] = {}
     for body in set(pairs.values()):
         own = {pair: lengths[pair] for pair, b in pairs.items() if b == body}
@@ -111,7 +112,7 @@ def _shifts(
 def _with_distances(
     body: str, points: np.ndarray, ends: list[tuple[int, ...]], lengths: list[float]
 ) -> np.ndarray:
-    """Points (n, 3) near the given ones with distances between ends: Gauss–Newton of least norm."""
+    """Return points (n, 3) near the given ones with given distances: Gauss–Newton steps of least norm."""
     x, wanted = points.copy(), np.array(lengths)
     for _ in range(MOST_ITERATIONS):
         apart = np.array([x[b] - x[a] for a, b in ends])
@@ -134,7 +135,7 @@ def _open(model: Model, phi: np.ndarray, share: float) -> str:
     worst = int(np.argmax(np.abs(phi)))
     return (
         f"joint[{model.row_joint[worst]}]: the loops cannot be closed with these lengths; at "
-        f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} is left open"
+        f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} remains open"
     )
 
 

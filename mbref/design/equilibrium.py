@@ -22,16 +22,18 @@ from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
 
-STARTS = 24  # poses from which an equilibrium is looked for
-STRIDE = 0.35  # lengths of the mechanism between neighbouring starts
-LONGEST = 0.3  # lengths of the mechanism, of a step towards an equilibrium
+STARTS = 24  # number of poses from which an equilibrium is searched
+STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism
+LONGEST = 0.3  # largest step towards an equilibrium / length of the mechanism
 MOST_STEPS = 60
-BALANCED = 1e-11  # of the scale of accelerations, which an equilibrium may leave
-SAME = 1e-6  # lengths of the mechanism or rad, between poses that count as one
-STILL = 1e-6  # of the largest |s|, below which a real part or an eigenvalue counts as zero
-NOTHING = 1e-9  # lengths of the mechanism in its duration squared: acceleration of a mechanism without forces
+BALANCED = 1e-11  # largest acceleration at an equilibrium / scale of accelerations
+SAME = 1e-6  # distance / length of the mechanism, or rad, below which two poses count as equal
+STILL = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
+# acceleration × duration² / length of the mechanism below which a mechanism counts as free of forces
+NOTHING = 1e-9
 SEED = 1
-AMPLITUDE, FRAMES = 0.1, 49  # of a vibration that is shown, in lengths of the mechanism; its samples
+# displayed vibration: largest displacement / length of the mechanism, and number of samples
+AMPLITUDE, FRAMES = 0.1, 49
 
 
 @dataclass(frozen=True, repr=False)
@@ -177,7 +179,8 @@ def _refuse(scene: Scene) -> None:
 
 
 def _scale(poses: list[Tangent]) -> float:
-    """Return an acceleration, m/s²: the largest at some poses, or by a displacement of the first's length."""
+    """Return the scale of accelerations, m/s²: the largest at some poses, or for a displacement by the
+    mechanism's length."""
     by_place = float(np.linalg.norm(poses[0].slope())) * poses[0].model.length
     return max(by_place, *(float(np.linalg.norm(each.accelerations(*_rest(each)))) for each in poses))
 
@@ -187,7 +190,8 @@ def _rest(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
-    """Yield the first pose, and further ones along the constraints in seeded directions, there and back."""
+    """Yield the first pose, and further poses along the constraints in random directions with a fixed
+    seed."""
     rng, freedoms = np.random.default_rng(SEED), first.freedoms
     yield first
     there = back = first
@@ -213,7 +217,7 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
-    """Return the pose near a start at which nothing accelerates, by Levenberg's method; None without one."""
+    """Return the pose near a start without accelerations, by Levenberg's method; None if there is none."""
     freedoms, damping = tangent.freedoms, 0.0
     off = tangent.accelerations(*_rest(tangent))
     for _ in range(MOST_STEPS):
@@ -261,7 +265,8 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     for part in (shapes.real, shapes.imag):
         part[..., 3:] = rotations.rotate(turned, part[..., 3:])
     in_units = (shapes / np.repeat([model.length, 1.0], 3)).reshape(len(order), -1)
-    largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]  # becomes 1
+    # the shape is scaled such that this entry becomes 1
+    largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]
     q = tangent.q.reshape(1, model.nb, 7)
     forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(model, tangent.q)[None])
     scene = _with_angles(placed(model, tangent.q), model, tangent.q)

@@ -1,4 +1,4 @@
-"""Exchanges and removals of joints that end all redundancy and leave the freedoms of a mechanism."""
+"""Exchanges and removals of joints that end all redundancy and keep the degrees of freedom of a mechanism."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
 
-WEAKER = {  # types that allow the motion of the first and more, those that keep most rows first
+WEAKER = {  # joint type → types that allow at least its motion, those with most rows first
     "revolute": ("cylindrical", "universal", "spherical", "inline"),
     "translational": ("cylindrical", "planar", "inline"),
     "cylindrical": ("inline",),
@@ -22,9 +22,9 @@ WEAKER = {  # types that allow the motion of the first and more, those that keep
     "spherical": ("inline",),
     "fixed": ("universal", "spherical"),
 }
-MOST_EXCHANGES = 4  # joints of a smallest set; a search of larger sets takes too long
-MOST_TRIALS = 5_000  # exchanges tried in the search of smallest sets, about 1 s
-PART = 1e-6  # weight of a row in a redundancy above which its joint takes part
+MOST_EXCHANGES = 4  # largest number of joints in a set; a search of larger sets takes too long
+MOST_TRIALS = 5_000  # number of exchanges tried in the search for smallest sets, about 1 s
+PART = 1e-6  # weight of a row in a dependence above which its joint takes part
 
 REMOVED = "removed"  # stands for a joint type
 Exchange = dict[str, str]  # joint → its new type, or REMOVED
@@ -33,10 +33,10 @@ Exchange = dict[str, str]  # joint → its new type, or REMOVED
 def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     """Return sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
-    The sets of the fewest joints where four are enough, at most ``most`` without and ``most`` with removed
-    joints; otherwise one set, found joint by joint. Empty where nothing is redundant or nothing is found.
-    Judged at a general pose, without drivers, and each by the rank. A joint on which a driver or a torsion
-    spring acts becomes only a type that can bear it, and is not removed.
+    If at most four joints suffice, the smallest sets are returned: at most ``most`` without and ``most`` with
+    removed joints. Otherwise one set is found joint by joint. The result is empty if nothing is redundant or
+    no set is found. The rank is computed at a general pose, without drivers. A joint with a driver or a
+    torsion spring is exchanged only for a type that can have it, and is not removed.
     """
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
@@ -59,21 +59,21 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
 
 
 class Weaker(NamedTuple):
-    """A weaker type in the place of a joint: its rows, and how they follow from the joint's own."""
+    """A weaker joint type in the place of a joint: its rows, and how they depend on the rows of the joint."""
 
     rows: np.ndarray  # (k, n), of unit length
     kept: np.ndarray  # (k, d): its rows as combinations of the d rows of the joint
-    lost: np.ndarray  # (d - k, d): an orthonormal basis of what these combinations leave out
+    lost: np.ndarray  # (d - k, d): orthonormal basis of the combinations that it lacks
 
 
-Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → what it leaves
+Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining rows
 
 
 class Combinations:
-    """The vanishing combinations of the rows of Φ_q, a basis, by joint: left null vectors of Φ_q.
+    """A basis of the vanishing linear combinations of the rows of Φ_q (its left null vectors), by joint.
 
-    A weaker joint leaves the combinations that do without its lost rows.  The rank stays where each lost row
-    ends a combination.
+    After an exchange those combinations remain that do not contain the lost rows. The rank is unchanged if
+    each lost row removes one combination.
     """
 
     def __init__(self, parts: Mapping[str, np.ndarray], number: int):
@@ -88,11 +88,11 @@ class Combinations:
         return cls(dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1])
 
     def involves(self, joint: str) -> bool:
-        """Return whether the joint has a row in a combination."""
+        """Return whether a combination contains a row of the joint."""
         return bool(np.linalg.norm(self.parts[joint], axis=1).max() > PART)
 
     def with_exchange(self, name: str, weaker: Weaker) -> Combinations | None:
-        """Return what an exchange leaves, None where it lowers the rank."""
+        """Return the combinations that remain after an exchange; None if it lowers the rank."""
         _, values, vt = np.linalg.svd(weaker.lost @ self.parts[name])
         if len(weaker.lost) > self.number or np.sum(values > PART) < len(weaker.lost):
             return None
@@ -103,7 +103,8 @@ class Combinations:
 
 
 def _smallest(redundant: Combinations, choices: Choices, most: int) -> list[Exchange]:
-    """Return the sets of the fewest joints that end the redundancy, at most ``most``; none beyond four."""
+    """Return the sets of the fewest joints that end the redundancy, at most ``most``; none for more than four
+    joints."""
     for size in range(1, MOST_EXCHANGES + 1):
         if found := list(itertools.islice(_of_size(redundant, choices, size), most)):
             return found
@@ -111,10 +112,11 @@ def _smallest(redundant: Combinations, choices: Choices, most: int) -> list[Exch
 
 
 def _of_size(redundant: Combinations, choices: Choices, size: int) -> Iterator[Exchange]:
-    """Yield the exchanges of ``size`` joints that end the redundancy, up to a number of trials."""
+    """Yield the exchanges of ``size`` joints that end the redundancy, for a limited number of trials."""
     names, trials = list(choices), itertools.count(1)
     most = [max((len(weaker.lost) for weaker in choices[name].values()), default=0) for name in names]
-    reach = [sorted(most[k:], reverse=True) for k in range(len(names) + 1)]  # rows lost from joint k on
+    # rows that can be lost from joint k on
+    reach = [sorted(most[k:], reverse=True) for k in range(len(names) + 1)]
 
     def extended(chosen: Exchange, left: Combinations, first: int) -> Iterator[Exchange]:
         missing = size - len(chosen)
@@ -135,9 +137,10 @@ def _of_size(redundant: Combinations, choices: Choices, size: int) -> Iterator[E
 
 
 def _joint_by_joint(redundant: Combinations, choices: Choices) -> Exchange | None:
-    """Return exchanges that end the redundancy, each of the next joint that loses most rows; None if none.
+    """Return exchanges that end the redundancy, made joint by joint, each with the most lost rows; None if
+    none is found.
 
-    A joint is removed where no other exchange is left.
+    A joint is removed if no other exchange remains.
     """
     chosen: Exchange = {}
     offers = [(name, kind) for name, kinds in choices.items() for kind in kinds]
@@ -151,13 +154,13 @@ def _joint_by_joint(redundant: Combinations, choices: Choices) -> Exchange | Non
 
 
 def _is_cure(rows: Mapping[str, np.ndarray], choices: Choices, exchange: Exchange) -> bool:
-    """Return whether the rows that an exchange leaves are independent, and as many as the rank."""
+    """Return whether the remaining rows are independent, and their number equals the rank."""
     left = {**rows, **{name: choices[name][kind].rows for name, kind in exchange.items()}}
     return _rank(left.values()) == _rank(rows.values()) == sum(map(len, left.values()))
 
 
 def _rows(model: Model) -> dict[str, np.ndarray]:
-    """Rows of Φ_q at the scene's poses, of unit length, by joint."""
+    """Return the rows of Φ_q at the scene's poses, of unit length, by joint."""
     jacobian, owner = scaled_jacobian(model, 0.0, model.start()), np.array(model.row_joint)
     return {name: jacobian[owner == name] for name in dict.fromkeys(model.row_joint)}
 
@@ -176,7 +179,7 @@ def _bearing(scene: Scene, name: str) -> list[str]:
 
 
 def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Sequence[str]) -> Choices:
-    """Return the weaker types of the joints of these names, and their removal, at the model's poses."""
+    """Return the weaker types of the named joints, and their removal, at the model's poses."""
     bearing = {name: _bearing(scene, name) for name in names}
     found: dict[str, dict[str, Weaker]] = {name: {} for name in names}
     for kind in dict.fromkeys(itertools.chain(*WEAKER.values())):
@@ -196,14 +199,16 @@ def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: 
 
 
 def _weaker(rows: np.ndarray, own: np.ndarray) -> Weaker:
-    """Return rows (k, n) as combinations of a joint's own rows (d, n), and what they leave out."""
+    """Return rows (k, n) as combinations of a joint's own rows (d, n), and the combinations that they
+    lack."""
     kept = rows @ np.linalg.pinv(own)
     _, _, vt = np.linalg.svd(kept.reshape(-1, len(own)))
     return Weaker(rows, kept, vt[len(rows) :])
 
 
 def _as(joint: Joint, kind: str) -> Joint:
-    """The joint as another type at the same place, a universal one with its first axis along the old."""
+    """Return the joint as another type at the same place; a universal joint gets the old axis as its first
+    one."""
     axis = np.array(joint.directions[0] if joint.directions else (0.0, 0.0, 1.0))
     across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
     anchor = joint.anchor_pair[1]

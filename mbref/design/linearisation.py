@@ -13,19 +13,19 @@ from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 
-RANK = 1e-9  # singular value of unit rows, relative to the largest, that counts as zero
-STEP = 0.02  # of the mechanism's length, of differences: (STEP)⁸ is rounding
-SHORT = 0.01  # of STEP, of differences of second order
+RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
+STEP = 0.02  # increment of difference quotients / mechanism's length; its eighth power is rounding
+SHORT = 0.01  # factor on STEP for differences of second order
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
-MET = 1e-10  # largest |Φ|, in lengths of the mechanism, of a pose on the constraints
+MET = 1e-10  # largest |Φ| / mechanism's length for a pose that satisfies the constraints
 
 
 class OffConstraints(Exception):
-    """No pose on the constraints was found near a displaced one."""
+    """No pose that satisfies the constraints was found near a displaced one."""
 
 
 class Tangent:
-    """Coordinates y (f,), m, about a pose q0 (7 nb,) at rest."""
+    """Coordinates y (f,), m, of poses near a pose q0 (7 nb,) at rest."""
 
     def __init__(self, model: Model, q: np.ndarray):
         self.model, self.q = model, q

@@ -1,4 +1,4 @@
-"""A scene written anew at other poses of its bodies."""
+"""A scene written again for other poses of its bodies."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from mbref.scene import Joint, Scene
 
 
 def placed(model: Model, q: np.ndarray) -> Scene:
-    """The model's scene with its bodies at coordinates q (7 nb,), joints and points of loads carried along.
+    """Return the model's scene with its bodies at coordinates q (7 nb,); joints and points of loads move with
+    the bodies.
 
-    A joint's anchor is the one on its second body, its axis the one on its first.
+    A joint's anchor is its anchor on the second body, its axis the one on the first body.
     """
     scene, zeros = model.scene, np.zeros((1, model.nb, 6))
     motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
@@ -28,7 +29,7 @@ def placed(model: Model, q: np.ndarray) -> Scene:
 
 
 def _carried(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
-    """The places of a joint that its type has."""
+    """Return the geometric fields of a joint at coordinates q."""
     ends = tuple(place(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
     axes = tuple(_direction(model, *end, q) for end in zip(joint.bodies, joint.directions * 2, strict=False))
     every: dict[str, Any] = {"anchor": ends[1], "anchors": ends, "axis": axes[:1] and axes[0], "axes": axes}
@@ -45,7 +46,7 @@ def _points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
 
 
 def place(model: Model, body: str, point: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
-    """World place at coordinates q of a point (world, t = 0) that a body carries."""
+    """Return the world position at coordinates q of a body-fixed point (world, t = 0)."""
     b, local = model.index(body), model.point(body, point)
     if b == model.nb:
         return _three(local)
@@ -59,5 +60,5 @@ def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.
 
 
 def _three(vector: np.ndarray) -> tuple[float, ...]:
-    """Without the rounding errors of zeros."""
+    """Return three numbers in which rounding errors of zeros are zero."""
     return tuple((np.round(vector, 15) + 0.0).tolist())

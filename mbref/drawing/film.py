@@ -1,4 +1,5 @@
-"""A moving mechanism as GIF (by Pillow) or MP4 (by ffmpeg): still pictures of its samples, drawn by resvg."""
+"""An animated mechanism as GIF (by Pillow) or MP4 (by ffmpeg), from pictures of its samples that resvg
+draws."""
 
 from __future__ import annotations
 
@@ -17,7 +18,7 @@ from mbref.drawing.view import View
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-BLOCK = 16  # px, of the codec
+BLOCK = 16  # px; size of blocks of the video codec
 MISSING = "{} needs {}: pip install 'mbref[video]'; SVG needs nothing more"
 
 
@@ -37,7 +38,7 @@ def _write_gif(path: Path, scene: Scene, motion: Trajectory, view: View | None) 
         raise ValueError(MISSING.format("GIF", "Pillow")) from None
     first, *others = [image.quantize(64) for image in _images(scene, motion, view)]
     ends = np.linspace(0.0, 100.0 * Timeline.of(motion.times).seconds, 2 + len(others))
-    durations = (10.0 * np.diff(np.round(ends))).tolist()  # ms; GIF counts hundredths of a second
+    durations = (10.0 * np.diff(np.round(ends))).tolist()  # ms; the unit of time in a GIF is 10 ms
     first.save(path, save_all=True, append_images=others, duration=durations, loop=0, optimize=True)
 
 
@@ -60,7 +61,7 @@ def _write_mp4(path: Path, scene: Scene, motion: Trajectory, view: View | None) 
 
 
 def _images(scene: Scene, motion: Trajectory, view: View | None) -> Iterator[Any]:
-    """Yield the samples that a moving picture shows as images of Pillow."""
+    """Yield the displayed samples as images of Pillow."""
     from PIL import Image
 
     for picture in frames(scene, motion, view):
@@ -68,7 +69,7 @@ def _images(scene: Scene, motion: Trajectory, view: View | None) -> Iterator[Any
 
 
 def _padded(image: Any) -> np.ndarray:
-    """Return the pixels (rows, columns, 3) of an image, with white added to whole blocks of the codec."""
+    """Return the pixels (rows, columns, 3) of an image, with white added up to whole blocks of the codec."""
     pixels = np.asarray(image)
     rows, columns = (-size % BLOCK for size in pixels.shape[:2])
     return np.pad(pixels, ((0, rows), (0, columns), (0, 0)), constant_values=255)

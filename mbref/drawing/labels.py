@@ -1,4 +1,4 @@
-"""Names of joints and bodies, placed where they cover neither one another nor the signs of joints."""
+"""Names of joints and bodies, placed such that they cover neither each other nor the symbols of joints."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ GAPS = (7.0, 16.0, 30.0)  # px, between a bar and the box of its name
 
 
 class Label(NamedTuple):
-    """A name, its look, and the middles (c, k, 2), px, that it may have in each of k frames, best first."""
+    """A name, its style, and the possible positions (c, k, 2), px, of its centre in each of k frames, best
+    first."""
 
     words: str
     look: str
@@ -38,7 +39,7 @@ class Label(NamedTuple):
 
 
 def names(stage: Stage) -> Iterator[str]:
-    """Yield the names of joints and bodies; each keeps its place near what it names while that moves."""
+    """Yield the names of joints and bodies; each stays near the joint or body while that moves."""
     size, taken = np.array([stage.page.width, stage.page.height]), list(_parts(stage))
     for label in (*_of_joints(stage), *_of_bodies(stage)):
         cost = sum((weight * _overlap(label, *box) for weight, *box in taken), _outside(label, size))
@@ -48,7 +49,7 @@ def names(stage: Stage) -> Iterator[str]:
 
 
 def _parts(stage: Stage) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Yield what names should not cover: weight, middle (k, 2) and half the size (2,), px, of boxes."""
+    """Yield boxes that names should not cover: weight, centre (k, 2) and half the size (2,), px."""
     for joint in stage.scene.joint:
         for body, point in anchors(joint):
             yield OVER_SIGN, stage.place(body, point), np.array([SIGN, SIGN])
@@ -66,21 +67,23 @@ def _parts(stage: Stage) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
 
 
 def _overlap(label: Label, middle: np.ndarray, half: np.ndarray) -> np.ndarray:
-    """Return the area (c,), px², that each place of a label has in common with a box, summed over frames."""
+    """Return the area (c,), px², that each position of a label has in common with a box, summed over
+    frames."""
     sides = label.half + half - np.abs(label.places - middle)
     area: np.ndarray = np.clip(sides, 0.0, None).prod(axis=2).sum(axis=1)
     return area
 
 
 def _outside(label: Label, size: np.ndarray) -> np.ndarray:
-    """Return the area (c,), px², by which each place of a label leaves the page, summed over frames."""
+    """Return the area (c,), px², by which each position of a label leaves the page, summed over frames."""
     low, high = label.half - label.places, label.places + label.half - size
     beyond: np.ndarray = np.clip(np.maximum(low, high), 0.0, None).max(axis=2).sum(axis=1)
     return LINE * beyond
 
 
 def _of_joints(stage: Stage) -> Iterator[Label]:
-    """Yield the names of joints, first up and to the left; joints that stay together share a label."""
+    """Yield the names of joints, preferably above and left of them; joints that stay together share a
+    label."""
     places = {joint.name: stage.place(*anchors(joint)[1]) for joint in stage.scene.joint}
     while places:
         place = next(iter(places.values()))
@@ -93,7 +96,7 @@ def _of_joints(stage: Stage) -> Iterator[Label]:
 
 
 def _of_bodies(stage: Stage) -> Iterator[Label]:
-    """Yield the names of bodies: beside the longest part of a bar, in a plate, near a block."""
+    """Yield the names of bodies: next to the longest part of a bar, inside a plate, near a block."""
     for b, shape in enumerate(shapes(stage.scene)):
         frames = stage.page.pixels(moved(shape, stage.motion, b))
         look = f'fill="{COLOURS[b % len(COLOURS)]}"'
@@ -125,7 +128,8 @@ def _places(name: str, is_plate: bool, frames: np.ndarray) -> np.ndarray:
 
 
 def _longest_part(frames: np.ndarray) -> np.ndarray:
-    """Return the neighbours (k, 2, 2) of a line (k, n, 2) that are the furthest apart in the first frame."""
+    """Return the neighbouring points (k, 2, 2) of a line (k, n, 2) that are farthest apart in the first
+    frame."""
     parts = np.hypot(*np.diff(frames[0], axis=0).T)
     i = int(np.argmax(parts > 0.99 * parts.max()))
     return frames[:, i : i + 2]

@@ -1,4 +1,4 @@
-"""The signs of joints, of the ground and of loads, each at its place on the page."""
+"""Symbols of joints, of the ground and of loads, each at its position on the page."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
 
 ACTION = "#b3261e"  # colour of loads and drivers
-STUB = 20.0  # px, half of an axis drawn at a joint
-ARROW = 52.0  # px
-FACING = 0.7  # cosine to the line of sight above which an axis is seen as a point
+STUB = 20.0  # px; half the length of an axis drawn at a joint
+ARROW = 52.0  # px; length of an arrow
+FACING = 0.7  # cosine of the angle to the line of sight above which an axis is drawn as a point
 
 
 class Stage(NamedTuple):
@@ -30,11 +30,11 @@ class Stage(NamedTuple):
     timeline: Timeline | None
 
     def place(self, body: str, point: tuple[float, float, float]) -> np.ndarray:
-        """Pixels (k, 2) of a point (world, t = 0) of a body."""
+        """Return the pixels (k, 2) of a point (world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, [point])[:, 0])
 
     def points(self, body: str, points: np.ndarray) -> np.ndarray:
-        """Pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
+        """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
 
 
@@ -46,13 +46,13 @@ def _unit(vector: tuple[float, ...]) -> np.ndarray:
 def _along(
     stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray, px: float
 ) -> np.ndarray:
-    """Pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
+    """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
     half = axis * px / stage.page.scale
     return stage.points(body, np.array([np.array(point) - half, np.array(point) + half]))
 
 
 def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
-    """A hatched triangle below a joint to the ground, or the dashed guide of one that slides."""
+    """Return a hatched triangle below a joint to the ground, or a dashed guide for a sliding joint."""
     side = joint.bodies.index(GROUND)
     point = joint.anchor_pair[side]
     if joint.facts.free_translations == 1 and joint.directions:
@@ -67,7 +67,8 @@ def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
 
 
 def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
-    """Pixels (1, 2, 2) of the line a joint to the ground slides along, a little longer than its travel."""
+    """Return the pixels (1, 2, 2) of the line along which a joint to the ground slides, a little longer than
+    its travel."""
     axis, point = _unit(joint.directions[0]), np.array(joint.anchor_pair[side])
     moving = attached(stage.scene, stage.motion, joint.bodies[1 - side], [joint.anchor_pair[1 - side]])[:, 0]
     travel, over = (moving - point) @ axis, 42 / stage.page.scale
@@ -76,7 +77,8 @@ def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
 
 
 def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
-    """The sign of a joint's type, moving with its second body, and its axes where they are seen."""
+    """Return the symbol of a joint's type, moving with its second body, and its axes unless they point to the
+    reader."""
     names, (first, second) = joint.bodies, joint.anchor_pair
     if joint.type == "distance":
         ends = np.stack([stage.place(names[0], first), stage.place(names[1], second)], axis=1)
@@ -146,7 +148,7 @@ SIGNS: dict[str, Callable[[], str]] = {
 
 
 def coupling_mark(stage: Stage, coupling: Coupling) -> str:
-    """A dotted line between both joints, which moves with them; a spiral at a joint that is coupled with
+    """Return a dotted line between both joints, which moves with them; a spiral for a joint coupled with
     itself."""
     joints = [stage.scene.joint_named(name) for name in coupling.joints]
     ends = [stage.place(joint.bodies[1], joint.anchor_pair[1]) for joint in joints]
@@ -157,7 +159,8 @@ def coupling_mark(stage: Stage, coupling: Coupling) -> str:
 
 
 def driver_mark(stage: Stage, driver: Driver) -> str:
-    """A turn about, or an arrow along, the axis of a driven joint, in the sense in which it begins."""
+    """Return a curved arrow about, or an arrow along, the axis of a driven joint, in the direction of its
+    initial motion."""
     joint = stage.scene.joint_named(driver.joint)
     axis, point = _unit(joint.directions[0]), joint.anchor_pair[1]
     rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
@@ -213,7 +216,8 @@ def _arrow_from_origin(stage: Stage, direction: np.ndarray) -> str:
 
 
 def _turning(stage: Stage, axis: np.ndarray, radius: float) -> str:
-    """A turn where the axis faces the reader, else the axis as an arrow with two heads."""
+    """Return a curved arrow if the axis points to the reader, otherwise the axis as an arrow with two
+    heads."""
     facing = float(axis @ stage.page.view.axes[2])
     if abs(facing) > FACING or not axis.any():
         return svg.turn(radius, facing, ACTION)
@@ -222,7 +226,7 @@ def _turning(stage: Stage, axis: np.ndarray, radius: float) -> str:
 
 
 def _zigzag(first: np.ndarray, second: np.ndarray, turns: int = 12) -> np.ndarray:
-    """Pixels (k, turns + 2, 2) of a spring between its ends (k, 2)."""
+    """Return the pixels (k, turns + 2, 2) of a spring between its ends (k, 2)."""
     along = second - first
     across = np.stack([-along[:, 1], along[:, 0]], axis=1)
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)

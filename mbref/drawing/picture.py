@@ -1,4 +1,4 @@
-"""Pictures of a mechanism as SVG, still or moving: panels of motions drawn over one another."""
+"""Pictures of a mechanism as SVG, still or animated: panels that show motions on top of each other."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from mbref.drawing.view import Page, View, round_length, view_of
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 
-FOOT, CLOCK = 30.0, 42.0  # px, heights of the rows for axes and scale, and for the line of time
-LEADING = 1.5  # height of a line of a title, relative to its letters
+FOOT, CLOCK = 30.0, 42.0  # px; heights of the row for axes and scale, and of the row for the line of time
+LEADING = 1.5  # height of a title line / height of its letters
 
 
 def signs(stage: Stage) -> Iterator[str]:
-    """Yield the signs of couplings, loads, joints and drivers."""
+    """Yield the symbols of couplings, loads, joints and drivers."""
     yield from (coupling_mark(stage, coupling) for coupling in stage.scene.coupling)
     yield from (load_mark(stage, load) for load in stage.scene.load)
     for joint in stage.scene.joint:
@@ -31,7 +31,7 @@ def signs(stage: Stage) -> Iterator[str]:
 
 
 class Look(NamedTuple):
-    """Look of bodies: one colour, or each body's own; thickness of bars, px; opacity from 0 to 1."""
+    """Style of bodies: one colour, or each body's own; thickness of bars, px; opacity from 0 to 1."""
 
     colour: str = ""
     thickness: float = 6.0
@@ -39,7 +39,7 @@ class Look(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """Bodies of a motion in a look, and what else is drawn with them, such as ``signs`` and ``names``."""
+    """Bodies of a motion in a style, and what else is drawn with them, such as ``signs`` and ``names``."""
 
     motion: Trajectory
     look: Look = Look()
@@ -47,7 +47,8 @@ class Layer(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Layers over one another, below the lines of a title, and paths (n, 3) in space, m, drawn in grey."""
+    """Layers on top of each other, below the lines of a title, and paths (n, 3) in space, m, drawn in
+    grey."""
 
     layers: Sequence[Layer]
     title: Sequence[str] = ()
@@ -55,7 +56,8 @@ class Panel(NamedTuple):
 
 
 class Form(NamedTuple):
-    """Sizes of a picture, px: width, margin and greatest height of a panel, letters; and panels in a row."""
+    """Sizes of a picture, px: width, margin and largest height of a panel, letters; and number of panels in a
+    row."""
 
     width: float = 720.0
     margin: float = 64.0
@@ -68,13 +70,13 @@ BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # layout of moti
 
 
 def still(scene: Scene, view: View | None = None, width: float = Form().width) -> str:
-    """Return the scene at t = 0 as SVG, seen across its plane unless a view is given."""
+    """Return the scene at t = 0 as SVG, seen normal to its plane unless a view is given."""
     panel = Panel([Layer(at_rest(scene), more=(signs, names))])
     return picture(scene, [panel], _title(scene), view=view, form=Form(width))
 
 
 def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
-    """Return the motion as SVG that moves by itself, in real time if one round of it takes 4 to 12 s.
+    """Return the motion as animated SVG, in real time if its duration is 4 to 12 s.
 
     It shows every n-th sample, at most 120 of them.  Raises ValueError if the trajectory has no sample.
     """
@@ -84,7 +86,7 @@ def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: fl
 
 
 def frames(scene: Scene, motion: Trajectory, view: View | None = None) -> Iterator[str]:
-    """Yield the samples that a moving picture shows, each as a still SVG of one size and part of space."""
+    """Yield the displayed samples, each as a still SVG of equal size and equal part of space."""
     _check([motion])
     for sample in Timeline.of(motion.times).samples:
         panel = Panel([Layer(_at(motion, [sample]), more=(signs, names))])
@@ -94,9 +96,9 @@ def frames(scene: Scene, motion: Trajectory, view: View | None = None) -> Iterat
 def side_by_side(
     scene: Scene, motions: Mapping[str, Trajectory], words: str, view: View | None = None
 ) -> str:
-    """Return motions over one span of time as one SVG that moves by itself, two in a row, below their titles.
+    """Return motions over one span of time as one animated SVG, two in a row, below their titles.
 
-    A motion that ended early stays at its last sample.  Raises ValueError if a trajectory has no sample.
+    A motion that ended early stays at its last sample. Raises ValueError if a trajectory has no sample.
     """
     _check(motions.values())
     panels = [Panel([Layer(motion)], [title]) for title, motion in motions.items()]
@@ -117,11 +119,11 @@ def picture(
     form: Form = BESIDE,
     shown: Sequence[Trajectory] = (),
 ) -> str:
-    """Return panels of a scene as SVG, described by ``words``; still without a timeline.
+    """Return panels of a scene as SVG, described by ``words``; it is not animated without a timeline.
 
-    All panels show the same part of space: all of the motions ``shown``, by default of the layers.
-    Readers who ask for no motion see all panels at the sample where a body is furthest from its place in
-    the first layer.
+    All panels show one part of space, which contains the motions ``shown``, by default all of its layers.
+    Readers whose browser suppresses animation see all panels at one sample: the one at which a body is
+    farthest from its position in the first layer.
     """
     space = _joined(shown or [layer.motion for panel in panels for layer in panel.layers])
     page = _page(scene, space, view, form)
@@ -155,7 +157,7 @@ def _check(motions: Iterable[Trajectory]) -> None:
 
 
 class _Grid(NamedTuple):
-    """Places of panels in a picture: the page of each, sizes, height of titles (px), number of panels."""
+    """Positions of panels in a picture: the page of each, sizes, height of titles (px), number of panels."""
 
     page: Page
     form: Form
@@ -194,7 +196,7 @@ def _with_motions(panel: Panel, change: Callable[[Trajectory], Trajectory]) -> P
 
 
 def _at(motion: Trajectory, samples: Any) -> Trajectory:
-    """Return the motion at samples given by number, (k,); its last sample stands for those that it lacks."""
+    """Return the motion at samples given by number (k,); its last sample replaces missing ones."""
     return _samples([motion], lambda values: values[0][np.minimum(samples, len(motion.times) - 1)])
 
 
@@ -204,7 +206,7 @@ def _joined(motions: Sequence[Trajectory]) -> Trajectory:
 
 
 def _samples(motions: Sequence[Trajectory], choose: Callable[[list[np.ndarray]], np.ndarray]) -> Trajectory:
-    """Return poses and velocities that a function chooses from several motions."""
+    """Return poses and velocities that a function selects from several motions."""
     fields = ("times", "position", "orientation", "velocity", "angular_velocity")
     chosen: dict[str, Any] = {name: choose([getattr(motion, name) for motion in motions]) for name in fields}
     first = motions[0]
@@ -212,7 +214,7 @@ def _samples(motions: Sequence[Trajectory], choose: Callable[[list[np.ndarray]],
 
 
 def _furthest(motions: Sequence[Trajectory]) -> int:
-    """Return the sample at which a body is furthest from its place in the first motion."""
+    """Return the sample at which a body is farthest from its position in the first motion."""
     places = np.array([motion.position for motion in motions])
     return int(np.linalg.norm(places - places[0], axis=-1).max(axis=(0, 2)).argmax())
 
@@ -220,7 +222,7 @@ def _furthest(motions: Sequence[Trajectory]) -> int:
 def _drawn(
     scene: Scene, shown: Trajectory, panels: Sequence[Panel], grid: _Grid, timeline: Timeline | None
 ) -> Iterator[str]:
-    """Yield the panels, each cut off at its edges."""
+    """Yield the panels, each clipped at its edges."""
     ground = [part for part in _ground(Stage(scene, shown, grid.page, None))]
     for k, panel in enumerate(panels):
         x, y = grid.corner(k)
@@ -296,7 +298,7 @@ def _scale(grid: _Grid) -> Iterator[str]:
 
 
 def _pace(grid: _Grid, timeline: Timeline | None) -> Iterator[str]:
-    """Yield how fast the time of a moving picture runs."""
+    """Yield the text on how fast an animation runs."""
     if timeline:
         words = f"{timeline.times[-1] - timeline.times[0]:.4g} s in {timeline.seconds:.3g} s"
         yield svg.text(grid.width / 2, grid.bottom + FOOT - 16, words, _words(grid))

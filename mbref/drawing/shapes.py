@@ -26,32 +26,32 @@ class Shape:
 
     @property
     def is_plate(self) -> bool:
-        """Whether the line encloses an area."""
+        """True if the line encloses an area."""
         return len(self.points) > 3 and bool((self.points[0] == self.points[-1]).all())
 
 
 def shapes(scene: Scene) -> list[Shape]:
-    """The shape of every body: its joints and the points where springs and forces act on it.
+    """Return the shape of every body: its joints and the points at which springs and forces act on it.
 
-    The centre of mass is added where that is a single point.
+    The centre of mass is added if there is a single point.
     """
     return [Shape(body.name, _ordered(_own_points(scene, body))) for body in scene.body]
 
 
 def anchors(joint: Joint) -> list[tuple[str, tuple[float, float, float]]]:
-    """Body and anchor (world, t = 0) of both sides of a joint."""
+    """Return body and anchor (world, t = 0) for both sides of a joint."""
     return list(zip(joint.bodies, joint.anchor_pair, strict=True))
 
 
 def attack(load: Load) -> list[tuple[str, tuple[float, float, float]]]:
-    """Body and point (world, t = 0) of the ends of a spring, or of a force."""
+    """Return body and point (world, t = 0) for the ends of a spring, or for a force."""
     if load.type == "spring":
         return list(zip(load.bodies, load.points, strict=True))
     return [(load.body, load.point)] if load.type == "force" else []
 
 
 def _own_points(scene: Scene, body: Body) -> np.ndarray:
-    """Distinct points (n, 3) of a body in its frame, its origin added to a single one."""
+    """Return the distinct points (n, 3) of a body in its frame; its origin is added to a single point."""
     found = [a for joint in scene.joint for name, a in anchors(joint) if name == body.name]
     found += [p for load in scene.load for name, p in attack(load) if name == body.name]
     points = np.array(found or [body.position]) - np.array(body.position)
@@ -61,24 +61,25 @@ def _own_points(scene: Scene, body: Body) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray) -> np.ndarray:
-    """Points along the direction in which they spread most; their convex hull, closed, where not in line."""
+    """Return points in the order along their main direction; points that are not on a line give their closed
+    convex hull."""
     centred = points - points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(centred)
     if len(points) < 3 or sizes[1] <= FLAT * sizes[0]:
         return points[np.argsort(centred @ axes[0])]
-    from scipy.spatial import ConvexHull  # a fifth of a second to load
+    from scipy.spatial import ConvexHull  # imported here, because it takes a fifth of a second
 
     order = ConvexHull(centred @ axes[:2].T).vertices
     return points[np.append(order, order[0])]
 
 
 def moved(shape: Shape, trajectory: Trajectory, body: int) -> np.ndarray:
-    """World points (k, n, 3) of a shape at the times of a trajectory."""
+    """Return the world points (k, n, 3) of a shape at the times of a trajectory."""
     return carried(shape.points, trajectory, body)
 
 
 def carried(points: np.ndarray, trajectory: Trajectory, body: int) -> np.ndarray:
-    """World points (k, n, 3) of points (n, 3) in the frame of a body."""
+    """Return the world points (k, n, 3) of points (n, 3) in the frame of a body."""
     q, r = trajectory.orientation[:, body, None], trajectory.position[:, body, None]
     return r + rotations.rotate(q, points[None])
 
@@ -86,7 +87,8 @@ def carried(points: np.ndarray, trajectory: Trajectory, body: int) -> np.ndarray
 def attached(
     scene: Scene, trajectory: Trajectory, name: str, points: Sequence[Sequence[float]]
 ) -> np.ndarray:
-    """World points (k, n, 3) of points (n, 3, world at t = 0) that move with a body or stay on the ground."""
+    """Return the world points (k, n, 3) of points (n, 3, world at t = 0) that move with a body or are fixed
+    to the ground."""
     b, at_start = scene.body_index(name), np.array(points, dtype=float)
     if b < 0:
         return np.broadcast_to(at_start, (len(trajectory.times), *at_start.shape))
@@ -96,7 +98,7 @@ def attached(
 
 
 def at_rest(scene: Scene) -> Trajectory:
-    """The trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
+    """Return the trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
     nb = len(scene.body)
     return Trajectory(
         scene=scene.name,

@@ -1,4 +1,4 @@
-"""SVG elements: lines and groups, which move along a timeline, words and arrows."""
+"""SVG elements: lines and groups that move along a timeline, text and arrows."""
 
 from __future__ import annotations
 
@@ -29,18 +29,18 @@ def follow(places: np.ndarray, content: str, timeline: Timeline | None) -> str:
 
 
 def text(x: float, y: float, words: str, look: str = "", anchor: str = "middle") -> str:
-    """Return words at a place, with a halo that keeps them legible over lines."""
+    """Return text at a position, with a halo that keeps it legible over lines."""
     halo = f'stroke="{PAPER}" stroke-width="3" paint-order="stroke" stroke-linejoin="round"'
     return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {halo} {look}>{printable(words)}</text>'
 
 
 def printable(words: str) -> str:
-    """Return words escaped for SVG, with characters that cannot be shown replaced."""
+    """Return text escaped for SVG, with unprintable characters replaced."""
     return escape("".join(c if c.isprintable() else "\ufffd" for c in words))
 
 
 def arrow(start: np.ndarray, end: np.ndarray, colour: str, width: float = 2.2) -> str:
-    """Return an arrow between two places (2,), px; a dot where it points along the line of sight."""
+    """Return an arrow between two points (2,), px; a dot if it points along the line of sight."""
     along, length = end - start, float(np.hypot(*(end - start)))
     if length < 1.0:
         return f'<circle cx="{start[0]:.1f}" cy="{start[1]:.1f}" r="3" fill="{colour}"/>'
@@ -66,7 +66,8 @@ def turn(radius: float, sense: float, colour: str, width: float = 2.2) -> str:
 
 
 def moving_or_still(moving: Iterable[str], still: Iterable[str]) -> list[str]:
-    """Return parts that move, and their substitutes for paper and for readers who ask for less motion."""
+    """Return animated parts, and their substitutes for paper and for readers whose browser suppresses
+    animation."""
     style = (
         "<style>.mbref-still{display:none}@media print,(prefers-reduced-motion:reduce)"
         "{.mbref-still{display:inline}.mbref-moving{display:none}}</style>"
@@ -76,7 +77,7 @@ def moving_or_still(moving: Iterable[str], still: Iterable[str]) -> list[str]:
 
 
 def document(width: float, height: float, parts: list[str], title: str) -> str:
-    """Return the whole picture, on white; the title is what screen readers read out."""
+    """Return the whole picture on white; screen readers read the title."""
     return "\n".join(
         [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:.0f} {height:.0f}" '

@@ -1,4 +1,4 @@
-"""Timeline of a moving picture: the samples that it shows, and when."""
+"""Timeline of an animation: the samples that it shows, and when."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FRAMES = 120  # largest number of samples in a picture: SVG grows in proportion to it
-SHORTEST, LONGEST = 4.0, 12.0  # s, limits of one round, within which a picture runs in real time
+FRAMES = 120  # largest number of samples in an animation, since the SVG grows in proportion to it
+# s; limits of the duration of one round, within which an animation runs in real time
+SHORTEST, LONGEST = 4.0, 12.0
 
 
 @dataclass(frozen=True)
@@ -19,10 +20,10 @@ class Timeline:
     A picture without a timeline stands still.
     """
 
-    times: np.ndarray  # (k,) s, of the samples shown
+    times: np.ndarray  # (k,) s, times of the displayed samples
     samples: np.ndarray  # (k,) their numbers in the motion
     seconds: float  # duration of one round
-    marks: tuple[float, ...] = ()  # s, times marked on a line of time; without any there is no such line
+    marks: tuple[float, ...] = ()  # s; times marked on a line of time, which is drawn only if there are any
     label: str = ""  # meaning of the marks
 
     @staticmethod

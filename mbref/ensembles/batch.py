@@ -1,9 +1,9 @@
-"""Batches: scenes that differ from a lead scene in numbers alone, simulated one after another in its memory.
+"""Batches: scenes that differ from a lead scene in numbers only, simulated one after another in its memory.
 
-All of them are set up at once, in arrays whose first axis counts them.  A scene of a batch must lead to the
-structural decisions of the lead scene (rank, active rows and columns), begin on no singular position, and
-complete in one call of the stepper, as the lead scene did.  Every other scene is left to a run of its own.
-The results agree to the bit with runs of single scenes.
+All scenes are prepared at once, in arrays whose first axis is the scene. A scene of a batch must have the
+rank and the active rows and columns of the lead scene, must not start at a singular position, and must
+complete in one call of the stepper. All other scenes are simulated by single runs. The results agree to the
+bit with runs of single scenes.
 """
 
 from __future__ import annotations
@@ -33,18 +33,19 @@ from mbref.trajectory import Crossing
 
 
 def may_lead(run: Run) -> bool:
-    """Whether a run that has ended was so ordinary that it may lead a batch."""
+    """Return whether a completed run may lead a batch: it started regularly, and one call of the stepper
+    completed it."""
     ordinary = run.reduction is not None and run.model.m <= LARGE
     completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
     return bool(ordinary and completed and run.stepper.was_short and run.ranks.least >= NEARLY)
 
 
 class BatchResult(NamedTuple):
-    """The s completed runs of a batch, at k samples.
+    """The s completed runs of a batch, each with k samples.
 
-    ``places`` (s) among the scenes, poses (s, k, nb, …) as a Motion names them, coordinates (s, k, nb, 7),
-    multipliers (s, k, m), ``layout.Counts`` (s, 6), the seconds of stepping (s) and construction, and the
-    message and the singular positions passed of each.
+    Fields are ``places`` (s), the indices of the scenes; poses (s, k, nb, …) with the names of a Motion;
+    coordinates (s, k, nb, 7); multipliers (s, k, m); ``layout.Counts`` (s, 6); the seconds of stepping (s)
+    and construction; and the message and the passed singular positions of each run.
     """
 
     places: list[int]
@@ -60,7 +61,7 @@ class BatchResult(NamedTuple):
     facts: dict[str, Any]
 
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
-        """The place and the motion of each; ``scenes`` are all of the batch."""
+        """Return index and motion of each run; ``scenes`` are all scenes of the batch."""
         for k, place in enumerate(self.places):
             poses = {name: array[k] for name, array in self.poses.items()}
             balance = Balance(scenes[place], self.times, self.coordinates[k], self.multipliers[k])
@@ -82,7 +83,8 @@ class BatchResult(NamedTuple):
 
 
 def run_batch(run: Run, scenes: Sequence[Scene]) -> BatchResult:
-    """Simulate scenes in the memory of a run that may lead them; the run cannot be read any more."""
+    """Simulate scenes in the memory of a run that may lead them; afterwards results of that run must not be
+    read."""
     began = time.process_time()
     batch = Batch(run, candidates_of(run, scenes))
     places = batch.run()
@@ -105,8 +107,10 @@ class Batch:
         self._seconds = np.zeros(count)
 
     def _begin(self) -> int:
-        """Reset memory to the start of the run. Return the number of independent rows, -1 for a start that
-        needs care."""
+        """Reset memory to the start of the run.
+
+        Returns the number of independent rows, -1 for a start that needs special treatment.
+        """
         run = self._run
         run.begin_again()
         run.stepper.enter()
@@ -116,14 +120,14 @@ class Batch:
         return -1 if extraordinary else rank
 
     def _keep(self, place: int) -> None:
-        """Keep the samples and counts of the scene at a place."""
+        """Store samples and counts of the scene with the given index."""
         memory = self._run.memory
         for kept, samples in zip(self._samples, memory.loop.samples, strict=True):
             kept[place] = samples
         self._counts[place] = tuple(memory.equations.system.counts)
 
     def run(self) -> list[int]:
-        """Run the scenes that fit; the places of those that completed in one call."""
+        """Run the scenes of equal structure; returns the indices of those that completed in one call."""
         run, stepper, completed = self._run, self._run.stepper, []
         for k in self._fit:
             self._parameters.write(k)
@@ -140,7 +144,7 @@ class Batch:
         return completed
 
     def result(self, places: list[int], seconds: float) -> BatchResult:
-        """The runs at these places, which all took so many seconds of CPU time."""
+        """Return the runs with these indices, which together took the given CPU seconds."""
         packs, nb = self._candidates.packs, self._run.model.nb
         shape = len(places), self._run.times.size, nb
         q, v, a, multipliers = (each[places] for each in self._samples)

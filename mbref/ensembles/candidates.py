@@ -23,10 +23,10 @@ from mbref.stepping.run import NEARLY, Run
 
 
 class Candidates(NamedTuple):
-    """Scenes (s) of equal structure and their starts.
+    """Scenes of equal structure, s in number, and their starts.
 
-    Coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent starts by place, ranks there, and
-    the places of the scenes that lead to the structural decisions of the run.
+    Fields are coordinates (s, 7 nb) and velocities (s, 6 nb) at the start, consistent starts by scene index,
+    their ranks, and the indices of the scenes whose rank, active rows and columns equal the run's.
     """
 
     packs: Packs
@@ -37,11 +37,12 @@ class Candidates(NamedTuple):
     fit: list[int]
 
     def model(self, place: int) -> Model:
-        """The model of the scene at a place."""
+        """Return the model of the scene with the given index."""
         return Model(self.packs.scenes[place], self.packs, place)
 
     def parameters(self, run: Run, memory: Memory) -> list[tuple[Any, ...]]:
-        """The arrays of memory of a run in which the scenes differ, each with the values of all scenes."""
+        """Return the arrays of a run's memory in which the scenes differ, each with the values of all
+        scenes."""
         length, rounding = self.packs.length, run.method.settings(0.0).rounding
         return [
             *parameters_of(memory.equations, run.reduced(self.packs.data, axis=1), self.packs),
@@ -53,14 +54,15 @@ class Candidates(NamedTuple):
 
 
 def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
-    """The scenes; those fit that lead to the structural decisions of the run and start as regularly."""
-    packs, evidence = Packs(scenes), _reduction(run).evidence
+    """Return the scenes. Those may join the batch whose structure equals the run's and whose start is
+    regular, too."""
+    packs, decisions = Packs(scenes), _reduction(run).decisions
     evaluations = Evaluations(run.model, packs)
     starts, q, v = _starts(run, packs, evaluations)
-    part, places, velocities = evidence.states(q, v)
+    part, places, velocities = decisions.states(q, v)
     durations = np.array([scene.duration for scene in scenes])
     terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
-    agree = evidence.which_agree(run.model, q, v, packs.mass, terms)
+    agree = decisions.which_agree(run.model, q, v, packs.mass, terms)
     symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
@@ -68,7 +70,7 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
 
 
 def _reduction(run: Run) -> Reduction:
-    """The reduction of a run that may lead a batch, which has one."""
+    """Return the reduction of a run that may lead a batch, which always has one."""
     assert run.reduction is not None
     return run.reduction
 
@@ -76,8 +78,8 @@ def _reduction(run: Run) -> Reduction:
 def _starts(
     run: Run, packs: Packs, evaluations: Evaluations
 ) -> tuple[dict[int, Start], np.ndarray, np.ndarray]:
-    """The consistent starts as ``Run`` finds them, by place where there is one; and the coordinates
-    (s, 7 nb) and velocities (s, 6 nb) of all."""
+    """Return the consistent starts as ``Run`` computes them, by scene index, and coordinates (s, 7 nb) and
+    velocities (s, 6 nb) of all scenes."""
     q, v = packs.start(), np.zeros_like(packs.mass)
     found = {k: start for k, start in enumerate(evaluations.starts()) if isinstance(start, Start)}
     if found:

@@ -1,6 +1,8 @@
-"""Ensembles: many scenes by one method, spread over processes; results are streamed, stored and resumed.
+"""Ensembles: many scenes simulated by one method in several processes; results are yielded as they come, and
+can be stored and resumed.
 
-Processes are given several runs at a time: scenes of equal structure are set up together (``batch``).
+A process receives several runs at a time, because scenes of equal structure are prepared together
+(``batch``).
 """
 
 from __future__ import annotations
@@ -28,9 +30,10 @@ from mbref.simulation.simulate import Limits, checked_times, prepare
 from mbref.trajectory import Outcome, Trajectory
 
 AHEAD = (
-    64  # runs handed to the executor, or as many as keep every core busy twice, before the first has to end
+    64  # runs submitted to the executor before the first result is needed; at least twice the number of cores
 )
-MOST_AT_ONCE, SECONDS = 128, 0.05  # runs that a process is given at a time, and the wall time they may take
+# most runs that a process receives at once, and the wall time (s) that they may take
+MOST_AT_ONCE, SECONDS = 128, 0.05
 
 
 def ensemble(
@@ -63,7 +66,7 @@ def ensemble(
         with processes() as pool:
             yield from ensemble(scenes, times, method, limits, pool, path)
         return
-    known = records.opened(path)  # before anything is compiled or run for it
+    known = records.opened(path)  # raises for a faulty file before anything is compiled or run
     prepare(Method.parse(method))  # once, not in every process at the same time
     work = Work(executor, method, times, limits)
     try:
@@ -83,7 +86,7 @@ def ensemble(
 
 
 class Job(NamedTuple):
-    """A run that is wanted."""
+    """A requested run."""
 
     place: int
     key: str
@@ -91,7 +94,7 @@ class Job(NamedTuple):
 
 
 class Work:
-    """Runs that the executor has been given, some at a time; runs of a killed process are tried one by one.
+    """Runs submitted to the executor, several at once; runs of a killed process are repeated one by one.
 
     ``error`` is the exception of the first scene that cannot be simulated.
     """
@@ -101,13 +104,13 @@ class Work:
         self._executor, self._method, self._times, self._limits = executor, method, times, limits
         self._done: SimpleQueue[Future[Ended]] = SimpleQueue()
         self._waiting: list[Job] = []
-        self._since = 0.0  # s, when the first of them began to wait
-        self._at_once = 0  # runs given to a worker at a time; 0 until the first run was timed
+        self._since = 0.0  # s; time at which the first waiting run was added
+        self._at_once = 0  # runs that a worker receives at once; 0 until the first run was timed
         self._cores = os.cpu_count() or 1
         self.error: Exception | None = None
 
     def add(self, job: Job) -> None:
-        """Hand a run over once as many wait as are given at a time, or for too long while none runs."""
+        """Submit runs when enough are waiting, or when they have waited too long while no process works."""
         now = time.monotonic()
         self._since = self._since if self._waiting else now
         self._waiting.append(job)
@@ -116,7 +119,7 @@ class Work:
             self.hand_over()
 
     def hand_over(self) -> None:
-        """Hand over those that wait."""
+        """Submit the waiting runs."""
         if self._waiting:
             self._submit(self._waiting)
             self._waiting = []
@@ -129,18 +132,18 @@ class Work:
         future.add_done_callback(self._done.put)
 
     def has_ended(self) -> bool:
-        """Whether there are results."""
+        """Return whether there are results."""
         return not self._done.empty()
 
     def is_full(self) -> bool:
-        """Whether a result is to be waited for before more is handed over."""
+        """Return whether a result must be awaited before more runs are submitted."""
         given = sum(map(len, self.pending.values()))
         if not self._at_once:
             return given >= self._cores
         return given >= max(AHEAD, 2 * self._cores * self._at_once)
 
     def ended(self) -> list[tuple[Job, Trajectory]]:
-        """The runs that end next, each with its trajectory."""
+        """Yield the runs that end next, each with its trajectory."""
         future = self._done.get()
         jobs = self.pending.pop(future)
         try:
@@ -152,7 +155,8 @@ class Work:
         return [(jobs[place], run) for place, run in found.motions([job.scene for job in jobs])]
 
     def _without_process(self, jobs: list[Job]) -> list[tuple[Job, Trajectory]]:
-        """Runs whose process was killed: one alone has crashed, several are handed over one by one."""
+        """Handle runs whose process was killed: a single run has crashed, several runs are submitted one by
+        one."""
         crashed = []
         for job in jobs:
             try:
@@ -171,13 +175,16 @@ class Work:
         )  # fmt: skip
 
     def cancel(self) -> None:
-        """Take back all that has not begun."""
+        """Cancel all runs that have not begun."""
         for future in self.pending:
             future.cancel()
 
 
 def _handed_out(work: Work, path: str | Path | None) -> Iterator[tuple[int, Trajectory]]:
-    """The runs that end next by their places, all stored first but those whose process was killed."""
+    """Yield the runs that end next by their indices.
+
+    All results are stored first, except for runs whose process was killed.
+    """
     found = work.ended()
     for job, run in found:
         if path and run.outcome is not Outcome.CRASHED:
@@ -189,6 +196,6 @@ def _handed_out(work: Work, path: str | Path | None) -> Iterator[tuple[int, Traj
 
 
 def _key(scene: Scene, times: np.ndarray, method: str, limits: Limits) -> str:
-    """Hash of all that determines a result."""
+    """Return the hash of everything that determines a result."""
     identity = [scene.to_dict(), times.tolist(), str(method), asdict(limits), __version__]
     return hashlib.sha256(json.dumps(identity, sort_keys=True).encode()).hexdigest()

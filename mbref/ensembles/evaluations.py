@@ -1,4 +1,5 @@
-"""Evaluations of scenes of equal structure, one after another in the memory of one model."""
+"""Evaluation of the equations of several scenes of equal structure, one after another in one model's
+memory."""
 
 from __future__ import annotations
 
@@ -13,16 +14,17 @@ from mbref.scene import SceneError
 
 
 class Evaluations:
-    """The terms of s scenes of the structure of a model, which keeps its numbers."""
+    """Terms of the equations of s scenes whose structure equals a model's; afterwards the model has its own
+    numbers again."""
 
     def __init__(self, model: Model, packs: Packs):
         self._model, self._packs = model, packs
         self._parameters = Parameters(parameters_of(model.memory.values, packs.data, packs))
 
     def terms(self, places: np.ndarray, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms of the scenes at places (c,) at k states each, with blocks (c, k, m, 12).
+        """Return the terms of c scenes, given by index, at k states each, with blocks (c, k, m, 12).
 
-        At times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
+        Arguments are times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
         """
         m, n, memory, shape = self._model.m, self._model.n, self._model.memory, times.shape
         columns = self._model.entry_columns
@@ -35,7 +37,7 @@ class Evaluations:
         return Terms(self._packs.mass[places], blocks.reshape(*shape, *columns.shape), phi, nu, gamma, forces)
 
     def starts(self) -> list[Start | SceneError]:
-        """The consistent start of each scene, or the error of a scene without one."""
+        """Return the consistent start of each scene, or the error of a scene without one."""
         packs = self._packs
         scenes = Alike(
             model=self._model,
@@ -49,7 +51,7 @@ class Evaluations:
         return consistent_starts(scenes)
 
     def _at_start(self, places: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms at t = 0, of one state of each scene, with blocks (c, m, 12)."""
+        """Return the terms at t = 0 for one state of each scene, with blocks (c, m, 12)."""
         terms = self.terms(places, np.zeros((len(places), 1)), q[:, None], v[:, None])
         of_states = (terms.jacobian, terms.phi, terms.nu, terms.gamma, terms.force)
         return Terms(terms.mass, *(values[:, 0] for values in of_states))

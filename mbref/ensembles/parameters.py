@@ -33,14 +33,14 @@ class Parameters:
 
 
 def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
-    """The arrays of memory of evaluations, each with the values of all scenes."""
+    """Return the arrays of memory of the equations, each with the values of all scenes."""
     system = equations.system
     masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
     return [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]
 
 
 def _arrays_of(values: Sequence[Any]) -> Iterator[np.ndarray]:
-    """All arrays of nested tuples."""
+    """Yield all arrays in nested tuples."""
     for value in values:
         if isinstance(value, np.ndarray):
             yield value

@@ -1,7 +1,7 @@
-"""Processes that each make one call after another; one that is killed fails its own call alone.
+"""Processes that each make one call after another; a killed process fails its own call only.
 
-(A ProcessPoolExecutor of several fails all the calls that it has been given.)  A call and its result go
-through a pipe without threads in between, which take longer than a short run.
+A ProcessPoolExecutor would fail all submitted calls. A call and its result go through a pipe without threads,
+which would take longer than a short run.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any
 
 
 class Processes(Executor):
-    """So many processes that wait for calls."""
+    """A number of processes that wait for calls, as a concurrent.futures.Executor."""
 
     def __init__(self, workers: int) -> None:
         self._threads = ThreadPoolExecutor(workers)
@@ -29,11 +29,11 @@ class Processes(Executor):
             self._idle.put(Worker())
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **named: Any) -> Future[Any]:
-        """The future of a call; BrokenExecutor is its exception where its process is killed."""
+        """Return the future of a call; if its process is killed, its exception is BrokenExecutor."""
         return self._threads.submit(self._call, function, arguments, named)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """End the processes when their calls have ended."""
+        """End the processes after their calls."""
         self._threads.shutdown(wait, cancel_futures=cancel_futures)
         while not self._idle.empty():
             self._idle.get().end(wait)
@@ -61,7 +61,8 @@ class Worker:
         theirs.close()
 
     def call(self, function: Callable[..., Any], arguments: tuple[Any, ...], named: dict[str, Any]) -> Any:
-        """The result or the exception of a call made there; BrokenProcessPool where the process is killed."""
+        """Return the result or raise the exception of a call made in the process; raises BrokenProcessPool if
+        it is killed."""
         try:
             self._pipe.send((function, arguments, named))
             succeeded, found = self._pipe.recv()
@@ -79,7 +80,8 @@ class Worker:
 
 
 def _answer(pipe: Connection) -> None:
-    """Make the calls that come through a pipe, until its other end is closed; interrupts are the parent's."""
+    """Make the calls that come through a pipe, until its other end is closed; the parent handles
+    interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(EOFError, OSError):
         while True:
@@ -92,7 +94,7 @@ def _answer(pipe: Connection) -> None:
 
 
 def _of_error(error: Exception) -> Any:
-    """An error for another process, by its text where it cannot be sent itself."""
+    """Return an error that can be sent to another process, by its text if it cannot be pickled."""
     try:
         return ForkingPickler.dumps((False, error))
     except Exception:
@@ -100,5 +102,5 @@ def _of_error(error: Exception) -> Any:
 
 
 def processes(workers: int | None = None) -> Processes:
-    """So many processes, by default one a core; an interrupt is heard by their parent alone."""
+    """Return a number of processes, by default one for each core; only their parent handles interrupts."""
     return Processes(workers or os.cpu_count() or 1)

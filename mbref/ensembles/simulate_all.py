@@ -18,20 +18,20 @@ from mbref.simulation.simulate import checked_run, finish_run, simulate
 from mbref.stepping.limits import Limits
 from mbref.stepping.run import Run
 
-FEW = 0.5  # fraction of a batch: where so few completed, no further batch is tried, but single runs
+FEW = 0.5  # fraction of a batch that must complete; otherwise single runs follow instead of further batches
 
 
 @dataclass
 class Ended:
-    """Runs of several scenes, by their places, and the exceptions of those that cannot be simulated.
+    """Runs of several scenes, by index, and the exceptions of scenes that cannot be simulated.
 
-    ``batches`` have the places of their scenes, and the completed runs.
+    ``batches`` contain the indices of their scenes, and the completed runs.
     """
 
     alone: dict[int, Motion] = field(default_factory=dict)
     batches: list[tuple[list[int], BatchResult]] = field(default_factory=list)
     errors: dict[int, Exception] = field(default_factory=dict)
-    seconds: float = 0.0  # of wall time
+    seconds: float = 0.0  # s of wall time
 
     @property
     def error(self) -> Exception | None:
@@ -39,7 +39,7 @@ class Ended:
         return self.errors[min(self.errors)] if self.errors else None
 
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
-        """Place and motion of every run."""
+        """Yield index and motion of every run."""
         yield from self.alone.items()
         for places, batch in self.batches:
             for k, motion in batch.motions([scenes[place] for place in places]):
@@ -49,7 +49,7 @@ class Ended:
 def simulate_all(
     scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits
 ) -> list[Motion]:
-    """The motions of the scenes, as ``simulate`` gives them one by one; raises its errors."""
+    """Return the motions of the scenes, as ``simulate`` does for single scenes; raises its errors."""
     ended = run_all(scenes, method, times, limits)
     if ended.error:
         raise ended.error
@@ -72,7 +72,7 @@ def run_all(scenes: Sequence[Scene], method: Method | str, times: np.ndarray, li
 
 
 def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
-    """The places of scenes of one shape."""
+    """Return the indices of scenes of equal structure, in groups."""
     groups: dict[object, list[int]] = {}
     for place, scene in enumerate(scenes):
         groups.setdefault(shape_of(scene), []).append(place)
@@ -80,27 +80,27 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 
 def _can_lead(method: Method, limits: Limits) -> bool:
-    """Whether runs of a method may lead a batch: those that projection or series hold to their motion."""
+    """Return whether runs of a method may lead batches: this needs projection or Taylor series."""
     held = limits.rank_tolerance <= DROPS and not limits.branches
     return method.stabilisation.projects and held
 
 
 class _Runs:
-    """Runs of scenes: of each shape a batch behind the first run that may lead one."""
+    """Runs of scenes: first a single run for each structure, then a batch if that run may lead one."""
 
     def __init__(self, scenes: Sequence[Scene], method: Method, times: np.ndarray, limits: Limits):
         self.ended, self._scenes, self._arguments = Ended(), scenes, (method, times, limits)
 
     def alone(self, places: Iterable[int]) -> None:
-        """Run the scenes at these places one by one."""
+        """Run the scenes with these indices one by one."""
         for place in places:
             try:
                 self.ended.alone[place] = simulate(self._scenes[place], *self._arguments)
-            except Exception as error:  # reported after the runs that went well
+            except Exception as error:  # reported after the successful runs
                 self.ended.errors[place] = error
 
     def in_batches(self, places: list[int]) -> None:
-        """Run scenes of equal structure at these places."""
+        """Run scenes of equal structure with these indices."""
         while places:
             try:
                 run = checked_run(self._scenes[places[0]], *self._arguments)
@@ -113,12 +113,12 @@ class _Runs:
             run.release()
 
     def _led(self, run: Run, places: list[int]) -> list[int]:
-        """The places of scenes that are left after the batch of a run."""
+        """Run the batch of a lead run; returns the indices of the scenes that remain."""
         if not places or not may_lead(run):
             return places
         try:
             batch = run_batch(run, [self._scenes[place] for place in places])
-        except np.linalg.LinAlgError:  # which the numbers of one scene have caused
+        except np.linalg.LinAlgError:  # the numbers of one scene can make a matrix singular
             self.alone(places)
             return []
         self.ended.batches.append((places, batch))

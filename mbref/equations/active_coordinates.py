@@ -1,9 +1,9 @@
-"""Active coordinates: the coordinates of a scene that can move; the others need no equation.
+"""Active coordinates: the coordinates of a scene that can move; all others need no equation.
 
-Rows and columns of Φ_q that hang together by non-zero entries form a block.  A block on which no force, no γ,
-Φ or ν and no initial velocity acts stays at rest with multipliers of zero; the bending of a planar mechanism
-out of its plane is such a block.  Entries are found to be zero at random states of the active coordinates: an
-expression that is not identically zero does not vanish there.
+Rows and columns of Φ_q that are connected by nonzero entries form a block. A block without force, γ, Φ, ν and
+initial velocity stays at rest with zero multipliers. An example are the motions of a planar mechanism out of
+its plane. Entries are tested for zero at random states of the active coordinates, since an expression that is
+not identically zero does not vanish there.
 """
 
 from __future__ import annotations
@@ -15,17 +15,18 @@ import numpy as np
 from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates, random_states
 
-STATES = 2  # random states, so that an accidental zero at one does no harm
-STILL = 1e-12  # fraction of the length, of 1 rad, or of the largest velocity: rounding
+STATES = 2  # number of random states; two, because an entry may vanish at one of them by chance
+STILL = 1e-12  # relative to the length, 1 rad, or the largest velocity: smaller numbers are rounding
 
 
 def active_entries(
     model: Model, q: np.ndarray, v: np.ndarray, read: list[RandomStates] | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which velocities (n,) can move, and which Jacobian entries (m, 12) of theirs can be other than zero.
+    """Return which velocities (n,) can be nonzero, and which of their Jacobian entries (m, 12) can be
+    nonzero.
 
-    q (7 nb,) and v (6 nb,) are the start.  Entries have the columns of ``layout.System.blocks``.
-    The states at which equations are read are added to ``read``.
+    q (7 nb,) and v (6 nb,) are the start. Entries have the columns of ``layout.System.blocks``. The states at
+    which equations are evaluated are appended to ``read``.
     """
     states, steady = random_states(1, STATES, model.n), _steady(model)
     moving = np.zeros(model.n, dtype=bool)
@@ -57,19 +58,21 @@ def _steady(model: Model) -> Model | None:
 
 
 def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:
-    """The terms at t = 0, one state as ``Model.along`` has it."""
+    """Return the terms at t = 0, for one state, in the form of ``Model.along``."""
     return model.along(np.zeros(1), q.reshape(1, -1), v.reshape(1, -1))
 
 
 def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which entries (m, 12) of the Jacobian are other than zero at one of k states; which rows (m,) ask for a
-    motion, and on which columns (n,) a force acts."""
+    """Return which entries (m, 12) of the Jacobian are nonzero at any of k states.
+
+    Also return which rows (m,) prescribe a motion, and on which columns (n,) a force acts.
+    """
     entries, rows, columns = (np.any(found, axis=0) for found in nonzero(model, terms))
     return np.asarray(entries), np.asarray(rows), np.asarray(columns)
 
 
 def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
+    """Return ``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
     entries: np.ndarray = (terms.jacobian != 0) & model.structure.of_bodies
     rows: np.ndarray = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
     return entries, rows, np.not_equal(terms.force, 0)
@@ -78,7 +81,7 @@ def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndar
 def reached(
     model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (n,) and rows (m,) of the blocks that have a driving row or column."""
+    """Return columns (n,) and rows (m,) of the blocks that contain one of the given rows or columns."""
     column = model.entry_columns
     found = np.append(columns, np.zeros(6, dtype=bool))
     while True:
@@ -93,8 +96,11 @@ def reached(
 def without_rounding(
     q: np.ndarray, v: np.ndarray, given: np.ndarray, length: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates (s, 7 nb) and velocities (s, 6 nb) of starts, with entries of round-off size set to zero,
-    except velocities that are ``given`` (s, 6 nb).  Of s scenes of lengths (s,) in m."""
+    """Return coordinates (s, 7 nb) and velocities (s, 6 nb) of starts with entries of round-off size set to
+    zero.
+
+    Velocities that the scenes give (``given``, (s, 6 nb)) are unchanged. The s scenes have lengths (s,) in m.
+    """
     small = np.full((len(q), q.shape[1] // 7, 7), STILL)
     small[..., :3] *= length[:, None, None]
     largest = np.abs(v).max(axis=1, keepdims=True, initial=0.0)
@@ -103,9 +109,10 @@ def without_rounding(
 
 
 def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
-    """Which coordinates can move from q (7 nb,) where these columns of v can: indices into q.
+    """Return which coordinates can change from q (7 nb,) if these entries of v can be nonzero, as indices
+    into q.
 
-    Turning about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the other two.
+    A rotation about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the two others.
     """
     moves = [7 * (c // 6) + c % 6 for c in velocities.tolist() if c % 6 < 3]
     turns: dict[int, list[int]] = {}
@@ -120,7 +127,8 @@ def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
 
 
 def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
-    """The Euler parameters that turns about these axes make other than zero, beside those reached."""
+    """Return the Euler parameters that rotations about these axes make nonzero, in addition to those
+    reached."""
     pairs = [pair for k in axes for pair in ({0, 1 + k}, {1 + (k + 1) % 3, 1 + (k + 2) % 3})]
     while True:
         found = reached.union(*(pair for pair in pairs if pair & reached))
@@ -130,6 +138,6 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
 
 
 def primitives_of(model: Model, rows: np.ndarray) -> np.ndarray:
-    """The primitives, by number, that have one of these rows."""
+    """Return the numbers of the primitives that have one of these rows."""
     last = np.searchsorted(model.structure.row, rows, side="right") - 1
     return np.flatnonzero(np.isin(model.structure.row, model.structure.row[last]))

@@ -31,7 +31,8 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
 
 
 def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
-    """Return by joint which components (k, 6) of its reaction equilibrium determines, along world axes."""
+    """Return for each joint which components (k, 6) of its reaction equilibrium determines, along world
+    axes."""
     model = Model(without_armatures(scene))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
@@ -41,7 +42,8 @@ def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarr
 
 
 def without_armatures(scene: Scene) -> Scene:
-    """Return the scene without armatures: a model has a rotor for each, whose pose no trajectory has."""
+    """Return the scene without armatures, because a model has a rotor for each, whose pose is not in the
+    trajectory."""
     bare = {"armature": 0.0}
     joints = [joint.model_copy(update=bare) if joint.reflected_inertia else joint for joint in scene.joint]
     return scene.with_(joint=joints)
@@ -70,7 +72,8 @@ def poses(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.nda
 
 
 def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
-    """Return world velocities (k, b, 3) and angular ones, in frames p (k, b, 4), as rates (k, 6 nb)."""
+    """Return world velocities (k, b, 3) and angular velocities as rates (k, 6 nb) in the frames p (k, b,
+    4)."""
     found = np.zeros((len(p), model.nb, 6))
     found[:, : p.shape[1], :3] = linear
     found[:, : p.shape[1], 3:] = rotations.rotate(rotations.conjugate(p), angular)

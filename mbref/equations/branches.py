@@ -1,10 +1,10 @@
 """The branches of motion that meet at a singular position, to second order.
 
-Where the rank of Φ_q drops, the velocities have more freedoms, and each left null vector w of Φ_q leaves an
-equation of second order, wᵀ γ(q, v, t) = 0: the quadratic cone of A. Müller (Mech. Mach. Theory 2016) and
-P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both are homogeneous:
-[Φ_q  -ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two directions of one freedom each are two
-branches that cross; a double one is a common tangent, whose branches only higher orders tell apart.
+At a pose where the rank of Φ_q drops, more velocities are possible, and each left null vector w of Φ_q gives
+an equation of second order, wᵀ γ(q, v, t) = 0: the quadratic cone of A. Müller (Mech. Mach. Theory 2016) and
+P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both are homogeneous: [Φ_q
+-ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two different directions belong to two branches that
+cross. A double direction is a common tangent of branches, which only higher orders can separate.
 """
 
 from __future__ import annotations
@@ -16,34 +16,36 @@ import numpy as np
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 
-SMOOTH = 1  # the branch that is taken unless another is asked for
-MOST_ROWS = 120  # constraint rows: for more, the analysis takes longer than the run
-RANK = 1e-6  # relative singular value that counts as zero at a singular position
-FLAT = 1e-7  # relative size of a quadratic form that counts as zero
-SAME = 1e-4  # rad between directions that are one
+SMOOTH = 1  # number of the smooth branch, which is taken unless another is requested
+MOST_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
+RANK = 1e-6  # relative singular value below which it counts as zero at a singular position
+FLAT = 1e-7  # relative size of a quadratic form below which it counts as zero
+SAME = 1e-4  # rad; directions at a smaller angle count as equal
 BROAD = 0.05  # distance of multiple roots, to which Newton's method converges slowly
 ZERO, CONVERGED = 1e-12, 1e-10  # at a root: size of the forms, last change of the iteration
-STARTS, ITERATIONS = 200, 40  # of Newton's method for more than two degrees of freedom
+# number of starts and iterations of Newton's method for more than two degrees of freedom
+STARTS, ITERATIONS = 200, 40
 
 NO_OTHER = "the smooth branch only"
 ALONE = "one branch"
 OPEN = "all directions agree with the constraints to second order"
 TANGENT = "branches with a common tangent, which second order does not separate"
-NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not looked for"
+NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not computed"
 MULTIPLE = " and others that second order does not determine"
-CONE = "a cone of directions, of which the smooth one is listed"
+CONE = "infinitely many directions (a cone); the smooth one is listed"
 
 
 class Branches(NamedTuple):
     """Velocities (b, n) of the branches, the branch of the motion first, and a sentence on what second order
-    decides."""
+    determines."""
 
     velocities: np.ndarray
     sentence: str
 
 
 class Passed(NamedTuple):
-    """A crossing at a time (s): coordinates (7 nb,), velocities (n,) on the smooth branch, the one taken."""
+    """A crossing at a time (s): coordinates (7 nb,), velocities (n,) on the smooth branch, and the branch
+    taken."""
 
     time: float
     coordinates: np.ndarray
@@ -65,24 +67,28 @@ class SingularPosition(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Whether velocities at a singular position fit a branch to second order, and one alone."""
+    """Whether velocities at a singular position belong to a branch to second order, and to one branch
+    only."""
 
     fits: bool
     is_simple: bool
 
 
 class SecondOrder(NamedTuple):
-    """Directions (n + 1, d) allowed by the constraints to first order, and the forms (c, d, d) of second."""
+    """Directions (n + 1, d) that the constraints allow to first order, and the quadratic forms (c, d, d) of
+    second order."""
 
     kernel: np.ndarray
     forms: np.ndarray
-    scale: np.ndarray  # scaling of velocities and time: columns of unit length
+    scale: np.ndarray  # scaling of velocities and time that gives columns of unit length
 
 
 def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
-    """The branches at a singular position, q (7 nb,) at t (s), which a motion passes with velocities v (n,).
+    """Return the branches at a singular position, q (7 nb,) at t (s), which a motion passes with velocities v
+    (n,).
 
-    Drivers prescribe a branch's velocities; without any, all have the kinetic energy of v.
+    If drivers exist, they determine a branch's velocities. Otherwise all branches have the kinetic energy of
+    v.
     """
     found = second_order(model, t, q, v)
     freedoms = found.kernel.shape[1]
@@ -103,15 +109,17 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
 
 
 def tangents(model: Model, q: np.ndarray) -> np.ndarray:
-    """Directions (b, n) of the branches of undriven motions that meet at q (7 nb,); none where second order
-    does not tell simple ones."""
+    """Return directions (b, n) of the branches of undriven motions that meet at q (7 nb,).
+
+    The result is empty if second order does not give simple directions.
+    """
     found = second_order(model, 0.0, q, np.zeros(model.n))
     along = [((found.kernel @ a) * found.scale)[:-1] for a in _lines(found)[0]]
     return np.array(along) if along else np.zeros((0, model.n))
 
 
 def fit_to_branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Fit | None:
-    """Return how velocities v (n,) fit the branches at q (7 nb,), t (s); None where no branches meet."""
+    """Return how velocities v (n,) agree with the branches at q (7 nb,), t (s); None if no branches meet."""
     found = second_order(model, t, q, v)
     if not _is_singular(found):
         return None
@@ -138,7 +146,8 @@ def velocities_along(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarr
 
 
 def _as_given(u: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """A direction (n + 1,) at the rate of the given entries of v, or of time; None where it does not fit."""
+    """Return a direction (n + 1,) scaled to the given entries of v, or to the rate of time; None if they do
+    not agree."""
     velocities, share = u[:-1], u[:-1] @ np.where(given, u[:-1], 0.0)
     if abs(u[-1]) > SAME * np.linalg.norm(u):
         velocities = velocities / u[-1]
@@ -149,9 +158,10 @@ def _as_given(u: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | N
 
 
 def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
-    """The constraints at q (7 nb,) to second order: rows of unit length, columns by the lengths of bodies.
+    """Return the constraints at q (7 nb,) to second order: rows of unit length, columns scaled by the lengths
+    of bodies.
 
-    Time is scaled by the velocities v (n,), and left out where nothing depends on it.
+    Time is scaled by the velocities v (n,), and left out if nothing depends on it.
     """
     at_rest = model.terms(t, q, np.zeros(model.n))
     lengths = np.column_stack([np.ones((model.nb, 3)), np.tile(1.0 / model.data.lengths[:, None], 3)]).ravel()
@@ -167,7 +177,7 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
 
 
 def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: np.ndarray) -> np.ndarray:
-    """wᵀ γ as quadratic forms (c, d, d) of d directions (n + 1, d), for c left null vectors (c, m)."""
+    """Return wᵀ γ as quadratic forms (c, d, d) of d directions (n + 1, d), for c left null vectors (c, m)."""
     d = directions.shape[1]
     i, j = np.tril_indices(d)
     one, other = directions.T[i], directions.T[j]
@@ -178,7 +188,7 @@ def _forms(model: Model, t: float, q: np.ndarray, directions: np.ndarray, null: 
 
 
 def _rates(model: Model, t: float, q: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Second order (k, m) along directions u (k, n + 1): γ₂ + t' γ₁ + t'² γ₀."""
+    """Return second-order terms (k, m) along directions u (k, n + 1): γ₂ + t' γ₁ + t'² γ₀."""
     count, v, time = len(directions), directions[:, :-1], directions[:, -1:]
     velocities = np.concatenate([v, -v, np.zeros((1, model.n))])
     states = len(velocities)
@@ -201,22 +211,23 @@ def _values(forms: np.ndarray, a: np.ndarray) -> np.ndarray:
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
-    """The angle (rad) between two lines."""
+    """Return the angle (rad) between two lines."""
     return float(np.arccos(min(1.0, abs(a @ b))))
 
 
 def _is_singular(found: SecondOrder) -> bool:
-    """Whether a position has more freedoms of first order than any motion of second order."""
+    """Return whether a position has more first-order degrees of freedom than any motion of second order."""
     return found.kernel.shape[1] >= 2 and len(found.forms) > 0
 
 
 def _fits(found: SecondOrder, a: np.ndarray) -> bool:
-    """Whether all forms are zero along a direction (d,)."""
+    """Return whether all forms are zero along a direction (d,)."""
     return bool(np.abs(_values(found.forms, a)).max() < SAME)
 
 
 def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
-    """Isolated directions (d,) on which all forms are zero; and CONE, MULTIPLE or nothing of the others."""
+    """Return isolated directions (d,) on which all forms are zero, and CONE, MULTIPLE or an empty text for
+    further directions."""
     if not _is_singular(found):
         return [], ""
     several = (_roots(found.forms[0]), False) if len(found.kernel.T) == 2 else _roots_of_many(found.forms)
@@ -227,7 +238,8 @@ def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
 
 
 def _roots(form: np.ndarray) -> list[np.ndarray]:
-    """The lines through the origin on which a form of two variables is zero: none, a double one, or two."""
+    """Return the lines through the origin on which a form of two variables is zero: none, a double line, or
+    two."""
     values, axes = np.linalg.eigh(form)
     if values[0] * values[1] > SAME**2:
         return []
@@ -239,8 +251,11 @@ def _roots(form: np.ndarray) -> list[np.ndarray]:
 
 
 def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
-    """Simple lines on which all forms are zero, by Newton's method from random starts, and whether there are
-    multiple ones; None where lines are not isolated: those are 2ᵈ⁻¹ at most (Bézout)."""
+    """Return simple lines on which all forms are zero, by Newton's method from random starts, and whether
+    multiple lines exist.
+
+    None if lines are not isolated: at most 2ᵈ⁻¹ isolated ones exist (Bézout).
+    """
     d, random = forms.shape[1], np.random.default_rng(0)
     simple: list[np.ndarray] = []
     multiple: list[np.ndarray] = []
@@ -255,7 +270,8 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
 
 
 def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, bool]:
-    """The end of Newton's method from a, the largest form there, and whether the end is a simple root."""
+    """Return the end of Newton's method from a, the largest form there, and whether the end is a simple
+    root."""
     change = np.ones(1)
     for _ in range(ITERATIONS):
         a = a / np.linalg.norm(a)
@@ -268,7 +284,7 @@ def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, boo
 
 
 def _direction(found: SecondOrder, v: np.ndarray) -> np.ndarray:
-    """The direction (d,) of unit length of a motion's velocities."""
+    """Return the direction (d,) of unit length of a motion's velocities."""
     scale = np.where(found.scale > 0, found.scale, 1.0)
     u = np.append(v, float(found.scale[-1] > 0)) / scale
     a = found.kernel.T @ u
@@ -276,7 +292,7 @@ def _direction(found: SecondOrder, v: np.ndarray) -> np.ndarray:
 
 
 def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) -> np.ndarray | None:
-    """The velocities (n,) of a branch; None for one on which time stands still."""
+    """Return the velocities (n,) of a branch; None for a branch with constant time."""
     u = (found.kernel @ a) * found.scale
     if found.scale[-1] > 0:
         return u[:-1] / u[-1] if abs(u[-1]) > SAME * np.linalg.norm(u) else None
@@ -286,9 +302,9 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
 
 
 def singular_position(model: Model, passed: Passed) -> SingularPosition:
-    """The branches at a crossing that a motion passed.
+    """Return the branches at a crossing that a motion passed.
 
-    Raises ValueError where a branch is to be taken that is not there.
+    Raises ValueError if the requested branch does not exist.
     """
     t, q, v, taken = passed
     large = model.m > MOST_ROWS

@@ -1,4 +1,5 @@
-"""Coordinates q = (r, p) and velocities v = (r', ω') of every body: q' of v, q ⊕ δ, the entries of y."""
+"""Coordinates q = (r, p) and velocities v = (r', ω') of every body: rates q' from v, displacements q ⊕ δ, and
+the entries of y."""
 
 from __future__ import annotations
 
@@ -10,7 +11,7 @@ from mbref.linear_algebra.vectors import copy
 
 @inlined
 def coordinate_rates(q, v, rates):
-    """q' (7 nb,) of v (6 nb,): r' and p' = ½ Lᵀ ω'."""
+    """Compute q' (7 nb,) from v (6 nb,): r' and p' = ½ Lᵀ ω'."""
     for b in range(q.shape[0] // 7):
         i, j = 7 * b, 6 * b
         for k in range(3):
@@ -37,9 +38,9 @@ def normalise(q):
 
 @inlined
 def displace(q, x, change):
-    """q := q ⊕ x with x (6 nb,) = (δr, δπ') per body: p + ½ Lᵀ δπ', back to unit length.
+    """Replace q by q ⊕ x with x (6 nb,) = (δr, δπ') for each body: p + ½ Lᵀ δπ', normalised.
 
-    ``change`` (7 nb,) is scratch.
+    ``change`` (7 nb,) is working memory.
     """
     coordinate_rates(q, x, change)
     for k in range(q.shape[0]):
@@ -57,7 +58,7 @@ def displace_all(q, x, change):
 
 @inlined
 def expand(y, active, state):
-    """The whole state of y; entries that y does not have stay as they are."""
+    """Copy y into the state; entries of the state that y does not contain are unchanged."""
     coordinates, velocities = active.coordinates, active.velocities
     nq = coordinates.shape[0]
     for k in range(nq):
@@ -68,7 +69,7 @@ def expand(y, active, state):
 
 @inlined
 def contract(q, v, active, y):
-    """The entries of y among all coordinates and velocities, or their rates."""
+    """Copy the active entries of all coordinates and velocities, or of their rates, into y."""
     coordinates, velocities = active.coordinates, active.velocities
     nq = coordinates.shape[0]
     for k in range(nq):
@@ -79,7 +80,7 @@ def contract(q, v, active, y):
 
 @kernel
 def fastest_turn(v):
-    """The largest angular velocity of a body (rad/s)."""
+    """Return the largest angular velocity of a body (rad/s)."""
     square = 0.0
     for b in range(v.shape[0] // 6):
         x, y, z = v[6 * b + 3], v[6 * b + 4], v[6 * b + 5]
@@ -89,7 +90,7 @@ def fastest_turn(v):
 
 @kernel
 def copy_state(source, target):
-    """``target`` := ``source``."""
+    """Copy the state ``source`` to ``target``."""
     copy(source.coordinates, target.coordinates)
     copy(source.velocities, target.velocities)
     copy(source.coordinate_rates, target.coordinate_rates)

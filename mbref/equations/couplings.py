@@ -1,7 +1,8 @@
-"""Couplings as primitive equations between joint coordinates; rotors that stand for armatures.
+"""Couplings as primitive equations between joint coordinates; rotors that represent armatures.
 
-The armature I of a joint coordinate q has the kinetic energy ½ I q'².  A rotor of its own has it: a body
-without gravity's lever, held by the fixed frame, with one coordinate that is coupled with q, ratio 1.
+The armature I of a joint coordinate q has the kinetic energy ½ I q'².  It is modelled by an additional body
+(rotor) that rotates about its centre of mass in the fixed frame; its coordinate is coupled with q with ratio
+1.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Coupled(NamedTuple):
-    """One row: the sum of two joint coordinates times factors is zero."""
+    """A row: the sum of two joint coordinates times factors is zero."""
 
     name: str
     joints: tuple[Joint, Joint]
@@ -26,7 +27,7 @@ class Coupled(NamedTuple):
 
 
 class Rotors(NamedTuple):
-    """The bodies that stand for armatures, the joints that hold them, and their couplings."""
+    """The bodies that represent armatures, the joints that carry them, and their couplings."""
 
     bodies: tuple[Body, ...] = ()
     joints: tuple[Joint, ...] = ()
@@ -34,7 +35,8 @@ class Rotors(NamedTuple):
 
 
 def rotors_of(scene: Scene, frame: str, length: float) -> Rotors:
-    """The rotors of a scene of this length (m), held by the fixed frame of that name; none without masses."""
+    """Return the rotors of a scene of the given length (m), joined to the fixed frame with the given name;
+    none without masses."""
     geared = [joint for joint in scene.joint if joint.reflected_inertia] if scene.has_mass() else []
     if not geared:
         return Rotors()
@@ -45,7 +47,7 @@ def rotors_of(scene: Scene, frame: str, length: float) -> Rotors:
 
 
 def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:
-    """A name for the rotor of each joint that nothing else has."""
+    """Return an unused name for the rotor of each joint."""
     taken = {entry.name for entries in (scene.body, scene.joint, scene.coupling) for entry in entries}
     for joint in joints:
         name = f"armature of {joint.name}"
@@ -55,7 +57,7 @@ def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:
 
 
 def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Joint, Coupled]:
-    """The rotor of a joint, the joint that holds it, and the row that couples both."""
+    """Return the rotor of a joint, the joint that carries it, and the row that couples both."""
     inertia, axis = joint.reflected_inertia, AXES[0]
     places: dict[str, Any] = {"bodies": (frame, name), "anchor": ORIGIN, "axis": axis}
     turns = joint.facts.driven == ANGLE
@@ -69,7 +71,7 @@ def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Jo
 
 
 def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
-    """The couplings of a scene, q₂ - ratio · q₁ = 0, of which no factor is above one."""
+    """Return the couplings of a scene, q₂ - ratio · q₁ = 0, scaled such that no factor is above one."""
     found = []
     for coupling in scene.coupling:
         (first, one), (second, other) = scene.coupled(coupling)
@@ -80,7 +82,7 @@ def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
 
 
 def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, Primitive]:
-    """The two primitives of a coupling, which share one row."""
+    """Return the two primitives of a coupling, which share one row."""
     first, second = map(_primitive, coupled.joints, coupled.coordinates, coupled.factors)
     return first, second
 

@@ -9,7 +9,7 @@ from mbref.equations.initial_state import Start, consistent_start, solve_positio
 from mbref.equations.model import Model, displaced
 from mbref.scene import Scene
 
-PERTURBATION = 1e-2  # rad, by which the fastest body turns away from a singular start
+PERTURBATION = 1e-2  # rad; rotation of the fastest body away from a singular start
 RANK_TOLERANCE = 1e-10  # relative residual of least squares below which rows are consistent
 
 
@@ -20,7 +20,7 @@ def undriven_freedoms(scene: Scene) -> int:
 
 
 def freedoms_left(model: Model, start: Start) -> int:
-    """``undriven_freedoms`` of a scene as a model with its start."""
+    """Return ``undriven_freedoms`` of a model with its start."""
     freedoms = model.n - rank_at_start(model, start)
     if freedoms == 0 or not model.scene.driver:
         return freedoms
@@ -28,7 +28,7 @@ def freedoms_left(model: Model, start: Start) -> int:
 
 
 def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
-    """Time and coordinates (7 nb,) when the fastest body has turned by PERTURBATION."""
+    """Return time and coordinates (7 nb,) at which the fastest body has turned by PERTURBATION."""
     q, v = start.q, start.v
     terms = model.terms(0.0, q, v)
     acceleration = _least(terms.jacobian, terms.gamma)
@@ -39,5 +39,5 @@ def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
 
 
 def _least(jacobian: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """The least-squares solution of least norm."""
+    """Return the least-squares solution of least norm."""
     return np.linalg.lstsq(jacobian, rhs, rcond=RANK_TOLERANCE)[0]

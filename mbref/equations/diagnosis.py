@@ -18,9 +18,10 @@ from mbref.scene_services import Counts
 from mbref.scenes import find_scene
 
 RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled Jacobian
-UNIQUE_TOLERANCE = 1e-8  # weight above which a row takes part in a redundancy
+# weight of a row in a left null vector above which the row takes part in a redundancy
+UNIQUE_TOLERANCE = 1e-8
 UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
-MOST_ROWS = 300  # beyond it a dense singular value decomposition takes more than about 0.1 s
+MOST_ROWS = 300  # rows; for more, a dense singular value decomposition takes more than about 0.1 s
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
@@ -66,7 +67,7 @@ def counts(scene: Scene) -> Counts:
 
 
 def rank_at_start(model: Model, start: Start) -> int:
-    """The rank of Φ_q at the corrected initial positions."""
+    """Return the rank of Φ_q at the corrected initial positions."""
     if model.m > LARGE:
         return _redundancy(model, start).rank
     return rank_of(scaled_jacobian(model, 0.0, start.q))
@@ -109,7 +110,8 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
 
 
 def _determined(model: Model, start: Start) -> dict[str, tuple[str, ...]]:
-    """Return by joint the names of the components of its reaction that equilibrium determines at t = 0."""
+    """Return for each joint the names of the components of its reaction that equilibrium determines at t =
+    0."""
     q = start.q.reshape(1, model.nb, 7)
     found = determined_components(model, q, model.blocks_along(np.zeros(1), q))
     return {name: tuple(np.array(COMPONENTS)[mask[0]].tolist()) for name, mask in found.items()}
@@ -126,12 +128,12 @@ def _redundancy(model: Model, start: Start) -> Redundancy:
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
-    """Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
+    """Return Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
     jacobian = model.terms(t, q, np.zeros(model.n)).jacobian
     return jacobian / row_lengths(jacobian)[:, None]
 
 
 def rank_of(matrix: np.ndarray) -> int:
-    """Number of singular values above the rank tolerance times the largest."""
+    """Return the number of singular values above the rank tolerance times the largest one."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(np.sum(values > RANK_TOLERANCE * values[0])) if values.size else 0

@@ -13,7 +13,8 @@ from mbref.linear_algebra.vectors import copy
 
 @inlined
 def set_poses(q, frames):
-    """Positions and rotation matrices of coordinates q; A(p) of p / |p|, so that length does not matter."""
+    """Compute positions and rotation matrices from coordinates q; the matrix of p / |p| is used, so that the
+    length of p has no influence."""
     position, a = frames.position, frames.rotation
     for b in range(q.shape[0] // 7):
         for k in range(3):
@@ -33,7 +34,7 @@ def set_poses(q, frames):
 
 @inlined
 def set_velocities(v, frames):
-    """Velocities r' and body-fixed ω' of the velocity vector v."""
+    """Compute velocities r' and body-fixed ω' from the velocity vector v."""
     velocity, angular_velocity = frames.velocity, frames.angular_velocity
     for b in range(v.shape[0] // 6):
         for k in range(3):
@@ -43,7 +44,7 @@ def set_velocities(v, frames):
 
 @inlined
 def violation_rate(v, equations):
-    """Φ' = Φ_q v - ν of every row."""
+    """Compute Φ' = Φ_q v - ν of every row."""
     bodies, blocks, rows = equations.scene.row_bodies, equations.system.blocks, equations.rows
     for row in range(bodies.shape[0]):
         value = -rows.nu[row]
@@ -57,7 +58,7 @@ def violation_rate(v, equations):
 
 @kernel
 def assemble_jacobian(equations, dense):
-    """The blocks of Φ_q as the matrix ``dense`` (m, n); a matrix without rows stays so."""
+    """Write the blocks of Φ_q into the matrix ``dense`` (m, n); a matrix without rows is unchanged."""
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     dense[:] = 0.0
     for row in range(dense.shape[0]):
@@ -70,7 +71,7 @@ def assemble_jacobian(equations, dense):
 
 @inlined
 def evaluate(t, q, v, equations):
-    """Φ, Φ_q (blocks), ν, γ and g at (t, q, v), of the rows that bear on moving coordinates."""
+    """Compute Φ, Φ_q (blocks), ν, γ and g at (t, q, v), for the rows that act on moving coordinates."""
     set_poses(q, equations.frames)
     set_velocities(v, equations.frames)
     constraints(t, equations.scene.moving, equations)
@@ -79,9 +80,9 @@ def evaluate(t, q, v, equations):
 
 @entry(INT(VECTOR, MATRIX, MATRIX, MATRIX, MATRIX, MATRIX, EQUATIONS))
 def evaluate_along(times, q, v, blocks, rows, forces, equations):
-    """``evaluate`` at k states, for Python: Φ_q as blocks (k, width m), (Φ, ν, γ) (k, 3 m), g (k, n).
+    """Call ``evaluate`` at k states from Python: Φ_q as blocks (k, width m), (Φ, ν, γ) (k, 3 m), g (k, n).
 
-    Returns k.  From times (k,), coordinates q (k, 7 nb) and velocities v (k, n).
+    Arguments are times (k,), coordinates q (k, 7 nb) and velocities v (k, n). Returns k.
     """
     count, m = times.shape[0], equations.rows.phi.shape[0]
     for k in range(count):
@@ -98,7 +99,8 @@ def evaluate_along(times, q, v, blocks, rows, forces, equations):
 
 @inlined
 def right_hand_side(v, equations):
-    """The right-hand side of Φ_q q̈ = γ, less the feedback of Eq. 9 where a stabilisation asks for it."""
+    """Compute the right-hand side of Φ_q q̈ = γ, minus the feedback of Eq. 9 if a stabilisation requires
+    it."""
     rows, rhs, settings = equations.rows, equations.system.rhs, equations.system.settings
     velocity_gain, position_gain = settings.velocity_gain, settings.position_gain
     for row in range(rhs.shape[0]):
@@ -112,7 +114,8 @@ def right_hand_side(v, equations):
 
 @kernel
 def add_resting_rows(t, static, equations):
-    """Φ_q of resting rows where ``evaluate`` was last, and the multipliers of rows that hold columns."""
+    """Compute Φ_q of resting rows at the state of the last evaluation, and the multipliers of rows that keep
+    columns at rest."""
     if equations.scene.resting.shape[0] > 0:
         constraints(t, equations.scene.resting, equations)
         add_static_multipliers(static, equations.system)
@@ -120,7 +123,7 @@ def add_resting_rows(t, static, equations):
 
 @inlined
 def assemble_system(t, q, v, equations):
-    """The system M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs at (t, q, v), which the formulation then solves."""
+    """Compute the system M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs at (t, q, v), which the formulation then solves."""
     equations.system.counts.evaluations += 1
     evaluate(t, q, v, equations)
     assemble_jacobian(equations, equations.system.jacobian)

@@ -17,13 +17,17 @@ from mbref.linear_algebra.clear_rank import least_norm
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import Body, SceneError
 
-RANK_TOLERANCE = 1e-5  # singular values below it (relative) are left alone: rank may drop at the start
-LARGE = 40  # rows; above, dense singular values take longer than sparse factors
-GROSS = 0.05  # violation / scene's length, or / given velocities: a larger one is a fault
-CONTRADICTED = 1e-3  # violation by drivers / speed: rounding of rates leaves less
+# singular values below it (relative) are left uncorrected, because the rank may drop at the start
+RANK_TOLERANCE = 1e-5
+LARGE = 40  # rows; for more, dense singular values take longer than sparse factors
+GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
+# violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
+CONTRADICTED = 1e-3
 MOST_ITERATIONS = 30
-OPEN_WEIGHT, REPEATS = 1e-4, 5  # weight of open velocities beside given ones, and how often it is compensated
-MET = 1e-13  # residual of Φ_q v = ν / largest velocity: on another branch it is larger
+# weight of open velocities relative to given ones, and number of compensating iterations
+OPEN_WEIGHT, REPEATS = 1e-4, 5
+# residual of Φ_q v = ν / largest velocity; it is larger if the velocities belong to another branch
+MET = 1e-13
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
@@ -38,13 +42,13 @@ class Start:
 
     q: np.ndarray  # (7 nb,)
     v: np.ndarray  # (6 nb,)
-    position_violation: float  # largest |Φ| before correction (m or rad)
-    velocity_violation: float  # largest |Φ_q v - ν| of fully given velocities before correction
-    given: np.ndarray  # (6 nb,) the velocities that the scene gives, zero elsewhere
+    position_violation: float  # largest |Φ| before the correction (m or rad)
+    velocity_violation: float  # largest |Φ_q v - ν| before the correction, if all velocities are given
+    given: np.ndarray  # (6 nb,) velocities that the scene gives, zero elsewhere
     follows_branch: bool = False  # True if undetermined velocities were taken from a branch
 
     def report(self) -> str:
-        """One sentence for the user; empty where nothing but rounding was corrected."""
+        """Return one sentence for the user; empty if only rounding was corrected."""
         parts = []
         if self.position_violation > 1e-9:
             parts.append(f"positions were off the constraints by {self.position_violation:.2e}")
@@ -57,9 +61,9 @@ class Start:
 class Alike(NamedTuple):
     """Scenes of equal structure whose consistent starts are computed together.
 
-    Coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each of s
-    scenes. ``terms`` evaluates the scenes at places (k,), with coordinates (k, 7 nb) and velocities (k, n),
-    and returns blocks (k, m, 12); ``model_of`` returns the model of the scene at a place.
+    Fields are coordinates (s, 7 nb) of their poses, masses (s, n), lengths (s,) in m, and the bodies of each
+    of the s scenes. ``terms`` evaluates the scenes with indices (k,), for coordinates (k, 7 nb) and
+    velocities (k, n), and returns blocks (k, m, 12). ``model_of`` returns the model of a scene by index.
     """
 
     model: Model
@@ -72,7 +76,7 @@ class Alike(NamedTuple):
 
 
 def _alone(model: Model, t: float = 0.0) -> Alike:
-    """One scene, its terms at a time (s)."""
+    """Return one scene in this form, with its terms at a time (s)."""
     return Alike(
         model=model,
         poses=model.start()[None],
@@ -85,7 +89,7 @@ def _alone(model: Model, t: float = 0.0) -> Alike:
 
 
 def consistent_start(model: Model) -> Start:
-    """The nearest consistent state; raises SceneError naming the joint that is grossly violated."""
+    """Return the nearest consistent state; raises SceneError for the joint that is grossly violated."""
     (found,) = consistent_starts(_alone(model))
     if isinstance(found, SceneError):
         raise found
@@ -93,7 +97,8 @@ def consistent_start(model: Model) -> Start:
 
 
 def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
-    """The nearest consistent state of each scene, or an error naming the joint that is grossly violated."""
+    """Return the nearest consistent state of each scene, or an error that names the grossly violated
+    joint."""
     q, before, faults, terms = _corrected(scenes, scenes.poses)
     (v, given), model = given_velocities(scenes.bodies, q), scenes.model
     if not (v.any() or terms.nu.any()):
@@ -108,8 +113,10 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
 
 
 class Rates(NamedTuple):
-    """The equations of a scene's velocities (n,): the given ones, a mask of them, ν, and Φ_q (m, n) for
-    velocities over their ``scale`` (n,), or blocks (m, 12) of Φ_q itself where it is large."""
+    """The velocity equations of a scene: the given velocities (n,), a mask of them, ν, and Φ_q.
+
+    Φ_q (m, n) refers to velocities over their ``scale`` (n,); a large scene has blocks (m, 12) of Φ_q itself.
+    """
 
     v: np.ndarray
     given: np.ndarray
@@ -119,7 +126,7 @@ class Rates(NamedTuple):
 
 
 def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) -> Start | SceneError:
-    """The start of one of the scenes from its corrected coordinates q."""
+    """Return the start of one of the scenes from its corrected coordinates q."""
     try:
         v, off, is_open = (_sparse_velocities if scenes.model.m > LARGE else _velocities)(scenes, k, rates)
     except SceneError as fault:
@@ -140,7 +147,7 @@ def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray)
 
 
 def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
-    """The largest |Φ_q v - ν| of unit rows at t = 0, over the largest of the velocities v (6 nb,)."""
+    """Return the largest |Φ_q v - ν| of unit rows at t = 0, over the largest of the velocities v (6 nb,)."""
     terms = model.terms(0.0, q, v)
     jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
     return float(np.abs(jacobian @ v - nu).max() / np.abs(v).max())
@@ -148,7 +155,7 @@ def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
 
 def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
     """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν, otherwise the most
-    accurate one, corrected as far as rounding allows."""
+    accurate one, corrected to rounding."""
     off = [rate_violation(model, q, w) for w in along]
     best = along[int(np.argmin(off)) if max(off) > MET else 0]
     terms = model.terms(0.0, q, best)
@@ -161,7 +168,8 @@ def _fault(model: Model, row: int, what: str) -> SceneError:
 
 
 def _contradiction(model: Model, row: int) -> SceneError:
-    """The fault of drivers whose velocities at t = 0 no motion has; ``row`` is missed most."""
+    """Return the fault of drivers whose velocities at t = 0 are impossible; ``row`` has the largest
+    residual."""
     names = [driver.joint for driver in model.scene.driver]
     who = f"the drivers of {', '.join(names)} contradict" if len(names) > 1 else "contradicts"
     where = f"at t = 0, most of all at joint {model.row_joint[row]!r}"
@@ -169,8 +177,8 @@ def _contradiction(model: Model, row: int) -> SceneError:
 
 
 def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError], Terms]:
-    """Consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, errors by place, and the terms
-    there at rest."""
+    """Return consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, errors by index, and the
+    terms there at zero velocities."""
     faults: dict[int, SceneError] = {}
     most = GROSS * np.maximum(1.0, scenes.length)
     q, before, terms = _solved(scenes, q, most)
@@ -181,20 +189,20 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
         what = f"positions given to bodies violate it by {first[k]:.3g} m or rad"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
     for k in np.flatnonzero((last > 1e-10) & (first <= most)).tolist():
-        what = f"no positions nearby meet it; {last[k]:.3g} m or rad are left"
+        what = f"no nearby positions satisfy it; {last[k]:.3g} m or rad remain"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(terms.phi[k]))), what)
     return q, first, faults, terms
 
 
 def is_met(violation: Any, length: Any) -> Any:
-    """Whether the largest |Φ| of a scene of a length (m) is rounding; of numbers or of arrays."""
+    """Return whether the largest |Φ| of a scene of a length (m) is rounding; for numbers or arrays."""
     return violation <= 1e-14 * np.maximum(1.0, length)
 
 
 def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Newton–Raphson on Φ(q, t) = 0 from q (7 nb,); the coordinates reached and Φ (m,) there.
+    """Solve Φ(q, t) = 0 by Newton–Raphson from q (7 nb,); return the coordinates reached and Φ (m,) there.
 
-    With the pseudo-inverse, so that redundant rows and a singular start do no harm; the change is least
+    The pseudo-inverse is used, so that redundant rows and a singular start are allowed; the change is least
     in the metric of M.
     """
     found, _, terms = _solved(_alone(model, t), q[None], np.full(1, np.inf))
@@ -202,8 +210,11 @@ def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, 
 
 
 def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, Terms]:
-    """``solve_positions`` of each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most`` (s,): the
-    coordinates, Φ (s, m) before, and the terms after, at rest."""
+    """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most``
+    (s,).
+
+    The result is the coordinates, Φ (s, m) before, and the terms after, at zero velocities.
+    """
     q, every, at_rest = q.copy(), np.arange(len(q)), np.zeros((len(q), scenes.model.n))
     first = terms = scenes.terms(every, q, at_rest)
     off = np.abs(terms.phi).max(axis=1, initial=0.0)
@@ -225,7 +236,8 @@ def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray,
 
 
 def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
-    """The changes (k, n), least in the metric of M, by which Φ_q of blocks (k, m, 12) grows by rhs (k, m)."""
+    """Return the changes (k, n), least in the metric of M, for which Φ_q (blocks (k, m, 12)) times the change
+    equals rhs (k, m)."""
     model, mass = scenes.model, scenes.mass[places]
     mass = np.where(mass > 0, mass, 1.0)
     if model.m > LARGE:
@@ -237,10 +249,8 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere) and which those are.
-
-    From the coordinates (s, 7 nb).
-    """
+    """Return the velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere), and a mask of them,
+    from coordinates (s, 7 nb)."""
     shape = len(q), len(bodies[0]), 6
     v, given = np.zeros(shape), np.zeros(shape, dtype=bool)
     for k, own in enumerate(bodies):
@@ -257,11 +267,11 @@ def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[n
 
 
 def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Velocities of a scene that meet Φ_q v = ν, how far the given ones were from that, and whether some may
-    be open.
+    """Return velocities of a scene that satisfy Φ_q v = ν, the residual of the given ones, and whether some
+    may be undetermined.
 
-    Among the solutions those nearest to the given velocities (angular ones times the scene's length);
-    velocities left open are least in the metric of M.
+    Among the solutions it is the nearest one to the given velocities (angular ones times the scene's length);
+    undetermined velocities are least in the metric of M.
     """
     v, given, nu, scale, jacobian = rates
     wanted = v[given] / scale[given]

@@ -1,9 +1,9 @@
 """Joint reactions from Lagrange multipliers: -Φ_qᵀ λ of a joint's rows, moved to its anchor.
 
-The part of a coupling's or an armature's row that acts along a joint's coordinate belongs to its reaction, as
-a driver's row does.
+The part of a coupling's or an armature's row that acts along a joint's coordinate is part of its reaction,
+like a driver's row.
 
-They are found when the first of them is asked for: to find them all takes longer than a short run.
+Reactions are computed at first access, because this takes longer than a short run.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import ANGLE
 from mbref.scene import Scene
 
-MOST_ROWS = 120  # singular values of more rows at every sample take longer than the run
-OPEN = 1e-6  # singular value, to the largest, of a combination of unit rows that counts as vanished
-SHARE = 1e-6  # weight of a joint in such a combination below which it takes no part
+MOST_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
+OPEN = 1e-6  # singular value of unit rows / largest one, below which a combination of rows vanishes
+SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
 
 class Balance:
-    """The samples of a run at which forces and reactions balance: times (k,) in s, q (k, nb, 7), λ (k, m)."""
+    """Samples of a run for the balance of forces and reactions: times (k,) in s, q (k, nb, 7), λ (k, m)."""
 
     def __init__(
         self,
@@ -41,25 +41,25 @@ class Balance:
         self._model = model
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the model, which another process makes when it needs it."""
+        """Leave out the model, which another process makes when it needs it."""
         found = {**vars(self), "_model": None}
         found.pop("_blocks", None)
         return found
 
     @functools.cached_property
     def _blocks(self) -> tuple[Model, np.ndarray]:
-        """The model and Φ_q as blocks (k, m, 12)."""
+        """Model and Φ_q as blocks (k, m, 12)."""
         model = self._model or Model(self._scene)
         blocks = model.blocks_along(self._times, self._q)
         model.release()
         return model, blocks
 
     def reactions(self) -> OfJoints | None:
-        """Per joint its reaction (k, 6), see ``reactions``; None where the scene has no masses."""
+        """Reaction (k, 6) of each joint, see ``reactions``; None if the scene has no masses."""
         return OfJoints(self._scene, self._reactions) if self._scene.has_mass() else None
 
     def open_dimensions(self) -> OfJoints | None:
-        """Per joint ``open_dimensions`` (k,); None where they are not found."""
+        """Number of undetermined reaction components (k,) of each joint; None if they are not computed."""
         found = self._scene.has_mass() and self._multipliers.shape[1] <= MOST_ROWS
         return OfJoints(self._scene, self._open_dimensions) if found else None
 
@@ -72,7 +72,7 @@ class Balance:
 
 
 class OfJoints(Mapping[str, np.ndarray]):
-    """Arrays by the names of a scene's joints, found when the first of them is asked for."""
+    """Arrays by the names of a scene's joints, computed at first access."""
 
     def __init__(self, scene: Scene, find: Callable[[], dict[str, np.ndarray]]):
         self._names, self._find = tuple(joint.name for joint in scene.joint), find
@@ -99,9 +99,9 @@ class OfJoints(Mapping[str, np.ndarray]):
 def reactions(
     model: Model, q: np.ndarray, blocks: np.ndarray, multipliers: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """Per joint force (N) and moment (N m) (k, 6) on its second body at the anchor, world axes.
+    """Return for each joint force (N) and moment (N m) (k, 6) on its second body at the anchor, world axes.
 
-    From q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m).
+    Arguments are q (k, nb, 7), the blocks (k, m, 12) of Φ_q and λ (k, m).
     """
     names = tuple(joint.name for joint in model.scene.joint)
     if not names:
@@ -121,7 +121,7 @@ def reactions(
 def _add_coupled(
     model: Model, q: np.ndarray, multipliers: np.ndarray, names: Sequence[str], wrench: np.ndarray
 ) -> None:
-    """Add what couplings and armatures do along the coordinates of joints to their wrenches (k, j, 6).
+    """Add the forces of couplings and armatures along the coordinates of joints to their wrenches (k, j, 6).
 
     It is a force along, or a moment about, the axis that the first body carries.
     """
@@ -140,11 +140,12 @@ def _add_coupled(
 
 
 def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
-    """Per joint the dimensions (k,) of its reaction that equilibrium does not determine at each sample.
+    """Return for each joint the number (k,) of reaction components that equilibrium does not determine at
+    each sample.
 
-    Redundant rows leave reactions open always, a singular position where the motion passes it: there a
-    combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech. 43, 2005).  From
-    the blocks (k, m, 12) of Φ_q.
+    Redundant rows leave reactions undetermined at all times, a singular position only when the motion passes
+    it. There a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech.
+    43, 2005). The argument ``blocks`` (k, m, 12) contains Φ_q.
     """
     vanishing, _ = vanishing_combinations(model, blocks)
     names = tuple(joint.name for joint in model.scene.joint)
@@ -193,17 +194,18 @@ def _singular_values(matrices: np.ndarray) -> np.ndarray:
 
 
 class Places(NamedTuple):
-    """For every joint: the body in whose coordinates its wrench is computed, its place (0 or 1), its rows."""
+    """For every joint: the body in whose coordinates its wrench is computed, first or second body (0 or 1),
+    and its rows."""
 
     body: np.ndarray
     side: np.ndarray
-    of: np.ndarray  # the joint of each row
+    of: np.ndarray  # joint of each row
     starts: np.ndarray  # first row of each joint; the rows of a joint are adjacent
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)
 def _places(structure: Structure, names: tuple[str, ...]) -> Places:
-    """The places of joints of these names, which are the first in the structure."""
+    """Return the places of the named joints, which are the first ones in the structure."""
     of = np.array([names.index(name) for name in structure.row_joint if name in names], dtype=int)
     starts = np.searchsorted(of, np.arange(len(names)))
     bodies = structure.row_bodies[starts]

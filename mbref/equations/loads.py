@@ -59,7 +59,7 @@ def forces(t, equations):
 
 @kernel
 def push(b, point, force, frames, g):
-    """A world force at a body-fixed point; a force on the fixed frame does nothing."""
+    """Add a world force at a body-fixed point; a force on the fixed frame has no effect."""
     if 6 * b < g.shape[0]:
         accumulate(g, 6 * b, force)
         accumulate(g, 6 * b + 3, cross(point, to_body(frames.rotation, b, force)))
@@ -67,7 +67,7 @@ def push(b, point, force, frames, g):
 
 @kernel
 def point_motion(b, s, frames):
-    """World position and velocity of a body-fixed point."""
+    """Return world position and velocity of a body-fixed point."""
     w = vector(frames.angular_velocity, b)
     position = add(vector(frames.position, b), to_world(frames.rotation, b, s))
     return position, add(vector(frames.velocity, b), to_world(frames.rotation, b, cross(w, s)))
@@ -75,7 +75,7 @@ def point_motion(b, s, frames):
 
 @kernel
 def spring(k, loads, frames, g):
-    """Tension stiffness (l - natural length) + damping l' between two points."""
+    """Add the tension stiffness (l - natural length) + damping l' between two points."""
     i, j = loads.first[k], loads.second[k]
     s_i, s_j = vector(loads.point_first, k), vector(loads.point_second, k)
     p_i, v_i = point_motion(i, s_i, frames)
@@ -92,7 +92,8 @@ def spring(k, loads, frames, g):
 
 @kernel
 def relative_angle(k, reference, loads, rotation):
-    """Angle of the second body against the first about the joint axis (rad), nearest to ``reference``."""
+    """Return the angle of the second body relative to the first about the joint axis (rad), nearest to
+    ``reference``."""
     i, j = loads.first[k], loads.second[k]
     x, y = to_world(rotation, i, vector(loads.x_first, k)), to_world(rotation, i, vector(loads.y_first, k))
     u = to_world(rotation, j, vector(loads.x_second, k))

@@ -1,7 +1,7 @@
 """Model: a scene as arrays, and its equations M, g, Φ, Φ_q, ν, γ at (t, q, v).
 
-Each body is described in its principal frame at the centre of mass, so that M is diagonal; frames are
-turned back where trajectories are written.
+Each body is described in its principal frame at the centre of mass, so that M is diagonal. Trajectories are
+converted to the bodies' own frames.
 """
 
 from __future__ import annotations
@@ -41,14 +41,15 @@ class Terms:
 
 
 class Model:
-    """A scene packed once; ``bodies`` lists the bodies of the scene, then the ground if it is modelled.
+    """A scene as arrays, with its equations; ``bodies`` lists the bodies of the scene, then the ground if it
+    is modelled.
 
     ``entry_columns`` (m, 12) has the columns of the blocks' entries; columns of the fixed frame are ≥ n.
     A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
     def __init__(self, scene: Scene, packs: Packs | None = None, place: int = 0):
-        """A scene, or that at a place of several that are packed."""
+        """Store a scene, or the scene with an index among several that are packed."""
         packs = packs or Packs([scene])
         self.scene, self._packs, self._place = scene, packs, place
         self.bodies, self.joints = packs.listed[place], packs.joints[place]
@@ -62,7 +63,7 @@ class Model:
 
     @property
     def memory(self) -> Pooled:
-        """Memory of evaluations with the numbers of this scene, acquired when it is first asked for."""
+        """Memory of evaluations with the numbers of this scene, acquired at first access."""
         if self._pooled is None:
             self._pooled = acquire((Equations, self.structure), self.equations)
             self.put_numbers(self._pooled.values, self.data)
@@ -82,9 +83,9 @@ class Model:
     def equations(
         self, sizes: Mapping[str, int] | None = None, data: SceneData | None = None, **system: Any
     ) -> Equations:
-        """Fresh memory of an evaluation, with a copy of the scene's data or of others.
+        """Return new memory for evaluations, with a copy of the scene's data or of other data.
 
-        ``system`` names fields of its System that are given.
+        ``system`` contains given fields of its System.
         """
         sizes, data = sizes or self.sizes, data or self.data
         defaults = {
@@ -117,25 +118,26 @@ class Model:
         return self.structure.has_angles
 
     def start(self) -> np.ndarray:
-        """Coordinates (7 nb,) of the scene's poses, principal frames."""
+        """Coordinates (7 nb,) of the scene's poses, for principal frames."""
         return self._packs.start()[self._place]
 
     def terms(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms at time t (s), coordinates q (7 nb,), velocities v (6 nb,)."""
+        """Return the terms at time t (s), coordinates q (7 nb,), velocities v (6 nb,)."""
         found = self.blocks(t, q, v)
         return replace(found, jacobian=self.dense(found.jacobian))
 
     def dense(self, blocks: np.ndarray) -> np.ndarray:
-        """Φ_q (…, m, n) from its blocks (…, m, 12)."""
+        """Return Φ_q (…, m, n) from its blocks (…, m, 12)."""
         matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), self.structure.rows
         for side in range(self.structure.sides):
             matrix[..., rows, self.structure.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
         return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
 
     def along(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms at k states, with the blocks (k, m, 12) instead of Jacobians; mass (n,) is constant.
+        """Return the terms at k states, with the blocks (k, m, 12) instead of Jacobians; mass (n,) is
+        constant.
 
-        From times (k,) in s, q (k, 7 nb) and v (k, n).
+        Arguments are times (k,) in s, q (k, 7 nb) and v (k, n).
         """
         count = len(times)
         blocks, rows = np.empty((count, self.entry_columns.size)), np.empty((count, 3 * self.m))
@@ -145,7 +147,7 @@ class Model:
         return Terms(self.mass, blocks.reshape(count, *self.entry_columns.shape), phi, nu, gamma, forces)
 
     def sparse(self, blocks: np.ndarray) -> csr_array:
-        """Φ_q (m, n) from its blocks (m, 12), without zeros."""
+        """Return Φ_q (m, n) from its blocks (m, 12), as a sparse matrix."""
         from scipy.sparse import csr_array
 
         columns = self.entry_columns
@@ -153,13 +155,13 @@ class Model:
         return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(self.m, self.n))
 
     def blocks(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
+        """Return the terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
         at = np.ascontiguousarray(q).reshape(1, -1), np.ascontiguousarray(v).reshape(1, -1)
         found = self.along(np.array([float(t)]), *at)
         return Terms(self.mass, found.jacobian[0], found.phi[0], found.nu[0], found.gamma[0], found.force[0])
 
     def blocks_along(self, times: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
+        """Return blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
         return self.along(times, q.reshape(len(q), 7 * self.nb), np.zeros((len(q), self.n))).jacobian
 
     def at(self, q: np.ndarray, states: RandomStates) -> Terms:
@@ -169,11 +171,11 @@ class Model:
 
     @property
     def closed_loops(self) -> int:
-        """Independent loops of bodies and joints; without one, no position is singular."""
+        """Number of independent loops of bodies and joints; without a loop no position is singular."""
         return self.structure.closed_loops
 
     def index(self, name: str) -> int:
-        """Index of a body, ``nb`` for the fixed frame."""
+        """Return the index of a body, ``nb`` for the fixed frame."""
         return self._packs.index[name]
 
     @property
@@ -182,19 +184,20 @@ class Model:
         return self._packs.to_local[self._place]
 
     def direction(self, name: str, vector: Sequence[float]) -> np.ndarray:
-        """A world vector (3,) at t = 0 in the principal frame of a body."""
+        """Return a world vector (3,) at t = 0 in the principal frame of a body."""
         at = np.array([self.index(name)]), np.array([vector], dtype=float)
         found: np.ndarray = self._packs.directions(*at)[self._place, 0]
         return found
 
     def point(self, name: str, point: Sequence[float]) -> np.ndarray:
-        """A world point (3,) at t = 0 in the principal frame of a body, from its centre of mass."""
+        """Return a world point (3,) at t = 0 in the principal frame of a body, relative to its centre of
+        mass."""
         at = np.array([self.index(name)]), np.array([point], dtype=float)
         found: np.ndarray = self._packs.points(*at)[self._place, 0]
         return found
 
     def anchors(self, q: np.ndarray) -> np.ndarray:
-        """World positions (k, j, 3) of the joints' anchors on their second bodies at q (k, nb, 7)."""
+        """Return world positions (k, j, 3) of the joints' anchors on their second bodies at q (k, nb, 7)."""
         second = np.array([self._packs.index[joint.bodies[1]] for joint in self.scene.joint], dtype=int)
         given = np.array([joint.anchor_pair[1] for joint in self.scene.joint], dtype=float).reshape(-1, 3)
         frame = np.broadcast_to([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (len(q), 1, 7))
@@ -203,7 +206,7 @@ class Model:
         return pose[..., :3] + rotations.rotate(pose[..., 3:], own)
 
     def motion(self, q: np.ndarray, v: np.ndarray, a: np.ndarray) -> dict[str, Any]:
-        """``motion_of`` the scene's bodies."""
+        """Return ``motion_of`` for the scene's bodies."""
         principal = self.principal if self._packs.turns_frames else None
         return motion_of(q, v, a, principal, len(self.scene.body))
 
@@ -211,10 +214,11 @@ class Model:
 def motion_of(
     q: np.ndarray, v: np.ndarray, a: np.ndarray, principal: np.ndarray | None, count: int
 ) -> dict[str, Any]:
-    """Poses, velocities and accelerations of the first so many bodies as a Trajectory names them.
+    """Return poses, velocities and accelerations of the first ``count`` bodies with the names of a
+    Trajectory, in world axes.
 
-    From q (…, nb, 7), v and a (…, nb, 6) of the ``principal`` frames (…, nb, 4), the bodies' own where it is
-    None, to world axes.
+    Arguments are q (…, nb, 7), v and a (…, nb, 6) of the ``principal`` frames (…, nb, 4); None means the
+    bodies' own frames.
     """
     own, p = slice(0, count), q[..., 3:]
     turned = p if principal is None else rotations.multiply(p, rotations.conjugate(principal))
@@ -231,12 +235,13 @@ def motion_of(
 
 
 def displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """q ⊕ x: coordinates (7 nb,) moved by (δr, δπ') per body (6 nb,), see ``coordinates.displace``."""
+    """Return q ⊕ x: coordinates (7 nb,) moved by (δr, δπ') for each body (6 nb,), see
+    ``coordinates.displace``."""
     return all_displaced(q, x.reshape(1, -1))[0]
 
 
 def all_displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """q ⊕ x (k, 7 nb) for each of x (k, 6 nb)."""
+    """Return q ⊕ x (k, 7 nb) for each of x (k, 6 nb)."""
     moved = np.empty((len(x), q.size))
     moved[:] = q
     displace_all(moved, np.ascontiguousarray(x, dtype=float), np.zeros(q.size))
@@ -244,7 +249,8 @@ def all_displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def displacement(q: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """The small (δr, δπ') per body (6 nb,) that displaces coordinates (7 nb,) to others, to first order."""
+    """Return the small (δr, δπ') for each body (6 nb,) that moves coordinates (7 nb,) to others, to first
+    order."""
     here, there = q.reshape(-1, 7), target.reshape(-1, 7)
     turn = 2.0 * rotations.multiply(rotations.conjugate(here[:, 3:]), there[:, 3:])
     return np.concatenate([there[:, :3] - here[:, :3], np.sign(turn[:, :1]) * turn[:, 1:]], axis=1).ravel()

@@ -1,7 +1,7 @@
 """Scenes of one structure as the arrays that kernels read, packed at once: a single scene, or many variants.
 
-Scenes are of one structure where they differ in numbers alone (``parts.shape_of``).  The first axis of every
-array counts the scenes.  An entry that scenes share, as variants share most, is read once.
+Scenes are of one structure if they differ in numbers only (``parts.shape_of``). The first axis of every array
+is the scene. An entry that scenes share is converted once.
 """
 
 from __future__ import annotations
@@ -53,14 +53,12 @@ OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the
 
 
 class Packs:
-    """Scenes of one shape: structure, SceneData, masses, frames and lengths.
-
-    For s scenes of nb bodies: ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where
-    the mass is zero; ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own
-    and from the world; ``length`` (s,), the largest distance between two centres of mass and joint anchors at
-    t = 0 (m).  ``to_local`` (s, nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames.
-    ``listed`` has the bodies of each scene, ``joints`` its joints.
-    """
+    """Scenes of one shape: structure, SceneData, masses, frames and lengths. For s scenes of nb bodies:
+    ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where the mass is zero;
+    ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own and from the world;
+    ``length`` (s,), the largest distance between two centres of mass and joint anchors at t = 0 (m).
+    ``to_local`` (s, nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames. ``listed`` has the
+    bodies of each scene, ``joints`` its joints."""
 
     def __init__(self, scenes: Sequence[Scene]):
         self.scenes, self.kinematic = scenes, not scenes[0].has_mass()
@@ -118,8 +116,8 @@ class Packs:
         coupled: Sequence[tuple[Primitive, ...]],
         driven: Mapping[str, int],
     ) -> Places:
-        """All of a scene but its numbers, from the primitives of each joint, the first scene's first, and of
-        the first scene's couplings."""
+        """Return everything of a scene except its numbers, from the primitives of each joint and of the first
+        scene's couplings."""
         scene, joints = self.scenes[0], self.joints[0]
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads, functions = () if self.kinematic else scene.load, functions_of(scene)
@@ -142,7 +140,7 @@ class Packs:
         )
 
     def _of_couplings(self, primitives: Sequence[tuple[Primitive, ...]]) -> Iterator[PrimitivePlace]:
-        """The joint coordinates of the first scene's couplings, two a row."""
+        """Return the joint coordinates of the first scene's couplings, two for each row."""
         for coupling, pair in zip(self._coupled[0], primitives, strict=True):
             for k, (joint, p) in enumerate(zip(coupling.joints, pair, strict=True)):
                 first, second = map(self.index.__getitem__, joint.bodies)
@@ -161,19 +159,19 @@ class Packs:
         return LoadPlace(kind, *map(self.index.__getitem__, bodies), function)
 
     def _all(self, array: np.ndarray) -> np.ndarray:
-        """An array that is the same for all scenes."""
+        """Return an array that is equal for all scenes."""
         many = len(self.scenes) > 1
         return np.broadcast_to(array, (len(self.scenes), *array.shape)) if many else array[None]
 
     def _rows(self, rows: Iterable[Any], width: int) -> np.ndarray:
-        """Rows of numbers (s, …, width) of entries, of one scene after another."""
+        """Return rows of numbers (s, …, width) of entries, scene after scene."""
         return np.array([*rows], dtype=float).reshape(len(self.scenes), -1, width)
 
     def _gravity(self) -> np.ndarray:
         return np.array([NONE if self.kinematic else scene.gravity for scene in self.scenes], dtype=float)
 
     def _bodies(self) -> Bodies:
-        """Masses and moments; places and frames of the bodies, the fixed frame behind them."""
+        """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""
         found = [_once(_of_body, bodies) for bodies in self.listed]
         numbers = self._rows((row for rows in found for row in (*(own for own, _ in rows), AT_ORIGIN)), 11)
         axes = [axes for rows in found for _, axes in rows]
@@ -191,7 +189,7 @@ class Packs:
         return Bodies(numbers[:, :-1, 7], numbers[:, :-1, 8:])
 
     def _lengths(self, joints: Sequence[Joint]) -> np.ndarray:
-        """Lengths (s, nb) of bodies; the anchors' distances from them, and the scenes' ``length``."""
+        """Return lengths (s, nb) of bodies, the vectors to their anchors, and the scenes' ``length``."""
         anchors = self._rows(_once(_anchors, joints), 6).reshape(len(self.scenes), -1, 3)
         scene = self.scenes[0]
         own = self._centres[:, : len(scene.body)], anchors[:, : 2 * len(scene.joint)]
@@ -202,10 +200,8 @@ class Packs:
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
     def _fixed_in_bodies(self, of_primitives: Sequence[Numbers]) -> tuple[Primitives, Loads]:
-        """Primitives and loads, from the numbers of the primitives of all joints, drivers and couplings.
-
-        Their vectors are turned to the principal frames of the bodies all at once.
-        """
+        """Return primitives and loads from the numbers of the primitives of all joints, drivers and
+        couplings. Their vectors are rotated to the principal frames of the bodies in one operation."""
         structure, scenes = self.structure, () if self.kinematic else self.scenes
         numbers = self._rows(of_primitives, 16)
         of_loads = self._rows((_numbers_of(load, scene) for scene in scenes for load in scene.load), 24)
@@ -225,7 +221,8 @@ class Packs:
         return primitives, loads
 
     def in_bodies(self, vectors: np.ndarray) -> np.ndarray:
-        """World vectors (s, 5 p + 6 l, 3) of the structure at t = 0 in the principal frames of its bodies."""
+        """Return world vectors (s, 5 p + 6 l, 3) of the structure at t = 0 in the principal frames of its
+        bodies."""
         origins = self._centres[:, self.structure.vector_origin]
         return self.directions(self.structure.vector_body, vectors - origins)
 
@@ -241,26 +238,29 @@ class Packs:
         return Functions(first, *waves, numbers[..., 3:], pieces[..., 0], pieces[..., 1], pieces[..., 2:])
 
     def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """World vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""
+        """Return world vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body with index
+        (k,)."""
         return (self.to_local[:, bodies] @ vectors[..., None])[..., 0]
 
     def points(self, bodies: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """World points (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body of index (k,)."""
+        """Return world points (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body with index
+        (k,)."""
         return self.directions(bodies, points - self._centres[:, bodies])
 
     def start(self) -> np.ndarray:
-        """Coordinates (s, 7 nb) of the scenes' poses, principal frames."""
+        """Return coordinates (s, 7 nb) of the scenes' poses, for principal frames."""
         poses = np.concatenate([self._centres[:, : self.nb], self.orientation], axis=-1)
         return poses.reshape(len(self.scenes), 7 * self.nb)
 
 
 def row_of(values: Any, place: Any) -> Any:
-    """The arrays of one scene, or of those at some places, of a schema of arrays of several."""
+    """Return the arrays of one scene, or of several, from a schema with the arrays of all scenes."""
     return type(values)(*(row_of(v, place) if isinstance(v, tuple) else v[place] for v in values))
 
 
 def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
-    """A function of every entry, called once for one that stands there several times."""
+    """Return a function's values for all entries; it is called once for an entry that occurs several
+    times."""
     known: dict[int, Any] = {}
     for entry in entries:
         if id(entry) not in known:
@@ -269,15 +269,15 @@ def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
 
 
 def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
-    """Quaternions (k, 4) of rotation matrices, of which None stands for no rotation."""
+    """Return quaternions (k, 4) of rotation matrices, where None means no rotation."""
     if all(each is None for each in axes):
         return np.tile([1.0, 0.0, 0.0, 0.0], (len(axes), 1))
     return rotations.from_matrix(np.array([np.eye(3) if each is None else each for each in axes]))
 
 
 def _of_body(body: Body) -> tuple[tuple[float, ...], np.ndarray | None]:
-    """Place, orientation, mass and principal moments, and the rotation from the principal frame to the body's
-    own; None for the same frame."""
+    """Return position, orientation, mass and principal moments of a body, and the rotation from the principal
+    frame to its own frame (None if they are equal)."""
     mass = 1.0 if body.mass is None else body.mass
     moments, axes = _principal_axes(body.inertia)
     return (*body.position, *body.orientation, mass, *moments), axes
@@ -296,26 +296,26 @@ def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
 
 
 def _anchors(joint: Joint) -> tuple[float, ...]:
-    """The anchors on the first and on the second body, world at t = 0."""
+    """Return the anchors on the first and on the second body, world at t = 0."""
     first, second = joint.anchor_pair
     return *first, *second
 
 
 def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Numbers]]:
-    """The primitives of a joint and its driver, and the 16 numbers of each: two points, three directions
-    (``direction_first``, ``turning_first``, ``direction_second``) and a length."""
+    """Return the primitives of a joint and its driver, and 16 numbers of each: two points, three directions
+    and a length. The directions are ``direction_first``, ``turning_first`` and ``direction_second``."""
     found = [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
     return found, [_numbers(p) for p in found]
 
 
 def _numbers(p: Primitive) -> Numbers:
-    """Two points, three directions and a length, or the factor of a joint coordinate."""
+    """Return two points, three directions and a length, or the factor of a joint coordinate."""
     return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
 
 
 def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
-    """Seven world vectors at t = 0 (force, two points, axis, x and y on the first body, x on the second),
-    stiffness, damping, natural length or angle; zero for those that a load has not."""
+    """Return seven world vectors at t = 0, stiffness, damping, and natural length or angle of a load; unused
+    ones are zero. The vectors are force, two points, axis, x and y on the first body, and x on the second."""
     if isinstance(load, Moment):
         return *load.moment, *NONE * 7
     if isinstance(load, Force):

@@ -1,4 +1,5 @@
-"""Bodies, joints and couplings of a scene's equations: the scene's own, rotors, and a modelled ground."""
+"""Bodies, joints and couplings of a scene's equations: the scene's own, rotors for armatures, and a modelled
+ground."""
 
 from __future__ import annotations
 
@@ -8,12 +9,13 @@ from typing import NamedTuple
 from mbref.equations.couplings import Coupled, rotors_of
 from mbref.scene import GROUND, Body, Fixed, Joint, Scene, TimeFunction
 
-FRAME = "the fixed frame"  # holds a modelled ground and the rotors of armatures
+# name of the frame to which a modelled ground and the rotors of armatures are joined
+FRAME = "the fixed frame"
 NONE = (0.0, 0.0, 0.0)
 
 
 def shape_of(scene: Scene) -> Hashable:
-    """All of a scene but its numbers: scenes of equal shape are packed together."""
+    """Return everything of a scene except its numbers: scenes of equal shape are packed together."""
     return (
         scene.ground,
         tuple((body.name, _shape_of_inertia(body)) for body in scene.body),
@@ -33,7 +35,7 @@ def _shape_of_function(function: TimeFunction | None) -> tuple[int, ...]:
 
 
 def _shape_of_inertia(body: Body) -> bool | None:
-    """Whether it has products of inertia; None without mass."""
+    """Return whether a body has products of inertia; None without mass."""
     return None if body.inertia is None else isinstance(body.inertia[0], tuple)
 
 
@@ -42,12 +44,12 @@ class Parts(NamedTuple):
 
     bodies: tuple[Body, ...]
     joints: tuple[Joint, ...]
-    couplings: tuple[Coupled, ...]  # that are not the scene's
+    couplings: tuple[Coupled, ...]  # couplings of armatures, which the scene does not list
 
 
 def all_parts(scene: Scene) -> Parts:
-    """Bodies and joints of a scene; a rotor for each armature, and the ground a body held by six rows where
-    the scene asks for it."""
+    """Return bodies and joints of a scene, with a rotor for each armature, and the ground as a body with six
+    rows if the scene requests it."""
     rotors = rotors_of(scene, FRAME, _extent(scene))
     bodies, joints = (*scene.body, *rotors.bodies), (*scene.joint, *rotors.joints)
     if scene.ground == "frame":
@@ -59,7 +61,7 @@ def all_parts(scene: Scene) -> Parts:
 
 
 def _extent(scene: Scene) -> float:
-    """The largest side of a box around all centres of mass and anchors (m), or 1."""
+    """Return the largest side of a box around all centres of mass and anchors (m), or 1."""
     points = [body.position for body in scene.body]
     points += [anchor for joint in scene.joint for anchor in joint.anchor_pair]
     return max(max(side) - min(side) for side in zip(*points, strict=True)) or 1.0

@@ -45,7 +45,7 @@ NOTHING = (0.0, 0.0, 0.0)
 
 @kernel
 def point(p, equations):
-    """Two body-fixed points coincide: three rows, whose ν stays zero.
+    """Evaluate the constraint that two body-fixed points coincide: three rows, whose ν stays zero.
 
     Constant entries of Φ_q are written at the first evaluation only, into zeros.
     """
@@ -64,9 +64,10 @@ def point(p, equations):
 
 @kernel
 def place_of(b, s, sign, row, column, equations):
-    """World place of a body-fixed point, and its acceleration without q̈; ± s × Aᵀ into three rows of Φ_q.
+    """Return the world position of a body-fixed point and its acceleration for q̈ = 0; write ± s × Aᵀ into
+    three rows of Φ_q.
 
-    Entries of the fixed frame, which nobody reads, are left out.
+    Entries of the fixed frame are never read and left out.
     """
     frames, blocks = equations.frames, equations.system.blocks
     if b == frames.position.shape[0] - 1:
@@ -103,7 +104,8 @@ def turned_direction(p, t, equations):
 
 @kernel
 def dot1(p, t, equations):
-    """Dot-1 constraint: a vector on each body, kept perpendicular; a driver rotates the first one."""
+    """Evaluate a dot-1 constraint: vectors of both bodies stay perpendicular; a driver rotates the first
+    one."""
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
@@ -129,7 +131,7 @@ def dot1(p, t, equations):
 
 @kernel
 def between(p, primitives, frames):
-    """Return the vector d between the points of both bodies, its rate, and d'' without q̈ (world)."""
+    """Return the vector d between the points of both bodies, its rate, and d'' for q̈ = 0 (world)."""
     i, j, a = primitives.first[p], primitives.second[p], frames.rotation
     s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
     w_i, w_j = vector(frames.angular_velocity, i), vector(frames.angular_velocity, j)
@@ -147,7 +149,8 @@ def between(p, primitives, frames):
 
 @kernel
 def dot2(p, t, equations):
-    """A vector on the first body stays perpendicular to d; with a driver, d advances along it."""
+    """Evaluate a dot-2 constraint: a vector on the first body stays perpendicular to d; a driver prescribes d
+    along it."""
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
@@ -172,7 +175,7 @@ def dot2(p, t, equations):
 
 @kernel
 def distance(p, equations):
-    """Two body-fixed points keep their distance."""
+    """Evaluate the constraint that two body-fixed points keep their distance."""
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
@@ -191,7 +194,8 @@ def distance(p, equations):
 
 @kernel
 def joint_coordinate(p, equations):
-    """Add a joint coordinate times its factor to the row of a coupling, which the first of two begins."""
+    """Add a joint coordinate times its factor to the row of a coupling; the first of the two coordinates
+    resets the row."""
     primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
     row = primitives.row[p]
     if primitives.begins[p]:
@@ -206,7 +210,8 @@ def joint_coordinate(p, equations):
 
 @kernel
 def joint_angle(p, reference, primitives, rotation):
-    """Angle of the second body against the first about the joint's axis (rad), nearest to ``reference``."""
+    """Return the angle of the second body relative to the first about the joint's axis (rad), nearest to
+    ``reference``."""
     i, j = primitives.first[p], primitives.second[p]
     x = to_world(rotation, i, vector(primitives.direction_first, p))
     y = to_world(rotation, i, vector(primitives.turning_first, p))
@@ -244,7 +249,7 @@ def add_angle(p, equations):
 
 @kernel
 def add_displacement(p, equations):
-    """Add a displacement to its row, as ``dot2`` has it."""
+    """Add a displacement to its row, by the formulas of ``dot2``."""
     primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
     rows, blocks = equations.rows, equations.system.blocks
     i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]
@@ -264,7 +269,8 @@ def add_displacement(p, equations):
 
 @inlined
 def constraints(t, primitives, equations):
-    """Φ, Φ_q, ν and γ of the rows of these primitives, by number, at the state in ``equations.frames``."""
+    """Evaluate Φ, Φ_q, ν and γ of the rows of these primitives, by number, at the state in
+    ``equations.frames``."""
     kinds = equations.scene.primitives.kind
     for k in range(primitives.shape[0]):
         p = primitives[k]

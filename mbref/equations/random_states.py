@@ -1,6 +1,6 @@
 """Random states at which the structure of equations is read.
 
-An expression that is not zero everywhere does not vanish there.
+An expression that is not identically zero does not vanish at a random state.
 """
 
 from __future__ import annotations
@@ -12,7 +12,8 @@ import numpy as np
 
 
 class RandomStates(NamedTuple):
-    """k times as parts of the duration, displacements (k, n) of the coordinates, and velocities (k, n)."""
+    """Random states: k times as fractions of the duration, displacements (k, n) of the coordinates, and
+    velocities (k, n)."""
 
     part: np.ndarray
     displacement: np.ndarray
@@ -27,7 +28,7 @@ class RandomStates(NamedTuple):
 
 @lru_cache(maxsize=64)
 def random_states(seed: int, count: int, n: int) -> RandomStates:
-    """So many states, the same for the same arguments."""
+    """Return ``count`` random states, which depend on the arguments only."""
     rng = np.random.default_rng(seed)
     drawn = [(rng.uniform(0.1, 1.0), rng.normal(size=n), rng.normal(size=n)) for _ in range(count)]
     part, displacement, velocity = map(np.array, zip(*drawn, strict=True))

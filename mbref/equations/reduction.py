@@ -1,9 +1,8 @@
-"""Reduction: the primitives, rows and columns of a scene that a run needs, computed once for scenes that
-agree.
+"""Reduction: the primitives, rows and columns of a scene that a run needs, computed once for scenes with
+equal decisions.
 
 The numbers of a scene decide which primitives, rows and columns a run leaves out. A scene of equal structure
-is asked equal questions (``evidence``). If all answers are equal, all decisions are, and the reduction is
-reused.
+is tested in the same way (``structural_decisions``). If all results are equal, the reduction is reused.
 """
 
 from __future__ import annotations
@@ -14,26 +13,27 @@ from functools import cached_property
 import numpy as np
 
 from mbref.equations.active_coordinates import active_coordinates, active_entries, primitives_of
-from mbref.equations.evidence import Evidence
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model
 from mbref.equations.random_states import RandomStates
 from mbref.equations.static_constraints import Asked, columns_held, held_by_rows, reduced_pattern
+from mbref.equations.structural_decisions import StructuralDecisions
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import Active, SparseFactor, StaticRows, Symbolic
 from mbref.kernels.scene_layout import Primitives, SceneData
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, unsigned
 
-MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # cache sizes: structures, and reductions of one structure
+MOST_STRUCTURES, MOST_OF_ONE = 64, 8  # cache sizes: number of structures, and of reductions of one structure
 
 _known: dict[Structure, list[Reduction]] = {}
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Primitives, by number, with an entry; columns that rows hold at rest; the others, and their factor.
+    """Numbers of the primitives with a nonzero entry, columns that rows keep at rest, all other columns, and
+    their factor.
 
-    ``resting`` says which of the primitives have rows that hold columns, and no others.
+    ``resting`` are the primitives whose rows only keep columns at rest.
     """
 
     primitives: np.ndarray
@@ -42,15 +42,18 @@ class Reduction:
     active: Active
     symbolic: Symbolic
     static: StaticRows
-    evidence: Evidence
+    decisions: StructuralDecisions
 
     def factor(self) -> SparseFactor:
         """Memory of the factor."""
         return sparse_factor(self.symbolic, self.static)
 
     def scene(self, data: SceneData, all_move: bool, axis: int = 0) -> SceneData:
-        """The data of a scene without the primitives that have no entry, which ``axis`` counts; all others
-        move where asked."""
+        """Return the data of a scene without the primitives that have no nonzero entry.
+
+        ``axis`` is the axis that counts primitives. With ``all_move`` all of the remaining ones are
+        evaluated.
+        """
         moving, still = self._all_moving if all_move else self._moving
         if axis:
             scenes = data.row_bodies.shape[:axis]
@@ -62,24 +65,24 @@ class Reduction:
 
     @cached_property
     def _moving(self) -> tuple[np.ndarray, np.ndarray]:
-        """Primitives, by number among those here, that move, and those that do not."""
+        """Return the indices, among the remaining primitives, of those that move and of those that do not."""
         return np.flatnonzero(~self.resting), np.flatnonzero(self.resting)
 
     @cached_property
     def _all_moving(self) -> tuple[np.ndarray, np.ndarray]:
-        """Primitives as in ``_moving``, if all of them move."""
+        """Return the indices as in ``_moving`` if all of them move."""
         return np.arange(self.resting.size), np.zeros(0, dtype=np.int64)
 
 
 def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:
     """Return the reduction of a scene at its start, and the blocks (m, 12) of Φ_q there.
 
-    The reduction is reused if one is known for the structure and its evidence agrees.
+    A stored reduction of the structure is reused if its decisions agree with the scene.
     """
     known = _known.get(model.structure, [])
     for reduction in known:
-        terms = reduction.evidence.terms(model, start)
-        if reduction.evidence.agrees(model, start, terms):
+        terms = reduction.decisions.terms(model, start)
+        if reduction.decisions.agrees(model, start, terms):
             return reduction, terms.jacobian[0, 0]
     found = _found(model, start)
     if model.structure not in _known and len(_known) >= MOST_STRUCTURES:
@@ -103,5 +106,5 @@ def _found(model: Model, start: Start) -> Reduction:
         active=Active(unsigned(active_coordinates(start.q, velocities)), symbolic.column),
         symbolic=symbolic,
         static=static,
-        evidence=Evidence(model, start, read, entries, asked),
+        decisions=StructuralDecisions(model, start, read, entries, asked),
     )

@@ -1,14 +1,15 @@
-"""Statically determined constraint rows: rows that hold columns at rest, such as a slider's sides.
+"""Statically determined constraint rows: rows that keep velocities (columns of Φ_q) at zero, such as the rows
+of a slider normal to its line.
 
-A group of rows, perpendicular to each other, of constant length and as many as the columns on which they
-bear, that prescribes no motion is a square system Φ_q v = 0 that is nowhere singular: its only solution is
-v = 0, from the start on.  Such rows and columns are eliminated before the factorisation, after which other
-rows may bear on as few columns; their multipliers balance the forces on the columns.  Rows are examined at
-random states of all other coordinates; the columns held need not be moved, because they rest.
+A group consists of rows that are perpendicular to each other, have constant length, prescribe no motion, and
+are as many as the columns in which they have entries. It is a square system Φ_q v = 0 that is never singular,
+so its only solution is v = 0. Such rows and columns are eliminated before the factorisation. Further groups
+may then appear among the remaining rows. The multipliers of eliminated rows balance the forces on their
+columns. Rows are examined at random states of all other coordinates; columns at rest need not be varied.
 
-Columns that a redundant row contains stay in the system, because the sharing of reactions depends on all of
-them; so do columns without mass, which formulations refuse.  Where a driver works against a group, no row is
-eliminated.
+Columns of redundant rows are not eliminated, because the distribution of reactions depends on all of them.
+Columns without mass are not eliminated either, because formulations must report them. If a driver contradicts
+a group, no row is eliminated.
 """
 
 from __future__ import annotations
@@ -28,44 +29,47 @@ from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.linear_algebra.redundancy import dense_null_shares, null_shares
 from mbref.linear_algebra.symbolic_factorisation import symbolic_factorisation, unsigned
 
-STATES = 3  # random states at which rows are examined
-MOST = 3  # most columns that a group of rows determines
+STATES = 3  # number of random states at which rows are examined
+MOST = 3  # largest number of columns that a group of rows determines
 SMALL = 1e-9  # length of a row (1 or m) below which it may be rounding
-ROUNDING = 1e-12  # relative rounding of constant lengths and perpendicular rows
-REDUNDANT = 1e-10  # share of a row in the left null space; with singular values over 1e-2 others have 1e-12
+ROUNDING = 1e-12  # relative rounding of constant lengths and of scalar products
+# component of a row in the left null space above which it is redundant; others have at most 1e-12
+REDUNDANT = 1e-10
 
 
 class Held(NamedTuple):
-    """Rows and the columns that they hold at rest, as many."""
+    """Groups of rows and the columns that they keep at rest, equal in number."""
 
     rows: tuple[int, ...]
     columns: tuple[int, ...]
 
 
 def columns_held(held: Sequence[Held]) -> list[int]:
-    """The columns of all groups."""
+    """Return the columns of all groups."""
     return [column for each in held for column in each.columns]
 
 
 def are_held(held: Sequence[Held], n: int) -> np.ndarray:
-    """Which of n columns are in one of the groups."""
+    """Return which of n columns belong to a group."""
     found = np.zeros(n, dtype=bool)
     found[columns_held(held)] = True
     return found
 
 
 def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Which entries, in these columns (m, 12), are in those wanted (n,); the fixed frame's are not."""
+    """Return which entries, in columns (m, 12), are in the wanted columns (n,); columns of the fixed frame
+    never are."""
     return np.append(wanted, np.zeros(6, dtype=bool))[columns]
 
 
 def reduced_pattern(
     moving: np.ndarray, entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]
 ) -> tuple[Symbolic, StaticRows]:
-    """The factorisation over the active columns (n,) that no row holds, and the rows that hold the others.
+    """Return the factorisation over the active columns (n,) that no group keeps at rest, and the eliminated
+    rows.
 
-    ``entries`` (m, 12) says which numbers of the Jacobian's blocks are other than zero, ``columns`` (m, 12)
-    has their columns.
+    ``entries`` (m, 12) are True for numbers of the Jacobian's blocks that can be nonzero, ``columns`` (m, 12)
+    are their columns.
     """
     static = _static_rows(entries, columns, held)
     active = moving & ~are_held(held, moving.size)
@@ -74,7 +78,8 @@ def reduced_pattern(
 
 
 def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> StaticRows:
-    """The rows that hold; a column's other entries are of rows whose multipliers are known by then."""
+    """Return the eliminated rows; other entries of their columns belong to rows whose multipliers are then
+    known."""
     row, entry = np.nonzero(entries)
     width = columns.shape[1]
     in_column: dict[int, list[int]] = {}
@@ -97,7 +102,8 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
 
 
 class Tried(NamedTuple):
-    """Rows that may hold these columns in a round of random states, and the rows among them that do."""
+    """Rows that may keep these columns at rest, found in a round of random states, and those among them that
+    do."""
 
     round: int
     rows: list[int]
@@ -106,7 +112,7 @@ class Tried(NamedTuple):
 
 
 class Asked:
-    """The questions about a scene's numbers by which rows that hold columns were found."""
+    """Questions about a scene's numbers that determined the groups."""
 
     def __init__(self) -> None:
         self.read: list[RandomStates] = []  # states at which the Jacobian was evaluated
@@ -117,9 +123,10 @@ class Asked:
 def held_by_rows(
     model: Model, start: Start, moving: np.ndarray, entries: np.ndarray, asked: Asked | None = None
 ) -> tuple[list[Held], np.ndarray]:
-    """Groups of statically determined rows and the active velocities (n,) that they hold, in the order found.
+    """Return groups of statically determined rows, and the active velocities (n,) that they keep at zero, in
+    the order found.
 
-    And the Jacobian's ``entries`` (m, 12) that can be other than zero while those velocities are zero.
+    Also return the Jacobian's ``entries`` (m, 12) that can be nonzero while those velocities are zero.
     """
     can_rest, asked = moving & (model.mass > 0), asked or Asked()
     held, left = _found(model, start.q, moving, entries, can_rest, asked)
@@ -133,7 +140,7 @@ def held_by_rows(
 
 
 def at_rest(start: Start, columns: Sequence[int]) -> Start:
-    """Return the start with velocities of round-off size set to zero in the columns held."""
+    """Return the start with velocities of round-off size set to zero in the columns of the groups."""
     if not columns:
         return start
     v = start.v.copy()
@@ -166,26 +173,26 @@ def _found(
 
 
 def _bears_on(model: Model, entries: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Which rows (m,) have an entry (m, 12) in one of these columns (n,)."""
+    """Return which rows (m,) have an entry (m, 12) in one of these columns (n,)."""
     return (entries & lies_in(model.entry_columns, columns)).any(axis=1)
 
 
 def _columns_of(model: Model, entries: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Columns (n,) in which these rows have an entry (m, 12)."""
+    """Return the columns (n,) in which these rows have an entry (m, 12)."""
     columns = np.zeros(model.n + 6, dtype=bool)
     columns[model.entry_columns[rows][entries[rows]]] = True
     return columns[: model.n]
 
 
 def are_redundant(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Which (…, r) of r rows are redundant in Jacobians whose blocks (…, m, 12) are given."""
+    """Return which (…, r) of r rows are redundant in Jacobians with blocks (…, m, 12)."""
     if not rows.size:
         return np.zeros((*blocks.shape[:-2], 0), dtype=bool)
     return _null_shares(model, blocks, rows) > REDUNDANT
 
 
 def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Share (…, r) of r rows in the left null space of Jacobians whose blocks (…, m, 12) are given."""
+    """Return the components (…, r) of r rows in the left null space of Jacobians with blocks (…, m, 12)."""
     if model.m <= LARGE:
         return dense_null_shares(model.dense(blocks), rows)
     every = blocks.reshape(-1, *blocks.shape[-2:])
@@ -194,15 +201,15 @@ def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarr
 
 
 class _Rows:
-    """Rows at random states: the free columns on which each bears, and its numbers there.
+    """Rows at random states: the remaining columns of each row, and its numbers there.
 
-    From Jacobian blocks (STATES, m, 12), which entries (m, 12) are other than zero, and which rows (m,)
-    prescribe a motion, and then hold nothing.
+    Arguments are Jacobian blocks (STATES, m, 12), which entries (m, 12) can be nonzero, and which rows (m,)
+    prescribe a motion and cannot belong to a group.
     """
 
     def __init__(self, model: Model, samples: np.ndarray, left: np.ndarray, driven: np.ndarray):
-        self.numbers = samples.transpose(1, 2, 0).tolist()  # row, entry, state
-        self.entry: dict[int, dict[int, int]] = {}  # row, column -> entry
+        self.numbers = samples.transpose(1, 2, 0).tolist()  # indices: row, entry, state
+        self.entry: dict[int, dict[int, int]] = {}  # row → column → index of the entry
         row, entry = np.nonzero(left & ~driven[:, None] & (model.entry_columns < model.n))
         for r, c, e in zip(
             row.tolist(), model.entry_columns[row, entry].tolist(), entry.tolist(), strict=True
@@ -210,7 +217,7 @@ class _Rows:
             self.entry.setdefault(r, {})[c] = e
 
     def grouped(self, free: Sequence[bool]) -> dict[tuple[int, ...], list[int]]:
-        """The rows that bear on no more than MOST free columns (n,), by those columns."""
+        """Return the rows with at most MOST remaining columns (n,), grouped by these columns."""
         groups: dict[tuple[int, ...], list[int]] = {}
         for row, entry in self.entry.items():
             columns = tuple(sorted(column for column in entry if free[column]))
@@ -219,7 +226,7 @@ class _Rows:
         return groups
 
     def at(self, row: int, columns: Sequence[int]) -> list[list[float]]:
-        """The numbers of a row in these columns, state by state."""
+        """Return the numbers of a row in these columns, state by state."""
         numbers, entry = self.numbers[row], self.entry[row]
         return [list(state) for state in zip(*(numbers[entry[column]] for column in columns), strict=True)]
 
@@ -227,17 +234,18 @@ class _Rows:
 def _tries(
     rows: _Rows, moving: np.ndarray, can_rest: np.ndarray
 ) -> Iterator[tuple[list[int], tuple[int, ...], list[int]]]:
-    """Rows that may hold columns, of those (n,) that move and can rest; the columns, and which rows do.
+    """Yield candidates: columns that move and can rest (n,), the rows that may keep them at rest, and which
+    rows do.
 
-    Rows hold where as many of them do as there are columns.  Each stands after those that let it bear on so
-    few.
+    A group is found if these rows are as many as the columns. It comes after the groups that reduce its
+    columns.
     """
     free, rests, found = moving.tolist(), can_rest.tolist(), True
     while found:
         found = False
         for columns, bearing in rows.grouped(free).items():
             if len(bearing) < len(columns) or not all(free[c] and rests[c] for c in columns):
-                continue  # too few rows, a column without mass, or one that another group has taken
+                continue  # too few rows, a column without mass, or a column of another group
             chosen = _perpendicular([rows.at(row, columns) for row in bearing])
             if len(chosen) == len(columns):
                 found = True
@@ -247,7 +255,8 @@ def _tries(
 
 
 def _perpendicular(rows: Sequence[Sequence[Sequence[float]]]) -> list[int]:
-    """Which of the rows, state by state, have a constant length and are perpendicular to those before."""
+    """Return which of the rows have a constant length and are perpendicular to the previous rows, in every
+    state."""
     chosen: list[int] = []
     directions: list[list[list[float]]] = []
     for k, row in enumerate(rows):
@@ -263,5 +272,5 @@ def _perpendicular(rows: Sequence[Sequence[Sequence[float]]]) -> list[int]:
 
 
 def _largest_cosine(one: Sequence[Sequence[float]], other: Sequence[Sequence[float]]) -> float:
-    """Between unit vectors, of any state."""
+    """Return the largest cosine between unit vectors, over all states."""
     return max(abs(sum(x * y for x, y in zip(a, b, strict=True))) for a, b in zip(one, other, strict=True))

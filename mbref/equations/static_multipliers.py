@@ -7,7 +7,8 @@ from mbref.kernels.compilation import inlined
 
 @inlined
 def add_static_multipliers(static, system):
-    """Multipliers of the statically determined rows: they balance the forces on columns without q̈."""
+    """Compute the multipliers of statically determined rows, which balance the forces on columns without
+    acceleration."""
     blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
     width = system.blocks.shape[1]
     start, entry, column, first, other = (

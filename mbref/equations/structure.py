@@ -1,6 +1,6 @@
 """Structure: a scene without its numbers, one object for all scenes of an equal structure.
 
-All that follows from names, types and bodies alone is found once and kept with it.
+Everything that follows from names, types and bodies alone is computed once and stored with it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from mbref.equations.joints.base import ROWS_OF
 from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, ANGLE, FORCE, SPRING
 
-MOST_KEPT = 256  # structures
+MOST_KEPT = 256  # largest number of cached structures
 
 
 class PrimitivePlace(NamedTuple):
@@ -22,11 +22,11 @@ class PrimitivePlace(NamedTuple):
 
     kind: int
     joint: str
-    first: int  # body
+    first: int  # index of the first body
     second: int
-    driver: int  # -1 without
-    part: int = 0  # 1 or 2 of the two joint coordinates in the row of a coupling
-    of: str = ""  # the joint whose coordinate it is
+    driver: int  # index of the driver, -1 without
+    part: int = 0  # 1 or 2: which of the two joint coordinates in the row of a coupling; 0 otherwise
+    of: str = ""  # name of the joint whose coordinate it is
 
 
 class LoadPlace(NamedTuple):
@@ -62,21 +62,22 @@ class Structure:
     """
 
     nb: int  # bodies; the fixed frame has this number
-    kind: np.ndarray  # (p,)
-    first: np.ndarray  # (p,) bodies
-    second: np.ndarray  # (p,)
-    driver: np.ndarray  # (p,), -1 without
-    row: np.ndarray  # (p,) the first row of each
-    places_in_row: np.ndarray  # (4, p) begins, column_first, column_second, angle of ``Primitives``
-    sides: int  # bodies of a row: 2, or 4 where joint coordinates are coupled
-    row_bodies: np.ndarray  # (m, sides), filled up with the fixed frame
+    kind: np.ndarray  # (p,) kinds of the primitives
+    first: np.ndarray  # (p,) first bodies
+    second: np.ndarray  # (p,) second bodies
+    driver: np.ndarray  # (p,) drivers, -1 without
+    row: np.ndarray  # (p,) first row of each primitive
+    places_in_row: np.ndarray  # (4, p) fields begins, column_first, column_second, angle of ``Primitives``
+    sides: int  # bodies of a row: 2, or 4 if joint coordinates are coupled
+    row_bodies: np.ndarray  # (m, sides), padded with the fixed frame
     entry_columns: np.ndarray  # (m, width)
     row_joint: tuple[str, ...]  # (m,) names
     load: np.ndarray  # (4, l): kind, first and second body, function of time
     angle: np.ndarray  # (l,) index of the unwrapped angle of a load about a joint's axis, else -1
     anchored: np.ndarray  # (e,) bodies of the joints' anchors
-    vector_body: np.ndarray  # (5 p + 6 l,) in whose frame each vector is fixed
-    vector_origin: np.ndarray  # (5 p + 6 l,) from whose centre of mass; directions have the fixed frame
+    vector_body: np.ndarray  # (5 p + 6 l,) the body in whose frame each vector is fixed
+    # (5 p + 6 l,) the body from whose centre of mass points are measured; the fixed frame for directions
+    vector_origin: np.ndarray
     places: Places
 
     @functools.cached_property
@@ -102,25 +103,26 @@ class Structure:
 
     @functools.cached_property
     def of_bodies(self) -> np.ndarray:
-        """Which entries (m, 12) of the blocks are not the fixed frame's."""
+        """Return which entries (m, 12) of the blocks do not belong to the fixed frame."""
         of_bodies: np.ndarray = self.entry_columns < 6 * self.nb
         return of_bodies
 
     @functools.cached_property
     def vector_is_point(self) -> np.ndarray:
-        """(5 p + 6 l,) whether each vector is a point: the first two of a primitive or a load are."""
+        """Return (5 p + 6 l,) whether each vector is a point: the first two vectors of a primitive or a load
+        are points."""
         places = self.places
         return np.array([k < 2 for _ in places.primitives for k in range(5)]
                         + [k < 2 for _ in places.loads for k in range(6)], dtype=bool)  # fmt: skip
 
     @functools.cached_property
     def rows(self) -> np.ndarray:
-        """(m,) 0 to m - 1."""
+        """Row numbers (m,), 0 to m - 1."""
         return np.arange(len(self.row_joint))
 
     @functools.cached_property
     def closed_loops(self) -> int:
-        """Independent loops of bodies and joints; without one, no position is singular."""
+        """Number of independent loops of bodies and joints; without a loop no position is singular."""
         part, loops = list(range(self.nb + 1)), 0
         for _, one, other in dict.fromkeys(
             (p.joint, p.first, p.second) for p in self.places.primitives if not p.part
@@ -132,7 +134,7 @@ class Structure:
 
     @functools.cached_property
     def anchor_shares(self) -> np.ndarray:
-        """The share (e, nb) of an anchor among those on each body."""
+        """Return (e, nb): one over the number of anchors on a body, for each anchor on it."""
         on_body = self.anchored[:, None] == np.arange(self.nb)
         shares: np.ndarray = on_body / np.maximum(on_body.sum(axis=0), 1)
         return shares
@@ -140,7 +142,8 @@ class Structure:
 
 @functools.lru_cache(maxsize=MOST_KEPT)
 def structure_of(places: Places) -> Structure:
-    """The structure of a scene between whose bodies and the fixed frame these primitives and loads are."""
+    """Return the structure of a scene with these primitives and loads between its bodies and the fixed
+    frame."""
     nb, primitives = places.nb, places.primitives
     kind, first, second, driver = (
         np.array([place[k] for place in primitives], dtype=np.int64) for k in (0, 2, 3, 4)
@@ -183,8 +186,8 @@ def structure_of(places: Places) -> Structure:
 
 
 def _coupled_bodies(places: Places) -> tuple[list[list[int]], tuple[list[int], list[int]]]:
-    """The four bodies of each coupling, filled up with the fixed frame; and for each primitive where in a row
-    the columns of its first and of its second body stand."""
+    """Return the four bodies of each coupling, padded with the fixed frame; and the positions in a row of the
+    columns of each primitive's first and second body."""
     coupled: list[list[int]] = []
     columns: tuple[list[int], list[int]] = [], []
     ahead = [*places.primitives, None][1:]

@@ -1,9 +1,9 @@
 """Lengths of bodies, and the metric of a projection: masses, with moments of inertia that are never tiny.
 
-The length of a body is the mean distance of its joints' anchors from its centre of mass.  Where its moment
-of inertia is next to nothing beside its mass at that length, rows of Φ_q that share its turn are all but
-parallel in the metric of M, though no singular position is near.  A projection gives every moment
-at least the value of the body's mass at SPREAD of its length.
+The length of a body is the mean distance of its joints' anchors from its centre of mass.  If its moment of
+inertia is tiny compared with its mass at that length, rows of Φ_q that act on its rotation are nearly
+parallel in the metric of M, although no singular position is near.  A projection gives every moment at least
+the value of the body's mass at SPREAD of its length.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 
 SPREAD = 0.5  # radius of gyration / body length; 0.58 for a slender rod about its end
-SMALLEST = 1e-9  # length / largest length: shorter ones are rounding
+SMALLEST = 1e-9  # length / largest length; shorter ones are rounding
 
 
 def metric(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """The projection's metric (…, 6 nb), from M (…, 6 nb) and lengths (…, nb)."""
+    """Return the projection's metric (…, 6 nb), from M (…, 6 nb) and lengths (…, nb)."""
     found = mass.reshape(*lengths.shape, 6).copy()
     least = found[..., :1] * (SPREAD * lengths[..., None]) ** 2
     found[..., 3:] = np.maximum(found[..., 3:], least)
@@ -23,21 +23,22 @@ def metric(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:
 
 
 def inverse_root(mass: np.ndarray) -> np.ndarray:
-    """Inverse roots of masses; 1 without mass."""
+    """Return inverse square roots of masses; 1 without mass."""
     return 1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0))
 
 
 def row_lengths(matrix: np.ndarray) -> np.ndarray:
-    """Lengths (…, m) of the rows of matrices (…, m, n), 1 for a row of zeros."""
+    """Return lengths (…, m) of the rows of matrices (…, m, n), 1 for a row of zeros."""
     lengths = np.sqrt((matrix * matrix).sum(axis=-1))
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
 def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Length (…, nb) of every body (m); one with all anchors in its centre has the mean of the others, or 1.
+    """Return the length (…, nb) of every body (m).
 
-    From the joints' anchors (…, e, 3) relative to the centres of mass of the bodies that they are on, and the
-    share (e, nb) of each among those on a body.
+    A body with all anchors in its centre has the mean of all other lengths, or 1. Arguments are the joints'
+    anchors (…, e, 3) relative to the centres of mass of their bodies, and one over the number of anchors on
+    the body (e, nb).
     """
     lengths = np.sqrt((arms * arms).sum(axis=-1)) @ shares
     has_arms = lengths > SMALLEST * lengths.max(axis=-1, keepdims=True, initial=0.0)

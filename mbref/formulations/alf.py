@@ -42,7 +42,8 @@ ABOUT = About(
 
 
 class Options(NamedTuple):
-    """The penalty α, the relative change that ends the iteration (Eq. 20), its most iterations, ω and μ."""
+    """Numbers of ALF: the penalty α, the relative change that ends the iteration (Eq. 20), the largest number
+    of iterations, ω and μ."""
 
     alpha: float = 1e5
     epsilon: float = 1e-9
@@ -66,13 +67,13 @@ options_of, scratch_of = opener(Options), opener(Scratch)
 
 
 def feedback(options: Mapping[str, float]) -> tuple[float, float]:
-    """Gains of Φ' and Φ: 2 ω μ and ω²."""
+    """Return the gains of Φ' and Φ: 2 ω μ and ω²."""
     return 2 * options["omega"] * options["mu"], options["omega"] ** 2
 
 
 @kernel
 def changed(before, now):
-    """Norm of the change relative to the larger of 1 and the norm of ``now`` (Eq. 20)."""
+    """Return the norm of the change relative to the larger of 1 and the norm of ``now`` (Eq. 20)."""
     change, size = 0.0, 0.0
     for j in range(now.shape[0]):
         step = now[j] - before[j]
@@ -83,7 +84,7 @@ def changed(before, now):
 
 @kernel
 def augmented(mass, inverse_root, d, alpha, a):
-    """M^(-1/2) (M + Φ_qᵀ α Φ_q) M^(-1/2) from D, its upper half."""
+    """Compute the upper half of M^(-1/2) (M + Φ_qᵀ α Φ_q) M^(-1/2) from D."""
     m, n = d.shape
     for j in range(n):
         for k in range(j, n):
@@ -131,7 +132,7 @@ def accelerate(system):
 
 @kernel
 def iterate(alpha, scratch):
-    """One iteration of Eqs. 17 and 18: x = (M + Φ_qᵀ α Φ_q)⁻¹ (load + Φ_qᵀ α γ), λ += α (Φ_q x - γ)."""
+    """Make one iteration of Eqs. 17 and 18: x = (M + Φ_qᵀ α Φ_q)⁻¹ (load + Φ_qᵀ α γ), λ += α (Φ_q x - γ)."""
     d, x, scaled, total = scratch.d, scratch.x, scratch.scaled, scratch.total
     m, n = d.shape
     copy(scratch.load, x)

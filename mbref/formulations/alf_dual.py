@@ -49,7 +49,8 @@ ABOUT = About(
 
 
 class Options(NamedTuple):
-    """α, the relative change that ends the iteration, its most iterations; gains of Φ' and Φ as of ALF."""
+    """Numbers of ALF-dual: α, the relative change that ends the iteration, the largest number of iterations;
+    gains of Φ' and Φ as in ALF."""
 
     alpha: float = 1e10
     epsilon: float = 1e-12
@@ -58,11 +59,14 @@ class Options(NamedTuple):
     mu: float = 1.0
 
 
-STRONGER, LARGEST_ALPHA = 1e3, 1e16  # factor of the next α; from there on 1/α is rounding beside S
-INFINITE = 1e300  # α without 1/α
-CLEAR, WIDE = 1e-4, 0.08  # squares of pivots: of clearly independent rows, and where one iteration is enough
+# factor for the next α; above the second number 1/α is rounding compared with S
+STRONGER, LARGEST_ALPHA = 1e3, 1e16
+INFINITE = 1e300  # α that stands for a matrix without 1/α
+# squared pivots: of clearly independent rows, and above which one iteration suffices
+CLEAR, WIDE = 1e-4, 0.08
 ROUNDING = 1e-14  # relative change of accelerations that ends the iteration
-REDUNDANT_ALPHA = 1e15  # the largest with which a matrix of redundant rows stays positive
+# the largest α with which the matrix of redundant rows is positive definite in double precision
+REDUNDANT_ALPHA = 1e15
 options_of, factor_of = opener(Options), opener(SparseFactor)
 
 
@@ -79,11 +83,11 @@ def accelerate(system):
 
 @kernel
 def solve_exactly(system):
-    """The solution for independent rows, without 1/α; False where they are not clearly so.
+    """Solve for independent rows, without 1/α; return False if they are not clearly independent.
 
-    Rows that are nearer to dependent need a second iteration, which takes the rounding of the first away,
-    unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small beside that and M^(1/2) q̈_0: at
-    high speeds accelerations along the rows are larger than those that forces give.
+    Rows that are less clearly independent need a second iteration, which removes the rounding errors of the
+    first one, unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small beside that and
+    M^(1/2) q̈_0: at high speeds accelerations along the rows are larger than those that forces give.
     """
     factor = factor_of(system.scratch)
     row, step = factor.symbolic.row, factor.step
@@ -111,7 +115,7 @@ def solve_exactly(system):
 
 @inlined
 def put_accelerations(system):
-    """q̈ of M^(1/2) q̈ in ``factor.change``; the square of its norm."""
+    """Compute q̈ from M^(1/2) q̈ in ``factor.change``; return the square of its norm."""
     factor, square = factor_of(system.scratch), 0.0
     column, root, x = factor.symbolic.column, factor.root, factor.change
     for j in range(column.shape[0]):
@@ -122,7 +126,7 @@ def put_accelerations(system):
 
 @inlined
 def square_of_forces(system):
-    """The square of the norm of M^(1/2) q̈_0 = M^(-1/2) g."""
+    """Return the square of the norm of M^(1/2) q̈_0 = M^(-1/2) g."""
     factor, square = factor_of(system.scratch), 0.0
     column, root = factor.symbolic.column, factor.root
     for j in range(column.shape[0]):
@@ -133,7 +137,7 @@ def square_of_forces(system):
 
 @kernel
 def iterate(system):
-    """The iteration, with a larger α where that is needed: OK, SINGULAR or NOT_CONVERGED."""
+    """Iterate, with a larger α if needed; return OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
     alpha, status = options.alpha, iterate_with(options.alpha, system)
     if system.settings.nearly_dependent:
@@ -148,7 +152,7 @@ def iterate(system):
 
 @kernel
 def iterate_with(alpha, system):
-    """The iteration from q̈_0 on with 1/α beside S: OK, SINGULAR or NOT_CONVERGED."""
+    """Iterate from q̈_0 with 1/α added to S; return OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
     if not start(alpha, system):
         return SINGULAR
@@ -159,9 +163,10 @@ def iterate_with(alpha, system):
 
 @kernel
 def start(alpha, system):
-    """The factor of S + I/α, q̈_0, b = γ - Φ_q q̈_0 and L⁻¹ b; False where S + I/α or M is singular.
+    """Compute the factor of S + I/α, q̈_0, b = γ - Φ_q q̈_0 and L⁻¹ b; return False if S + I/α or M is
+    singular.
 
-    M^(1/2) q̈_0 stands in ``factor.change``, b in ``factor.residual``, L⁻¹ b in ``factor.step``.
+    The results are M^(1/2) q̈_0 in ``factor.change``, b in ``factor.residual``, and L⁻¹ b in ``factor.step``.
     """
     factor = factor_of(system.scratch)
     column, root, x = factor.symbolic.column, factor.root, factor.change
@@ -179,9 +184,9 @@ def start(alpha, system):
 
 @inlined
 def find_residual(x, system):
-    """γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
+    """Compute γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
 
-    No copy of a vector follows, which would wait for the numbers stored last.
+    Both are written at once, because a later copy would wait for the numbers stored last.
     """
     factor = factor_of(system.scratch)
     row, start, column, d = factor.symbolic.row, factor.symbolic.d_start, factor.symbolic.d_column, factor.d

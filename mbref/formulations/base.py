@@ -1,4 +1,4 @@
-"""Formulation: how accelerations and multipliers follow from M, Φ_q, g and γ."""
+"""Interface of formulations, which compute accelerations and multipliers from M, Φ_q, g and γ."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class NoOptions(NamedTuple):
 
 
 class About(NamedTuple):
-    """Texts on a formulation, from which `mbref list` and the pages of the documentation are made."""
+    """Texts on a formulation, for `mbref list` and the pages of the documentation."""
 
     title: str
     meaning: str  # one line for `mbref list methods`
@@ -33,26 +33,26 @@ class About(NamedTuple):
 
 
 class LinearAlgebra(ABC):
-    """Which Jacobian a formulation reads, and the memory that its kernel needs."""
+    """Interface: which Jacobian a formulation reads, and the memory that its kernel needs."""
 
     sparse: bool
 
     @abstractmethod
     def rows(self, m: int) -> int:
-        """Rows of the dense Jacobian that the kernel reads: m or none."""
+        """Return the number of rows of the dense Jacobian that the kernel reads: m or 0."""
 
     @abstractmethod
     def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
-        """The kernel's memory for m rows, n velocities and a sparse factor where one is used."""
+        """Return the kernel's memory for m rows, n velocities and a sparse factor if one is used."""
 
     @abstractmethod
     def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
-        """Memory of the sparse factor of one dense Jacobian (m, n), where one is used."""
+        """Return memory of the sparse factor of one dense Jacobian (m, n), if one is used."""
 
 
 @dataclass(frozen=True)
 class Dense(LinearAlgebra):
-    """The kernel reads the dense Jacobian; ``memory`` is the schema of its scratch."""
+    """The kernel reads the dense Jacobian; ``memory`` is the schema of its working memory."""
 
     memory: type
     sparse = False
@@ -69,8 +69,10 @@ class Dense(LinearAlgebra):
 
 @dataclass(frozen=True)
 class Sparse(LinearAlgebra):
-    """The kernel reads the numbers of the Jacobian at places that a sparse factor knows: cost grows with the
-    number of joints and no faster."""
+    """The kernel reads the nonzero numbers of the Jacobian, whose positions a sparse factor has.
+
+    The cost is proportional to the number of joints.
+    """
 
     sparse = True
 
@@ -103,11 +105,13 @@ class Formulation:
     handles_redundancy: bool
     handles_singular_mass: bool
     crosses: Literal["no", "by regularisation"] = (
-        "no"  # a singular position, where no stabilisation ends the run
+        "no"  # a singular position at which no stabilisation ends the run
     )
-    needs_independent_columns: bool = False  # works only where no freedom is left
-    needs_all_rows: bool = False  # rows that depend on others, too: it chooses or weighs rows itself
-    numbers: type = NoOptions  # the method's own numbers, a record with their defaults
+    # True if the formulation needs as many independent rows as coordinates, so no degree of freedom
+    needs_independent_columns: bool = False
+    # True if dependent rows must not be left out, because the formulation selects or weights rows itself
+    needs_all_rows: bool = False
+    numbers: type = NoOptions  # record of the method's own numbers with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
 
     @cached_property
@@ -116,7 +120,7 @@ class Formulation:
         return self.numbers()._asdict()
 
     def packed_options(self, options: Mapping[str, float]) -> Packed | None:
-        """The method's numbers for its kernel."""
+        """Return the method's numbers for its kernel."""
         if not self.options:
             return None
         return packed(record(self.numbers(**{**self.options, **options})))
@@ -125,7 +129,7 @@ class Formulation:
         self, mass: np.ndarray, jacobian: np.ndarray, force: np.ndarray, gamma: np.ndarray,
         rank_tolerance: float = 1e-10, **options: float,
     ) -> tuple[int, np.ndarray, np.ndarray]:  # fmt: skip
-        """(status, q̈ (n,), λ (m,)) of one system; mass (n,) is the diagonal of M, jacobian (m, n).
+        """Return (status, q̈ (n,), λ (m,)) of one system; mass (n,) is the diagonal of M, jacobian (m, n).
 
         Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
         """

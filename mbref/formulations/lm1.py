@@ -3,9 +3,9 @@
     [M   Φ_qᵀ] [q̈]   [g]
     [Φ_q   0 ] [λ ] = [γ]
 
-Scaled symmetrically by M^(-1/2) and the length of the rows, which changes no solution, so that "singular"
-does not depend on units.  Fails on redundant rows; needs no M⁻¹, so that bodies without inertia are
-allowed where the constraints hold them.
+The system is scaled symmetrically by M^(-1/2) and the length of the rows, so that the test for singularity
+does not depend on units. LM1 fails on redundant rows. It needs no M⁻¹, so that bodies without inertia are
+allowed if constraints determine their accelerations.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ SINGULAR_PIVOT = 1e-12  # pivot of the scaled matrix with rows and columns of un
 
 
 class Scratch(NamedTuple):
-    """The augmented system."""
+    """Memory of the augmented system."""
 
     matrix: Annotated[Matrix, "m + n", "m + n"]
     d: Annotated[Matrix, "m", "n"]  # Φ_q M^(-1/2) with rows of unit length

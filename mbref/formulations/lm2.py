@@ -1,8 +1,9 @@
 """LM2: multipliers from (Φ_q M⁻¹ Φ_qᵀ) λ = Φ_q M⁻¹ g - γ, then q̈ = M⁻¹ (g - Φ_qᵀ λ) (Eqs. 6 to 8).
 
-By Cholesky, which the scale of rows does not disturb.  Fails on redundant rows and on a singular M.  What
-rounding leaves of a redundant row is ε over the pivots before it, 1e-16 to 5e-12 on the paper's mechanisms at
-random poses; so a row nearer than 3e-6 rad to dependent counts as redundant.
+The multipliers are computed by Cholesky factorisation, which does not depend on the scale of rows. LM2 fails
+on redundant rows and on a singular M. The pivot of a redundant row is rounding: ε divided by earlier pivots,
+1e-16 to 5e-12 on the paper's mechanisms at random poses. So a row within 3e-6 rad of a dependent row counts
+as redundant.
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SINGULAR_PIVOT = 1e-11  # pivot / diagonal entry: sine² of the angle between a 
 
 
 class Scratch(NamedTuple):
-    """The Schur complement and its factors."""
+    """Memory of the Schur complement and its factors."""
 
     transposed: Annotated[Matrix, "n", "m"]  # M^(-1/2) Φ_qᵀ
     s: Annotated[Matrix, "m", "m"]  # Φ_q M⁻¹ Φ_qᵀ and its Cholesky factor
@@ -44,7 +45,7 @@ scratch_of = opener(Scratch)
 
 @kernel
 def factor_schur_complement(rows, dt, s, diagonal):
-    """The factor of Φ_q M⁻¹ Φ_qᵀ from the first columns of M^(-1/2) Φ_qᵀ; False where rows are dependent."""
+    """Factorise Φ_q M⁻¹ Φ_qᵀ from the first columns of M^(-1/2) Φ_qᵀ; return False if rows are dependent."""
     gram(dt, s)
     for i in range(rows):
         diagonal[i] = s[i, i]

@@ -13,9 +13,9 @@ from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 @kernel
 def scaled_residual(system, d, b):
-    """D, b = γ - Φ_q q̈_unc in scaled rows, and q̈_unc; False where M is singular.
+    """Compute D, b = γ - Φ_q q̈_unc in scaled rows, and q̈_unc; return False if M is singular.
 
-    The row scale is left in ``system.multipliers``.
+    The row scale is stored in ``system.multipliers``.
     """
     jacobian, acceleration, row_scale = system.jacobian, system.acceleration, system.multipliers
     m, n = jacobian.shape
@@ -36,7 +36,7 @@ def scaled_residual(system, d, b):
 
 @kernel
 def transpose(d, dt):
-    """dt (n, m) := Dᵀ."""
+    """Compute dt (n, m) = Dᵀ."""
     m, n = d.shape
     for j in range(n):
         for i in range(m):
@@ -45,7 +45,7 @@ def transpose(d, dt):
 
 @kernel
 def recover_solution(x, dual, system):
-    """q̈ from x = D⁺ b, and λ = -R (Dᵀ)⁺ x; the row scale R stands in ``system.multipliers``."""
+    """Compute q̈ from x = D⁺ b, and λ = -R (Dᵀ)⁺ x; the row scale R is in ``system.multipliers``."""
     for j in range(x.shape[0]):
         system.acceleration[j] += system.inverse_root[j] * x[j]
     for i in range(dual.shape[0]):

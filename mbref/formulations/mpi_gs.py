@@ -1,7 +1,7 @@
 """MPI-GS: accelerations by the Moore–Penrose inverse from Gram–Schmidt orthogonalisation.
 
-Eqs. 29 and 30 ask for independent columns, which redundant rows with free coordinates do not give.  Here
-columns are taken in the order of their size and dependent ones left out, D P = Q R, and a second
+Eqs. 29 and 30 need independent columns, which do not exist with redundant rows or degrees of freedom. Here
+columns are selected in the order of their size, dependent ones are left out, D P = Q R, and a second
 orthogonalisation of the rows of R gives R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ, the true inverse for any rank.
 """
 
@@ -30,7 +30,7 @@ ABOUT = About(
 
 
 class Scratch(NamedTuple):
-    """D, its columns as rows, and the triangular factors of both orthogonalisations."""
+    """Memory of D, its columns as rows, and the triangular factors of both orthogonalisations."""
 
     d: Annotated[Matrix, "m", "n"]
     columns: Annotated[Matrix, "n", "m"]

@@ -30,7 +30,7 @@ ABOUT = About(
 
 
 class Scratch(NamedTuple):
-    """D, its columns as rows, R, and the two solutions."""
+    """Memory of D, its columns as rows, R, and the two solutions."""
 
     d: Annotated[Matrix, "m", "n"]
     columns: Annotated[Matrix, "n", "m"]

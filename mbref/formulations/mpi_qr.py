@@ -1,4 +1,4 @@
-"""MPI-QR: Eq. 26 by a pivoted Householder QR of Dᵀ, the cheapest of the rank-revealing ones here.
+"""MPI-QR: Eq. 26 by a Householder QR of Dᵀ with pivoting, the cheapest rank-revealing factorisation here.
 
 Dᵀ P = Q R; the rows behind the rank are redundant and left out, so that x = Q₁ R₁⁻ᵀ b₁ is the
 solution of least norm and equals D⁺ b for consistent equations (Kim & Vanderploeg, ASME J. Mech.
@@ -27,7 +27,7 @@ ABOUT = About(
 
 
 class Scratch(NamedTuple):
-    """D, the factors of its transpose, and the two solutions."""
+    """Memory of D, the factors of its transpose, and the two solutions."""
 
     d: Annotated[Matrix, "m", "n"]
     transposed: Annotated[Matrix, "n", "m"]

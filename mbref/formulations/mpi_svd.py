@@ -35,7 +35,7 @@ ABOUT = About(
 
 
 class Scratch(NamedTuple):
-    """D, its right-hand side and the two solutions."""
+    """Memory of D, its right-hand side and the two solutions."""
 
     d: Annotated[Matrix, "m", "n"]
     b: Annotated[Vector, "m"]

@@ -1,11 +1,11 @@
 """Adams: predictor–corrector of orders 1 to 12 and steps of any length, as in Shampine & Gordon's STEP.
 
 L. F. Shampine and M. K. Gordon, Computer Solution of Ordinary Differential Equations, Freeman, 1975.
-PECE with local extrapolation: predict with order k, evaluate, correct with order k + 1, evaluate.  Kept of
-the past are modified divided differences φ_i of y' and ψ_i, the time since the last state but i; from them
-follow the coefficients of a next step of any length.  Order and step are chosen from the errors estimated
-at orders k - 2 to k + 1; a run starts at order 1, then raises the order and doubles the step until the
-estimates object.
+PECE with local extrapolation: predict with order k, evaluate, correct with order k + 1, evaluate.  Modified
+divided differences φ_i of y' are stored, and ψ_i, the time since the state i + 1 steps ago. They give the
+coefficients of a next step of any length.  Order and step are chosen from the errors estimated at orders k -
+2 to k + 1; a run starts at order 1, then increases the order and doubles the step until the error estimates
+forbid it.
 """
 
 from __future__ import annotations
@@ -22,32 +22,32 @@ from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy
 
 HIGHEST = 12
-AIM = 0.5  # the error, in tolerances, that steps are chosen for
+AIM = 0.5  # error / tolerance for which step lengths are chosen
 
 
 class Progress(NamedTuple):
     """Numbers of the order and step control."""
 
-    restart: int = -1  # ``clock.restart`` of the past that is kept
+    restart: int = -1  # ``clock.restart`` of the stored past
     order: int = 0
     next_order: int = 0  # order of the next attempt
-    error_below: float = 0.0  # estimated at the order below
+    error_below: float = 0.0  # estimated error at the order below
     error: float = 0.0
     last_order: int = 0
     last_step: float = 0.0  # s
-    equal_steps: float = 0.0  # steps in a row of that length
+    equal_steps: float = 0.0  # number of successive steps of that length
     settled: int = 0  # 1 after the start phase
-    failed: int = 0  # attempts in a row
+    failed: int = 0  # successive failed attempts
 
 
 class Past(NamedTuple):
     """Modified divided differences φ_i of y' (row i), and numbers indexed from 1."""
 
     differences: Annotated[Matrix, HIGHEST + 3, "14*nb"]
-    implied: Annotated[Vector, "14*nb"]  # y' that the prediction implies
-    change: Annotated[Vector, "14*nb"]  # y' evaluated there less that
-    past_psi: Annotated[Vector, HIGHEST + 3]  # s, time since the last state but i
-    psi: Annotated[Vector, HIGHEST + 3]  # of the attempt, as beta, g, sigma and the integrals of g
+    implied: Annotated[Vector, "14*nb"]  # y' of the predicting polynomial
+    change: Annotated[Vector, "14*nb"]  # evaluated y' minus the y' of the predicting polynomial
+    past_psi: Annotated[Vector, HIGHEST + 3]  # s, time since the state i steps ago
+    psi: Annotated[Vector, HIGHEST + 3]  # at the attempt, like beta, g, sigma and the integrals of g
     beta: Annotated[Vector, HIGHEST + 3]
     g: Annotated[Vector, HIGHEST + 3]
     sigma: Annotated[Vector, HIGHEST + 3]
@@ -59,7 +59,7 @@ past_of = opener(Past)
 
 
 def _gamma_star() -> np.ndarray:
-    """|γ*_k|, the corrector's error constants at equal steps, from Σ_j γ*_(k-j) / (j + 1) = 0."""
+    """Return |γ*_k|, the corrector's error constants for equal steps, from Σ_j γ*_(k-j) / (j + 1) = 0."""
     gamma = np.zeros(HIGHEST + 2)
     gamma[0] = 1.0
     for k in range(1, gamma.size):
@@ -72,7 +72,7 @@ GAMMA_STAR = _gamma_star()
 
 @kernel
 def norm(vector, y, control):
-    """Euclidean norm of a vector in tolerances of y, as in STEP."""
+    """Return the Euclidean norm of a vector in tolerances of y, as in STEP."""
     total = 0.0
     for i in range(y.shape[0]):
         ratio = vector[i] / (control.atol + control.rtol * abs(y[i]))
@@ -82,12 +82,12 @@ def norm(vector, y, control):
 
 @kernel
 def find_coefficients(h, k, memory):
-    """ψ, β, g and σ of a step of length h at order k, from the past ψ."""
+    """Compute ψ, β, g and σ of a step of length h at order k, from the past ψ."""
     past, psi, beta = memory.past_psi, memory.psi, memory.beta
     g, sigma, integrals = memory.g, memory.sigma, memory.integrals
     psi[1], beta[1], sigma[1] = h, 1.0, 1.0
     for i in range(2, HIGHEST + 2):
-        known = past[i - 1] > 0.0  # otherwise the run is younger than that
+        known = past[i - 1] > 0.0  # otherwise the run has fewer steps
         psi[i] = past[i - 1] + h if known else 0.0
         beta[i] = beta[i - 1] * psi[i - 1] / past[i - 1] if known else 0.0
     for i in range(1, k + 1):
@@ -103,7 +103,7 @@ def find_coefficients(h, k, memory):
 
 @kernel
 def predict(h, k, y, y_new, past):
-    """y of order k after a step h, and y' that its polynomial has there."""
+    """Compute y of order k after a step h, and y' of its polynomial there."""
     for i in range(y.shape[0]):
         slope, rate = 0.0, 0.0
         for j in range(k, 0, -1):
@@ -116,7 +116,8 @@ def predict(h, k, y, y_new, past):
 
 @kernel
 def estimate(h, k, y, past, control):
-    """Errors at orders k and below, and the order they speak for; returns the error ratio of the step."""
+    """Estimate errors at orders k and below, and the order that they suggest; return the error ratio of the
+    step."""
     progress, sigma, g = past.progress, past.sigma, past.g
     change = past.change[: y.shape[0]]
     size, error = h * norm(change, y, control), 0.0
@@ -163,9 +164,9 @@ def forget(past, restart):
 
 @kernel
 def first_step(y, y_rate, control):
-    """STEP's own first step, of order 1, its error guessed from the sizes of y and y'.
+    """Return STEP's initial step, of order 1, whose error is estimated from the sizes of y and y'.
 
-    Apart from ``one_step.first_step``, because a step of order 1 must be shorter than one of order 8.
+    ``one_step.first_step`` is not used, because a step of order 1 must be shorter than one of order 8.
     """
     rate, least = norm(y_rate, y, control), 1e-6 * control.largest_step
     return max(least, 0.25 * sqrt(max(1.0, norm(y, y, control))) / rate) if rate > 0.0 else least
@@ -173,7 +174,7 @@ def first_step(y, y_rate, control):
 
 @kernel
 def remember(h, k, y_rate, past):
-    """Differences and ψ after a step of length h at order k that ended with rates y'."""
+    """Update differences and ψ after a step of length h at order k that ended with rates y'."""
     progress, beta, differences = past.progress, past.beta, past.differences
     for i in range(y_rate.shape[0]):
         difference = y_rate[i] - past.implied[i]
@@ -190,7 +191,8 @@ def remember(h, k, y_rate, past):
 
 @kernel
 def choose_order(h, y, past, control):
-    """The order of the next step, with ``error`` its error; sets ``settled`` when the start is over."""
+    """Return the order of the next step, and its error in ``error``; sets ``settled`` after the start
+    phase."""
     progress, highest = past.progress, int(control.order)
     k = progress.order
     if progress.next_order < k or k == highest:

@@ -1,4 +1,4 @@
-"""Integrator: one step of y' = f(t, y) in the compiled loop, and the choice of its length."""
+"""Interface of integrators: one step of y' = f(t, y) in the compiled loop, and the choice of its length."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ class Integrator:
     crosses: Literal["no", "by series"] = "no"  # how it crosses singular positions
 
     def highest_order(self, options: Mapping[str, float]) -> int:
-        """The order the options allow; ValueError unless ``max_order`` is a whole number up to ``order``."""
+        """Return the order that the options allow; raises ValueError unless ``max_order`` is a whole number
+        up to ``order``."""
         wanted = options.get("max_order", self.order)
         if wanted not in range(1, self.order + 1):
             raise ValueError(f"{self.name}: max_order must be 1 to {self.order}, got {wanted:g}")

@@ -22,7 +22,7 @@ from mbref.linear_algebra.vectors import copy, larger
 
 
 class Stages(NamedTuple):
-    """Slopes of the stages, and both error estimates over the tolerance."""
+    """Slopes at the stages, and both error estimates over the tolerance."""
 
     slopes: Annotated[Matrix, 12, "14*nb"]
     errors3: Annotated[Vector, "14*nb"]
@@ -33,7 +33,8 @@ stages_of = opener(Stages)
 
 
 def sum_with(weights: Sequence[float]) -> Callable:
-    """A kernel (k, i) -> Σ_s weights[s] k[s, i], with the weights as constants; zeros cost nothing."""
+    """Return a kernel (k, i) → Σ_s weights[s] k[s, i] with constant weights; zero weights need no
+    operations."""
     count, weights = len(weights), tuple(map(float, weights))
 
     @inlined
@@ -48,9 +49,10 @@ def sum_with(weights: Sequence[float]) -> Callable:
 
 
 def stages_to(last: int) -> Callable:
-    """A kernel that fills rows 1 to ``last`` of k with the slopes of those stages; its status.
+    """Return a kernel that computes rows 1 to ``last`` of k, the slopes at those stages, and returns its
+    status.
 
-    One piece of code a stage: a loop over the stages, whose sums differ, would take half as long again.
+    The stages are not a loop, whose different sums would take half as long again.
     """
     if last == 0:
         return no_stage
@@ -70,7 +72,7 @@ def stages_to(last: int) -> Callable:
 
 @kernel
 def no_stage(rates, t, h, y, y_new, k, memory):
-    """Stage 0 has the slope at y, which is known."""
+    """Do nothing: stage 0 has the slope at y, which is known."""
     return OK
 
 

@@ -12,7 +12,8 @@ ROUNDED = 0.02  # error / tolerance below which the error may be rounding and sh
 
 @kernel
 def first_step(y, y_rate, control):
-    """A first step from the sizes of y and y': the first guess of Hairer, Nørsett & Wanner, section II.4."""
+    """Return the initial step from the sizes of y and y': the first guess of Hairer, Nørsett & Wanner,
+    section II.4."""
     size, rate = 0.0, 0.0
     for i in range(y.shape[0]):
         scale = control.atol + control.rtol * abs(y[i])
@@ -23,7 +24,7 @@ def first_step(y, y_rate, control):
 
 @inlined
 def next_step(h, suggested, ratio, trend, control):
-    """The next step after one of length h, times ``trend`` where that was accepted."""
+    """Return the next step after one of length h, multiplied by ``trend`` if that step was accepted."""
     if ratio > 1.0:
         return h * max(SHRINK, SAFETY * ratio ** (-1.0 / control.order))
     if not ratio >= 0.0:
@@ -40,9 +41,9 @@ def propose(h, suggested, ratio, y, y_rate, memory):
 
 @kernel
 def trend(h, ratio, memory):
-    """The factor, 1 at most, by which the trend of errors shortens the step after one of length h.
+    """Return the factor, at most 1, by which growing errors shorten the step after one of length h.
 
-    The error of steps of one length grows from the step before to the last as it will to the next (K.
+    The error of steps of equal length is assumed to grow to the next step as it grew to the last one (K.
     Gustafsson, ACM Trans. Math. Software 20, 1994).
     """
     clock, taken = memory.loop.clock, memory.equations.system.counts.steps

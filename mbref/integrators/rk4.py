@@ -12,7 +12,7 @@ from mbref.kernels.named_memory import Vector, opener
 
 
 class Stages(NamedTuple):
-    """The slope of a stage and the weighted sum of those before."""
+    """The slope at a stage and the weighted sum of the previous slopes."""
 
     slope: Annotated[Vector, "14*nb"]
     total: Annotated[Vector, "14*nb"]

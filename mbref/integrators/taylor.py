@@ -1,8 +1,8 @@
-"""Taylor: series of the motion in natural coordinates, of orders 4 to 30, in steps of their own.
+"""Taylor: power series of the motion in natural coordinates, of orders 4 to 30, with their own step control.
 
-``mbref.taylor`` computes steps and samples: accelerations and multipliers follow from the series too, so
-that the formulation has no part in them.  A series continues over singular positions.  Order 0 stands for the
-order that costs least at the tolerance.
+``mbref.taylor`` computes steps and samples. Accelerations and multipliers follow from the series, too, so
+that the formulation is not used. A series continues across singular positions. Order 0 selects the order of
+least cost at the tolerance.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Arrays that begin at a line of the processor's cache, so that a block of eight numbers fills one line."""
+"""Arrays that begin at a cache line of the processor, so that a block of eight numbers fills one line."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LINE = 64  # bytes
 
 
 def aligned_zeros(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
-    """Zeros of a shape and type, C-contiguous."""
+    """Return zeros of a shape and type, C-contiguous."""
     size = math.prod(shape) * np.dtype(dtype).itemsize
     memory = np.zeros(size + LINE, np.uint8)
     first = -memory.ctypes.data % LINE

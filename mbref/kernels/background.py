@@ -1,7 +1,7 @@
-"""Kernels compiled in a second process, beside those that this process compiles.
+"""Compilation of kernels in a second process, in parallel with this process.
 
-Compiling is work of one core.  The second process leaves its kernels in the cache of this machine, from where
-this process loads them.
+Compiling uses one core. The second process stores its kernels in the cache of this machine, from which this
+process loads them.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from contextlib import contextmanager
 
 from mbref.kernels.compilation import Exchangeable
 
-# The second process ends with its parent, whose death closes its standard input.
+# The second process ends with its parent, whose end closes its standard input.
 PROGRAM = """\
 from mbref.kernels.background import end_with_parent
 end_with_parent()
@@ -26,10 +26,11 @@ from {module} import {function}
 
 @contextmanager
 def compiled_in_background(kernels: Sequence[Exchangeable], module: str, function: str) -> Iterator[None]:
-    """While the block runs, ``module.function()`` compiles the kernels in a second process, whose end is
-    waited for; without such a process where the cache has them all, or with one core.
+    """Compile the kernels by ``module.function()`` in a second process while the ``with`` block runs, then
+    wait for it.
 
-    Where the second process fails, the kernels are compiled when they are first called.
+    No process is started if the cache has all kernels, or with one core. If the second process fails, the
+    kernels are compiled at their first call.
     """
     if (os.cpu_count() or 1) < 2 or all(kernel.is_kept for kernel in kernels):
         yield
@@ -45,7 +46,7 @@ def compiled_in_background(kernels: Sequence[Exchangeable], module: str, functio
 
 
 def end_with_parent() -> None:
-    """End this process as soon as its standard input is closed."""
+    """End this process when its standard input is closed."""
     threading.Thread(target=_end_at_end_of_input, daemon=True).start()
 
 

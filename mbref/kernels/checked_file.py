@@ -1,6 +1,8 @@
-"""Files of a cache: whole or not there, with a checksum; where they cannot be kept, work goes on without.
+"""Files of a cache with a checksum, written completely or not at all; without a writable folder nothing is
+stored.
 
-Nothing here raises for a damaged, foreign, missing or unwritable file: a cache may be thrown away any time.
+No function here raises for a damaged, foreign, missing or unwritable file, since a cache may be deleted at
+any time.
 """
 
 from __future__ import annotations
@@ -13,11 +15,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-DIGEST = hashlib.sha256().digest_size  # bytes, before the data
+DIGEST = hashlib.sha256().digest_size  # bytes before the data
 
 
 def read(path: Path) -> bytes | None:
-    """The data written to this path; None where there are none, or the file is damaged.
+    """Return the data stored at this path; None if there are none, or the file is damaged.
 
     A damaged file is reported in one line on stderr and removed if possible.
     """
@@ -38,7 +40,8 @@ def read(path: Path) -> bytes | None:
 
 
 def write(path: Path, data: bytes) -> None:
-    """Keep the data, whole or not at all; where that fails one line on stderr says so, once a folder."""
+    """Store the data completely or not at all; a failure is reported in one line on stderr, once for each
+    folder."""
     temporary = ""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,10 +1,10 @@
 """Compilation of kernels: once per machine and source version, cached on disk, replaceable.
 
-``kernel`` marks a helper that other kernels call, ``inlined`` one that becomes part of them,
-``allocating`` one that makes arrays: no other can.
-``exchangeable(signature)`` marks one that is passed to another kernel as an argument (a formulation, a
-chart, an integrator): it is compiled when it is first asked for, and the kernels that take it need no
-compilation of their own for it.  With NUMBA_DISABLE_JIT=1 all leave the plain Python function.
+``kernel`` marks a helper that other kernels call, ``inlined`` a helper that is compiled into its callers,
+``allocating`` the only type of kernel that may make arrays. ``exchangeable(signature)`` marks a kernel that
+is passed to another kernel as an argument (a formulation, a chart, an integrator). It is compiled at first
+use, and the kernels that receive it need not be compiled again.  With NUMBA_DISABLE_JIT=1 all of these
+decorators return the plain Python function.
 
 The cache lives in a folder named after a hash of the sources that have kernels, because numba does not
 notice an edit in a kernel that another file's kernel calls.
@@ -38,7 +38,7 @@ from mbref.kernels.disk_cache import (
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
-CONFIG: Any = numba.config  # whose names are made on import
+CONFIG: Any = numba.config  # numba creates the names of this module when it is imported
 PLAIN = bool(CONFIG.DISABLE_JIT)
 Function = Callable[..., Any]
 
@@ -73,12 +73,13 @@ CACHE = _cache_root() / f"kernels-{_source_hash()}"
 
 
 def kernel(function: Function) -> Function:
-    """A compiled helper, callable from kernels and from Python."""
+    """Return a compiled helper, callable from kernels and from Python."""
     return _compiled(function)
 
 
 def inlined(function: Function) -> Function:
-    """A kernel compiled into each of its callers: of an evaluation, half of whose time calls would take.
+    """Return a kernel that is compiled into each of its callers, since calls would take half of the time of
+    an evaluation.
 
     Each caller compiles it again: inlined kernels that call each other take long to compile.
     """
@@ -86,7 +87,7 @@ def inlined(function: Function) -> Function:
 
 
 def allocating(function: Function) -> Function:
-    """A kernel that allocates: numpy's decompositions do."""
+    """Return a kernel that allocates memory, such as a call of numpy's decompositions."""
     return _compiled(function, _nrt=True)
 
 
@@ -95,11 +96,11 @@ def _compiled(function: Function, **options: Any) -> Function:
 
 
 class Helper:
-    """A kernel that other kernels call: numba's dispatcher, made when a kernel is compiled with it.
+    """A kernel that other kernels call; numba's dispatcher is made when a caller is compiled.
 
-    Of several hundred helpers a run from the cache asks for few; dispatchers of all take 0.1 s.  The disk
-    keeps no helper: numba's index of a helper that was compiled for a type of another program's module
-    cannot be read where that module is missing.
+    A run from the cache needs few of several hundred helpers, and dispatchers of all would take 0.1 s.
+    Helpers are not stored on disk: numba cannot read the index of a helper that was compiled for a type of
+    another program if the program's module is missing.
     """
 
     def __init__(self, function: Function, options: dict[str, Any]):
@@ -111,7 +112,7 @@ class Helper:
 
     @property
     def _numba_type_(self) -> types.Type:
-        """The type by which numba compiles calls of this kernel."""
+        """Return the type by which numba compiles calls of this kernel."""
         return self._dispatcher._numba_type_
 
     @functools.cached_property
@@ -120,14 +121,14 @@ class Helper:
 
 
 class Exchangeable:
-    """A kernel of fixed signature that other kernels take as an argument; ``pointer`` compiles it."""
+    """A kernel of fixed signature that other kernels receive as an argument; ``pointer`` compiles it."""
 
     def __init__(self, function: Function, signature: Signature):
         self.function, self.signature = function, signature
 
     @functools.cached_property
     def pointer(self) -> Function:
-        """The function that kernels take: the compiled one, or the plain one without the JIT."""
+        """Return the function that kernels receive: the compiled one, or the plain one without the JIT."""
         if PLAIN:
             return self.function
         if not is_writable(CACHE):
@@ -158,7 +159,7 @@ class Exchangeable:
         return Entry(copy, self.signature)
 
     def _compile(self, **options: Any) -> Function:
-        """The compiled function, loaded where the cache has it."""
+        """Return the compiled function, loaded if the cache has it."""
         with cached_in(CACHE):
             return self._decorator(**{**OPTIONS, **options})(self.function)
 
@@ -166,17 +167,17 @@ class Exchangeable:
         return cfunc(self.signature, **options)
 
     def _is_loaded(self, compiled: Any) -> bool:
-        """Whether the compiled function comes from the cache."""
+        """Return whether the compiled function comes from the cache."""
         return bool(compiled.cache_hits)
 
     @property
     def is_kept(self) -> bool:
-        """Whether the cache of this machine has the compiled kernel, or none is needed."""
+        """Return whether the cache of this machine has the compiled kernel, or none is needed."""
         return PLAIN or any(path.suffix == ".nbc" for path in files_of(CACHE, self.function))
 
 
 class Entry(Exchangeable):
-    """A kernel that Python calls: explicit signature, compiled on first use."""
+    """A kernel that Python calls: explicit signature, compiled at first use."""
 
     def __call__(self, *arguments: object) -> Any:
         return self.pointer(*arguments)
@@ -189,22 +190,22 @@ class Entry(Exchangeable):
 
 
 def exchangeable(signature: Signature) -> Callable[[Function], Exchangeable]:
-    """Decorator: a kernel that is passed to other kernels."""
+    """Return a decorator for kernels that are passed to other kernels."""
     return lambda function: Exchangeable(function, signature)
 
 
 def entry(signature: Signature) -> Callable[[Function], Entry]:
-    """Decorator: a kernel that Python calls."""
+    """Return a decorator for kernels that Python calls."""
     return lambda function: Entry(function, signature)
 
 
 def pointer_to(signature: Signature) -> types.Type:
-    """The argument type of an exchangeable kernel."""
+    """Return the argument type for an exchangeable kernel."""
     return types.FunctionType(signature)
 
 
 @functools.cache
 def _announce_once() -> None:
-    """Tell the user on stderr why the first run takes long; standard output belongs to results."""
+    """Report on stderr why the first run takes long; standard output belongs to results."""
     message = "mbref: compiling kernels for this machine, once for each method; up to a minute"
     print(message, file=sys.stderr, flush=True)

@@ -1,6 +1,6 @@
 """Dimensions of declared arrays: expressions in the names of sizes, and whether arrays fit them.
 
-Both are remembered, because a run allocates and checks the same schemas as the run before.
+Results are cached, because successive runs allocate and check equal schemas.
 """
 
 from __future__ import annotations
@@ -10,13 +10,13 @@ import re
 from collections.abc import Mapping
 from types import CodeType
 
-MOST_CHECKED = 256  # schemas and sizes whose check is remembered
+MOST_CHECKED = 256  # number of schemas with sizes whose check is cached
 
 Shapes = tuple[str, tuple[str, ...], tuple[int, ...]]  # name of an array, its declared and its actual shape
 
 
 def size_of(expression: str, sizes: Mapping[str, int]) -> int:
-    """The length of a dimension, an expression in the sizes' names that the schema's author wrote."""
+    """Return the length of a dimension, an expression in the names of sizes from the schema's source."""
     if expression in sizes:
         return sizes[expression]
     return int(eval(_compiled(expression), {"max": max}, dict(sizes)))
@@ -29,13 +29,13 @@ def _compiled(expression: str) -> CodeType:
 
 @functools.cache
 def _names(expression: str) -> set[str]:
-    """The sizes that an expression names."""
+    """Return the names of sizes in an expression."""
     return set(re.findall(r"[a-z_]\w*", expression)) - {"max"}
 
 
 @functools.lru_cache(maxsize=MOST_CHECKED)
 def check_sizes(arrays: tuple[Shapes, ...]) -> None:
-    """TypeError unless dimensions of one name have one length in all arrays."""
+    """Raise TypeError unless dimensions of one name have one length in all arrays."""
     sizes: dict[str, int] = {}
     for _, shape, found in arrays:
         for dimension, length in zip(shape, found, strict=True):

@@ -21,15 +21,16 @@ from typing import Any
 
 import numba
 
-CHECKSUMS = "checksums.txt"  # one line per file: SHA-256, blank, path in the folder
-LEAST_FREE = 1 << 27  # bytes of the disk: kernels of all methods take 40 MB, and numba fails on a full disk
+CHECKSUMS = "checksums.txt"  # one line for each file: SHA-256, blank, path in the folder
+LEAST_FREE = 1 << 27  # bytes of free disk; kernels of all methods take 40 MB, and numba fails on a full disk
 LINE = hashlib.sha256().digest_size * 2 + 1  # characters before the path
 
 
 @contextlib.contextmanager
 def cached_in(folder: Path) -> Iterator[None]:
-    """Let numba cache in the folder the functions that are decorated meanwhile (``NUMBA_CACHE_DIR``)."""
-    config: Any = numba.config  # whose names are made on import
+    """Let numba cache functions that are decorated in the ``with`` block in the folder
+    (``NUMBA_CACHE_DIR``)."""
+    config: Any = numba.config  # numba creates the names of this module when it is imported
     before, config.CACHE_DIR = config.CACHE_DIR, str(folder)
     try:
         yield
@@ -39,7 +40,7 @@ def cached_in(folder: Path) -> Iterator[None]:
 
 @functools.cache
 def is_writable(folder: Path) -> bool:
-    """Whether files can be kept in the folder; one line on stderr says so where they cannot."""
+    """Return whether files can be stored in the folder; otherwise one line on stderr reports it."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
@@ -52,7 +53,7 @@ def is_writable(folder: Path) -> bool:
 
 
 def files_of(folder: Path, function: Callable[..., Any]) -> list[Path]:
-    """The files of a function in the folder: an index, and the code of each of its signatures."""
+    """Return the files of a function in the folder: an index, and the code of each of its signatures."""
     source = Path(function.__code__.co_filename)
     stem = f"{source.stem}.{function.__qualname__}-".replace("<", "").replace(">", "")
     return [
@@ -65,9 +66,11 @@ def files_of(folder: Path, function: Callable[..., Any]) -> list[Path]:
 
 
 def remove_damaged(folder: Path, function: Callable[..., Any]) -> None:
-    """Remove the files of a function unless the list has all their checksums; stderr names damaged ones.
+    """Remove the files of a function unless the list has all their checksums; damaged ones are reported on
+    stderr.
 
-    Files written since this process began to use the folder are of a process that compiles now, and stay.
+    Files written since this process began to use the folder belong to a process that compiles now, and are
+    not removed.
     """
     since = begin(folder)
     paths, is_whole = [path for path in files_of(folder, function) if _time_of(path) < since], True
@@ -101,7 +104,8 @@ def begin(folder: Path) -> float:
 
 
 def _known(folder: Path, path: Path) -> set[str]:
-    """The checksums that the list has of a file: processes that compile at the same time write it twice."""
+    """Return the checksums that the list has for a file; processes that compile at the same time write it
+    twice."""
     try:
         size = (folder / CHECKSUMS).stat().st_size
     except OSError:
@@ -111,7 +115,7 @@ def _known(folder: Path, path: Path) -> set[str]:
 
 @functools.lru_cache(maxsize=2)
 def _checksums(folder: Path, _size: int) -> dict[str, set[str]]:
-    """The list of a folder, read again when its size has changed."""
+    """Return the list of a folder, read again when its size has changed."""
     found: dict[str, set[str]] = {}
     for line in (folder / CHECKSUMS).read_text(errors="replace").splitlines():
         found.setdefault(line[LINE:], set()).add(line[: LINE - 1])
@@ -121,14 +125,14 @@ def _checksums(folder: Path, _size: int) -> dict[str, set[str]]:
 def _checksum(path: Path) -> str:
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
-    except OSError:  # removed by another process
+    except OSError:  # another process removed it
         return ""
 
 
 def _time_of(path: Path) -> float:
     try:
         return path.stat().st_mtime
-    except OSError:  # removed by another process
+    except OSError:  # another process removed it
         return 0.0
 
 
@@ -137,7 +141,8 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def _names_in(folder: Path) -> list[str]:
-    """The names in a folder; none where it is missing or no folder.  A third of the time of ``glob``."""
+    """Return the names in a folder; none if it is missing or no folder. This takes a third of the time of
+    ``glob``."""
     try:
         return os.listdir(folder)
     except OSError:

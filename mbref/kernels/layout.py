@@ -26,7 +26,7 @@ OK, SINGULAR, NOT_CONVERGED, NOT_FINITE = range(4)
 CHANGED, SINGULAR_AHEAD = (
     4,
     5,
-)  # the chart chose new coordinates; the rank drops inside the step or at its end
+)  # status: the chart chose new coordinates; the rank drops inside the step or at its end
 
 
 class Frames(NamedTuple):
@@ -54,7 +54,7 @@ class Settings(NamedTuple):
     position_gain: float = 0.0
     rank_tolerance: float = 1e-10
     newton_tolerance: float = 1e-13
-    rounding: float = 1e-15  # violation of positions that is not corrected
+    rounding: float = 1e-15  # violation of positions below which they are not corrected
     independent: int = 0  # 1 if rows with small singular values are known to be independent
     nearly_dependent: int = 0  # 1 if rows are nearly dependent at the start, as with two tilted hinges
 
@@ -103,7 +103,7 @@ class Equations(NamedTuple):
 
 
 class State(NamedTuple):
-    """q, v, q' and q''."""
+    """State: q, v, q' and q''."""
 
     coordinates: Annotated[Vector, "7*nb"]
     velocities: Annotated[Vector, "n"]
@@ -119,17 +119,18 @@ class Active(NamedTuple):
 
 
 class Symbolic(NamedTuple):
-    """Where every number of D, S = D Dᵀ and its factor L stands; r rows and c columns take part."""
+    """Positions of all numbers of D, S = D Dᵀ and its factor L; r rows and c columns are in the
+    factorisation."""
 
     row: Annotated[Unsigned, "r"]  # the system's row of each row here, in the order of elimination
     column: Annotated[Unsigned, "c"]  # the system's column of each column here
-    d_start: Annotated[Unsigned, "r + 1"]  # where each row of D begins
+    d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D
     d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
     s_start: Annotated[Unsigned, "nl + 1"]  # first product in S of each entry of L
     s_left: Annotated[Unsigned, "products"]  # the products: two numbers of D
     s_right: Annotated[Unsigned, "products"]
-    l_start: Annotated[Unsigned, "r + 1"]  # where each column of L begins, its diagonal first
+    l_start: Annotated[Unsigned, "r + 1"]  # first entry of each column of L, its diagonal element
     l_row: Annotated[Unsigned, "nl"]
     update_start: Annotated[Unsigned, "nl + 1"]  # first update of each entry of L
     update_left: Annotated[Unsigned, "updates"]  # factors of an update: entries of L and L Δ
@@ -140,7 +141,7 @@ class StaticRows(NamedTuple):
     """Statically determined rows: each determines columns at rest; its multiplier balances their force."""
 
     row: Annotated[Unsigned, "h"]
-    start: Annotated[Unsigned, "h + 1"]  # where the entries of each row begin
+    start: Annotated[Unsigned, "h + 1"]  # first entry of each row
     entry: Annotated[Unsigned, "e"]  # index of each entry in the blocks
     column: Annotated[Unsigned, "e"]
     other_start: Annotated[Unsigned, "e + 1"]  # first entry of other rows in the column
@@ -177,39 +178,40 @@ class Control(NamedTuple):
     most_steps: float
     steps_per_call: float
     forced_step: float  # s; a step this short is taken whatever its error estimate
-    first_step: float  # s; 0 where the integrator chooses it
+    first_step: float  # s; 0 if the integrator chooses it
     rtol: float
     atol: float
     closed_loops: float  # number of closed loops; without loops no position is singular
 
 
 class Watch(NamedTuple):
-    """The smallest pivot of Φ_q that a chart watches, and when it last accepted a state."""
+    """The smallest pivot of Φ_q that a chart monitors, and its value at the last accepted state."""
 
     smallest_pivot: float = 0.0
-    past_pivot: float = 0.0  # smallest_pivot of the last accepted state
-    nearest: float = 1.0  # the least that smallest_pivot has been, over the reference at that time
-    reference_pivot: float = 0.0  # the largest that smallest_pivot has been; 0 where nothing is watched
+    past_pivot: float = 0.0  # smallest_pivot at the last accepted state
+    nearest: float = 1.0  # least value of smallest_pivot so far, over the reference at that time
+    reference_pivot: float = 0.0  # largest value of smallest_pivot so far; 0 if nothing is monitored
     generic_rank: int = 0
     regular: int = 0  # 1 if the motion does not begin at a singular position
     accepted_time: float = 0.0  # s
-    singular_part: float = 0.0  # fraction of the last step from its start to the singular position
+    # position of the singular position in the last step, as a fraction of the step
+    singular_part: float = 0.0
 
 
 class Clock(NamedTuple):
-    """Where the stepping loop is."""
+    """Time and step lengths of the stepping loop."""
 
     time: float = 0.0  # s
-    length: float = 0.0  # s, of the last step
-    suggested: float = 0.0  # s, that length before sample times cut it
+    length: float = 0.0  # s, length of the last step
+    suggested: float = 0.0  # s, this length before it was limited by sample times
     ratio: float = 0.0  # error of the last step over its tolerance
-    past_length: float = 0.0  # s, of the step before the last
-    past_ratio: float = 0.0  # error / tolerance of the past step
-    share: float = 1.0  # tolerance of a step / rtol and atol (``stepping.loop.share``)
+    past_length: float = 0.0  # s, length of the step before the last
+    past_ratio: float = 0.0  # error / tolerance of the step before the last
+    share: float = 1.0  # factor on rtol and atol (``stepping.loop.share``)
     y_size: int = 0  # length of y
-    sample: int = 0  # the next one to take
-    restart: int = 0  # the step since which the states are one smooth piece
-    attempt_end: float = 0.0  # s, the end of the step that meets a singular position
+    sample: int = 0  # index of the next sample
+    restart: int = 0  # first step of the present smooth piece of the motion
+    attempt_end: float = 0.0  # s, end of the step that reaches a singular position
     violated_row: int = -1
 
 
@@ -223,11 +225,11 @@ class Samples(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """Both ends of a step of a run that watches pivots, and the product of their constraint gradients."""
+    """Both ends of a step of a run that monitors pivots, and the product of their constraint gradients."""
 
-    gradient: Annotated[Vector, "watched_entries"]  # D of ``SparseFactor`` where the step began
-    squared_pivots: Annotated[Vector, "watched_rows"]  # there
-    lower: Annotated[Vector, "watched_numbers"]  # of ``sparse_lu.factorise_product``
+    gradient: Annotated[Vector, "watched_entries"]  # D of ``SparseFactor`` at the start of the step
+    squared_pivots: Annotated[Vector, "watched_rows"]  # at the start of the step
+    lower: Annotated[Vector, "watched_numbers"]  # lower factor of ``sparse_lu.factorise_product``
     upper: Annotated[Vector, "watched_numbers"]
     pivots: Annotated[Vector, "watched_rows"]
     rates: Annotated[Matrix, 2, "7*nb"]  # q' at both ends

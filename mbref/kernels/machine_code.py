@@ -1,4 +1,4 @@
-"""Machine code of scenes: LLVM IR compiled once, kept on disk and, once loaded, in this process."""
+"""Machine code of scenes: LLVM IR compiled once, stored on disk and, once loaded, in this process."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ import llvmlite.binding as llvm
 
 from mbref.kernels import checked_file
 
-MOST = 64  # pieces of code that a process keeps loaded
+MOST = 64  # number of pieces of code that a process keeps loaded
 _loaded: dict[Path, Code] = {}
 
 
 class NoGeneratedCode(Exception):
-    """A scene or method without generated code, with the reason."""
+    """A scene or method has no generated code; the message is the reason."""
 
 
 class Code:
-    """Object code in memory; ``address(name)`` of a function is good while this object lives."""
+    """Object code in memory; ``address(name)`` of a function is valid while this object exists."""
 
     def __init__(self, data: bytes):
         self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
@@ -28,14 +28,15 @@ class Code:
         self._addresses: dict[str, int] = {}
 
     def address(self, name: str) -> int:
-        """Where a function begins."""
+        """Return the address of a function."""
         if name not in self._addresses:
             self._addresses[name] = self._engine.get_function_address(name)
         return self._addresses[name]
 
 
 def code_at(path: Path, write: Callable[[], str]) -> Code:
-    """The code of a path: as loaded before, as kept on disk, or compiled from the LLVM IR that is written."""
+    """Return the code of a path: loaded before, stored on disk, or compiled from the LLVM IR that ``write``
+    returns."""
     if path not in _loaded:
         data = checked_file.read(path) or _compiled(path, write())
         if len(_loaded) >= MOST:
@@ -54,7 +55,7 @@ def _compiled(path: Path, text: str) -> bytes:
 
 @functools.cache
 def processor() -> str:
-    """The processor that the code is for."""
+    """Return the processor for which the code is made."""
     return f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}"
 
 
@@ -66,7 +67,7 @@ def _target() -> llvm.Target:
 
 
 def _target_machine() -> llvm.TargetMachine:
-    """A fresh one each time: an engine takes it over."""
+    """Return a new target machine: an engine takes ownership of it."""
     return _target().create_target_machine(
         cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=2, jit=True
     )

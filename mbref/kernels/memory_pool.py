@@ -1,8 +1,7 @@
-"""Memory pool: memory of kernels that is made and packed once, and serves one run after another.
+"""Memory pool: memory of kernels that is made and packed once, and reused by successive runs.
 
 To allocate and pack the memory of a small mechanism takes longer than a short run.  Released memory is
-acquired again for an equal key with the numbers that it had when it was made, so that nothing of one run
-reaches the next.
+acquired again for an equal key. Its numbers are then reset, so that no number of one run reaches the next.
 """
 
 from __future__ import annotations
@@ -17,7 +16,8 @@ from mbref.kernels.aligned import aligned_copy
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import Numbers
 
-MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20  # kept for later; larger memory is not kept
+# limits of stored memory: keys, pieces of a key, bytes of a piece
+MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20
 
 
 class SavedNumbers:
@@ -29,7 +29,7 @@ class SavedNumbers:
         self.size = sum(array.nbytes for array, _ in self._pairs)  # bytes
 
     def restore(self) -> None:
-        """Write the numbers back to where they were copied from."""
+        """Write the numbers back to the arrays and records from which they were copied."""
         for array, numbers in self._pairs:
             array[...] = numbers
 
@@ -49,9 +49,9 @@ def arrays_in(values: Any) -> Iterator[np.ndarray]:
 
 
 class Pooled:
-    """Packed memory of a schema, and the numbers with which it begins.
+    """Packed memory of a schema, with its initial numbers.
 
-    ``part`` is other pooled memory that is in it, and keeps its own numbers; ``number`` identifies it.
+    ``part`` is other pooled memory inside it, which has its own initial numbers; ``number`` identifies it.
     """
 
     def __init__(self, values: Any, key: Hashable, part: Pooled | None = None):
@@ -64,7 +64,7 @@ class Pooled:
         self.size: int = self._first.size + (part.size if part else 0)  # bytes in arrays and records
 
     def restore(self) -> None:
-        """Write the numbers with which the memory was made to its arrays and records, except its part's."""
+        """Write the initial numbers to the arrays and records, except in ``part``."""
         self._first.restore()
 
 
@@ -73,7 +73,8 @@ _numbers = itertools.count()
 
 
 def acquire(key: Hashable, make: Callable[[], Any], part: Pooled | None = None) -> Pooled:
-    """Memory of a key, which determines all that ``make`` makes, its part included: kept memory, or new."""
+    """Return memory for a key, which determines everything that ``make`` returns, its part included: stored
+    memory, or new."""
     key = (key, part.number) if part else key
     kept = _kept.get(key)
     try:
@@ -87,7 +88,7 @@ def acquire(key: Hashable, make: Callable[[], Any], part: Pooled | None = None) 
 
 
 def release(memory: Pooled) -> None:
-    """Keep memory that nobody uses any more."""
+    """Store memory that is no longer used."""
     if memory.size > MOST_BYTES:
         return
     if memory.key not in _kept and len(_kept) >= MOST_KEYS:
@@ -113,10 +114,10 @@ def write(record: Any, values: Any) -> None:
 
 
 def shapes_of(values: Any) -> tuple[Any, ...]:
-    """The shapes of the arrays of a schema."""
+    """Return the shapes of the arrays of a schema."""
     return tuple(shapes_of(value) if isinstance(value, tuple) else value.shape for value in values)
 
 
 def copied(values: Any) -> Any:
-    """An instance of the same schema with arrays of its own."""
+    """Return an instance of an equal schema with its own arrays."""
     return type(values)(*(copied(v) if isinstance(v, tuple) else aligned_copy(v) for v in values))

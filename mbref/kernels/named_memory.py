@@ -1,4 +1,5 @@
-"""Named memory: a schema of NamedTuples, declared once, from which allocation, packing and opening follow.
+"""Named memory: NamedTuples declare the arrays and numbers of kernels; allocation and access follow from the
+declaration (schema).
 
 A field of a schema is an array, a record of numbers, a kernel, another schema, or an ``Address``:
 
@@ -7,9 +8,9 @@ A field of a schema is an array, a record of numbers, a kernel, another schema, 
         limits: Limits                       # a NamedTuple of int and float fields is a record
         step: Annotated[Kernel, STEP]
 
-Kernels write ``rows.phi[i]`` and ``limits.steps += 1``.  Compiled, a schema is one pointer to a table of
-addresses, and only the fields that a kernel names are loaded.  Without compilation it is the NamedTuple
-itself.  The table and its arrays stay in place while kernels run.
+Kernels write ``rows.phi[i]`` and ``limits.steps += 1``.  In compiled code a schema is one pointer to a table
+of addresses, and only the fields that a kernel uses are loaded. Without compilation it is the NamedTuple
+itself. The table and its arrays must not be moved or freed while kernels run.
 """
 
 from __future__ import annotations
@@ -38,12 +39,13 @@ Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
 Indices = Annotated[np.ndarray, INDICES]  # int64 (k,)
 IndexTable = Annotated[np.ndarray, INDEX_TABLE]  # int64 (k, l)
-Unsigned = Annotated[np.ndarray, UNSIGNED]  # uint32 (k,): indices without a test of their sign
+Unsigned = Annotated[np.ndarray, UNSIGNED]  # uint32 (k,): indices whose sign need not be tested
 Kernel = Callable[..., Any]  # annotated with its signature
-Address = Annotated[Any, "address"]  # of a packed schema that the reader names with ``opener``
+# address of a packed schema; ``opener`` of that schema gives access to it
+Address = Annotated[Any, "address"]
 
 WORD, WORDS = ir.IntType(64), 3  # words of a field: address, rows, columns
-MOST_SHAPES = 256  # schemas whose shapes are remembered
+MOST_SHAPES = 256  # number of schemas whose shapes are cached
 
 
 class Named(types.Type):
@@ -69,20 +71,20 @@ def _unbox_named(kind, value, context):
 
 
 class Field(typing.NamedTuple):
-    """One field of a schema: its numba type, its shape in names of dimensions, its first row in the table."""
+    """One field of a schema: its numba type, its shape as names of dimensions, its first row in the table."""
 
     name: str
-    title: str  # name of the field with its schema
+    title: str  # name of the schema and the field
     kind: types.Type
     shape: tuple[str, ...]
     row: int
-    schema: type | None  # of a field that is another schema
-    dtype: np.dtype | None  # of an array's entries, or of a record
+    schema: type | None  # set for a field that is another schema
+    dtype: np.dtype | None  # type of an array's entries, or of a record
 
 
 @functools.cache
 def fields_of(schema: type) -> Mapping[str, Field]:
-    """Fields of a schema by name, in the order of its table."""
+    """Return the fields of a schema by name, in the order of its table."""
     fields, row = {}, 0
     for name, hint in typing.get_type_hints(schema, include_extras=True).items():
         kind, shape = _kind_of(hint)
@@ -97,7 +99,7 @@ def fields_of(schema: type) -> Mapping[str, Field]:
 
 
 def rows_of(schema: type) -> int:
-    """Rows that a schema takes in a table of addresses."""
+    """Return the number of rows of a schema in a table of addresses."""
     return sum(rows_of(field.schema) if field.schema else 1 for field in fields_of(schema).values())
 
 
@@ -113,7 +115,7 @@ def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
 
 
 def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
-    """The schema with the fields ``given``, and zeros of the declared shapes for the others."""
+    """Return the schema with the ``given`` fields, and zeros of the declared shapes for all other fields."""
     makers = _makers(schema, tuple(sizes.items()), frozenset(given))
     return schema(**given, **{name: make() for name, make in makers})
 
@@ -122,7 +124,7 @@ def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
 def _makers(
     schema: type, sizes: tuple[tuple[str, int], ...], given: frozenset[str]
 ) -> list[tuple[str, Callable[[], Any]]]:
-    """The name of each field that is not given, and the function that makes it."""
+    """Return the name of each field that is not given, and the function that makes it."""
     hints = zip(fields_of(schema).values(), _hints(schema), strict=True)
     return [
         (field.name, _maker(field, hint, dict(sizes))) for field, hint in hints if field.name not in given
@@ -130,7 +132,7 @@ def _makers(
 
 
 def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], Any]:
-    """The function that makes a field: a schema, a record, or zeros."""
+    """Return the function that makes a field: a schema, a record, or zeros."""
     if field.schema:
         return functools.partial(allocate, field.schema, sizes)
     if not field.shape:
@@ -141,14 +143,15 @@ def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], An
 
 @functools.cache
 def _hints(schema: type) -> tuple[Any, ...]:
-    """The types of a schema's fields."""
+    """Return the types of a schema's fields."""
     return tuple(typing.get_type_hints(schema).values())
 
 
 class Packed:
-    """A schema or a record ready for kernels, which take ``argument``.  Keep it while they run.
+    """A schema or a record in the form that kernels accept: pass the field ``argument`` to a kernel. The
+    object must exist while the kernel runs.
 
-    ``part`` is a schema in it that is packed already, which saves time.
+    ``part`` is a schema inside it that is already packed, which saves time.
     """
 
     def __init__(self, values: Any, part: Packed | None = None):
@@ -160,23 +163,25 @@ class Packed:
             check_sizes(tuple(self.shapes))
             self.table = np.array(words, dtype=np.int64)
             self.address = self.table.ctypes.data
-            self._numba_type_ = _kind(type(values))  # of this argument, read by numba's dispatcher
+            self._numba_type_ = _kind(type(values))  # numba's dispatcher reads the type of this argument here
         self.argument = values if PLAIN else self
 
 
 @functools.cache
 def _kind(schema: type) -> Named:
-    """One numba type a schema: making one takes longer than a call."""
+    """Return the numba type of a schema, which is cached because making a type takes longer than a call."""
     return Named(schema)
 
 
 def packed(values: Any, part: Packed | None = None) -> Packed:
-    """A schema or record for kernels; TypeError names the field that does not fit its declaration."""
+    """Return a schema or record packed for kernels; raises TypeError for a field that does not fit its
+    declaration."""
     return Packed(values, part)
 
 
 def _words(values: Any, part: Packed | None = None) -> tuple[list[int], list[Shapes]]:
-    """The table of a schema, WORDS a field: address, rows and columns; and the shapes of its arrays."""
+    """Return the table of a schema with WORDS numbers for each field (address, rows and columns), and the
+    shapes of its arrays."""
     if part is not None and values is part.values:
         return part.table.tolist(), part.shapes
     words: list[int] = []
@@ -197,14 +202,14 @@ def _words(values: Any, part: Packed | None = None) -> tuple[list[int], list[Sha
 
 
 def _check_schema(field: Field, value: Any) -> None:
-    """TypeError unless a value has the schema that its field declares."""
+    """Raise TypeError unless a value has the schema that its field declares."""
     if type(value) is not field.schema:
         needed = field.schema.__name__ if field.schema else ""
         raise TypeError(f"{field.title}: needs {needed}, got {type(value).__name__}")
 
 
 def _check_array(field: Field, value: Any) -> None:
-    """TypeError unless an array has the entries and the order that its field declares."""
+    """Raise TypeError unless an array has the entries and the order that its field declares."""
     fits = isinstance(value, np.ndarray) and value.dtype == field.dtype
     if not (fits and value.ndim == len(field.shape) and value.flags.c_contiguous):
         found = f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
@@ -212,7 +217,7 @@ def _check_array(field: Field, value: Any) -> None:
 
 
 def _address_of_other(field: Field, value: Any) -> int:
-    """The address of a record, a kernel or a packed schema; 0 for none."""
+    """Return the address of a record, a kernel or a packed schema; 0 for none."""
     if field.dtype is not None:
         if getattr(value, "dtype", None) != field.dtype:
             raise TypeError(
@@ -261,7 +266,7 @@ def _load_field(context, builder, kind, pointer, name):
 
 
 def _load(builder, place) -> ir.Value:
-    """A word of the table, which no kernel changes: LLVM may load it once for a whole loop."""
+    """Return a word of the table, which no kernel changes: LLVM may load it once for a whole loop."""
     word = builder.load(place)
     word.set_metadata("invariant.load", builder.module.add_metadata([]))
     return word
@@ -283,7 +288,7 @@ def _array(context, builder, kind, place, address) -> ir.Value:
 
 
 def opener(schema: type) -> Callable[[Any], Any]:
-    """A kernel function (address) -> the packed schema, or the record, there."""
+    """Return a kernel function that maps an address to the packed schema, or the record, at that address."""
     kind = from_dtype(dtype_of(schema)) if is_record(schema) else Named(schema)
 
     @intrinsic
@@ -297,5 +302,5 @@ def opener(schema: type) -> Callable[[Any], Any]:
 
 
 def _as_it_is(memory: Any) -> Any:
-    """Without compilation an address is the schema itself."""
+    """Return the memory itself: without compilation an address is the schema."""
     return memory.values if isinstance(memory, Packed) else memory

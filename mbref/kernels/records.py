@@ -1,4 +1,4 @@
-"""Records: numbers of a schema in memory of their own, which Python and kernels read and write by name."""
+"""Records: numbers of a schema in their own memory, which Python and kernels read and write by name."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ Schema = TypeVar("Schema")
 
 
 class Numbers(np.void):  # type: ignore[misc]  # NumPy's stubs call it final
-    """Numbers of a schema in memory of their own; a class of its own gives each schema's numbers by name."""
+    """Numbers of a schema in their own memory; a subclass for each schema has properties with the names of
+    the numbers."""
 
     __slots__ = ()
 
 
 def is_record(schema: type) -> bool:
-    """Whether all fields of a NamedTuple are numbers."""
+    """Return whether all fields of a NamedTuple are numbers."""
     return all(hint in (int, float) for hint in typing.get_type_hints(schema).values())
 
 
 @functools.cache
 def dtype_of(record: type) -> np.dtype:
-    """The NumPy structure of a record; TypeError for a field name that NumPy has taken."""
+    """Return the NumPy structure of a record; raises TypeError for a field name that NumPy uses."""
     hints = typing.get_type_hints(record)
     if taken := [name for name in hints if hasattr(Numbers, name)]:
         raise TypeError(f"{record.__name__}: NumPy's records have attributes called {', '.join(taken)}")
@@ -34,13 +35,13 @@ def dtype_of(record: type) -> np.dtype:
 
 @functools.cache
 def numbers_of(schema: type) -> np.dtype:
-    """The NumPy type of a record of numbers."""
+    """Return the NumPy type of a record of numbers."""
     numbers = {name: _number(name) for name in dtype_of(schema).names or ()}
     return np.dtype((type(schema.__name__, (Numbers,), {"__slots__": (), **numbers}), dtype_of(schema)))
 
 
 def _number(name: str) -> property:
-    """The number of a name: an attribute found by Python takes a third of the time of NumPy's own."""
+    """Return a property for a number, which takes a third of the time of NumPy's own attribute access."""
 
     def put(numbers: Numbers, value: Any) -> None:
         numbers[name] = value
@@ -49,6 +50,6 @@ def _number(name: str) -> property:
 
 
 def record(values: Schema) -> Schema:
-    """Return the numbers of a record in memory of their own, to be read and written by name."""
+    """Return the numbers of a record in their own memory, to be read and written by name."""
     kind: Any = type(values)
     return np.array([values], dtype=numbers_of(kind))[0]

@@ -33,16 +33,16 @@ class Primitives(NamedTuple):
     second: Annotated[Indices, "p"]
     driver: Annotated[Indices, "p"]  # index of the driver's function of time, -1 without
     row: Annotated[Indices, "p"]
-    begins: Annotated[Indices, "p"]  # 0 of the second coordinate in the row of a coupling, else 1
-    column_first: Annotated[Indices, "p"]  # in the blocks, where the columns of the first body stand
+    begins: Annotated[Indices, "p"]  # 0 for the second coordinate in the row of a coupling, otherwise 1
+    column_first: Annotated[Indices, "p"]  # index in the blocks of the first body's columns
     column_second: Annotated[Indices, "p"]
-    angle: Annotated[Indices, "p"]  # index of the unwrapped angle of a joint coordinate, else -1
+    angle: Annotated[Indices, "p"]  # index of the unwrapped angle of a joint coordinate, otherwise -1
     point_first: Annotated[Matrix, "p", 3]
     point_second: Annotated[Matrix, "p", 3]
     direction_first: Annotated[Matrix, "p", 3]
-    turning_first: Annotated[Matrix, "p", 3]  # a quarter turn from direction_first, where a driver turns it
+    turning_first: Annotated[Matrix, "p", 3]  # direction_first rotated by 90°, if a driver rotates it
     direction_second: Annotated[Matrix, "p", 3]
-    length: Annotated[Vector, "p"]  # of a distance (m), or the factor of a joint coordinate
+    length: Annotated[Vector, "p"]  # length of a distance constraint (m), or the factor of a joint coordinate
 
 
 class Functions(NamedTuple):
@@ -62,7 +62,8 @@ class Functions(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Loads; a kind uses the vectors that it needs.  Points and axes are body-fixed, forces are world."""
+    """Loads; a kind uses the vectors that it needs. Points and axes are body-fixed, forces are in the world
+    frame."""
 
     kind: Annotated[Indices, "l"]
     first: Annotated[Indices, "l"]
@@ -81,15 +82,15 @@ class Loads(NamedTuple):
     natural: Annotated[Vector, "l"]  # length or displacement (m) or angle (rad)
 
 
-FIRST_NUMBERS = Primitives._fields.index("point_first")  # earlier fields belong to the structure
+FIRST_NUMBERS = Primitives._fields.index("point_first")  # all earlier fields belong to the structure
 FIRST_OF_LOADS = Loads._fields.index("force")
 
 
 class SceneData(NamedTuple):
-    """A scene as kernels read it; none changes it."""
+    """A scene as kernels read it; no kernel changes it."""
 
     gravity: Annotated[Vector, 3]
-    lengths: Annotated[Vector, "nb"]  # of the bodies (m), see equations.units
+    lengths: Annotated[Vector, "nb"]  # lengths of the bodies (m), see equations.units
     metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies
     primitives: Primitives
@@ -101,7 +102,7 @@ class SceneData(NamedTuple):
 
     @property
     def numbers(self) -> tuple[Any, ...]:
-        """The arrays in which scenes of one structure differ."""
+        """Return the arrays in which scenes of one structure differ."""
         primitives, loads = self.primitives[FIRST_NUMBERS:], self.loads[FIRST_OF_LOADS:]
         return (
             self.gravity,

@@ -1,1 +1,1 @@
-"""Dense and sparse factorisations for the kernels; nothing here knows a mechanism."""
+"""Dense and sparse factorisations for the kernels; nothing here depends on mechanisms."""

@@ -1,8 +1,8 @@
-"""Solutions of least norm, and the null space, of dense equations: by QR where the rank is clear.
+"""Solutions of least norm, and the null space, of dense equations: by QR if the rank is certain.
 
-Aᵀ P = Q R with column pivoting.  The rank is clear where the last pivot that counts is CLEAR at least, of
-rows of length one, and all that is left behind it is rounding.  Elsewhere, and where equations contradict
-each other, singular values decide, which take four times as long.
+Aᵀ P = Q R with column pivoting.  The rank is certain if the last nonzero pivot is at least CLEAR, for rows of
+length one, and the remaining entries are rounding. Otherwise, and if equations contradict each other,
+singular values decide, which take four times as long.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ UNCLEAR = -1
 
 
 class Scratch(NamedTuple):
-    """The factors of ``qr_pivoted``, the solution and an orthonormal basis of the null space as rows."""
+    """The factors of ``qr_pivoted``, the solution, and an orthonormal basis of the null space as rows."""
 
     transposed: Annotated[Matrix, "n", "m"]
     order: Annotated[Indices, "m"]
@@ -37,7 +37,7 @@ class Scratch(NamedTuple):
 
 @kernel
 def largest_left(rank, transposed):
-    """The largest entry that is left behind the rank."""
+    """Return the largest remaining entry after the given number of pivots."""
     largest = 0.0
     for i in range(rank, transposed.shape[0]):
         for j in range(rank, transposed.shape[1]):
@@ -47,9 +47,10 @@ def largest_left(rank, transposed):
 
 @entry(INT(FLOAT, Named(Scratch)))
 def solve_clearly(tolerance, scratch):
-    """The rank, once the solution and, in the first rows, the basis are found; UNCLEAR without them.
+    """Compute the solution and, in the first rows, the basis of the null space; return the rank, or UNCLEAR
+    without a result.
 
-    A pivot counts that exceeds ``tolerance`` of the longest row.
+    A pivot is nonzero if it exceeds ``tolerance`` times the longest row.
     """
     rank, n = qr_pivoted(tolerance, scratch), scratch.x.shape[0]
     if rank > 0 and abs(scratch.transposed[rank - 1, rank - 1]) < CLEAR:
@@ -69,11 +70,11 @@ def solve_clearly(tolerance, scratch):
 
 
 def least_norm(matrix: np.ndarray, rhs: np.ndarray, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """The solution x (n,) of A x = b, of least squares and least norm, and an orthonormal basis (n, k) of the
-    null space.
+    """Return the solution x (n,) of A x = b, of least squares and least norm, and an orthonormal basis (n, k)
+    of the null space.
 
-    The rows of A (m, n) are of length one at most; singular values below ``tolerance`` of the largest are
-    taken for zero.
+    The rows of A (m, n) have at most length one; singular values below ``tolerance`` times the largest count
+    as zero.
     """
     m, n = matrix.shape
     if not matrix.size:

@@ -1,7 +1,7 @@
 """Dense factorisations by elimination: LU with partial and with full pivoting, Cholesky.
 
-Small matrices by hand, because a call of LAPACK costs more than the work.  All in place on C-contiguous
-arrays given by the caller.
+For small matrices, because a call of LAPACK would take longer than the work. All functions work in place on
+C-contiguous arrays of the caller.
 """
 
 from __future__ import annotations
@@ -55,9 +55,10 @@ def lu_solve(a, n, pivots, b):
 
 @inlined
 def multiplied(size, part, number):
-    """The size of a product times a number, as a logarithm and a part of which none has been taken.
+    """Return the size of a product times a number, as a logarithm and a factor whose logarithm is not yet
+    included.
 
-    Logarithms are taken of as many numbers at a time as a number's range allows.
+    One logarithm is computed for as many numbers as the range of doubles allows.
     """
     part *= max(abs(number), 1e-150)
     if not 1e-150 < part < 1e150:

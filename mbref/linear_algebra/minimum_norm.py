@@ -34,20 +34,22 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 TINY, NEVER = 1e-300, 1e300
-LEAST = 2  # iterations of ``solve_to_tolerance``: enough but near singular positions, so that they are fixed
-ALPHA = 1e10  # penalty of systems solved once: ignores singular values below 1e-5
+# least number of iterations of ``solve_to_tolerance``; enough away from singular positions, so that it is
+# fixed there
+LEAST = 2
+ALPHA = 1e10  # penalty for systems that are solved once; singular values below 1e-5 are ignored
 ITERATIONS, ROUNDING = 20, 1e-15
-DEPENDENT = 1e-11  # singular value of unit rows below which the rest counts as dependent
+DEPENDENT = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 
 
 @inlined
 def solve_to_tolerance(factor, epsilon, most, target, multipliers):
-    """Change ``target`` (n,) by the least that makes Φ_q target grow by the residual.
+    """Change ``target`` (n,) by the least change for which Φ_q times the change equals the residual.
 
-    Stops when the next change would be ≤ ``epsilon``, judged by how the changes shrink.  ``multipliers``
-    (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after ``most``.  L⁻¹
-    times the residual stands in ``factor.step`` already, where ``factorise`` leaves it.
+    The iteration ends when the next change would be ≤ ``epsilon``, estimated from the previous changes.
+    ``multipliers`` (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after
+    ``most``.  L⁻¹ times the residual stands in ``factor.step`` already, where ``factorise`` leaves it.
     """
     row, step, total = factor.symbolic.row, factor.step, factor.total
     total[:] = 0.0
@@ -71,10 +73,10 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
 
 @kernel
 def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
-    """Go on from where ``solve_to_tolerance`` ended, by Craig's method with S + I/α as its preconditioner.
+    """Continue after ``solve_to_tolerance``, by Craig's method with S + I/α as preconditioner.
 
-    A singular value that is small beside α^(-1/2) takes about one direction (J. E. Craig, J. Math. and
-    Physics 34, 1955).  Returns OK where rounding, or rows dependent to DEPENDENT, are left; otherwise
+    A singular value that is small compared with α^(-1/2) takes about one direction (J. E. Craig, J. Math. and
+    Physics 34, 1955). Returns OK if only rounding, or rows dependent to DEPENDENT, remain; otherwise
     NOT_CONVERGED.
     """
     residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
@@ -110,7 +112,7 @@ def go_along(length, factor, target, multipliers):
 
 @kernel
 def size_of(target, factor):
-    """The larger of 1 and the norm of M^(1/2) target (n,)."""
+    """Return the larger of 1 and the norm of M^(1/2) target (n,)."""
     column, root, square = factor.symbolic.column, factor.root, 1.0
     for j in range(root.shape[0]):
         value = target[column[j]] / root[j]
@@ -138,7 +140,7 @@ def solve_fixed_iterations(factor, iterations, target):
 
 @inlined
 def iterate(factor, target):
-    """One iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; the size of that change."""
+    """Make one iteration: target += M^(-1/2) x, x = Dᵀ (S + I/α)⁻¹ b; return the size of that change."""
     copy(factor.residual, factor.step)
     substitute_forward(factor, factor.step)
     return change_by_step(factor, target)
@@ -146,7 +148,7 @@ def iterate(factor, target):
 
 @inlined
 def change_by_step(factor, target):
-    """The rest of ``iterate``, L⁻¹ b being in ``factor.step``."""
+    """Make the second part of ``iterate``, with L⁻¹ b in ``factor.step``."""
     substitute_back(factor, factor.step)
     times_transpose(factor, factor.step, factor.change)
     return add_scaled(factor, target)
@@ -154,7 +156,8 @@ def change_by_step(factor, target):
 
 @inlined
 def add_scaled(factor, target):
-    """target (n,) += M^(-1/2) x; the norm of that, relative to the larger of 1 and the target's norm."""
+    """Compute target (n,) += M^(-1/2) x; return the norm of that, relative to the larger of 1 and the
+    target's norm."""
     column, root, x, change, size = factor.symbolic.column, factor.root, factor.change, 0.0, 0.0
     for j in range(x.shape[0]):
         step, k = root[j] * x[j], column[j]
@@ -167,9 +170,9 @@ def add_scaled(factor, target):
 
 @inlined
 def find_least_multipliers(factor, force, multipliers):
-    """The multipliers λ of the rows that take part for which Φ_qᵀ λ is nearest to forces (n,).
+    """Compute the multipliers λ of the factor's rows for which Φ_qᵀ λ is nearest to forces (n,).
 
-    Of redundant rows they are the least in the norm of unit rows.
+    For redundant rows they have the least norm in unit rows.
 
     (S + I/α) Δ = D x, x -= Dᵀ Δ, λ += Δ, from the scaled forces x.
     """
@@ -200,7 +203,7 @@ def find_least_multipliers(factor, force, multipliers):
 
 @entry(INT(VECTOR, VECTOR, FACTOR))
 def factorise_once(numbers, inverse_root, factor):
-    """For Python: the factor of S + I/α; 0 where it is not positive definite."""
+    """Factorise S + I/α for Python; returns 0 if it is not positive definite."""
     return 1 if regularised_factor(factor, numbers, inverse_root, ALPHA) else 0
 
 
@@ -214,7 +217,7 @@ def iterate_once(target, factor):
 
 @entry(INT(VECTOR, FACTOR))
 def solve_once(b, factor):
-    """For Python: b := (S + I/α)⁻¹ b."""
+    """Replace b by (S + I/α)⁻¹ b, for Python."""
     solve(factor, b)
     return OK
 
@@ -243,7 +246,7 @@ class MinimumNorm:
         self._rows = symbolic.row.astype(int)
 
     def __call__(self, rhs: np.ndarray) -> np.ndarray:
-        """x (n,) for b = rhs (m,); in the sense of least squares of unit rows where they contradict."""
+        """Return x (n,) for b = rhs (m,); if rows contradict each other, by least squares of unit rows."""
         x, factor = np.zeros(self.d.shape[1]), self._factor.values
         factor.residual[:] = (self._scale * rhs)[self._rows]
         for _ in range(ITERATIONS):
@@ -253,7 +256,7 @@ class MinimumNorm:
         return self._root * x
 
     def regularised_solution(self, b: np.ndarray) -> np.ndarray:
-        """(S + I/α)⁻¹ b (m,) of unit rows."""
+        """Return (S + I/α)⁻¹ b (m,) for unit rows."""
         solution, own = ALPHA * b, np.ascontiguousarray(b[self._rows], dtype=float)
         solve_once(own, self._factor.argument)
         solution[self._rows] = own

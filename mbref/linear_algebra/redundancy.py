@@ -1,7 +1,7 @@
 """Rank and redundancy of large Jacobians, by the regularised inverse instead of singular values.
 
-With the rows of Φ_q at unit length, S = Φ_q Φ_qᵀ and B = (I/α) (S + I/α)⁻¹, B² has the left null vectors' sum
-of squares on its diagonal, plus (1/(α σ²))² for every other singular value σ.
+With rows of Φ_q scaled to unit length, S = Φ_q Φ_qᵀ and B = (I/α) (S + I/α)⁻¹, B² has the left null vectors'
+sum of squares on its diagonal, plus (1/(α σ²))² for every other singular value σ.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """``null_shares`` (…, r) of small matrices (…, m, n), whose rows may be zero."""
+    """Return ``null_shares`` (…, r) of small matrices (…, m, n), whose rows may be zero."""
     lengths = np.sqrt((matrix * matrix).sum(axis=-1, keepdims=True))
     d = matrix / np.where(lengths > 0, lengths, 1.0)
     unit = np.eye(matrix.shape[-2])
@@ -26,7 +26,8 @@ def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
 
 
 def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:
-    """Share of each of these rows in the left null space of the matrix of ``solution``, from 0 to 1."""
+    """Return the squared component of each of these rows in the left null space of the matrix of
+    ``solution``, from 0 to 1."""
     shares = np.zeros(rows.size)
     for k, row in enumerate(rows):
         unit = np.zeros(solution.d.shape[0])
@@ -36,7 +37,10 @@ def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:
 
 
 class Redundancy:
-    """Rank and ``shares`` of a Jacobian (m, n); singular values from 1e-4 of the rows' length count fully."""
+    """Rank of a Jacobian (m, n), and squared components ``shares`` of its rows in the left null space.
+
+    Singular values above 1e-4 of the rows' length count fully.
+    """
 
     def __init__(self, jacobian: csr_array):
         self._solution = MinimumNorm(jacobian, np.ones(jacobian.shape[1]))
@@ -44,7 +48,7 @@ class Redundancy:
         self.rank = jacobian.shape[0] - round(float(np.sum(self.shares)))
 
     def singular_values(self) -> tuple[float, float]:
-        """The smallest above rank, and the largest, of the rows at unit length."""
+        """Return the smallest nonzero and the largest singular value of unit rows."""
         from scipy.sparse.linalg import LinearOperator, eigsh
 
         d, inverse = self._solution.d, self._solution.regularised_solution

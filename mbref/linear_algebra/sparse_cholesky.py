@@ -11,7 +11,7 @@ from mbref.kernels.compilation import inlined
 
 @inlined
 def assemble_gradients(factor, numbers, inverse_root):
-    """M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian."""
+    """Compute M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian."""
     symbolic, d, root = factor.symbolic, factor.d, factor.root
     entry, d_column, column = symbolic.d_entry, symbolic.d_column, symbolic.column
     for j in range(column.shape[0]):
@@ -22,7 +22,7 @@ def assemble_gradients(factor, numbers, inverse_root):
 
 @inlined
 def product_of_rows(factor, entry):
-    """The number of S at an entry of L: the inner product of two rows of D."""
+    """Return the number of S at an entry of L: the inner product of two rows of D."""
     symbolic, d, value = factor.symbolic, factor.d, 0.0
     start, left, right = symbolic.s_start, symbolic.s_left, symbolic.s_right
     for p in range(start[entry], start[entry + 1]):
@@ -32,7 +32,8 @@ def product_of_rows(factor, entry):
 
 @inlined
 def eliminate(value, factor, entry):
-    """A number of S + I/α less the products of the numbers of L in its row and column of earlier columns."""
+    """Subtract from a number of S + I/α the products of numbers of L in its row and column, from earlier
+    columns."""
     symbolic, l, scaled = factor.symbolic, factor.l, factor.scaled
     start, left, right = symbolic.update_start, symbolic.update_left, symbolic.update_right
     for p in range(start[entry], start[entry + 1]):
@@ -42,9 +43,10 @@ def eliminate(value, factor, entry):
 
 @inlined
 def factorise(factor, alpha, b):
-    """L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; False where an entry of Δ is ≤ 0.
+    """Compute L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; return False if an entry
+    of Δ is ≤ 0.
 
-    Every number is found at once from its products, and b while the next column waits for its pivot.
+    Every number is computed at once from its products, and b while the next column waits for its pivot.
     """
     first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
     for k in range(first.shape[0] - 1):
@@ -65,7 +67,7 @@ def factorise(factor, alpha, b):
 
 @inlined
 def regularised_factor(factor, numbers, inverse_root, alpha):
-    """D, and the factor of S + I/α; False where that is not positive definite."""
+    """Compute D and the factor of S + I/α; return False if that is not positive definite."""
     assemble_gradients(factor, numbers, inverse_root)
     factor.step[:] = 0.0
     return factorise(factor, alpha, factor.step)
@@ -73,14 +75,14 @@ def regularised_factor(factor, numbers, inverse_root, alpha):
 
 @inlined
 def solve(factor, b):
-    """b := (S + I/α)⁻¹ b."""
+    """Replace b by (S + I/α)⁻¹ b."""
     substitute_forward(factor, b)
     substitute_back(factor, b)
 
 
 @inlined
 def substitute_forward(factor, b):
-    """b := L⁻¹ b, as ``factorise`` finds it; bᵀ (S + I/α)⁻¹ b."""
+    """Replace b by L⁻¹ b, as ``factorise`` does; return bᵀ (S + I/α)⁻¹ b."""
     first, row, l, square = factor.symbolic.l_start, factor.symbolic.l_row, factor.l, 0.0
     for k in range(first.shape[0] - 1):
         value = b[k]
@@ -92,7 +94,7 @@ def substitute_forward(factor, b):
 
 @inlined
 def substitute_back(factor, b):
-    """b := L⁻ᵀ Δ⁻¹ b."""
+    """Replace b by L⁻ᵀ Δ⁻¹ b."""
     first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
     for k in range(first.shape[0] - 2, -1, -1):
         value = b[k] * l[first[k]]
@@ -103,7 +105,7 @@ def substitute_back(factor, b):
 
 @inlined
 def subtract_product(factor, x, b):
-    """b -= D x."""
+    """Subtract D x from b."""
     start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for k in range(b.shape[0]):
         value = b[k]
@@ -114,14 +116,14 @@ def subtract_product(factor, x, b):
 
 @inlined
 def times_transpose(factor, b, x):
-    """x := Dᵀ b."""
+    """Compute x = Dᵀ b."""
     x[:] = 0.0
     add_transpose(factor, b, x)
 
 
 @inlined
 def add_transpose(factor, b, x):
-    """x += Dᵀ b."""
+    """Add Dᵀ b to x."""
     start, column, d = factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for k in range(b.shape[0] - 1, -1, -1):
         value = b[k]
@@ -131,7 +133,8 @@ def add_transpose(factor, b, x):
 
 @inlined
 def find_squared_pivots(factor):
-    """Squares (r,) of the pivots of unit rows: the sines of the angle between each row and those before."""
+    """Compute the squared pivots (r,) of unit rows: squared sines of the angle between each row and the rows
+    before it."""
     first, l, diagonal, squares = factor.symbolic.l_start, factor.l, factor.diagonal, factor.squared_pivots
     for k in range(diagonal.shape[0]):
         squares[k] = 1.0 / (l[first[k]] * diagonal[k])
@@ -139,7 +142,7 @@ def find_squared_pivots(factor):
 
 @inlined
 def least_squared_pivot(factor):
-    """The least square of a pivot of unit rows; 1 without rows."""
+    """Return the least squared pivot of unit rows; 1 without rows."""
     first, l, diagonal, most = factor.symbolic.l_start, factor.l, factor.diagonal, 1.0
     for k in range(diagonal.shape[0]):
         most = max(most, l[first[k]] * diagonal[k])

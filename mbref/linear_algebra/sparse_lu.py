@@ -1,6 +1,6 @@
 """Sparse LU factors of the product of two gradients, D D̃ᵀ + diag(D Dᵀ)/α, without exchange of rows.
 
-They have entries where the Cholesky factor of D Dᵀ has its own.  The product of the first k pivots is the
+They have the sparsity pattern of the Cholesky factor of D Dᵀ.  The product of the first k pivots is the
 determinant of the first k rows: it changes its sign where these rows lose rank between D̃ and D.
 """
 
@@ -11,7 +11,8 @@ from mbref.kernels.compilation import kernel
 
 @kernel
 def factorise_product(factor, other, alpha, product):
-    """The factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D belongs to the factor, D̃ is ``other`` (nd,).
+    """Compute the factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D belongs to the factor, D̃ is ``other``
+    (nd,).
 
     ``product.lower`` (nl,) has ones on the diagonal of L left out, ``product.upper`` the numbers of Uᵀ; its
     pivots (r,) are over D Dᵀ's diagonal.
@@ -30,7 +31,8 @@ def factorise_product(factor, other, alpha, product):
 
 @kernel
 def square_of_row(factor, diagonal):
-    """The square of the length of a row of D, by its place on the diagonal; 1 of a row without entries."""
+    """Return the squared length of a row of D, given by its place on the diagonal; 1 for a row without
+    entries."""
     symbolic, d, square = factor.symbolic, factor.d, 0.0
     for p in range(symbolic.s_start[diagonal], symbolic.s_start[diagonal + 1]):
         square += d[symbolic.s_left[p]] * d[symbolic.s_right[p]]
@@ -39,8 +41,8 @@ def square_of_row(factor, diagonal):
 
 @kernel
 def eliminated(factor, other, product, place):
-    """The numbers of D D̃ᵀ below and right of the diagonal that belong to a place of the Cholesky factor,
-    less the products of the numbers of L and U in earlier columns."""
+    """Return the numbers of D D̃ᵀ below and right of the diagonal at a place of the Cholesky factor, minus
+    products of earlier columns of L and U."""
     symbolic, d, lower, upper = factor.symbolic, factor.d, product.lower, product.upper
     below, right = 0.0, 0.0
     for p in range(symbolic.s_start[place], symbolic.s_start[place + 1]):

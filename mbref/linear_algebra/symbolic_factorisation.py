@@ -1,8 +1,8 @@
-"""Symbolic factorisation of S = D Dᵀ: where every number of D, S and its Cholesky factor L stands.
+"""Symbolic factorisation of S = D Dᵀ: the positions of all numbers of D, S and its Cholesky factor L.
 
-Made once per scene.  The order of elimination and the fill are SuperLU's (multiple minimum degree on the
-symmetric pattern); added here are the lists of products that the kernels of ``sparse_cholesky`` go through.
-Indices are unsigned, because kernels would test the sign of others.
+It is made once for each scene. SuperLU determines the order of elimination and the fill (multiple minimum
+degree on the symmetric pattern). This module adds the lists of products for the kernels of
+``sparse_cholesky``. Indices are unsigned, because compiled code tests the sign of signed ones.
 """
 
 from __future__ import annotations
@@ -20,17 +20,17 @@ from mbref.kernels.named_memory import allocate
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-MOST_PATTERNS = 64  # kept
+MOST_PATTERNS = 64  # number of cached patterns
 
 
 def symbolic_factorisation(
     row: np.ndarray, column: np.ndarray, entry: np.ndarray, active: np.ndarray
 ) -> Symbolic:
-    """The symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
+    """Return the symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
-    Places are indices into the flat constraint Jacobian; ``active`` (n,) says
-    which columns take part.  Scenes of one structure share the arrays of their pattern, which nobody changes.
-    Raises OverflowError for a pattern too large for 32-bit indices.
+    Places are indices into the flat constraint Jacobian; ``active`` (n,) selects the columns. Scenes of one
+    structure share the arrays of their pattern, which are never changed. Raises OverflowError for a pattern
+    too large for 32-bit indices.
     """
     indices = (np.asarray(array, dtype=np.int64).tobytes() for array in (row, column, entry))
     return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes())
@@ -38,7 +38,7 @@ def symbolic_factorisation(
 
 @functools.lru_cache(maxsize=MOST_PATTERNS)
 def _of_pattern(*pattern: bytes) -> Symbolic:
-    """The symbolic factorisation of a pattern whose arrays are given as bytes, kept on disk."""
+    """Return the symbolic factorisation of a pattern given by arrays as bytes; it is also cached on disk."""
     digest = hashlib.sha256(b"".join(len(part).to_bytes(8, "little") + part for part in pattern))
     path = CACHE / "patterns" / digest.hexdigest()[:32]
     data = checked_file.read(path)
@@ -85,7 +85,7 @@ def _made(*pattern: bytes) -> Symbolic:
 
 
 def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
-    """Indices as 32-bit unsigned integers; OverflowError where one does not fit."""
+    """Return indices as 32-bit unsigned integers; raises OverflowError if one does not fit."""
     array = np.asarray(indices, dtype=np.int64)
     if array.max(initial=0) > np.iinfo(np.uint32).max:
         raise OverflowError("the scene is too large for 32-bit indices")
@@ -93,19 +93,19 @@ def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
 
 
 def no_static_rows() -> StaticRows:
-    """Without statically determined rows."""
+    """Return a StaticRows object without rows."""
     nothing, start = unsigned([]), unsigned([0])
     return StaticRows(nothing, start, nothing, nothing, start, nothing)
 
 
 def empty_factor() -> SparseFactor:
-    """Memory of no factor."""
+    """Return memory of a factor without rows."""
     nothing = np.zeros(0, dtype=np.int64)
     return sparse_factor(symbolic_factorisation(nothing, nothing, nothing, np.zeros(0, dtype=bool)))
 
 
 def sparse_factor(symbolic: Symbolic, static: StaticRows | None = None) -> SparseFactor:
-    """Memory for the factor of this pattern."""
+    """Return memory for the factor of this pattern."""
     sizes = {
         "nd": symbolic.d_entry.size, "nl": symbolic.l_row.size, "r": symbolic.row.size,
         "c": symbolic.column.size,
@@ -114,9 +114,9 @@ def sparse_factor(symbolic: Symbolic, static: StaticRows | None = None) -> Spars
 
 
 def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Order of elimination of S = D Dᵀ, and where the columns of its factor begin and have their rows.
+    """Return the order of elimination of S = D Dᵀ, and first entries and rows of the columns of its factor.
 
-    SuperLU factors a matrix of that pattern with a dominant diagonal, so that it keeps the order.
+    SuperLU factorises a matrix of that pattern with a dominant diagonal, so that it does not exchange rows.
     """
     from scipy.sparse import csc_array, csr_array, eye_array
     from scipy.sparse.linalg import splu
@@ -147,7 +147,8 @@ def _sorted_by(key: np.ndarray, *others: np.ndarray) -> list[np.ndarray]:
 def _products(
     row: np.ndarray, column: np.ndarray, l_key: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of numbers of D in one column, and the position in L of the number of S they add to, sorted."""
+    """Return sorted index triples: two numbers of D in one column, and the place in L of the number of S to
+    which their product is added."""
     by_column, pairs = np.argsort(column, kind="stable"), []
     for group in np.split(by_column, np.flatnonzero(np.diff(column[by_column])) + 1):
         first, second = np.tril_indices(group.size)
@@ -161,7 +162,7 @@ def _products(
 def _updates(
     l_start: np.ndarray, l_row: np.ndarray, l_key: np.ndarray, size: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions in L of numbers that lose a product, sorted, and of its two factors; early columns first."""
+    """Return sorted index triples of the updates L[target] −= L[left] · LΔ[right], early columns first."""
     nothing = np.zeros(0, dtype=np.int64)
     keys, pairs = [nothing], [(nothing, nothing)]
     for k in range(size):

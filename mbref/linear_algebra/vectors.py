@@ -14,20 +14,20 @@ TINY = 1e-100  # its cube is still a normal number
 
 @kernel
 def vector(table, row):
-    """A row (3,) of a table (k, 3)."""
+    """Return a row (3,) of a table (k, 3) as a tuple."""
     return table[row, 0], table[row, 1], table[row, 2]
 
 
 @kernel
 def larger(size, value):
-    """The larger of a size and a value's magnitude; undefined where either is."""
+    """Return the larger of a size and a value's magnitude; NaN if either is NaN."""
     magnitude = abs(value)
     return magnitude if magnitude > size or isnan(magnitude) else size
 
 
 @inlined
 def largest(values):
-    """The largest magnitude of a vector; undefined where an entry is."""
+    """Return the largest magnitude of a vector; NaN if an entry is NaN."""
     size = 0.0
     for value in values:
         size = larger(size, value)
@@ -36,7 +36,7 @@ def largest(values):
 
 @kernel
 def all_finite(values):
-    """Whether no entry is infinite or undefined."""
+    """Return whether no entry is infinite or NaN."""
     for value in values:  # noqa: SIM110 - numba compiles no generator expression
         if not isfinite(value):
             return False
@@ -45,14 +45,14 @@ def all_finite(values):
 
 @kernel
 def copy(source, target):
-    """``target`` := ``source``, two vectors of one length."""
+    """Copy ``source`` to ``target``, two vectors of one length."""
     for k in range(target.shape[0]):
         target[k] = source[k]
 
 
 @inlined
 def flush_denormals(y):
-    """Zero for entries below TINY: with denormal numbers arithmetic is a hundred times slower."""
+    """Replace entries below TINY by zero: with denormal numbers arithmetic is a hundred times slower."""
     for k in range(y.shape[0]):
         if abs(y[k]) < TINY:
             y[k] = 0.0
@@ -60,7 +60,7 @@ def flush_denormals(y):
 
 @kernel
 def sort(values):
-    """Put values in increasing order, in place, by insertion."""
+    """Sort values in increasing order, in place, by insertion."""
     for k in range(1, values.shape[0]):
         value, place = values[k], k
         while place > 0 and values[place - 1] > value:
@@ -71,37 +71,38 @@ def sort(values):
 
 @kernel
 def add(a, b):
-    """a + b."""
+    """Return a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
 @kernel
 def subtract(a, b):
-    """a - b."""
+    """Return a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 @kernel
 def scale(s, a):
-    """s a."""
+    """Return s a."""
     return s * a[0], s * a[1], s * a[2]
 
 
 @kernel
 def dot(a, b):
-    """a · b."""
+    """Return a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @kernel
 def cross(a, b):
-    """a × b."""
+    """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @kernel
 def to_world(rotation, body, a):
-    """A vector of the body's frame in the world; ``rotation`` (nb + 1, 9) has rotation matrices by rows."""
+    """Return a vector of the body's frame in world axes; ``rotation`` (nb + 1, 9) has rotation matrices by
+    rows."""
     return (
         rotation[body, 0] * a[0] + rotation[body, 1] * a[1] + rotation[body, 2] * a[2],
         rotation[body, 3] * a[0] + rotation[body, 4] * a[1] + rotation[body, 5] * a[2],
@@ -111,7 +112,7 @@ def to_world(rotation, body, a):
 
 @kernel
 def to_body(rotation, body, a):
-    """A vector of the world in the body's frame."""
+    """Return a world vector in the body's frame."""
     return (
         rotation[body, 0] * a[0] + rotation[body, 3] * a[1] + rotation[body, 6] * a[2],
         rotation[body, 1] * a[0] + rotation[body, 4] * a[1] + rotation[body, 7] * a[2],
@@ -129,7 +130,7 @@ def put(table, row, column, a):
 
 @kernel
 def put_negative(table, row, column, a):
-    """Write minus a three-vector into a row."""
+    """Write the negative of a three-vector into a row."""
     table[row, column] = -a[0]
     table[row, column + 1] = -a[1]
     table[row, column + 2] = -a[2]

@@ -64,7 +64,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "h_frame": h_frame,
 }
 
-# of any number of loops, two unless said: four_bar_chain[40]
+# chains with any number of loops, by default two: four_bar_chain[40]
 CHAINS: dict[str, Callable[[int, str], Scene]] = {
     "four_bar_chain": four_bar_chain,
     "slider_crank_chain": slider_crank_chain,
@@ -99,7 +99,7 @@ def find_scene(name: str) -> Scene:
 
 
 def _missing(path: Path) -> str:
-    """The sentence on a scene file that is not there, with the file or the scene that was probably meant."""
+    """Return the sentence on a missing scene file, with the file or scene that was probably meant."""
     if path.stem in SCENES:
         return f"{path}: no such file; without .toml {path.stem!r} is a built-in scene"
     here = [str(other) for other in path.parent.glob("*.toml")]

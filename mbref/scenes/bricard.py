@@ -20,7 +20,7 @@ POINTS = (
     (0.0, -1.0, 1.0),
     (0.0, 0.0, 1.0),
 )
-AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # of the hinges, in turn
+AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))  # axes of the hinges in their order
 SIDE = 0.1  # m, of the square section
 
 

@@ -1,1 +1,1 @@
-"""Simulation: a scene by a method, from the call to the motion, its outcome and its message."""
+"""Simulation of a scene by a method: from the call to the motion, its outcome and its message."""

@@ -1,10 +1,11 @@
 """Comparison of a run with the motion that the default method follows.
 
-Without projection only the accelerations keep a run on its branch. At a singular position they are ill-
-determined, and a pseudo-inverse whose rank drops there lets the run continue along another branch, with all
-constraints and its energy intact. Near one, a partition whose dependent coordinates jump does so too. A
-projected run may change branch where it came near a singular position, or where a coarse rank tolerance drops
-independent rows. Such runs are completed only on the motion of the default method.
+Without projection only the accelerations keep a run on its branch. At a singular position these are
+ill-determined. A pseudo-inverse whose rank drops there lets the run continue along another branch, without
+violating constraints or energy balance. Near a singular position coordinate partitioning can also change the
+branch, if its dependent coordinates jump. A projected run may change branch where it came near a singular
+position, or where a coarse rank tolerance drops independent rows. Such runs count as completed only if they
+agree with the motion of the default method.
 """
 
 from __future__ import annotations
@@ -22,19 +23,21 @@ from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
 from mbref.stepping.run import Run
 
 MOST_STEPS = 100_000
-TOLERANCE = 1e-10  # of the reference
-OFF = (1e3, 1e-6)  # lengths or rad by which a run may be off: over its tolerance, and whatever that is
+TOLERANCE = 1e-10  # relative tolerance of the run by the default method
+# allowed distance (lengths of the mechanism or rad): a multiple of the run's tolerance, and a least value
+OFF = (1e3, 1e-6)
 DROPS = 1e-10  # rank tolerance above which independent rows may be dropped
-NEAR = 0.1  # relative pivot below which a projected run came near a singular position
-COARSE = 0.1  # lengths or rad by which a run in fixed steps may be off, whose error no tolerance limits
+NEAR = 0.1  # relative pivot below which a projected run was near a singular position
+COARSE = 0.1  # allowed distance (lengths or rad) of a run in fixed steps, whose error no tolerance limits
 
 
 def compare_with_default(run: Run, ended: int) -> int:
     """Return the status of a run after comparing its samples with the default method.
 
-    ``ended`` is the status before. LEFT_MOTION if a sample is off by more than allowed; samples then end
-    there. UNDECIDED if the run was DONE and the default method does not continue. Otherwise ``ended``. Runs
-    that cannot leave their motion, and runs without a sample, are not compared.
+    ``ended`` is the status before the comparison. The result is LEFT_MOTION if the distance at a sample
+    exceeds the allowed one; samples then end there. It is UNDECIDED if the run was DONE and the default
+    method does not continue, otherwise ``ended``. Runs that cannot leave their motion, and runs without a
+    sample, are not compared.
     """
     clock = run.memory.loop.clock
     if not (clock.sample and may_leave(run) and run.limits.compared):
@@ -71,7 +74,7 @@ def _allowed(run: Run) -> float:
 
 
 def _distances(run: Run, other: Run, samples: int) -> np.ndarray:
-    """The largest distance (k,) of a body at each of the first samples: over the length, or rad."""
+    """Return the largest distance (k,) of a body at each of the first samples: over the length, or rad."""
     mine, theirs = (r.memory.loop.samples.coordinates[:samples] for r in (run, other))
     mine, theirs = (q.reshape(samples, run.model.nb, 7) for q in (mine, theirs))
     places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / run.model.length

@@ -1,4 +1,4 @@
-"""Crossings: the singular positions that a run passed; their branches are found when one asks for them."""
+"""Crossings: the singular positions that a run passed. Their branches are computed at first access."""
 
 from __future__ import annotations
 
@@ -38,12 +38,12 @@ class Crossings(Sequence[Crossing]):
         return repr(self._found)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """To another process they go as a tuple."""
+        """Pickle as a tuple, so that another process receives all branches."""
         return tuple, (list(self._found),)
 
 
 def _crossing(model: Model, passed: Passed) -> Crossing:
-    """A singular position in the scene's frames."""
+    """Return a singular position in the scene's frames."""
     crossing = singular_position(model, passed)
     v = crossing.velocities.reshape(len(crossing.velocities), -1, 6)
     q = np.broadcast_to(crossing.coordinates.reshape(-1, 7), (len(v), v.shape[1], 7))

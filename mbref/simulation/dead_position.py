@@ -1,9 +1,9 @@
-"""Dead positions: drivers turn their joints as far as the mechanism can follow, and no further.
+"""Dead positions: poses beyond which the mechanism cannot follow its drivers.
 
-Near such a position the velocities that the drivers ask for, over the rates of the drivers, grow with the
-inverse root of the time that is left: Φ_q v = ν is not consistent there.  Where branches of a motion cross,
-Φ_q loses rank too, but ν stays in its range, and the velocities stay bounded.  A state that violates the
-constraints has large velocities there, too: then `taylor` follows the motion further.
+Near a dead position the velocities, over the rates of the drivers, grow with the inverse root of the
+remaining time: Φ_q v = ν has no solution there. If branches of a motion cross, Φ_q also loses rank, but ν is
+in its range, and the velocities are bounded. A state that violates the constraints has large velocities
+there, too, but then `taylor` can follow the motion further.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ import numpy as np
 from mbref.simulation.trial import trial_of
 from mbref.stepping.run import Run
 
-TRANSMISSION = 1e2  # largest velocity / driver rate: above it the position is dead
-ROUNDING = 1e-13  # relative singular value of redundant rows
-BEYOND = 1.01  # times the time of a failure: a run that gets further has met no dead position
-MOST_ROWS = 400  # constraint rows: larger least-squares problems take seconds
+TRANSMISSION = 1e2  # largest velocity / driver rate above which the position is dead
+ROUNDING = 1e-13  # relative singular value below which rows are redundant
+BEYOND = 1.01  # a run that gets beyond this multiple of the failure's time has met no dead position
+MOST_ROWS = 400  # constraint rows; larger least-squares problems take seconds
 
 
 def is_at_dead_position(run: Run) -> bool:
-    """Whether a run that failed has come to a dead position of its drivers."""
+    """Return whether a run that failed is at a dead position of its drivers."""
     state, model = run.memory.state, run.model
     if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
         return False

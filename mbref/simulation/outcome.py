@@ -1,4 +1,4 @@
-"""The samples of a run as a motion; the one place where a failure becomes an Outcome."""
+"""The samples of a run as a Motion; every failure becomes an Outcome here."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ DEAD_POSITION = (
 )
 
 REST_POSITION = (
-    "the motion begins at rest on a singular position, and the branch along which it is pushed cannot be "
-    "computed; give the bodies velocities along the branch"
+    "the motion begins at rest on a singular position, and the branch along which the forces accelerate it "
+    "cannot be computed; give the bodies velocities along the branch"
 )
 
 LEAVES_REST = (
@@ -79,11 +79,12 @@ NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 SINGULAR_POSITION = "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it{}"
 LOSE_RANK = " (the constraint rows of {} lose rank)"
-FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)  # near a singular position, because of it
+# statuses of failures near a singular position that it may have caused
+FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)
 
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
-    """The samples reached, in the scene's frames and units."""
+    """Return the samples reached, in the scene's frames and units."""
     met = _singular_position(run, status)
     if met is not None:
         status, run.memory.loop.clock.time = SINGULAR_AHEAD, met.time
@@ -107,7 +108,8 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
 
 
 def facts_of(run: Run) -> dict[str, Any]:
-    """The fields of a Motion that runs of one method and limits share, whose scenes are of one shape."""
+    """Return the fields of a Motion that are equal for runs of scenes of equal structure by one method and
+    limits."""
     return {
         "scene": run.scene.name,
         "engine": "mbref",
@@ -122,17 +124,18 @@ def facts_of(run: Run) -> dict[str, Any]:
 
 
 def reactions_of(balance: Balance) -> dict[str, Any]:
-    """The fields of a Motion that its reactions fill."""
+    """Return the fields of a Motion for the joint reactions."""
     return {"reactions": balance.reactions(), "open_reactions": balance.open_dimensions()}
 
 
 def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
-    """The cost of a run, from ``layout.Counts`` in their order, without the crossings."""
+    """Return the cost of a run from ``layout.Counts`` in their order, without crossings."""
     return Cost(seconds, built, *map(int, counts[:5]))
 
 
 def _singular_position(run: Run, status: int) -> Met | None:
-    """The singular position at which a run ended that does not cross it; None where it ended elsewhere."""
+    """Return the singular position at which a run by a method that does not cross it ended; None if it ended
+    elsewhere."""
     meets = status == SINGULAR_AHEAD
     if run.method.is_series or not (meets or (status in FAILED and is_near(run))) or is_at_dead_position(run):
         return None
@@ -140,7 +143,7 @@ def _singular_position(run: Run, status: int) -> Met | None:
 
 
 def _met(run: Run, met: Met) -> str:
-    """One sentence on the singular position at which a run ended."""
+    """Return one sentence on the singular position at which a run ended."""
     where = LOSE_RANK.format(", ".join(map(repr, met.joints))) if met.joints else ""
     trial = trial_of(run)
     able = trial is None or trial.completed or trial.reached > met.time
@@ -148,8 +151,10 @@ def _met(run: Run, met: Met) -> str:
 
 
 def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:
-    """The singular positions passed, or the one at which the run ended; None for a method that does not look
-    for them."""
+    """Return the singular positions that were passed, or the one at which the run ended.
+
+    None for a method that does not look for them.
+    """
     if met is not None:
         return Crossings(run.model, [Passed(met.time, met.coordinates, met.velocities, NONE_TAKEN)])
     if not run.method.stabilisation.projects:
@@ -158,7 +163,7 @@ def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:
 
 
 def _message(run: Run, status: int) -> str:
-    """One sentence: the cause and time of the end, and a remedy; or the correction of the start."""
+    """Return one sentence: cause and time of an early end with a remedy, or the correction of the start."""
     if status != DONE and is_at_dead_position(run):
         return DEAD_POSITION.format(run.memory.loop.clock.time)
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and begins_at_rest(run):
@@ -179,8 +184,8 @@ def _left_from_rest(run: Run) -> str:
 
 
 def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
-    """Report the correction of the start, rows that are redundant to rounding, and the number of singular
-    positions were passed."""
+    """Return a report on the correction of the start, on rows that are redundant to rounding, and on the
+    number of passed singular positions."""
     passed = f"singular positions passed: {crossings}" if crossings else ""
     return "; ".join(filter(None, (start.report(), _rounded(ranks), passed)))
 
@@ -190,7 +195,8 @@ def _rounded(ranks: Ranks) -> str:
 
 
 def _remedy(run: Run, status: int) -> str:
-    """The remedy of an early end; for rows that are nearly dependent at the start, one of the scene."""
+    """Return the remedy for an early end; if rows are nearly dependent at the start, a remedy for the
+    scene."""
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
         return remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
@@ -198,7 +204,7 @@ def _remedy(run: Run, status: int) -> str:
 
 
 def _cause(run: Run, status: int) -> str:
-    """The cause and time of an early end."""
+    """Return the cause and the time of an early end."""
     memory = run.memory
     t = memory.loop.clock.time
     if status == VIOLATED:

@@ -1,6 +1,7 @@
 """Remedies: the change of method or limits that a failed run suggests.
 
-`taylor` is named only if it completes the motion. Where it is not tried, facts of method and scene decide.
+`taylor` is suggested only if a trial run completes the motion. Without a trial, properties of method and
+scene decide.
 """
 
 from __future__ import annotations
@@ -60,13 +61,14 @@ def _of_singular_matrix(run: Run) -> str:
 
 
 def _completes(run: Run) -> str:
-    """Return the fact that `taylor` completes the motion; empty if it does not, or is not tried."""
+    """Return the fact that `taylor` completes the motion; empty if it does not, or if there is no trial
+    run."""
     trial = trial_of(run)
     return COMPLETES if trial is not None and trial.completed else ""
 
 
 def _bearing(mass: bool = False, redundancy: bool = False) -> str:
-    """Return the advice to use a formulation that claims to handle such a matrix or such rows."""
+    """Return the advice to use a formulation that accepts a singular mass matrix or redundant rows."""
     able = [
         f.name
         for f in FORMULATIONS.values()

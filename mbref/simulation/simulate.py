@@ -1,4 +1,4 @@
-"""simulate: a scene by a method, sampled at given times."""
+"""simulate: the motion of a scene by a method, sampled at given times."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def simulate(
 
 
 def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:
-    """Return the run of a scene; raises MethodError for limits that the method cannot meet."""
+    """Return the run of a scene; raises MethodError for limits that the method does not support."""
     if limits.branches and method.crosses != "by series":
         raise MethodError(f"branches: {method} does not cross singular positions; use taylor")
     if limits.code == GENERATED and not method.is_series:
@@ -118,19 +118,19 @@ def finish_run(run: Run, progress: Callable[[float], None] | None = None) -> Mot
 
 
 def _check_branches(run: Run) -> None:
-    """Raise ValueError where a branch was asked for at a singular position that the motion does not pass."""
+    """Raise ValueError if a branch is requested at a singular position that the motion does not pass."""
     last, passed = max(dict(run.limits.branches), default=0), len(run.crossings)
     if last > passed:
         raise ValueError(
             f"branches: the motion passes {passed} singular positions up to t = {run.times[-1]:g} s, "
-            f"and not {last}"
+            f"and no number {last}"
         )
 
 
 def prepare(method: Method) -> None:
     """Compile the kernels of the method, or load them from the cache of this machine.
 
-    Those of Taylor series are among them: runs of other methods are compared with one.
+    Kernels of `taylor` are included, because runs of other methods are compared with `taylor`.
     """
     kernels, beside = (
         (STEPPING, prepare_stepping) if method.is_series else (KERNELS_OF_SERIES, prepare_series)
@@ -143,15 +143,15 @@ def prepare(method: Method) -> None:
 
 
 def are_compiled(method: Method) -> bool:
-    """Whether the kernels of a run by the method are in the cache of this machine."""
+    """Return whether the kernels of the method are in the cache of this machine."""
     of_series = KERNELS_OF_SERIES if method.is_series else ()
     return all(kernel.is_kept for kernel in (*preparation.kernels_of(method), *of_series))
 
 
 def why_no_code(scene: Scene, method: Method) -> str:
-    """The reason why a scene cannot have generated code by `taylor`; empty where it can, and now has it.
+    """Return the reason why no code of `taylor` can be generated for a scene; empty if it was generated.
 
-    Compiles the kernels of the method.
+    The kernels of the method are compiled.
     """
     prepare(method)
     try:
@@ -162,7 +162,8 @@ def why_no_code(scene: Scene, method: Method) -> str:
 
 
 def checked_times(times: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Sample times as an array (k,); ValueError unless finite, not negative and increasing."""
+    """Return sample times as an array (k,); raises ValueError unless they are finite, not negative and
+    increasing."""
     try:
         array = np.ascontiguousarray(times, dtype=float)
     except (TypeError, ValueError, OverflowError):

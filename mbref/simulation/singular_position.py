@@ -1,6 +1,6 @@
-"""The singular position at which a run that watches the rank has ended: time, pose and joints.
+"""The singular position at which a run that monitors the rank has ended: time, pose and joints.
 
-The joints have rows that depend on each other there.
+The joints are those whose rows depend on each other at that pose.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from mbref.equations.branches import MOST_ROWS
 from mbref.equations.units import row_lengths
 from mbref.stepping.run import Run
 
-TAKES_PART = 0.05  # part of a row / largest part in a dependence: smaller parts are ignored
-NEAR = 0.03  # relative pivot below which steps that fail are near a singular position
+TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored
+NEAR = 0.03  # relative pivot below which failing steps are near a singular position
 
 
 class Met(NamedTuple):
-    """A singular position at a time (s): coordinates (7 nb,), velocities (n,), and joints that lose rank."""
+    """A singular position: time (s), coordinates (7 nb,), velocities (n,), and joints whose rows lose
+    rank."""
 
     time: float
     coordinates: np.ndarray
@@ -27,7 +28,7 @@ class Met(NamedTuple):
 
 
 def is_near(run: Run) -> bool:
-    """Whether the last step of a run that watches pivots ended near a singular position."""
+    """Return whether the last step of a run that monitors pivots ended near a singular position."""
     watch = run.memory.watch
     watched = run.model.closed_loops > 0 and watch.reference_pivot > 0.0
     return bool(watched and watch.smallest_pivot < NEAR * watch.reference_pivot)
@@ -46,20 +47,21 @@ def met_by(run: Run, inside: bool) -> Met:
 
 
 def _accepted(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and velocities of the last accepted state."""
+    """Return coordinates and velocities of the last accepted state."""
     if run.memory.loop.clock.time == 0.0:
         return run.start.q, run.start.v
     return run.memory.previous.coordinates.copy(), run.memory.previous.velocities.copy()
 
 
 def _rank(run: Run, t: float, q: np.ndarray) -> int:
-    """The rank of Φ_q, or that which the run has known."""
+    """Return the rank of Φ_q at the start, or the regular rank that the run found."""
     found = int((_singular_values(run, t, q)[0] > run.limits.rank_tolerance).sum())
     return max(found, int(run.memory.watch.generic_rank), 1)
 
 
 def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Singular values, and left singular vectors (m, m), of unit rows of Φ_q in columns of unit length."""
+    """Return singular values and left singular vectors (m, m) of Φ_q with unit rows and columns scaled to
+    unit length."""
     terms, model = run.model.terms(t, q, np.zeros(run.model.n)), run.model
     jacobian = terms.jacobian * model.data.metric_root
     left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None])
@@ -67,7 +69,7 @@ def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def _joints(run: Run, t: float, q: np.ndarray, rank: int) -> tuple[str, ...]:
-    """The joints whose rows have a part in the dependences that Φ_q has there beyond its regular ones."""
+    """Return the joints whose rows take part in dependences of Φ_q that exist at this pose only."""
     values, left = _singular_values(run, t, q)
     lost = [k for k in range(min(rank, left.shape[1])) if values[k] < max(NEAR, 2.0 * values[rank - 1])]
     part = np.linalg.norm(left[:, lost], axis=1)

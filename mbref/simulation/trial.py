@@ -1,4 +1,5 @@
-"""Trials: how far `taylor` follows the motion on which another method failed, so that advice is true."""
+"""Trial runs: how far `taylor` follows a motion on which another method failed, so that advice is
+reliable."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 
-MOST_STEPS = 2000  # of a trial, which takes a fraction of a second
+MOST_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
 
 
 _TRIALS: WeakKeyDictionary[Run, Trial | None] = WeakKeyDictionary()
@@ -29,8 +30,8 @@ class Trial:
 def trial_of(run: Run) -> Trial | None:
     """Return the trial of a run, which is made once.
 
-    None where it is not cheap, or says nothing: for a run of `taylor` itself, for more than 100 bodies, and
-    before the kernels of `taylor` are compiled.
+    None for a run of `taylor` itself, for more than 100 bodies, and before the kernels of `taylor` are
+    compiled.
     """
     if run not in _TRIALS:
         _TRIALS[run] = _made(run)

@@ -1,4 +1,5 @@
-"""The chart of the entries in ``Memory.active``: all coordinates and velocities, or the active ones.
+"""Chart whose vector y contains the entries in ``Memory.active``: all coordinates and velocities, or the
+active ones.
 
 y = (r, Euler parameters; r', ω'), body by body.
 """
@@ -25,7 +26,7 @@ def rates(t, y, y_rate, memory):
 
 @inlined
 def accelerate(t, y, y_rate, memory):
-    """y' at time t (s) by the formulation; its status."""
+    """Compute y' at time t (s) by the formulation; return its status."""
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
     assemble_system(t, state.coordinates, state.velocities, equations)
@@ -36,7 +37,7 @@ def accelerate(t, y, y_rate, memory):
 
 @inlined
 def write_rates(y_rate, memory):
-    """y' of the entries of y, from the accelerations found."""
+    """Compute y' of the entries of y from the accelerations."""
     state = memory.state
     coordinate_rates(state.coordinates, state.velocities, state.coordinate_rates)
     contract(state.coordinate_rates, memory.equations.system.acceleration, memory.active, y_rate)

@@ -1,4 +1,5 @@
-"""Stabilisation: how the state is integrated, and how constraint violation is fed back or corrected."""
+"""Interface of stabilisations: which variables are integrated, and how constraint violation is fed back or
+corrected."""
 
 from __future__ import annotations
 
@@ -37,7 +38,8 @@ class Stabilisation:
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
     projects: bool = False  # True if every accepted state satisfies the constraints
     watches_rank: bool = False  # True if a run ends at a singular position
-    largest_turn: float = 1.0  # rad that a body may turn in an adaptive step unless the user says
+    # rad; largest rotation of a body in an adaptive step unless the user chooses another
+    largest_turn: float = 1.0
 
     @cached_property
     def options(self) -> Mapping[str, float]:

@@ -8,7 +8,7 @@ from mbref.stabilisation.base import Stabilisation
 
 
 class Options(NamedTuple):
-    """α and β (1/s)."""
+    """Gains α and β (1/s)."""
 
     alpha: float = 5.0
     beta: float = 5.0

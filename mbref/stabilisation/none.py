@@ -1,4 +1,4 @@
-"""No stabilisation: constraint violations are left to grow (section 2 of the paper, Figure 2)."""
+"""No stabilisation: constraint violations grow (section 2 of the paper, Figure 2)."""
 
 from mbref.stabilisation.all_coordinates import accept, enter, rates
 from mbref.stabilisation.base import Stabilisation

@@ -30,13 +30,14 @@ SINGULAR_PIVOT = 1e-13
 
 
 class Options(NamedTuple):
-    """The relative pivot of Φ_u below which coordinates are partitioned anew."""
+    """Relative pivot of Φ_u below which a new partition is chosen."""
 
     kept: float = 0.6
 
 
 class Partition(NamedTuple):
-    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, now and when chosen."""
+    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, now and when the
+    partition was chosen."""
 
     rank: int = 0
     pivot: float = 0.0
@@ -44,7 +45,7 @@ class Partition(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """The Jacobian by Euler parameters, the factor of its dependent columns, and the partition."""
+    """Memory of the Jacobian by Euler parameters, the factor of its dependent columns, and the partition."""
 
     jacobian: Annotated[Matrix, "m + nb", "7*nb"]  # [Φ_r Φ_p; 0 2pᵀ]
     dependent: Annotated[Matrix, "7*nb", "7*nb"]  # Φ_u of the active rows, factored
@@ -60,7 +61,7 @@ options_of, scratch_of = opener(Options), opener(Scratch)
 
 @kernel
 def jacobian_by_euler_parameters(q, equations, a):
-    """[Φ_r Φ_p; 0 2pᵀ] (m + nb, 7 nb) at the state last evaluated; Φ_p = 2 Φ_π' L."""
+    """Compute [Φ_r Φ_p; 0 2pᵀ] (m + nb, 7 nb) at the state of the last evaluation; Φ_p = 2 Φ_π' L."""
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
     m, nq = bodies.shape[0], q.shape[0]
     a[:] = 0.0
@@ -84,7 +85,7 @@ def jacobian_by_euler_parameters(q, equations, a):
 
 @kernel
 def choose_partition(memory):
-    """Choose the partition at ``memory.state``, last evaluated."""
+    """Choose the partition at ``memory.state``, the state of the last evaluation."""
     q, scratch, system = memory.state.coordinates, scratch_of(memory.chart), memory.equations.system
     a = scratch.jacobian
     jacobian_by_euler_parameters(q, memory.equations, a)
@@ -99,7 +100,7 @@ def choose_partition(memory):
 
 @kernel
 def gather_independent(y, memory):
-    """Copy the independent coordinates and their rates of ``memory.state`` into y; the length of y."""
+    """Copy the independent coordinates and their rates of ``memory.state`` into y; return the length of y."""
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank = scratch.column_order, scratch.partition.rank
     k = order.shape[0] - rank
@@ -122,7 +123,7 @@ def enter(t, y, memory):
 
 @kernel
 def factorise_dependent(memory):
-    """LU of Φ_u at the state last evaluated; False where it is singular."""
+    """Compute LU factors of Φ_u at the state of the last evaluation; return False if it is singular."""
     scratch = scratch_of(memory.chart)
     a, lu, rank = scratch.jacobian, scratch.dependent, scratch.partition.rank
     rows, columns = scratch.row_order, scratch.column_order
@@ -142,7 +143,7 @@ def factorise_dependent(memory):
 
 @kernel
 def find_residual(memory):
-    """Φ and pᵀp - 1 of the active rows into the residual; the largest."""
+    """Compute Φ and pᵀp - 1 of the active rows into the residual; return the largest."""
     q, phi, scratch = memory.state.coordinates, memory.equations.rows.phi, scratch_of(memory.chart)
     m, rank, size, b = phi.shape[0], scratch.partition.rank, 0.0, scratch.residual
     for i in range(rank):
@@ -160,7 +161,7 @@ def find_residual(memory):
 
 @kernel
 def predict_dependent(t, memory):
-    """Dependent coordinates by u + h u' + ½ h² u'' of the last accepted state (Eq. 16)."""
+    """Predict dependent coordinates by u + h u' + ½ h² u'' of the last accepted state (Eq. 16)."""
     q, last, scratch = memory.state.coordinates, memory.previous, scratch_of(memory.chart)
     h = t - memory.watch.accepted_time
     for i in range(scratch.partition.rank):
@@ -171,9 +172,10 @@ def predict_dependent(t, memory):
 
 @kernel
 def solve_dependent_coordinates(t, y, memory):
-    """The dependent coordinates of y by Newton–Raphson into ``memory.state``, with Φ_u factored there.
+    """Compute the dependent coordinates of y by Newton–Raphson into ``memory.state``, and factorise Φ_u
+    there.
 
-    Apart from ``projection.newton_step``, because only the dependent coordinates are unknown (Eq. 15).
+    ``projection.newton_step`` is not used, because only the dependent coordinates are unknown here (Eq. 15).
     """
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank, b = scratch.column_order, scratch.partition.rank, scratch.residual
@@ -199,7 +201,8 @@ def solve_dependent_coordinates(t, y, memory):
 
 @kernel
 def solve_dependent_rates(y, memory):
-    """The dependent rates of y (Eq. 14) and v of all, into ``memory.state``; uses the last factor of Φ_u."""
+    """Compute the dependent rates of y (Eq. 14) and v of all bodies into ``memory.state``, with the last
+    factor of Φ_u."""
     scratch, nu, q_rate = scratch_of(memory.chart), memory.equations.rows.nu, memory.state.coordinate_rates
     order, rank, a, b = scratch.column_order, scratch.partition.rank, scratch.jacobian, scratch.residual
     free = order.shape[0] - rank
@@ -218,7 +221,7 @@ def solve_dependent_rates(y, memory):
 
 @kernel
 def velocities_of_rates(state):
-    """v of q': r' and ω' = 2 L p'."""
+    """Compute v from q': r' and ω' = 2 L p'."""
     q, q_rate, v = state.coordinates, state.coordinate_rates, state.velocities
     for body in range(q.shape[0] // 7):
         i, j = 7 * body, 6 * body
@@ -233,7 +236,7 @@ def velocities_of_rates(state):
 
 @kernel
 def second_rates(acceleration, state):
-    """q'' of the accelerations: r'' and p'' = ½ Lᵀ ω̇' - ¼ (ω'·ω') p."""
+    """Compute q'' from the accelerations: r'' and p'' = ½ Lᵀ ω̇' - ¼ (ω'·ω') p."""
     q, v, second = state.coordinates, state.velocities, state.coordinate_second
     coordinate_rates(q, acceleration, second)
     for body in range(q.shape[0] // 7):

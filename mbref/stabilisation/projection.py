@@ -26,22 +26,25 @@ from mbref.stabilisation.all_coordinates import accelerate, write_rates
 from mbref.stabilisation.base import Stabilisation
 
 ALPHA = 1e10  # penalty of the iteration
-REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of one made once
-INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # the squared pivot from which on a row counts as independent
-DEPENDENT = 3e-3  # the pivot up to which a row clearly depends on others
-CLEAR = 0.05  # the pivot from which on it clearly does not
+REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of a single correction
+INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # squared pivot above which a row counts as independent
+DEPENDENT = 3e-3  # pivot below which a row clearly depends on others
+CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
 MOST_ITERATIONS = 10
-ROUNDING = 1e3  # tolerances: the violation below which iterations may fail to reduce it further
-SMALL, GOOD_REDUCTION = 1e-8, 1e-2  # violation and its reduction by a step: below both the factor is kept
-BENT = 1e-6  # last correction / distance from a singular position: below it the factor is kept
-MOVED = 30.0  # roundings of a last correction behind which rows and factor are found anew
-LARGEST_TURN = 0.75  # rad: two bodies turn by less than a right angle, with which gradients would oppose
+ROUNDING = 1e3  # violation / tolerance below which iterations may fail to reduce it further
+# violation, and its reduction by a step, below which the factor is used again
+SMALL, GOOD_REDUCTION = 1e-8, 1e-2
+BENT = 1e-6  # last correction / distance from a singular position, below which the factor is used again
+MOVED = 30.0  # last correction in roundings, above which rows and factor are computed again
+# rad; so that two bodies turn by less than a right angle, at which gradients would be opposite
+LARGEST_TURN = 0.75
 FACTOR_FAILED = -1.0  # returned by a Newton step instead of the violation
 
 
 class Scratch(NamedTuple):
-    """Corrections of positions: (δr, δπ') per body and the change of coordinates; blocks of rows left out."""
+    """Corrections of positions: (δr, δπ') for each body and the change of coordinates; blocks of rows that
+    are left out."""
 
     correction: Annotated[Vector, "n"]
     change: Annotated[Vector, "7*nb"]
@@ -53,13 +56,14 @@ scratch_of = opener(Scratch)
 
 @exchangeable(ENTER)
 def enter(t, y, memory):
-    """The active entries of ``memory.state`` into y; their number."""
+    """Copy the active entries of ``memory.state`` into y; return their number."""
     return put_active(t, y, memory)
 
 
 @kernel
 def put_active(t, y, memory):
-    """The active entries of ``memory.state`` into y, the pivots watched; their number."""
+    """Copy the active entries of ``memory.state`` into y, and monitor the pivots; return the number of
+    entries."""
     state, active = memory.state, memory.active
     evaluate(t, state.coordinates, state.velocities, memory.equations)
     if factorise_constraints(memory):
@@ -72,7 +76,7 @@ def put_active(t, y, memory):
 
 @inlined
 def factorise_constraints(memory):
-    """The factor of S + I/α at the state last evaluated; False where it does not exist."""
+    """Factorise S + I/α at the state of the last evaluation; return False if no factor exists."""
     equations, system = memory.equations, memory.equations.system
     system.counts.factorisations += 1
     return regularised_factor(memory.factor, system.blocks.reshape(-1), equations.scene.metric_root, ALPHA)
@@ -80,7 +84,7 @@ def factorise_constraints(memory):
 
 @kernel
 def keep_end(memory):
-    """Keep the gradient and the pivots of the last factor, at which the next step begins."""
+    """Save the gradient and the pivots of the last factor, for the start of the next step."""
     ends = memory.loop.ends
     copy(memory.factor.d, ends.gradient)
     for k in range(ends.squared_pivots.shape[0]):
@@ -89,14 +93,15 @@ def keep_end(memory):
 
 @inlined
 def watch_pivots(memory):
-    """Watch the pivots of the last factor."""
+    """Record the pivots of the last factor."""
     find_squared_pivots(memory.factor)
     watch(memory.factor.squared_pivots, memory.pivots, memory.watch)
 
 
 @inlined
 def watch(squares, pivots, record):
-    """Keep the pivots, the largest rank seen, the smallest of so many pivots now, and its largest value."""
+    """Record the pivots, the largest rank so far, the smallest of that many pivots now, and its largest
+    value."""
     rank, smallest = 0, 1.0
     for k in range(squares.shape[0]):
         square = squares[k]
@@ -117,7 +122,7 @@ def watch(squares, pivots, record):
 
 @inlined
 def remove_violation(violation, iterations, factor, target):
-    """Change ``target`` (n,) by the least that takes the violation (m,) of every row away."""
+    """Change ``target`` (n,) by the least change that removes the violation (m,) of every row."""
     row = factor.symbolic.row
     for i in range(row.shape[0]):
         factor.residual[i] = -violation[row[i]]
@@ -126,10 +131,10 @@ def remove_violation(violation, iterations, factor, target):
 
 @kernel
 def newton_step(t, before, memory):
-    """One step of Newton's method for Φ(q, t) = 0 in ``memory.state``; the largest |Φ| before it.
+    """Make one step of Newton's method for Φ(q, t) = 0 in ``memory.state``; return the largest |Φ| before it.
 
-    The last factor serves again while the violation ``before`` was small and shrinks well.  Positions whose
-    violation is rounding stay, so that the rows are theirs.
+    The last factor is used again while the violation ``before`` was small and decreases well. Positions whose
+    violation is rounding are not changed, so that the evaluated rows belong to them.
     """
     state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
     evaluate(t, state.coordinates, state.velocities, equations)
@@ -146,7 +151,7 @@ def newton_step(t, before, memory):
 
 @inlined
 def correct_positions(memory):
-    """Take Φ away from the coordinates in ``memory.state``, with the last factor."""
+    """Remove Φ by changing the coordinates in ``memory.state``, with the last factor."""
     scratch = scratch_of(memory.chart)
     remove_violation(memory.equations.rows.phi, REPEATED, memory.factor, scratch.correction)
     displace(memory.state.coordinates, scratch.correction, scratch.change)
@@ -156,7 +161,7 @@ def correct_positions(memory):
 def project_positions(t, memory):
     """Repeat Newton steps until the violation is rounding.
 
-    Return OK, SINGULAR where no factor exists, or NOT_CONVERGED.
+    Return OK, SINGULAR if no factor exists, or NOT_CONVERGED.
     """
     system, before = memory.equations.system, NEVER
     tolerance = system.settings.newton_tolerance
@@ -173,7 +178,7 @@ def project_positions(t, memory):
 
 @kernel
 def project(t, y, memory):
-    """Project y; OK, SINGULAR or NOT_CONVERGED."""
+    """Project y; return OK, SINGULAR or NOT_CONVERGED."""
     state = memory.state
     expand(y, memory.active, state)
     status = project_positions(t, memory)
@@ -188,10 +193,10 @@ def project(t, y, memory):
 
 @kernel
 def follow_last_correction(t, memory):
-    """Bring rows and factor to positions that the last correction moved by more than rounding.
+    """Compute rows and factor again if the last correction moved positions by more than rounding.
 
-    So it is where the violation left was rounding, but a light body beside a heavy one moves the farther.
-    False where no factor exists.
+    This happens if the violation is rounding, but a light body next to a heavy one moves much farther. Return
+    False if no factor exists.
     """
     equations, state = memory.equations, memory.state
     if not largest(scratch_of(memory.chart).correction) > MOVED * equations.system.settings.rounding:
@@ -202,7 +207,7 @@ def follow_last_correction(t, memory):
 
 @inlined
 def project_velocities(iterations, memory):
-    """Take Φ' = Φ_q v - ν away by the least change of v, with the last factor."""
+    """Remove Φ' = Φ_q v - ν by the least change of v, with the last factor."""
     velocities, equations = memory.state.velocities, memory.equations
     violation_rate(velocities, equations)
     remove_violation(equations.rows.phi_rate, iterations, memory.factor, velocities)
@@ -215,10 +220,10 @@ def accept(t, y, memory):
 
 @exchangeable(RATES)
 def rates(t, y, y_rate, memory):
-    """y' by the rows that were independent where the step began.
+    """Compute y' by the rows that were independent at the start of the step.
 
-    Rows that depend on others do so on the constraints alone: a stage of a step violates these a little, and
-    there such a row contradicts the others by as much as it is independent of them.
+    Rows depend on others only if the constraints are satisfied. A stage of a step violates them slightly.
+    There a dependent row contradicts the others, so it is left out.
     """
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
@@ -235,9 +240,10 @@ def rates(t, y, y_rate, memory):
 
 @kernel
 def depend_on_others(memory):
-    """Whether rows clearly depended on others, as many as ever, at the last state that was projected.
+    """Return whether rows clearly depended on others, as many as ever, at the last projected state.
 
-    Near a singular position more rows seem to; a motion that may have begun on one does not tell how many do.
+    Near a singular position more rows seem dependent. For a motion that may have started at one, the number
+    is unknown.
     """
     pivots, watched, independent = memory.pivots, memory.watch, 0
     if not watched.regular:
@@ -252,7 +258,7 @@ def depend_on_others(memory):
 
 @kernel
 def leave_out_dependent_rows(memory):
-    """Set rows that depend on others to zero, and save their blocks."""
+    """Set dependent rows to zero, and save their blocks."""
     pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
     kept = scratch_of(memory.chart).blocks
     for k in range(pivots.shape[0]):
@@ -276,7 +282,7 @@ def put_back_dependent_rows(memory):
 
 @exchangeable(RATES)
 def whole_rates(t, y, y_rate, memory):
-    """``rates``, with the multipliers of all rows."""
+    """Compute ``rates`` with the multipliers of all rows."""
     status = accelerate(t, y, y_rate, memory)
     add_resting_rows(t, memory.factor.static, memory.equations)
     return status

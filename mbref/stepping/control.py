@@ -11,12 +11,14 @@ from mbref.kernels.layout import Control
 from mbref.method import Method
 from mbref.stepping.limits import Limits
 
-STEPS_PER_CALL = 5_000  # steps between returns to Python, for interrupts and progress
-UNWRAPPED = 1.0  # rad that a body may turn in a step where torsion springs unwrap: two turn less than π apart
+STEPS_PER_CALL = 5_000  # steps between returns to Python, which handles interrupts and progress
+# rad; largest rotation of a body in a step if torsion springs need unwrapped angles: two bodies turn by less
+# than π
+UNWRAPPED = 1.0
 
 
 def control_of(model: Model, method: Method, times: np.ndarray, limits: Limits) -> Control:
-    """The limits of a run that ends at the last of the times (k,), s."""
+    """Return the limits of a run that ends at the last of the times (k,), s."""
     integrator, span = method.integrator, float(times[-1]) or 1.0
     options, largest_step = method.options_of(integrator), limits.largest_step or span
     turn = UNWRAPPED if model.has_angles else method.stabilisation.largest_turn
@@ -38,5 +40,5 @@ def control_of(model: Model, method: Method, times: np.ndarray, limits: Limits) 
 
 
 def largest_violation(limits: Limits, length: Any) -> Any:
-    """The largest |Φ| (m or rad) of scenes of a length (m); of a number or an array."""
+    """Return the largest allowed |Φ| (m or rad) of scenes of a length (m); for a number or an array."""
     return limits.violation * np.maximum(1.0, length)

@@ -34,7 +34,7 @@ class ExplicitStepper:
         clock.restart = run.memory.equations.system.counts.steps
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
-        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
+        """Run to the end; return the final status and the process CPU time of the stepping alone (s)."""
         began, status = time.process_time(), PAUSED
         if self.run.times[-1] > 0.0 and begins_on_singular_position(self.run):
             status = SINGULAR_AHEAD
@@ -50,7 +50,7 @@ class ExplicitStepper:
 
     @property
     def was_short(self) -> bool:
-        """Whether the run was completed by one call of kernels."""
+        """True if one call of kernels completed the run."""
         return bool(self.run.memory.equations.system.counts.steps <= STEPS_PER_CALL)
 
     @property
@@ -64,11 +64,12 @@ class ExplicitStepper:
     def parameters(
         self, packs: Packs, q: np.ndarray, places: Sequence[int]
     ) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Return no numbers, because the stepper has no memory of its own, and all places."""
+        """Return no numbers, because the stepper has no memory of its own, and all scene indices."""
         return [], [*places]
 
     def advance_once(self) -> tuple[int, float]:
-        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+        """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone
+        (s)."""
         began = time.process_time()
         return int(advance_to_end(self.run.packed.argument)), time.process_time() - began
 

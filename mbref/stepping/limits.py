@@ -12,10 +12,10 @@ from mbref.scene_fields import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
 CODES = (AUTO, GENERIC, GENERATED)
-FINEST = 1e-16  # smallest relative tolerance: doubles have no more digits
+FINEST = 1e-16  # least relative tolerance; doubles have no more digits
 MOST = 2**62  # largest count
 
-# field → least and largest value, and whether 0 is taken too
+# field → least and largest value, and whether 0 is allowed, too
 INTERVALS = {
     "rtol": (FINEST, 0.99, False),
     "atol": (SMALLEST, LARGEST, False),
@@ -30,28 +30,29 @@ INTERVALS = {
 COUNTS = {"most_steps": (1, MOST)}
 
 
-Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # keyed by crossing, or stored as pairs
+Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # crossing → branch, or stored as pairs
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Tolerances, steps and code of a run; raises ValueError naming a field that is out of its interval.
+    """Tolerances, steps and code of a run; raises ValueError for a field outside its interval.
 
     Whatever number is given, the field is a Python float or int: compiled code reads its bytes.
     """
 
-    rtol: float = 1e-9  # local error per step, less in runs of more than 1000 steps, relative …
-    atol: float | None = None  # … and absolute (SI units); None means as rtol
-    rank_tolerance: float = 1e-10  # relative singular value or pivot below which it counts as zero
-    violation: float = 3e-3  # largest |Φ| tolerated (m or rad), times the scene's length where over 1 m
-    first_step: float = 0.0  # first step, s; 0: chosen by the integrator
-    smallest_step: float = 0.0  # s; 0 means a million-millionth of the duration
-    forced_step: float = 0.0  # s; a step this short is taken whatever its error estimate; 0: none
-    largest_step: float = 0.0  # s, of fixed steps too; 0 means the duration
-    largest_turn: float = 0.0  # rad that the fastest body may turn in an adaptive step; 0: a safe angle
+    rtol: float = 1e-9  # relative local error of a step; smaller in runs of more than 1000 steps
+    atol: float | None = None  # absolute local error (SI units); None: equal to rtol
+    rank_tolerance: float = 1e-10  # singular value or pivot / largest one below which it counts as zero
+    violation: float = 3e-3  # largest allowed |Φ| (m or rad), times the scene's length if that is over 1 m
+    first_step: float = 0.0  # s; 0: chosen by the integrator
+    smallest_step: float = 0.0  # s; 0: 1e-12 of the duration
+    forced_step: float = 0.0  # s; a step this short is accepted whatever its error estimate; 0: none
+    largest_step: float = 0.0  # s, also for fixed steps; 0: the duration
+    # rad; largest rotation of the fastest body in an adaptive step; 0: a safe angle
+    largest_turn: float = 0.0
     most_steps: int = 5_000_000
     compared: bool = True  # compare a run without projection with a projected run
-    branches: Branches = ()  # branches to take at crossings, both counted from 1; default: smooth branch
+    branches: Branches = ()  # branches to take at crossings, both counted from 1; default: the smooth branch
     code: str = AUTO  # code of `taylor`: GENERIC, GENERATED for the scene, or AUTO
 
     def __post_init__(self) -> None:
@@ -76,7 +77,7 @@ def _checked(name: str, value: Any) -> Any:
 
 
 def _pairs(value: Any) -> tuple[tuple[int, int], ...]:
-    """Pairs of whole numbers from 1, of a mapping or of pairs."""
+    """Return pairs of whole numbers from 1, for a mapping or for pairs."""
     try:
         pairs = value.items() if isinstance(value, Mapping) else value
         return tuple(

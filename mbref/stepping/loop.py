@@ -15,16 +15,17 @@ from mbref.stepping.singular_crossing import (
     remember_watch,
 )
 
-# statuses of a call, in addition to evaluation statuses (SINGULAR, …)
+# status codes of a call, in addition to evaluation statuses (SINGULAR, …)
 DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, UNDECIDED, LEFT_MOTION, CREEPING = range(10, 18)
 
-MANY, PACE = 1000.0, 50  # steps of a run whose errors add up to little, and from which on its pace is known
+# steps up to which tolerances are not reduced; steps after which the mean step length is known
+MANY, PACE = 1000.0, 50
 LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # least tolerance of a step; tolerance of first steps / rtol
 
 
 @kernel
 def worst_row(phi):
-    """The row with the largest violation; -1 without rows."""
+    """Return the row with the largest violation; -1 without rows."""
     worst = -1
     for row in range(phi.shape[0]):
         if worst < 0 or abs(phi[row]) > abs(phi[worst]):
@@ -34,7 +35,8 @@ def worst_row(phi):
 
 @kernel
 def check_state(y, y_rate, memory):
-    """OK where a state is finite and no row is violated beyond the limit, else NOT_FINITE or VIOLATED."""
+    """Return OK if a state is finite and no row is violated beyond the limit, otherwise NOT_FINITE or
+    VIOLATED."""
     if not (all_finite(y) and all_finite(y_rate)):
         return NOT_FINITE
     phi = memory.equations.rows.phi
@@ -47,7 +49,7 @@ def check_state(y, y_rate, memory):
 
 @kernel
 def remember_accepted_state(t, memory):
-    """Remember the accepted state, from which charts predict and angles unwrap."""
+    """Save the accepted state, from which dependent coordinates are predicted and angles are unwrapped."""
     copy_state(memory.state, memory.previous)
     memory.watch.accepted_time = t
     remember_angles(memory.equations)
@@ -55,7 +57,7 @@ def remember_accepted_state(t, memory):
 
 @kernel
 def largest_step(memory):
-    """The step that the user's limit and the fastest turning body allow."""
+    """Return the longest step that the user's limit and the fastest rotating body allow."""
     control, fastest = memory.control, fastest_turn(memory.state.velocities)
     h = control.largest_step
     return min(h, control.largest_turn / fastest) if fastest > 0.0 else h
@@ -63,11 +65,12 @@ def largest_step(memory):
 
 @kernel
 def share(suggested, memory):
-    """The part of rtol and atol that a step may lose: 1, but (MANY / steps)² in runs of more steps than MANY.
+    """Return the factor on rtol and atol for a step: 1, or (MANY / N)² if more than MANY steps N are
+    expected.
 
-    Errors of a motion's frequency add up to a phase that grows with the square of the time.  The number of
-    steps is expected from the pace so far, among the first ones also from the step that is suggested (s).
-    First steps may be far shorter than others, so that their part is EARLY at least.
+    Errors of a motion's frequency add up to a phase error that grows with the square of the time. The number
+    of steps is estimated from the mean step length so far, at first also from the suggested step (s). First
+    steps may be far shorter than later ones, so that their factor is at least EARLY.
     """
     loop, steps, least = (
         memory.loop,
@@ -85,14 +88,14 @@ def share(suggested, memory):
 
 @kernel
 def proposed_or_first_step(suggested, memory):
-    """The user's first step where one is given, else the integrator's proposal."""
+    """Return the user's first step if one is given, otherwise the integrator's proposal."""
     first = memory.control.first_step
     return first if memory.equations.system.counts.steps == 0 and first > 0.0 else suggested
 
 
 @kernel
 def step_within(interval, h):
-    """The next step towards the end of an interval: the interval, its half, or h."""
+    """Return the next step towards the end of an interval: the interval, its half, or h."""
     if h * (1.0 + 1e-9) >= interval:
         return interval
     return 0.5 * interval if 2.0 * h > interval else h
@@ -100,7 +103,7 @@ def step_within(interval, h):
 
 @entry(INT(MEMORY))
 def advance_to_end(memory):
-    """Advance until the last sample time, a failure, or the number of steps per call; says which."""
+    """Advance until the last sample time, a failure, or the number of steps per call; return the status."""
     loop, clock, counts = memory.loop, memory.loop.clock, memory.equations.system.counts
     taken, times = 0, memory.loop.times
     while True:
@@ -126,7 +129,7 @@ def advance_to_end(memory):
 
 @kernel
 def evaluate_state(y, y_rate, memory):
-    """Evaluate y' at the present time, with outputs at a sample time; check and remember the state."""
+    """Evaluate y' at the present time, with outputs at a sample time; check and save the state."""
     clock, kernels = memory.loop.clock, memory.kernels
     t = clock.time
     select_pieces(t, memory.equations)
@@ -143,16 +146,16 @@ def evaluate_state(y, y_rate, memory):
 
 @kernel
 def attempt(t, h, y, y_rate, y_new, memory):
-    """One attempt at a step: its error ratio, or minus the status of an evaluation that failed."""
+    """Attempt a step; return its error ratio, or minus the status of a failed evaluation."""
     step, kernels = memory.kernels.step, memory.kernels
     return step(kernels.rates, t, h, y, y_rate, y_new, memory)
 
 
 @kernel
 def accept_step(now, h, suggested, ratio, memory):
-    """Correct and keep the new state: OK, CHANGED (new coordinates), or the status of the failure.
+    """Correct and keep the new state; return OK, CHANGED (new coordinates), or the status of the failure.
 
-    SINGULAR_AHEAD, nothing kept, where the step comes to a singular position or passes one.
+    SINGULAR_AHEAD, with nothing kept, if the step reaches a singular position or passes one.
     """
     loop, counts = memory.loop, memory.equations.system.counts
     clock = loop.clock

@@ -1,21 +1,22 @@
-"""The pace of a run: whether its steps are so short that the end is out of reach."""
+"""Check of the mean step length: a run whose steps are too short to reach the end is stopped."""
 
 from __future__ import annotations
 
 from mbref.stepping.loop import CREEPING, PAUSED
 from mbref.stepping.run import Run
 
-OUT_OF_REACH, PACE_STEPS = 100.0, 20_000  # limits of steps that the end is away, at the pace of so many
+# number of step limits to the end above which a run is stopped, and steps between two checks
+OUT_OF_REACH, PACE_STEPS = 100.0, 20_000
 
 
 class Pace:
-    """The pace of a run, judged between calls of kernels."""
+    """Mean step length of a run, checked between calls of kernels."""
 
     def __init__(self, run: Run):
-        self._run, self._judged = run, (0.0, 0)  # time (s) and steps when the pace was last judged
+        self._run, self._judged = run, (0.0, 0)  # time (s) and steps at the last check
 
     def judge(self, status: int) -> int:
-        """Return CREEPING instead of PAUSED where at the last pace the end is out of all reach."""
+        """Return CREEPING instead of PAUSED if the end cannot be reached at the latest mean step length."""
         if status != PAUSED:
             return status
         memory, limits = self._run.memory, self._run.limits

@@ -1,4 +1,4 @@
-"""Ranks: how many constraint rows of a run are independent at its start, by singular values or pivots."""
+"""Ranks: the number of independent constraint rows at the start of a run, by singular values or pivots."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.minimum_norm import factorise_once
 from mbref.stabilisation.projection import INDEPENDENT
 
-MOST_ROWS = 120  # rows whose singular values are found
+MOST_ROWS = 120  # rows; singular values of more rows are not computed
 
 
 class Ranks(NamedTuple):
-    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of them, the next."""
+    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of those, and the next
+    one."""
 
     rank: int
     least: float
@@ -46,9 +47,9 @@ def ranks_at(
 def all_ranks(
     model: Model, blocks: np.ndarray, metric_root: np.ndarray, symbolic: Symbolic, tolerance: float
 ) -> list[Ranks]:
-    """``ranks_at`` of s scenes of the structure of a model; no ranks where there are too many rows.
+    """Return ``ranks_at`` for s scenes of a model's structure; no ranks if there are too many rows.
 
-    From Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
+    Arguments are Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
     """
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
     if rows.size > MOST_ROWS or not rows.size:

@@ -43,20 +43,20 @@ NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
 
 class Stepper(Protocol):
-    """The loop of steps of a run, by an explicit integrator or by a Taylor series."""
+    """Interface of the stepping loop of a run, by an explicit integrator or by a Taylor series."""
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
-        """Run to the end; the final status and the process CPU time of the stepping alone (s).
+        """Run to the end; return the final status and the process CPU time of the stepping alone (s).
 
-        ``progress`` is given the time reached (s).
+        ``progress`` receives the reached time (s).
         """
 
     def release(self) -> None:
-        """Release memory of its own."""
+        """Release the stepper's own memory."""
 
     @property
     def was_short(self) -> bool:
-        """Whether the run was completed by one call of kernels."""
+        """True if one call of kernels completed the run."""
 
     @property
     def memory(self) -> Any:
@@ -71,12 +71,16 @@ class Stepper(Protocol):
     def parameters(
         self, packs: Packs, q: np.ndarray, places: Sequence[int]
     ) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Return (target array, values per scene) for numbers of the stepper that differ between the scenes
-        of ``packs``, with coordinates q (s, 7 nb) at the start; and the places whose scenes have
-        room in memory."""
+        """Return (target array, values for each scene) for numbers of the stepper that differ between the
+        scenes of ``packs``.
+
+        q (s, 7 nb) are coordinates at the start. Also return the indices of scenes whose equations fit into
+        the memory.
+        """
 
     def advance_once(self) -> tuple[int, float]:
-        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+        """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone
+        (s)."""
 
 
 class Run:
@@ -91,15 +95,15 @@ class Run:
         stepper: Callable[[Run], Stepper],
     ):
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
-        self._blocks: np.ndarray | None = None  # (m, 12) of Φ_q at the start, where it was asked for
+        self._blocks: np.ndarray | None = None  # (m, 12) of Φ_q at the start, if it was computed
         self.model, self.start, self.reduction = self._posed()
         self._control = control_of(self.model, method, times, limits)
-        prepare(method)  # so that the run alone is timed
+        prepare(method)  # before the timed run
         self.pooled = self._acquire_memory()
         self.memory, self.packed = self.pooled.values, self.pooled.packed
         self.put_start()
         self.crossings: list[Passed] = []
-        self.making = 0.0  # s of CPU time, within ``advance``, that is construction
+        self.making = 0.0  # s of CPU time for construction during ``advance``
         self.built = 0.0  # s of CPU time before the first step
         self.stepper = stepper(self)
 
@@ -110,7 +114,7 @@ class Run:
         self.model.release()
 
     def _posed(self) -> tuple[Model, Start, Reduction | None]:
-        """The scene as a model, its consistent start, and the part of the equations that the method needs.
+        """Return the scene as a model, its consistent start, and the reduction that the method needs.
 
         None stands for all equations.
         """
@@ -143,11 +147,12 @@ class Run:
         state.
         """
         sparse = self.method.formulation.linear_algebra.sparse
-        all_move = all_move or not self.method.stabilisation.projects  # others read the gradients of all rows
+        # other stabilisations read the gradients of all rows
+        all_move = all_move or not self.method.stabilisation.projects
         return self.reduction.scene(data, all_move, axis) if self.reduction and sparse else data
 
     def _acquire_memory(self) -> Pooled:
-        """Memory with the numbers of this run."""
+        """Return memory with the numbers of this run."""
         data = self.reduced(self.model.data)
         key = (Memory, *self._identity(), self.model.structure, self.reduction, self.times.size)
         memory = acquire(key, lambda: self._allocate(data))
@@ -162,7 +167,7 @@ class Run:
         memory.loop.times[:] = self.times
 
     def _identity(self) -> tuple[Any, ...]:
-        """All of the method that is in its memory: kernels, schemas and options."""
+        """Return everything of the method that is in its memory: kernels, schemas and options."""
         formulation, stabilisation, integrator = self.method.parts
         schemas = formulation.linear_algebra, stabilisation.memory, integrator.schema
         numbers = formulation.numbers, stabilisation.numbers
@@ -181,7 +186,8 @@ class Run:
         sizes["watched_rows"] = pivots if watched else 0
         sizes["watched_entries"] = factor.d.size if watched else 0
         sizes["watched_numbers"] = factor.l.size if watched else 0
-        static = no_static_rows() if data.resting.size else factor.static  # else their multipliers come last
+        # otherwise their multipliers are computed last
+        static = no_static_rows() if data.resting.size else factor.static
         at_every_state = factor._replace(static=static)
         equations = model.equations(
             sizes,
@@ -206,15 +212,15 @@ class Run:
         )
 
     def _factor(self) -> tuple[SparseFactor, Active]:
-        """The factor, and the entries of y, which are all where no part of the equations is left out."""
+        """Return the factor, and the entries of y; these are all entries if no equation is left out."""
         if self.reduction is None:
             everything = unsigned(np.arange(7 * self.model.nb)), unsigned(np.arange(self.model.n))
             return empty_factor(), Active(*everything)
         return self.reduction.factor(), self.reduction.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:
-        """The kernels of the method on this chart, which leaves rows out that some formulations need; none of
-        a series."""
+        """Return the kernels of the method for this chart, which leaves out rows that some formulations need;
+        none for a series."""
         integrator, formulation = self.method.integrator, self.method.formulation
         of_all_rows = formulation.needs_all_rows and chart.projects
         chosen = {
@@ -248,13 +254,13 @@ class Run:
             settings.rounding *= min(1.0, self.model.length)
 
     def _ranks_at_start(self) -> Ranks:
-        """Return the rank of the constraint rows at the start, and what decides it."""
+        """Return the rank of the constraint rows at the start, and the singular value that decides it."""
         factor, tolerance = self.memory.factor, self.limits.rank_tolerance
         return ranks_at(self.model, self.start.q, factor, tolerance, self._blocks)
 
 
 def missing_masses(scene: Scene) -> list[str]:
-    """One fault per body without mass, for a dynamic analysis."""
+    """Return one fault for each body without mass, for a dynamic analysis."""
     return [
         f"body[{b}].mass: {body.name!r} has no mass and inertia, which a dynamic analysis needs"
         for b, body in enumerate(scene.body)

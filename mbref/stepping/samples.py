@@ -1,4 +1,4 @@
-"""Samples: what a run records at the sample times, at states of steps and inside a leap."""
+"""Samples: state, accelerations and multipliers that a run records at the sample times."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from mbref.linear_algebra.vectors import copy
 
 @kernel
 def take_sample(memory):
-    """Record state, accelerations and multipliers as the last evaluation left them."""
+    """Record state, accelerations and multipliers of the last evaluation."""
     samples, state, system = memory.loop.samples, memory.state, memory.equations.system
     k = memory.loop.clock.sample
     copy(state.coordinates, samples.coordinates[k])

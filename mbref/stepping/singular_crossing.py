@@ -1,11 +1,11 @@
-"""Detection of singular positions by a run that watches the rank of Φ_q: such a run ends there.
+"""Detection of singular positions by a run that monitors the rank of Φ_q: such a run ends there.
 
-Where the rank of Φ_q drops, a pivot of its rows falls to zero and rises again.  The pivots belong to unit
-rows in columns of unit length (``equations.units``), so that masses have no part in them; the projection has
-them at hand after every step (``layout.Watch``).  A step comes to a singular position where it ends at one.
-Inside a step rows may lose rank where a pivot of the product of the gradients at both ends is negative
+At a drop of the rank of Φ_q, a pivot of its rows falls to zero and rises again. The pivots belong to unit
+rows in columns of unit length (``equations.units``), so that they do not depend on masses; the projection
+computes them after every step (``layout.Watch``). A step may end at a singular position. Rows may lose rank
+inside a step if a pivot of the product of the gradients at both ends is negative
 (``linear_algebra.sparse_lu``).  The pose at the zero of that pivot decides: at a singular position fewer
-pivots are left than the rank; elsewhere a redundant row has taken the place of the one that vanishes.
+nonzero pivots are left than the rank. Otherwise a redundant row has replaced the row whose pivot vanishes.
 """
 
 from __future__ import annotations
@@ -21,22 +21,26 @@ from mbref.linear_algebra.vectors import sort
 from mbref.stabilisation.projection import factorise_constraints, keep_end
 
 REACHED = 1e-3  # relative pivot below which a step has reached a singular position
-VANISHED = 1e-2  # relative pivot inside a step that counts as zero, because the pose is interpolated
+# relative pivot inside a step below which it counts as zero, because the pose is interpolated
+VANISHED = 1e-2
 ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
-SEARCH, EXACT = 30, 1e-9  # evaluations that find a zero, and parts of the step within which it is found
+SEARCH, EXACT = 30, 1e-9  # evaluations that locate a zero, and accuracy of its place relative to the step
 
 
 @kernel
 def relative_pivot(watch):
-    """Smallest pivot of Φ_q over the largest it has had; 1 where the chart does not watch it."""
+    """Return the smallest pivot of Φ_q over its largest value so far; 1 if the chart does not monitor it."""
     reference = watch.reference_pivot
     return watch.smallest_pivot / reference if reference > 0.0 else 1.0
 
 
 @kernel
 def meets_singular_position(h, memory):
-    """Whether a step of h seconds, whose end has just been projected, comes to a singular position or passes
-    one; its place in the step and the pose are in memory then."""
+    """Return whether a step of h seconds, whose end has just been projected, reaches or passes a singular
+    position.
+
+    Its place in the step and the pose are then in memory.
+    """
     watch = memory.watch
     if memory.control.closed_loops == 0.0 or watch.reference_pivot == 0.0:
         return False
@@ -48,7 +52,7 @@ def meets_singular_position(h, memory):
 
 @kernel
 def keep_position(part, h, memory):
-    """Keep the part of a step of h seconds and the pose there, as those at which the run ends."""
+    """Save the fraction of a step of h seconds and the pose there, at which the run ends."""
     memory.watch.singular_part = part
     put_pose(part, h, memory)
 
@@ -57,7 +61,7 @@ def keep_position(part, h, memory):
 def passes_singular_position(h, memory):
     """Whether the rank drops inside a step of h seconds.
 
-    Rows whose pivots are small at both ends are redundant: no zero of theirs is looked at.
+    Rows whose pivots are small at both ends are redundant, and are not examined.
     """
     ends, factor = memory.loop.ends, memory.factor
     factorise_product(factor, ends.gradient, ALPHA, ends)
@@ -78,7 +82,7 @@ def passes_singular_position(h, memory):
 
 @kernel
 def put_rates(memory):
-    """q' at both ends of the step."""
+    """Compute q' at both ends of the step."""
     rates, before, after = memory.loop.ends.rates, memory.previous, memory.state
     coordinate_rates(before.coordinates, before.velocities, rates[0])
     coordinate_rates(after.coordinates, after.velocities, rates[1])
@@ -86,7 +90,7 @@ def put_rates(memory):
 
 @kernel
 def put_pose(part, h, memory):
-    """The pose at a part of a step of h seconds, by Hermite's cubic polynomial."""
+    """Compute the pose at a fraction of a step of h seconds, by Hermite's cubic polynomial."""
     ends, rest = memory.loop.ends, 1.0 - part
     before, after = memory.previous.coordinates, memory.state.coordinates
     of_before, of_after = (1.0 + 2.0 * part) * rest * rest, (1.0 + 2.0 * rest) * part * part
@@ -99,7 +103,8 @@ def put_pose(part, h, memory):
 
 @kernel
 def expand_product_at(part, h, memory):
-    """The factor at the pose of a part of a step of h seconds, and its product with that at the start."""
+    """Compute the factor at the pose at a fraction of a step of h seconds, and its product with the gradient
+    at the start."""
     ends, t = memory.loop.ends, memory.loop.clock.time + part * h
     put_pose(part, h, memory)
     evaluate(t, ends.pose, memory.state.velocities, memory.equations)
@@ -109,9 +114,11 @@ def expand_product_at(part, h, memory):
 
 @kernel
 def zero_of_pivot(k, h, memory):
-    """The part of a step of h seconds at which pivot k of the product changes its sign: false position
-    (the Pegasus rule of
-    Dowell & Jarratt, BIT 12, 1972).  The factor is left at the pose there."""
+    """Return the fraction of a step of h seconds at which pivot k of the product changes its sign.
+
+    The method is false position with the Pegasus rule (Dowell & Jarratt, BIT 12, 1972). Afterwards the factor
+    belongs to the pose there.
+    """
     pivots, low, high, part = memory.loop.ends.pivots, 0.0, 1.0, 1.0
     at_low, at_high = memory.loop.ends.squared_pivots[k], pivots[k]
     for _ in range(SEARCH):
@@ -130,7 +137,7 @@ def zero_of_pivot(k, h, memory):
 
 @kernel
 def pivot_at_pose(memory):
-    """The smallest of as many pivots as there are independent rows, where the factor was last found."""
+    """Return the smallest of as many pivots as there are independent rows, at the pose of the last factor."""
     factor, rank = memory.factor, memory.watch.generic_rank
     find_squared_pivots(factor)
     squares = factor.squared_pivots
@@ -140,7 +147,7 @@ def pivot_at_pose(memory):
 
 @kernel
 def remember_watch(memory):
-    """Keep the pivots and the gradient at the end of an accepted step, where the next one begins."""
+    """Save the pivots and the gradient at the end of an accepted step, at which the next one begins."""
     watch = memory.watch
     watch.past_pivot = watch.smallest_pivot
     watch.nearest = min(watch.nearest, relative_pivot(watch))

@@ -1,9 +1,9 @@
 """Starts on a singular position, which the motion leaves along one of the branches that meet there.
 
-Φ_q leaves more freedoms there than any branch has, and accelerations that it allows leave the constraints.
-A motion goes on along the branch of its velocities, which is the only one where the rates of the second-order
-forms along these velocities are independent.  From rest, Gauss's principle of least constraint selects, among
-accelerations along the branches, the acceleration nearest to free bodies, in the metric of M.
+There Φ_q allows more velocities than any branch has, and accelerations that it allows may violate the
+constraints. A motion continues along the branch of its velocities. This branch is unique if the rates of the
+second-order forms along these velocities are independent.  From rest, Gauss's principle of least constraint
+selects, among accelerations along the branches, the acceleration nearest to free bodies, in the metric of M.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mbref.equations.branches import MOST_ROWS, fit_to_branches, tangents
 from mbref.equations.initial_state import MET, rate_violation
 from mbref.stepping.run import Run
 
-NEAR_SINGULAR = 1e-6  # smallest singular value of unit rows below which a start is near-singular
-STILL = 1e-12  # force along a branch / largest force: below it the body stays at rest
+NEAR_SINGULAR = 1e-6  # smallest singular value of unit rows below which a start is near a singular position
+STILL = 1e-12  # force along a branch / largest force, below which the body stays at rest
 
 
 class Leaving(NamedTuple):
@@ -43,13 +43,13 @@ def leaving(run: Run) -> Leaving | None:
 
 
 def fits_no_branch(run: Run) -> bool:
-    """Whether a run begins on a singular position with velocities that agree with no branch there."""
+    """Return whether a run starts at a singular position with velocities that agree with no branch."""
     fit = fit_to_branches(run.model, 0.0, run.start.q, run.start.v) if begins_in_motion(run) else None
     return fit is not None and not fit.fits
 
 
 def begins_on_singular_position(run: Run) -> bool:
-    """Whether a run that projects begins on a singular position at which several branches meet."""
+    """Return whether a run with projection starts at a singular position at which several branches meet."""
     if begins_at_rest(run):
         return len(tangents(run.model, run.start.q)) > 1
     if not (begins_in_motion(run) or begins_near_singular(run)):
@@ -58,39 +58,48 @@ def begins_on_singular_position(run: Run) -> bool:
 
 
 def freedoms_of_first_order(run: Run) -> int:
-    """Freedoms that Φ_q leaves at the start of a run that projects; 0 where ranks are not looked at."""
+    """Return the number of velocities that Φ_q allows at the start of a run with projection; 0 if ranks are
+    not computed."""
     if not run.method.stabilisation.projects or run.model.m > MOST_ROWS:
         return 0
     return int(run.memory.active.velocities.size - run.memory.watch.generic_rank)
 
 
 def begins_at_rest(run: Run) -> bool:
-    """Whether a run begins closed loops without drivers at rest, with two freedoms of first order or more."""
+    """Return whether a run starts at rest, with closed loops without drivers, and Φ_q allows two velocities
+    or more."""
     if run.scene.driver or np.any(run.start.v) or not run.model.closed_loops:
         return False
     return freedoms_of_first_order(run) > 1
 
 
 def begins_in_motion(run: Run) -> bool:
-    """Whether a run begins closed loops in motion, with dependent rows that leave two freedoms of first order
-    or more: time is one of them where drivers prescribe the motion."""
+    """Return whether a run starts in motion, with closed loops and dependent rows, and two velocities or more
+    are allowed.
+
+    Time counts as one of them if drivers prescribe the motion.
+    """
     if run.ranks.rank == run.memory.pivots.size or not np.any(run.start.v):
         return False
     return freedoms_of_first_order(run) > (0 if run.scene.driver else 1) and run.model.closed_loops > 0
 
 
 def begins_near_singular(run: Run) -> bool:
-    """Whether a run begins so near to a singular position that rounding of the start turns its velocities,
-    with velocities that meet Φ_q v = ν to rounding. Velocities of no branch near a gap do not."""
+    """Return whether a run starts so near to a singular position that rounding errors of the start change the
+    direction of its velocities.
+
+    The velocities must satisfy Φ_q v = ν to rounding; velocities of no branch near a gap do not.
+    """
     if not run.ranks.least < NEAR_SINGULAR or not np.any(run.start.v):
         return False
     return rate_violation(run.model, run.start.q, run.start.v) <= MET
 
 
 def leaving_acceleration(run: Run) -> np.ndarray | None:
-    """The acceleration (n,) of a run from rest along a branch; None unless several branches meet there.
+    """Return the acceleration (n,) of a run from rest along a branch; None unless several branches meet
+    there.
 
-    It is u (uᵀ g) / (uᵀ M u) of the direction u for which (uᵀ g)² / (uᵀ M u) is largest.
+    It is u (uᵀ g) / (uᵀ M u) for the direction u with the largest (uᵀ g)² / (uᵀ M u).
     """
     found = tangents(run.model, run.start.q)
     if len(found) < 2:

@@ -1,1 +1,2 @@
-"""Taylor series of a motion in natural coordinates, by kernels for every scene or code of a scene's own."""
+"""Taylor series of a motion in natural coordinates, by kernels for all scenes or by code generated for a
+scene."""

@@ -1,4 +1,4 @@
-"""The entries of a run in series: where it begins, and the steps that it takes in one call."""
+"""Entry points of a run by Taylor series: its start, and the steps that it takes in one call."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ def enter_series(memory):
 
 @entry(INT(SERIES))
 def advance_series(memory):
-    """Begin a series unless one has begun, and advance until the end, a failure, or the number of steps or of
-    singular positions per call; says which.
+    """Begin a series unless one has begun, and advance until the end, a failure, or the limit of steps or
+    singular positions in a call; return the status.
 
-    SINGULAR_AHEAD where a crossing cannot be short.
+    SINGULAR_AHEAD if a crossing cannot be short.
     """
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     status = begin_once(memory)

@@ -1,4 +1,4 @@
-"""The equations of many scenes of one structure, found at once."""
+"""The equations of many scenes of one structure, computed at once."""
 
 from __future__ import annotations
 
@@ -61,10 +61,11 @@ def _numbers(data: SceneData, batch: Batch) -> SceneData:
 def equations_of_all(
     packs: Packs, q: np.ndarray, places: Sequence[int], moving: np.ndarray, driven: bool, memory: TaylorMemory
 ) -> tuple[list[tuple[np.ndarray, np.ndarray]], list[int]]:
-    """Return the arrays of memory in which the scenes at these places differ, each with its values, one row
-    for every scene of ``packs``; and the places whose equations have the structure of those in memory.
+    """Return the arrays of memory in which the scenes with these indices differ, each with one row for every
+    scene of ``packs``.
 
-    From coordinates (s, 7 nb) of all scenes at the start.
+    Also return the indices of scenes whose equations have the structure of those in memory. q (s, 7 nb) are
+    the coordinates of all scenes at the start.
     """
     if not places:
         return [], []

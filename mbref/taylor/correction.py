@@ -1,4 +1,5 @@
-"""Correction of a series' first coefficients: the least change, in the metric of M, that meets the rows."""
+"""Correction of the first coefficients of a series: the least change, in the metric of M, that satisfies the
+rows."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise_equations, solution
 
-MAX_VIOLATION = 1e-6  # violation: below it one correction leaves rounding
+MAX_VIOLATION = 1e-6  # violation below which one correction leaves rounding
 MAX_CORRECTIONS = 8
 
 
@@ -68,7 +69,7 @@ def violation_rate_in_loops(memory):
 
 @inlined
 def subtract_violation(order, memory):
-    """Change the variables of order 0 or 1 by the least, in the metric of M, that takes Φ or Φ' away."""
+    """Change the variables of order 0 or 1 by the least change, in the metric of M, that removes Φ or Φ'."""
     solver, terms, variable = memory.solver, memory.series.terms, memory.series.variable
     lanes = terms.shape[1]
     for j in range(0, lanes, WIDTH):
@@ -81,7 +82,7 @@ def subtract_violation(order, memory):
 
 @inlined
 def close(memory):
-    """Take Φ away from the variables, by code of the scene's own where it has any."""
+    """Remove Φ by changing the variables, with generated code if there is any."""
     solver, code, terms = memory.solver, memory.code, memory.series.terms
     if code.close != 0:
         close_by_code(code.close, terms, solver.phi, solver.response, solver.change)
@@ -91,7 +92,7 @@ def close(memory):
 
 @inlined
 def close_rate(memory):
-    """Take Φ' away from the rates, by code of the scene's own where it has any."""
+    """Remove Φ' by changing the rates, with generated code if there is any."""
     solver, code, terms = memory.solver, memory.code, memory.series.terms
     if code.close_rate != 0:
         close_by_code(code.close_rate, terms, solver.phi, solver.response, solver.change)
@@ -111,10 +112,11 @@ def largest_change(memory):
 
 @kernel
 def changes_factor(left, memory):
-    """Return whether the last correction, which took a violation away, has changed the factor.
+    """Return whether the last correction has changed the factor.
 
-    It changes by the correction over the distance from a singular position, which is the least pivot; where
-    masses differ much, light bodies move the farther the heavier the others are, by the change over Φ.
+    The relative change of the factor is the correction over the distance from a singular position, which is
+    about the least pivot. If masses differ much, light bodies move farther, so the change of variables over Φ
+    is also considered.
     """
     tolerance, change, pivot = memory.mode.tolerance, memory.step.correction, least_pivot(memory)
     return left > tolerance * pivot * pivot or change * change > tolerance * left

@@ -17,7 +17,7 @@ NO_DRIVER = -1
 
 
 class DirectionVectors:
-    """All variables and where they come from."""
+    """All variables, each with the body and the linear form from which it is computed."""
 
     def __init__(self, length: float):
         self.length = length

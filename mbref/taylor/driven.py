@@ -51,9 +51,10 @@ PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = (
 
 @entry(INT(SERIES))
 def follow_drivers(memory):
-    """Begin a series unless one has begun, and advance to the end, or by the steps or crossings per call.
+    """Begin a series unless one has begun, and advance to the end, or by the limit of steps or crossings in a
+    call.
 
-    Return DONE, PAUSED, or the reason why the motion cannot be followed.
+    Return DONE, PAUSED, or the failure status.
     """
     clock, counts, control = memory.run.loop.clock, memory.run.equations.system.counts, memory.run.control
     progress = memory.progress
@@ -79,9 +80,9 @@ def follow_drivers(memory):
 
 @kernel
 def take_accurate_step(memory):
-    """Take one high-accuracy step; return OK, or UNDECIDED where the motion cannot be followed.
+    """Take one high-accuracy step; return OK, or UNDECIDED if the motion cannot be followed.
 
-    Behind the singular position predictor steps follow.
+    After the singular position predictor steps follow.
     """
     step = memory.step
     if memory.kernels.step(memory) != OK:
@@ -100,7 +101,7 @@ def take_accurate_step(memory):
 def take_predictor_step(memory):
     """Take one predictor step and its samples; return OK or the failure status.
 
-    SINGULAR_AHEAD, ready for high-accuracy steps, where it may come to a singular position.
+    SINGULAR_AHEAD, ready for high-accuracy steps, if the step may come to a singular position.
     """
     control, counts, clock, step = (
         memory.run.control, memory.run.equations.system.counts, memory.run.loop.clock, memory.step,
@@ -130,8 +131,8 @@ def take_predictor_step(memory):
 def longest_predictor_step(memory):
     """Return the longest predictor step (s), and save the order of the series that it evaluates.
 
-    Its last two terms are as large as the tolerance.  Near a singular position terms of high order are
-    rounding, which grows with the order, so that fewer terms reach farther.
+    Its last two terms are as large as the tolerance. Near a singular position terms of high order are
+    rounding, which grows with the order, so that fewer terms allow a longer step.
     """
     step, control, full = memory.step, memory.run.control, memory.mode.order
     best, step.used_order, largest = 0.0, full, log(control.largest_step)
@@ -152,7 +153,7 @@ def longest_predictor_step(memory):
 def attempt_predictor_step(h, last, memory):
     """Correct the end of a predictor step of h seconds, judge it and expand there.
 
-    Return OK, SINGULAR_AHEAD where it contains a singular position or ends near one, or the failure status.
+    Return OK, SINGULAR_AHEAD if it contains a singular position or ends near one, or the failure status.
     """
     status = expand_at(h, last, memory)
     if status != OK:
@@ -167,7 +168,7 @@ def attempt_predictor_step(h, last, memory):
 
 @kernel
 def continues_motion(h, memory):
-    """Return whether the new series has the second derivatives of the old one, within the tolerance."""
+    """Return whether the new series and the old one have equal second derivatives, within the tolerance."""
     order, state, terms, off = memory.mode.order, memory.state, memory.series.terms, 0.0
     for i in range(memory.solver.pivot_columns.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
@@ -201,7 +202,8 @@ def start_accurate_steps(ahead, stop, memory):
 def length_before(ahead, memory):
     """Return the length (s) of a predictor step to the distance from which a high-accuracy step crosses best.
 
-    By the terms of the present series, whose order is lower; 0 where the step would be short.
+    The length follows from the terms of the present series, whose order is lower; 0 if the step would be
+    short.
     """
     order, accurate_order = memory.mode.order, memory.options.accurate_order
     across = longest_step(ACCURATE_TOLERANCE ** (order / accurate_order), memory)

@@ -1,7 +1,7 @@
 """Affine expressions in the variables of a mechanism, products of two of them, and their elimination.
 
-An expression is a dictionary from variables to coefficients, the key ONE standing for the constant; a
-polynomial is one from pairs of keys, in ascending order, to coefficients.
+An expression is a dictionary from variables to coefficients; its key ONE has the constant. A polynomial is a
+dictionary from pairs of keys, in increasing order, to coefficients.
 """
 
 from __future__ import annotations
@@ -57,8 +57,7 @@ def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polyn
 
 
 def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
-    """Return a polynomial without coefficients of round-off size; its constant alone where all others
-    vanish."""
+    """Return a polynomial without coefficients of round-off size; only its constant if all others vanish."""
     size = largest(c for key, c in equation.items() if key != constant)
     small = ROUNDING if size > VANISHING else VANISHING
     return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
@@ -77,15 +76,15 @@ def as_expression(polynomial: Polynomial) -> Expression:
 class Elimination:
     """Variables expressed by others, by Gauss–Jordan elimination of linear equations.
 
-    ``may_go(variable, others)`` says whether an equation with so many other variables may eliminate a
-    variable: the fewer equations eliminate, the fewer products of variables are left.
+    ``may_go(variable, others)`` returns whether an equation with ``others`` further variables may eliminate a
+    variable. Elimination of a variable increases the number of products in other equations.
     """
 
     def __init__(self, may_go: Callable[[int, int], bool]):
         self._may_go = may_go
         self.expressed: dict[int, Expression] = {}
-        self._users: dict[int, set[int]] = {}  # variable → the eliminated ones that it expresses
-        self.left: list[Expression] = []  # equations that eliminate nothing
+        self._users: dict[int, set[int]] = {}  # variable → the eliminated ones that depend on it
+        self.left: list[Expression] = []  # equations that have eliminated nothing
 
     def __call__(self, expression: Expression) -> Expression:
         """Return the expression in variables that are not eliminated."""
@@ -96,7 +95,7 @@ class Elimination:
         return combination(*parts)
 
     def add(self, equation: Expression) -> None:
-        """Take in an equation, expression = 0, with coefficients of about one."""
+        """Add an equation, expression = 0, with coefficients of about one."""
         reduced = significant(self(equation), ONE)
         variables = [k for k, v in reduced.items() if k != ONE and abs(v) > VANISHING]
         able = [k for k in variables if self._may_go(k, len(variables) - 1)]
@@ -106,7 +105,7 @@ class Elimination:
             self.left.append(reduced)
 
     def settle(self) -> None:
-        """Try the equations left again, until none of them eliminates a variable."""
+        """Try the remaining equations again, until none of them eliminates a variable."""
         before = -1
         while before != len(self.expressed):
             before, equations, self.left = len(self.expressed), self.left, []

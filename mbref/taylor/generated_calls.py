@@ -1,6 +1,6 @@
-"""Calls of generated functions by their addresses, from kernels that every scene shares.
+"""Calls of generated functions by their addresses, from kernels that all scenes share.
 
-``mbref.taylor.generated`` writes the functions.  Kernels call none while the address is 0.
+``mbref.taylor.generated`` writes the functions. Kernels call no function whose address is 0.
 """
 
 from __future__ import annotations
@@ -20,37 +20,38 @@ def function_type(doubles: int, integers: int = 0, counts: int = 0) -> ir.Functi
 
 @intrinsic
 def expand_by_code(typing, address, terms, response, left, right, scale, growth, sums, last):
-    """Call the function at an address that finds the orders 0 … last of multipliers."""
+    """Call the generated function that computes the orders 0 … last with multipliers."""
     return types.void(address, terms, response, left, right, scale, growth, sums, last), _call
 
 
 @intrinsic
 def expand_by_power(typing, address, terms, response, left, right, sums, last):
-    """Call the function at an address that finds the orders 0 … last without multipliers."""
+    """Call the generated function that computes the orders 0 … last without multipliers."""
     return types.void(address, terms, response, left, right, sums, last), _call
 
 
 @intrinsic
 def violation_by_code(typing, address, terms, phi):
-    """Call the function at an address that finds the violations of rows."""
+    """Call the generated function that computes the violations of rows."""
     return types.void(address, terms, phi), _call
 
 
 @intrinsic
 def close_by_code(typing, address, terms, phi, response, change):
-    """Call the function at an address that takes violations, or their rates, away."""
+    """Call the generated function that removes violations, or their rates."""
     return types.void(address, terms, phi, response, change), _call
 
 
 @intrinsic
 def factorise_by_code(typing, address, terms, tableau, particular, null_space, response, last, row, order):
-    """Call the function at an address that finds the pivots and the response."""
+    """Call the generated function that computes the pivots and the response."""
     arrays = terms, tableau, particular, null_space, response, last, row, order
     return types.void(address, *arrays), _call
 
 
 def _call(context, builder, signature, arguments):
-    """Call the function at the first argument's address with the data of arrays, and with whole numbers."""
+    """Emit a call of the function at the address in the first argument, with the data pointers of arrays and
+    with integers."""
     kinds, values = signature.args[1:], arguments[1:]
     arrays = [kind for kind in kinds if isinstance(kind, types.Array)]
     whole = sum(isinstance(array.dtype, types.Integer) for array in arrays)

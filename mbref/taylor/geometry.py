@@ -1,6 +1,6 @@
-"""Geometries that are known: natural coordinates are found once for scenes that differ in masses and loads.
+"""Cache of geometries: natural coordinates are computed once for scenes that differ in masses and loads.
 
-To find them takes longer than a short run.
+Computing them takes longer than a short run.
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from mbref.taylor.natural import NaturalCoordinates, pose_of
 from mbref.taylor.numbers import OneScene
 from mbref.taylor.polynomials import Geometry
 
-MOST_KEPT = 64  # geometries
+MOST_KEPT = 64  # largest number of cached geometries
 
 _known: dict[Hashable, Geometry] = {}
 
 
 def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) -> Geometry:
-    """Return the geometry of a scene at its start, of which these velocities (n,) can be other than zero.
+    """Return the geometry of a scene at its start, for which these velocities (n,) can be nonzero.
 
-    ``driven``: for kinematics alone, because drivers prescribe the whole motion.
+    ``driven`` is True for kinematics, when drivers prescribe the whole motion.
     """
     key = driven, _key(model, start, moving)
-    found = _known.get(key)  # once: to hash joints takes time
+    found = _known.get(key)  # looked up once, because hashing joints takes time
     if found is None:
         if len(_known) >= MOST_KEPT:
             _known.pop(next(iter(_known)), None)
@@ -36,6 +36,6 @@ def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) ->
 
 
 def _key(model: Model, start: Start, moving: np.ndarray) -> Hashable:
-    """Return all numbers and joints that the geometry depends on."""
+    """Return all numbers and joints on which the geometry depends."""
     numbers = (start.q, moving, model.start(), model.principal, *model.data.primitives)
     return model.structure, model.joints, model.length, *(array.tobytes() for array in numbers)

@@ -2,7 +2,7 @@
 
 Sizes: nz variables, nr rows, ng functions that drivers prescribe, nb bodies, orders of a
 series from 0 on.  A coefficient of the series is a row of ``lanes`` numbers: variables, multipliers,
-functions, padded_size up with zeros.  Variables and lengths are in units of the scene's length.
+functions, padded with zeros.  Variables and lengths are in units of the scene's length.
 """
 
 from __future__ import annotations
@@ -16,22 +16,23 @@ from mbref.taylor.polynomial_layout import Polynomials, PoseMaps
 
 
 class Series(NamedTuple):
-    """Taylor coefficients about a time, orders in rows; multipliers stand two orders later than variables."""
+    """Taylor coefficients about a time, orders in rows; multipliers are two rows later than variables."""
 
     terms: Annotated[Matrix, "orders", "lanes"]
-    past: Annotated[Matrix, "orders", "lanes"]  # about the time of the step's beginning
+    past: Annotated[Matrix, "orders", "lanes"]  # about the time at the start of the step
     past_angles: Annotated[Matrix, "torsions", "orders"]
     driven: Annotated[Vector, "orders"]  # of one driver
-    springs: Annotated[Matrix, "7*springs", "orders"]  # vector (3), length, inverse, rate, pull
+    # vector (3), length, inverse length, rate, force over length
+    springs: Annotated[Matrix, "7*springs", "orders"]
     torsions: Annotated[Matrix, "15*torsions", "orders"]  # directions (9), cosine, sine, angle, three moments
     slides: Annotated[Matrix, "8*slides", "orders"]  # axis (3), vector (3), displacement, force
     factors: Annotated[Matrix, "f", "orders"]  # functions of time that multiply loads
     left: Annotated[Matrix, "orders", "slots"]  # factors of the products, one order later
     right: Annotated[Matrix, "orders", "slots"]
     sums: Annotated[Matrix, "orders", "lanes"]  # sums of products of known orders, minus the forces
-    scale: Annotated[Matrix, "orders", "lanes"]  # of the sums on the right-hand side
-    growth: Annotated[Matrix, "orders", "lanes"]  # of the solution
-    variable: Annotated[Vector, "lanes"]  # 1 for a variable, else 0
+    scale: Annotated[Matrix, "orders", "lanes"]  # scale of the sums on the right-hand side
+    growth: Annotated[Matrix, "orders", "lanes"]  # scale of the solution
+    variable: Annotated[Vector, "lanes"]  # 1 for a variable, otherwise 0
 
 
 class Solver(NamedTuple):
@@ -40,22 +41,24 @@ class Solver(NamedTuple):
     pivot_rows: Annotated[Indices, "nr"]  # the independent rows first
     pivot_columns: Annotated[Indices, "nz"]  # dependent variables first
     work: Annotated[Matrix, "nr", "nz"]
-    left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, where pivots are chosen
-    row_max: Annotated[Vector, "nr"]  # the largest entry of each row there
-    first: Annotated[Vector, "nz"]  # pivots when they were chosen: of G, then of the reduced mass matrix
+    left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, while pivots are chosen
+    row_max: Annotated[Vector, "nr"]  # largest entry of each row, while pivots are chosen
+    # pivots when the partition was chosen: of G, then of the reduced mass matrix
+    first: Annotated[Vector, "nz"]
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
-    past: Annotated[Vector, "nz"]  # pivots where the step began
+    past: Annotated[Vector, "nz"]  # pivots at the start of the step
     past_motion: Annotated[Vector, "nz"]  # T of the first independent variable, if any, where the step began
     past_gradient: Annotated[Matrix, "nz", "nr"]  # Gᵀ of the independent rows where the step began
-    product: Annotated[Matrix, "nr", "nr"]  # of gradients at both ends of a step
-    place: Annotated[Indices, "twofold"]  # in the tableau, of the products of rows
-    linear: Annotated[Matrix, "nr + 1", "lanes"]  # the part of the tableau that depends on no variable
-    tableau: Annotated[Matrix, "nr + 1", "lanes"]  # [G 1] of the rows; the last one takes functions
+    product: Annotated[Matrix, "nr", "nr"]  # product of the gradients at both ends of a step
+    place: Annotated[Indices, "twofold"]  # index in the tableau of each product of rows
+    linear: Annotated[Matrix, "nr + 1", "lanes"]  # part of the tableau that depends on no variable
+    tableau: Annotated[Matrix, "nr + 1", "lanes"]  # [G 1] of the rows; the last row is for functions
     particular: Annotated[Matrix, "nz", "lanes"]  # N, in the lanes of multipliers
     null_space: Annotated[Matrix, "nz", "lanes"]  # Tᵀ, a row for each independent variable
     momentum: Annotated[Matrix, "nz", "lanes"]  # Tᵀ M
     reduced: Annotated[Matrix, "nz", "nz"]  # Tᵀ M T
-    forces: Annotated[Matrix, "nz", "lanes"]  # left at a variable by the motion due to one right-hand side
+    # force that remains at a variable after the motion due to one right-hand side
+    forces: Annotated[Matrix, "nz", "lanes"]
     response: Annotated[
         Matrix, "lanes", "lanes"
     ]  # row: the lanes that one number of the right-hand side moves
@@ -67,14 +70,14 @@ class Solver(NamedTuple):
 class Options(NamedTuple):
     """Numbers of a run that its steps do not change."""
 
-    regular_tolerance: float = 0.0  # of the last terms of the series, in regular steps
-    regular_order: int = 0  # of their series
-    accurate_tolerance: float = 0.0  # of high-accuracy steps, which cross singular positions
+    regular_tolerance: float = 0.0  # tolerance of the last terms of the series, in regular steps
+    regular_order: int = 0  # order of the series in regular steps
+    accurate_tolerance: float = 0.0  # tolerance of high-accuracy steps, which cross singular positions
     accurate_order: int = 0
-    velocity_change: float = 0.0  # relative, of a perturbed run
-    start_distance: float = 0.0  # m or rad by which the series may miss the coordinates of the start
+    velocity_change: float = 0.0  # relative velocity change of a perturbed run
+    start_distance: float = 0.0  # m or rad; largest distance of the series from the start
     start_freedoms: int = 0  # degrees of freedom at the start, from singular values
-    follows_drivers: int = 0  # whether steps are predictor steps away from singular positions
+    follows_drivers: int = 0  # 1 if steps are predictor steps away from singular positions
 
 
 class Mode(NamedTuple):
@@ -86,12 +89,12 @@ class Mode(NamedTuple):
 
 
 class Partition(NamedTuple):
-    """Which rows are independent and which variables depend on them."""
+    """The independent rows and the variables that depend on them."""
 
     rank: int = 0  # of the constraint rows
-    partition_id: int = 0  # number of choices of rows and variables so far
+    partition_id: int = 0  # number of selections of rows and variables so far
     parity: int = 0  # 1 if the order of pivots is an odd permutation
-    replaced_pivot: float = 0.0  # least pivot before the last choice; minus infinity if a sign had changed
+    replaced_pivot: float = 0.0  # least pivot before the last selection; minus infinity if a sign had changed
 
 
 class Step(NamedTuple):
@@ -99,19 +102,19 @@ class Step(NamedTuple):
 
     start_partition_id: int = 0
     start_parity: int = 0
-    start_pivot: float = 1.0  # the least pivot of G
-    start_negative: int = 0  # whether det G of a square gradient is negative
-    start_logarithm: float = 0.0  # of the size of det G
-    start_violation: float = 0.0  # of the rows; known after an attempt failed
-    approaching: int = 1  # whether the pivot falls since the step before, which did not cross
+    start_pivot: float = 1.0  # least pivot of G
+    start_negative: int = 0  # 1 if det G of a square gradient is negative
+    start_logarithm: float = 0.0  # logarithm of the size of det G
+    start_violation: float = 0.0  # violation of the rows; computed after a failed attempt
+    approaching: int = 1  # 1 if the pivot falls since the previous step, which did not cross
     last_order: int = 0  # last order that rounding does not dominate
     used_order: int = 0  # the last order that an attempt evaluates
     time_to_pole: float = 0.0  # s to the rounding pole that is subtracted; 0 without one
     time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
-    deceleration: float = 0.0  # 1/s, the relative rate of the speed where orders are by power; else 0
+    deceleration: float = 0.0  # 1/s, relative rate of the speed if orders are computed by power; otherwise 0
     violation: float = 0.0  # the largest before the last correction
     correction: float = 0.0  # the largest change of a variable by the last correction
-    crossed: int = 0  # whether the last attempt crossed a singular position
+    crossed: int = 0  # 1 if the last attempt crossed a singular position
     first_crossing: float = 0.0  # s from the start of the last step
     second_crossing: float = 0.0  # s; negative if there was one
 
@@ -119,20 +122,21 @@ class Step(NamedTuple):
 class Progress(NamedTuple):
     """Progress of a run: its end, what is recorded, and its largest pivots."""
 
-    end: float = 0.0  # s at which the last step ends
-    begun: int = 0  # whether a series has been begun
+    end: float = 0.0  # s, end of the last step
+    begun: int = 0  # 1 if a series has begun
     recorded: int = 0  # singular positions in ``Crossings``
     completed: int = 0  # samples that have accelerations and multipliers
     largest_pivot: float = 0.1  # largest value of the least pivot so far
-    entry_pivot: float = 0.0  # the least pivot where the high-accuracy steps began
-    leaving: int = 0  # whether the motion leaves a singular position that it has crossed
-    rests_near: int = 0  # whether the motion started at rest near a singular position and is still near
-    clearance: float = 0.0  # distance from singular positions, relative to the end of a long crossing
-    is_clear: int = 0  # whether a long crossing has ended
+    entry_pivot: float = 0.0  # least pivot at the start of the high-accuracy steps
+    leaving: int = 0  # 1 if the motion leaves a singular position that it has crossed
+    rests_near: int = 0  # 1 if the motion started at rest near a singular position and is still near
+    # distance from singular positions, relative to the distance at which a long crossing may end
+    clearance: float = 0.0
+    is_clear: int = 0  # 1 if a long crossing has ended
 
 
 class SeriesKernels(NamedTuple):
-    """The kernels that several others call, by address: each is compiled once."""
+    """The kernels that several others call by address, so that each is compiled once."""
 
     begin: Annotated[Kernel, BEGIN]
     expand: Annotated[Kernel, EXPAND]
@@ -149,24 +153,24 @@ class SceneCode(NamedTuple):
     """Addresses of the functions generated for the scene at a rank of its rows; 0 for none."""
 
     rank: int = 0
-    expand: int = 0  # finds all orders
-    expand_by_power: int = 0  # finds them without multipliers, of a motion of one freedom that is not at rest
-    factorise: int = 0  # finds pivots and response
-    violation: int = 0  # finds Φ
-    close: int = 0  # takes Φ away
-    close_rate: int = 0  # takes Φ' away
+    expand: int = 0  # computes all orders
+    expand_by_power: int = 0  # computes them without multipliers, for one degree of freedom in motion
+    factorise: int = 0  # computes pivots and response
+    violation: int = 0  # computes Φ
+    close: int = 0  # removes Φ
+    close_rate: int = 0  # removes Φ'
 
 
 class Instant(NamedTuple):
-    """When a state was saved."""
+    """The time at which a state was saved."""
 
     time: float = 0.0  # s
-    sample: int = 0  # the next one to take
+    sample: int = 0  # index of the next sample
     crossings: int = 0  # singular positions passed so far
 
 
 class SavedState(NamedTuple):
-    """The state of a run at an instant."""
+    """The state of a run at a saved time."""
 
     instant: Instant
     coordinates: Annotated[Vector, "7*nb"]
@@ -175,7 +179,7 @@ class SavedState(NamedTuple):
 
 
 class Crossings(NamedTuple):
-    """Singular positions passed since they were last asked for: times (s) and states, the first rows."""
+    """Singular positions passed since the last request: times (s) and states, in the first rows."""
 
     time: Annotated[Vector, "kept"]
     coordinates: Annotated[Matrix, "kept", "7*nb"]
@@ -183,14 +187,14 @@ class Crossings(NamedTuple):
 
 
 class StepStart(NamedTuple):
-    """Where a series begins: values and rates of the variables, and angles of torsion springs."""
+    """Start of a series: values and rates of the variables, and angles of torsion springs."""
 
     terms: Annotated[Matrix, 2, "lanes"]
     angles: Annotated[Vector, "torsions"]
 
 
 class Waiting(NamedTuple):
-    """Samples whose accelerations and multipliers are found when the steps of a call have ended."""
+    """Samples whose accelerations and multipliers are computed after the steps of a call."""
 
     state: Annotated[Matrix, "k", "3*lanes"]  # variables and their two derivatives
     angles: Annotated[Matrix, "k", "torsions"]  # rad, unwrapped
@@ -198,7 +202,7 @@ class Waiting(NamedTuple):
 
 
 class TaylorMemory(NamedTuple):
-    """All that the kernels of the method share."""
+    """Memory of all kernels of the method."""
 
     run: Memory  # of the simulation: samples, counts, limits, and the general kernels
     polynomials: Polynomials
@@ -217,7 +221,7 @@ class TaylorMemory(NamedTuple):
     step_start: StepStart
     series_start: StepStart  # of the present series, saved while samples are completed
     crossings: Crossings
-    branch_switches: Annotated[Indices, "branch_switches"]  # numbers of crossings left along another branch
+    branch_switches: Annotated[Indices, "branch_switches"]  # crossings left along another branch
     crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables at the end of a crossing
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
@@ -228,5 +232,5 @@ class TaylorMemory(NamedTuple):
 
 SERIES = Named(TaylorMemory)
 BEGIN = STEP = PARTITION = RESPOND = TERMS = SAMPLE = INT(SERIES)
-DETECT = INT(FLOAT, FLOAT, SERIES)  # length of the step (s), least pivot at its end
-EXPAND = INT(FLOAT, SERIES)  # t
+DETECT = INT(FLOAT, FLOAT, SERIES)  # arguments: length of the step (s), least pivot at its end
+EXPAND = INT(FLOAT, SERIES)  # arguments: t

@@ -82,7 +82,8 @@ def applied_order(amount, function, k, factors):
 
 @inlined
 def has_direction(s, springs):
-    """Return whether the force of a spring depends on its direction; else it is linear in the variables."""
+    """Return whether the force of a spring depends on its direction; otherwise it is linear in the
+    variables."""
     return springs.natural[s] > 0.0 or springs.damping[s] > 0.0
 
 
@@ -128,11 +129,11 @@ def add_springs(k, memory):
 
 @kernel
 def time_to_no_length(memory):
-    """Return the shortest time (s) in which the ends of a spring could meet at their speed; infinite
-    without any.
+    """Return the shortest time (s) in which the ends of a spring could meet at their speed; infinite without
+    springs.
 
-    Beyond that time the series of a force that has the direction of its spring is rounding: a small length
-    divides it.
+    Beyond that time the series of the spring's force is dominated by rounding, because it is divided by a
+    small length.
     """
     springs, shortest = memory.polynomials.springs, inf
     for s in range(springs.stiffness.shape[0]):
@@ -146,10 +147,10 @@ def time_to_no_length(memory):
 
 @kernel
 def part_behind_no_length(memory):
-    """Return the part of a step behind a position where a spring has no length and its force turns around; 0
-    for none.
+    """Return the fraction of a step after a position at which a spring has zero length and its force
+    reverses; 0 for none.
 
-    Such a spring has turned by more than a right angle.  Its series goes on with a negative length.
+    Such a spring has turned by more than a right angle. Its series continues with a negative length.
     """
     springs, series, largest = memory.polynomials.springs, memory.series, 0.0
     for s in range(springs.stiffness.shape[0]):
@@ -216,10 +217,11 @@ def add_torsions(k, memory):
 
 @kernel
 def add_coupled_angle(s, k, of, memory):
-    """Add to the row of a coupling what order k + 2 of an angle is without that order of the variables; take
-    order k - 1 of the multiplier, which is known, into the moment.
+    """Add to the row of a coupling the part of order k + 2 of an angle that does not contain that order of
+    the variables.
 
-    The multiplier of order k, which is not, acts by the gradient at the time of expansion.
+    Also add order k - 1 of the multiplier, which is known, to the moment. The multiplier of order k acts by
+    the gradient at the time of expansion.
     """
     torsions, terms, sums = memory.polynomials.torsions, memory.series.terms, memory.series.sums
     lane, factor = memory.solver.pivot_columns.shape[0] + torsions.row[s], torsions.factor[s]

@@ -36,9 +36,9 @@ from mbref.taylor.loads import COSINE, SINE, VALUE
 from mbref.taylor.numbers import Batch, OneScene, largest, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
-MOST_TERMS = 40  # most terms of an equation that eliminates a position
+MOST_TERMS = 40  # largest number of terms of an equation that eliminates a position
 MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
-MOST_KINEMATIC = 4  # most terms, if the equations serve kinematics only
+MOST_KINEMATIC = 4  # largest number of terms if the equations serve kinematics only
 
 
 class Pose(NamedTuple):
@@ -55,14 +55,14 @@ def pose_of(q: np.ndarray) -> Pose:
 
 
 def unit_of_length(length: float) -> float:
-    """Return the power of two next to a length (m)."""
+    """Return the power of two nearest to a length (m)."""
     return float(2.0 ** round(np.log2(length)))
 
 
 class NaturalCoordinates:
     """The variables of a model from its pose at the start, lengths in the unit ``length`` (m), and rows.
 
-    ``moving`` (n,) says which velocities can be other than zero.  ``kept`` are the variables left, ``given``
+    ``moving`` (n,) are the velocities that can be nonzero. ``kept`` are the remaining variables, ``given``
     those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  ``angles`` belong to rows of
     couplings, beside their products.  Where drivers prescribe the whole motion (``driven``), no forces are
     needed: equations eliminate more, and driven cranks have linear rows.
@@ -149,8 +149,10 @@ class NaturalCoordinates:
         return found
 
     def _couplings(self) -> list[tuple[Polynomial, list[tuple[int, float]]]]:
-        """Return of each coupling the polynomial of its displacements, and its angles: the primitive and its
-        factor; of both the larger factor is 1, in the unit of length."""
+        """Return for each coupling the polynomial of its displacements, and its angles with their factors.
+
+        In the unit of length the larger factor is 1.
+        """
         primitives, found = self.model.data.primitives, []
         for second in np.flatnonzero(primitives.begins == 0).tolist():
             pair, polynomial = (second - 1, second), Polynomial()
@@ -175,7 +177,8 @@ class NaturalCoordinates:
         return self.length if self.model.data.primitives.kind[p] == SLIDE else 1.0
 
     def _is_prescribed(self, row: Polynomial) -> bool:
-        """Return whether a row has a driver; it eliminates nothing, because M would depend on time."""
+        """Return whether a row has a driver; such a row eliminates nothing, because M would depend on
+        time."""
         return any(variable in self.given for pair in row for variable in pair)
 
     def _linear_equations(self) -> Iterator[Expression]:
@@ -213,8 +216,8 @@ class NaturalCoordinates:
         return _difference(*self._ends(p)[::-1])
 
     def _turned(self, p: int) -> int | None:
-        """Return the orientation that a driver turns about an axis at rest, from directions at rest; else
-        None."""
+        """Return the orientation that a driver turns about an axis at rest, from directions at rest;
+        otherwise None."""
         table = self.model.data.primitives
         if not self.driven or table.driver[p] < 0 or table.kind[p] != DOT1:
             return None

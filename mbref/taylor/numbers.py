@@ -1,8 +1,8 @@
-"""Numbers of many scenes at once: one operation finds the equations of all scenes of a batch.
+"""Numbers of many scenes at once: the equations of all scenes of a batch are computed together.
 
 Coefficients of a batch are floats if each scene has the same float, otherwise ``Numbers``.
-Every operation is one of IEEE arithmetic, so that a scene has the same bits in a batch and alone.
-The first scene decides; the batch remembers which scenes decide otherwise.
+Every operation is one of IEEE arithmetic, so that a scene has equal bits in a batch and alone. The first
+scene makes decisions; the batch records which scenes would decide differently.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class OneScene:
 
 
 class Batch:
-    """The scenes of a batch: ``agree`` (s,) says which have made all decisions as the first one."""
+    """The scenes of a batch: ``agree`` (s,) are those that made all decisions like the first one."""
 
     number_type: type = object
 
@@ -69,7 +69,7 @@ class Batch:
 
 
 class Numbers:
-    """A number of each scene of a batch."""
+    """A number for each scene of a batch."""
 
     __slots__ = ("batch", "values")
 
@@ -137,7 +137,7 @@ def scalar(number: Any) -> Any:
 
 
 def of_first(number: Any) -> Any:
-    """Return the number of the first scene, for a decision on which no result depends."""
+    """Return the number of the first scene, for a decision that influences no result."""
     return float(number.values[0]) if type(number) is Numbers else number
 
 

@@ -1,4 +1,4 @@
-"""Orientations of the bodies of a scene: with the fixed frame, about an axis at rest, or freely."""
+"""Orientations of the bodies of a scene: fixed, rotating about an axis at rest, or free."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, cleaned, product_sum
 from mbref.taylor.numbers import dot, norm, scalar
 
-PARALLEL = 1e-9  # sine of an angle between the direction_vectors of one axis
+PARALLEL = 1e-9  # sine of an angle between axes below which they are parallel
 APART = 0.2  # sine of the least angle between two directions of a basis
 
 Triple = tuple[Expression, ...]
-Frame = tuple[int, np.ndarray]  # the number of an orientation, and an axis fixed in it (world, at the start)
+Frame = tuple[int, np.ndarray]  # number of an orientation, and an axis fixed in it (world, at the start)
 
 
 @dataclass(frozen=True)
 class Orientation:
-    """R of some bodies: fixed (no variables), turning about an axis, or free.
+    """Rotation matrix R of some bodies: fixed (no variables), rotating about an axis, or free.
 
-    The variables of a free one are the direction vectors of its ``basis``, three directions (3, 3) in rows.
-    One that turns has a right-handed basis (arm, across, axis) and, as variables, the components of the arm
-    along the first two of the fixed ``frame`` (3, 3), whose third is the axis.
+    The variables of a free one are the direction vectors of its ``basis``, three directions (3, 3) in rows. A
+    rotating one has a right-handed basis (arm, across, axis). Its variables are the components of the arm
+    along the first two rows of the fixed ``frame`` (3, 3), whose third row is the axis.
     """
 
     variables: tuple[int, ...] = ()
@@ -77,8 +77,8 @@ FIXED = Orientation()
 class Orientations:
     """The orientations of a model's bodies, by number: -1 is the fixed frame's.
 
-    ``axes`` (nb, 3, 3) are the principal frames at the start, ``moving`` (nb, 3) says about which principal
-    axes a body can turn, ``direction_vectors`` takes the variables.
+    ``axes`` (nb, 3, 3) are the principal frames at the start. ``moving`` (nb, 3) are True for principal axes
+    about which a body can turn. The variables are added to ``direction_vectors``.
     """
 
     def __init__(
@@ -102,7 +102,7 @@ class Orientations:
         return dot(self._axes[body], local) if body < self.nb else np.asarray(local)
 
     def _groups(self) -> list[int]:
-        """Return the number of the orientation of each body; -1 for those oriented with the fixed frame."""
+        """Return the number of the orientation of each body; -1 for bodies that do not rotate."""
         group = [*range(self.nb), -1]
         for joint in self.model.joints:
             if len(joint.facts.forbidden_rotations) == 3:
@@ -125,7 +125,7 @@ class Orientations:
         return found
 
     def _axes_at_rest(self) -> dict[int, list[np.ndarray]]:
-        """Return up to two axes of each orientation that rest, in world axes."""
+        """Return up to two axes at rest of each orientation, in world axes."""
         known: dict[int, list[np.ndarray]] = {-1: [np.eye(3)[0], np.eye(3)[1]]}
         for body, (group, turns) in enumerate(zip(self.group, self._moving, strict=True)):
             turning = np.flatnonzero(turns).tolist()
@@ -172,8 +172,8 @@ class Orientations:
         )
 
     def _frame(self, axis: np.ndarray) -> np.ndarray:
-        """Return Right-handed unit vectors in rows, the third an axis, the first one that a body slides
-        along."""
+        """Return right-handed unit vectors in rows: the third is the axis, the first a direction along which
+        a body slides."""
         slides = [j for j in self.model.joints if len(j.facts.forbidden_translations) == 2]
         along = [self._axis(j.bodies[0], j.directions[0]) for j in slides]
         first = next((x for x in along if abs(dot(x, axis)) < PARALLEL), np.eye(3)[np.argmin(np.abs(axis))])
@@ -228,7 +228,7 @@ def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> b
 
 
 def _basis(directions: Iterable[np.ndarray]) -> np.ndarray:
-    """Return the first two directions that are well apart and the one across both, unit vectors, in rows."""
+    """Return in rows the first two directions with a large enough angle and the unit vector across both."""
     chosen: list[np.ndarray] = []
     for unit in directions:
         if not chosen or norm(rotations.cross(chosen[0], unit)) > APART:

@@ -1,7 +1,7 @@
-"""Outputs of a series: accelerations and multipliers at the samples that its steps have kept.
+"""Outputs of a series: accelerations and multipliers at the samples that its steps have saved.
 
-A series of second order about the sample gives the accelerations.  Near a singular position rounding over the
-distance would spoil that series: there the second derivative of the high-accuracy step is used.
+A series of second order about the sample gives the accelerations.  Near a singular position rounding divided
+by the distance would dominate that series, so the second derivative of the high-accuracy step is used.
 Multipliers balance the forces in the metric of a projection, so that bodies may lack inertia.
 """
 
@@ -29,10 +29,10 @@ SAMPLE_CORRECTIONS = 2  # corrections of a sample of a low-accuracy series; two 
 
 @entry(INT(INT, SERIES))
 def complete_samples(go_on, memory):
-    """Complete the samples kept since the last call: OK, or the reason why one has no accelerations or
-    multipliers, which is then the first that is not taken.
+    """Complete the samples saved since the last call; return OK, or the failure status of the first sample
+    without accelerations or multipliers, which is then not recorded.
 
-    ``go_on``: whether steps go on afterwards from the present series.
+    ``go_on`` is true if steps continue from the present series.
     """
     end = memory.run.loop.clock.sample
     if memory.progress.completed >= end:
@@ -49,8 +49,8 @@ def complete_samples(go_on, memory):
 
 @kernel
 def complete_until(end, memory):
-    """Complete the samples before one: OK, or the reason why the one at which the clock then stands has no
-    accelerations or multipliers."""
+    """Complete the samples before ``end``; return OK, or the failure status of the sample at which the clock
+    then is."""
     loop, progress, mode, status = memory.run.loop, memory.progress, memory.mode, OK
     order, tolerance = mode.order, mode.tolerance
     mode.order, mode.tolerance = 2, memory.options.accurate_tolerance
@@ -65,9 +65,9 @@ def complete_until(end, memory):
 
 @exchangeable(SAMPLE)
 def complete_sample(memory):
-    """Record the sample at which the clock stands: OK or the reason why it cannot be.
+    """Record the sample at the clock; return OK or the failure status.
 
-    Its quaternions are on the side of those at the sample before, or at the start.
+    The sign of its quaternions agrees with the previous sample, or the start.
     """
     run, waiting, slot = memory.run, memory.waiting, memory.polynomials.torsions.slot
     k, status, before = run.loop.clock.sample, OK, run.loop.samples.coordinates
@@ -89,7 +89,8 @@ def complete_sample(memory):
 
 @kernel
 def expand_at_sample(memory):
-    """Correct the variables in ``state``, and find their second derivatives: OK or the reason why not."""
+    """Correct the variables in ``state``, and compute their second derivatives; return OK or the failure
+    status."""
     terms, state, variable = memory.series.terms, memory.state, memory.series.variable
     lanes, t, status = terms.shape[1], memory.run.loop.clock.time, OK
     for j in range(0, lanes, WIDTH):
@@ -108,9 +109,10 @@ def expand_at_sample(memory):
 
 @kernel
 def balance_forces(t, run):
-    """Compute multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory: OK or SINGULAR.
+    """Compute multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory; return OK or
+    SINGULAR.
 
-    For redundant rows, the multipliers of least norm in unit rows.
+    For redundant rows, they have the least norm in unit rows.
     """
     equations, system, factor = run.equations, run.equations.system, run.factor
     system.counts.evaluations += 1
@@ -128,7 +130,7 @@ def balance_forces(t, run):
 
 @kernel
 def keep_series_here(memory):
-    """Keep the variables, their rates and the angles about which the series in ``terms`` is."""
+    """Save the variables, their rates and the angles about which the series in ``terms`` is expanded."""
     here, terms = memory.series_start, memory.series.terms
     for order in range(2):
         copy(terms[order], here.terms[order])

@@ -1,4 +1,4 @@
-"""Samples between the ends of a step: states from the series, kept until the steps of a call have ended."""
+"""Samples between the ends of a step: states from the series, saved until the steps of a call have ended."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def turning(a, a_rate, out):
 
 @inlined
 def put_quaternion(a, p):
-    """Compute the unit quaternion of a rotation matrix by rows (9,), on the side of the one that p (4,)
-    was."""
+    """Compute the unit quaternion of a rotation matrix by rows (9,), with the sign nearer to the previous p
+    (4,)."""
     squares = (
         1.0 + a[0] + a[4] + a[8], 1.0 + a[0] - a[4] - a[8],
         1.0 - a[0] + a[4] - a[8], 1.0 - a[0] - a[4] + a[8],
@@ -116,7 +116,7 @@ def put_terms(series, memory):
 
 @kernel
 def keep_sample(h, memory):
-    """Keep the variables at the next sample, at a distance h (s) into the step, until samples are completed
+    """Save the variables at the next sample, at a distance h (s) into the step, until samples are completed
     (``mbref.taylor.outputs``)."""
     clock, waiting = memory.run.loop.clock, memory.waiting
     evaluate_series(h, memory)

@@ -1,4 +1,4 @@
-"""Snapshots of a run: its state at a time, kept in memory and gone back to."""
+"""Saved states of a run, to which it can return."""
 
 from __future__ import annotations
 

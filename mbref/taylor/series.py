@@ -1,9 +1,9 @@
 """Taylor coefficients of a motion, order by order, with one factorisation for all of them.
 
-Of order k the unknowns z_{k+2} and λ_k enter linearly, with the matrix at the time of expansion (J. D.
-Pryce, BIT 41, 2001); all else is sums of products of lower orders, Σ a_i b_{k-i}.  Products of rows and of
+At order k the unknowns z_{k+2} and λ_k enter linearly, with the matrix at the time of expansion (J. D. Pryce,
+BIT 41, 2001). All other terms are sums of products of lower orders, Σ a_i b_{k-i}.  Products of rows and of
 forces run over the same orders because multipliers stand two orders later than variables.  A new coefficient
-is added to the sums of all later orders at once, so that little is left between one order and the next.
+is added to the sums of all later orders at once, so that few operations separate one order from the next.
 """
 
 from __future__ import annotations
@@ -17,7 +17,9 @@ from mbref.taylor.loads import add_loads, has_varying_loads, start_loads
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 
-SLOWEST = 2.0  # step / time in which the speed would vanish: in longer steps rounding grows with order
+# step length / time in which a constant deceleration would stop the motion: beyond it rounding grows with the
+# order
+SLOWEST = 2.0
 
 
 @inlined
@@ -138,8 +140,8 @@ def starts_at_rest(memory):
 
 @inlined
 def turns_back_in(h, memory):
-    """Return whether a motion whose orders are by power is at rest, or may turn back in much less than h
-    seconds."""
+    """Return whether a motion whose orders are computed by power is at rest, or may reverse in much less than
+    h seconds."""
     return not memory.step.deceleration * h <= SLOWEST
 
 

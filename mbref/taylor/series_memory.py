@@ -21,7 +21,7 @@ from mbref.taylor.solver import respond_in_loops
 from mbref.taylor.step_start import choose_partition
 from mbref.taylor.stepping import begin_series, expand_from, take_step
 
-KEPT = 16  # singular positions that are passed in a call
+KEPT = 16  # singular positions that a call can record
 CALLED = (
     begin_series, expand_from, take_step, choose_partition, respond_in_loops, expand_series,
     expand_with_multipliers, contains_singular_position, complete_sample,
@@ -50,7 +50,7 @@ def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order
 def _allocate(
     run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
 ) -> TaylorMemory:
-    """Return memory of the series, ready except for numbers."""
+    """Return memory of the series without the numbers of a run."""
     kernels = zip(SeriesKernels._fields, CALLED, strict=True)
     orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
     series = allocate(Series, sizes)
@@ -72,7 +72,7 @@ def _allocate(
 
 
 def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
-    """Return the shapes of the equations of a scene: all of them have room in memory that is made for one."""
+    """Return the shapes of the equations of a scene: memory for one scene fits all scenes of equal shapes."""
     return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
 
 

@@ -1,9 +1,9 @@
 """SIMD vectors: eight numbers as one value of the processor, for the inner loops of the series.
 
-Compiled loops over as few numbers would cost several times as much.  Offsets count numbers of an array's
-memory; the rows of every array are padded to a multiple of WIDTH.  Vectors are added, subtracted and
-multiplied with each other, and multiplied by a number from the left; a sum may take a product in before it is
-rounded.  Without the JIT a vector is a NumPy array.
+Compiled loops over eight numbers would take several times as long. Offsets count numbers of an array's
+memory; the rows of every array are padded to a multiple of WIDTH. Vectors are added, subtracted and
+multiplied with each other, and multiplied by a number from the left; products may be added by fused
+multiply-add.  Without the JIT a vector is a NumPy array.
 """
 
 from __future__ import annotations

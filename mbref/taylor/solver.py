@@ -42,7 +42,7 @@ def exchange(memory):
 
 @inlined
 def inverse_or_zero(pivot):
-    """Return 1 / pivot, or 0 for a pivot of zero, after which rows and variables are chosen again."""
+    """Return 1 / pivot, or 0 for a zero pivot, after which rows and variables are selected again."""
     return 1.0 / pivot if pivot != 0.0 else 0.0
 
 
@@ -193,12 +193,12 @@ def put_multipliers(memory):
 
 @inlined
 def put_force(i, memory):
-    """Compute the force left at a variable: the applied one minus its inertia."""
+    """Compute the remaining force at a variable: the applied one minus its inertia force."""
     solver, inertia, lanes = memory.solver, memory.polynomials.inertia, memory.solver.response.shape[1]
     response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
     first, end = inertia.first[i], inertia.first[i + 1]
     for j in range(0, lanes, WIDTH):
-        left = 0.0 * load(mass, 0)  # forces may be infinite behind a pivot of zero
+        left = 0.0 * load(mass, 0)  # forces may be infinite after a zero pivot
         for e in range(first, end):
             left = left - mass[i, coupled[e]] * load(response, coupled[e] * lanes + j)
         store(left, forces, i * lanes + j)
@@ -271,7 +271,7 @@ def factorise_equations(memory):
 
 @kernel
 def factorise_anew(memory):
-    """Compute the response by a partition that has just been chosen, whose pivots are the reference."""
+    """Compute the response for a newly chosen partition, whose pivots become the reference."""
     respond(memory)
     for k in range(memory.solver.first.shape[0]):
         memory.solver.first[k] = abs(memory.solver.last[k])
@@ -279,7 +279,7 @@ def factorise_anew(memory):
 
 @inlined
 def inertia_left(memory):
-    """Return OK, or SINGULAR where a motion that the rows allow has no inertia."""
+    """Return OK, or SINGULAR if a motion that the rows allow has no inertia."""
     solver, mass, largest = memory.solver, memory.polynomials.inertia.mass, 0.0
     for i in range(mass.shape[0]):
         largest = max(largest, mass[i, i])
@@ -308,7 +308,7 @@ def add_functions(functions, memory):
 
 @inlined
 def subtract_row(row, lane, value, solver):
-    """Subtract what the dependence of a row on a function takes from the right-hand side."""
+    """Subtract from the right-hand side the part of a row that depends on a function."""
     response, lanes, nz = solver.response, solver.response.shape[1], solver.pivot_columns.shape[0]
     if lane >= nz + solver.pivot_rows.shape[0]:
         for j in range(0, lanes, WIDTH):

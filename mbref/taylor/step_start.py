@@ -1,4 +1,5 @@
-"""The start of a step: the series that the step evaluates, and the way back to it after a failed attempt."""
+"""The start of a step: the series that the step evaluates, and the return to the start after a failed
+attempt."""
 
 from __future__ import annotations
 

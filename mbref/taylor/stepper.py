@@ -1,4 +1,5 @@
-"""The steps of a run in Taylor series: memory made of the scene's natural coordinates, and their loop."""
+"""The steps of a run by Taylor series: memory made from the scene's natural coordinates, and the loop of
+steps."""
 
 from __future__ import annotations
 
@@ -47,9 +48,11 @@ from mbref.taylor.series_memory import acquire_memory, put_equations
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
 SHARE = 0.05  # tolerance of the last terms / (rtol + atol), far from singular positions
 ROUNDING = 1e-16  # relative rounding of a singular value
-STEPS_WORTH_CODE = 20_000  # steps ahead from which on generated code saves more time than it takes
+# expected steps above which generated code saves more time than its generation takes
+STEPS_WORTH_CODE = 20_000
 LEAST_ORDER, MOST_ORDER = 4, 30
-CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}  # order: at a tolerance of 1, and more per digit
+# order of least cost: at a tolerance of 1, and increase for each digit
+CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:
@@ -81,7 +84,7 @@ class SeriesStepper:
         exact_order = max(order, EXACT_ORDER) if run.model.closed_loops else order
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
-        self._calls, self._sampling = 0, 0.0  # of kernels that take steps; s of CPU time spent on samples
+        self._calls, self._sampling = 0, 0.0  # calls of kernels that take steps; s of CPU time for samples
         self._options = Options(
             regular_tolerance=tolerance,
             regular_order=order,
@@ -127,7 +130,7 @@ class SeriesStepper:
         return moving
 
     def release(self) -> None:
-        """Release the memory to the next run; this one cannot be read any more."""
+        """Release the memory for another run; results of this one must not be read afterwards."""
         release(self._pooled)
 
     def _put_options(self) -> None:
@@ -137,11 +140,12 @@ class SeriesStepper:
         self.taylor.progress.end = self.run.times[-1]
         mode, options = self.taylor.mode, self._options
         mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order
-        self.run.memory.previous.coordinates[:] = self.run.start.q  # its quaternions select the sign
+        # the signs of its quaternions are continued
+        self.run.memory.previous.coordinates[:] = self.run.start.q
 
     @property
     def was_short(self) -> bool:
-        """Return whether the run was completed by one call of kernels."""
+        """Return whether one call of kernels completed the run."""
         return self._calls == 1
 
     @property
@@ -162,14 +166,15 @@ class SeriesStepper:
     def parameters(
         self, packs: Packs, q: np.ndarray, places: Sequence[int]
     ) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Return where memory has numbers that differ between scenes, their values, and the places of scenes
-        whose equations have the structure of those in memory."""
+        """Return (target array, values for each scene) for numbers that differ between the scenes, and the
+        indices of scenes whose equations have the structure of those in memory."""
         varied, alike = equations_of_all(packs, q, places, self._moving, self.follows_drivers, self.taylor)
         distances = START_ERROR * np.maximum(1.0, packs.length)
         return [(self.taylor.options, distances, "start_distance"), *varied], alike
 
     def advance_once(self) -> tuple[int, float]:
-        """Advance by one call of kernels: the status, and the process CPU time of the stepping alone (s)."""
+        """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone
+        (s)."""
         began = time.process_time()
         status = self.take_steps()
         seconds = time.process_time() - began
@@ -177,20 +182,20 @@ class SeriesStepper:
         return self._status_with_samples(status, go_on=False), seconds
 
     def _generate_where_it_pays(self) -> None:
-        """Go on with generated code where many steps are ahead."""
+        """Continue with generated code if many steps are ahead."""
         if self._wants_code and self._steps_ahead() >= STEPS_WORTH_CODE:
             self._wants_code = False
             with contextlib.suppress(NoGeneratedCode):  # continue with the generic kernels
                 self._put_code()
 
     def _steps_ahead(self) -> float:
-        """Return the steps to the end at the pace so far, or to the limit of steps."""
+        """Return the number of steps to the end at the mean length so far, or to the limit of steps."""
         run = self.run
         taken, reached = run.memory.equations.system.counts.steps, run.memory.loop.clock.time
         return min(taken * (run.times[-1] / reached - 1.0), run.limits.most_steps - taken)
 
     def _put_code(self) -> None:
-        """Expand the series by generated code from now on; raises NoGeneratedCode where there is none."""
+        """Expand the series by generated code from now on; raises NoGeneratedCode if it is not available."""
         began = time.process_time()
         try:
             from mbref.taylor.generated.build import put_code  # optional, and not needed by most runs
@@ -200,7 +205,7 @@ class SeriesStepper:
         self.run.making += time.process_time() - began
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
-        """Run to the end; the final status and the process CPU time of the stepping alone (s)."""
+        """Run to the end; return the final status and the process CPU time of the stepping alone (s)."""
         making, began = self.run.making, time.process_time()
         status = self._leave_start()
         while status == PAUSED:
@@ -229,12 +234,12 @@ class SeriesStepper:
         return int((follow_drivers if self.follows_drivers else advance_series)(self.argument))
 
     def expand(self) -> int:
-        """Expand at the present time and state, for steps until the end: OK or the reason why not."""
+        """Expand at the present time and state, for steps until the end; return OK or the failure status."""
         self.taylor.progress.end = self.run.times[-1]
         return int(enter_series(self.argument))
 
     def _begin_again(self, status: int) -> int:
-        """Complete the samples of a crossing and begin a series behind it; return the status."""
+        """Complete the samples of a crossing and begin a series after it; return the status."""
         status = self._complete_samples(status, go_on=False)
         return UNDECIDED if status == PAUSED and self.expand() != OK else status
 
@@ -246,12 +251,12 @@ class SeriesStepper:
         return status
 
     def _status_with_samples(self, status: int, go_on: bool) -> int:
-        """Complete the samples of steps, without taking the time."""
+        """Complete the samples of steps, without measuring the time."""
         completed = int(complete_samples(int(go_on), self.argument))
         return status if completed == OK or status == UNDECIDED else completed
 
     def recorded(self) -> list[Passed]:
-        """Return the singular positions crossed since they were last asked for, along smooth branches."""
+        """Return the singular positions crossed since the last request, along smooth branches."""
         progress = self.taylor.progress
         count, progress.recorded = int(progress.recorded), 0
         if not count:
@@ -260,21 +265,24 @@ class SeriesStepper:
         return list(map(Passed, times.tolist(), coordinates, velocities, repeat(SMOOTH)))
 
     def _asked(self, number: int) -> int:
-        """Return the branch to take at a singular position, both counted from 1."""
+        """Return the requested branch at a singular position, both counted from 1."""
         return dict(self.run.limits.branches).get(number, SMOOTH)
 
     def _leaves_branch(self) -> bool:
-        """Return whether the last singular position is to be left along another branch, not yet taken."""
+        """Return whether the last singular position must be left along another branch, which is not yet
+        taken."""
         crossings = self.run.crossings
         return bool(crossings) and crossings[-1].taken != self._asked(len(crossings))
 
     def _cross(self) -> int:
-        """Cross the singular position ahead: PAUSED clear of it, DONE at the end, else the reason why not."""
+        """Cross the singular position ahead; return PAUSED when it is far enough, DONE at the end, or the
+        failure status."""
         self._calls += 1
         return self._until_clear(int(cross_position(self.argument)), [])
 
     def _take_branch(self) -> int:
-        """Go on along the branch asked for at the last singular position: as ``_cross``."""
+        """Continue along the requested branch at the last singular position; return the status as
+        ``_cross``."""
         crossings = self.run.crossings
         begin_crossing(self.argument)
         taken = [crossings.pop()._replace(taken=self._asked(len(crossings) + 1))]
@@ -289,7 +297,7 @@ class SeriesStepper:
         return self._begin_again(self._until_clear(self._departure.from_start(self._way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
-        """Take high-accuracy steps until they are clear of singular positions, the first ones ``crossed``."""
+        """Take high-accuracy steps until no singular position is near; the first ones are ``crossed``."""
         counts: Any = self.run.memory.equations.system.counts
         while status in (PAUSED, DONE):
             branch = self._record(crossed)

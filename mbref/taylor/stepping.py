@@ -2,9 +2,8 @@
 
 Steps follow À.  Jorba and M.  Zou (Experimental Mathematics 14, 2005).  At the end of a step the rows are
 violated by the error of the series, which is corrected, and the accelerations of the equations differ from
-the series.  Where either is more than the tolerance explains, or rows have become dependent, the step is
-repeated with a smaller length.  So a series that continues across a singular position crosses it, and no
-other does.
+the series.  If either exceeds what the tolerance explains, or rows have become dependent, the step is
+repeated with a smaller length. So only a series that continues across a singular position crosses it.
 """
 
 from __future__ import annotations
@@ -65,9 +64,9 @@ def expand_from(t, memory):
 def longest_step(tolerance, memory):
     """Return the step (s) at which the last two terms of the series are as large as the tolerance.
 
-    The terms of its rate count too, relative to the largest rate where that is above 1; more loosely in
-    high-accuracy steps, and not near a singular position.  A step ends little behind a position where a
-    spring has no length.
+    The terms of the rates must also be that small, relative to the largest rate if that is above 1.
+    High-accuracy steps have a larger tolerance of rates, and near a singular position rates are ignored. A
+    step ends shortly after a position at which a spring has zero length.
     """
     step, control, is_first = memory.step, memory.run.control, memory.run.equations.system.counts.steps == 0
     h = control.largest_step
@@ -87,8 +86,8 @@ def longest_step(tolerance, memory):
 
 @kernel
 def first_lengths(left, memory):
-    """Return the longest step (s) by the tolerance, and the longest one that crosses; at most the time
-    left."""
+    """Return the longest step (s) by the tolerance, and the longest one that crosses; both are at most the
+    remaining time."""
     step = memory.step
     if not is_accurate(memory):
         part = share(memory.run.loop.clock.length, memory.run)
@@ -108,8 +107,8 @@ def first_lengths(left, memory):
 def next_length(h, regular, memory):
     """Return the length (s) of the attempt after one of h seconds.
 
-    Clearly across the singular position that the attempt came near or crossed, by the terms of the series
-    that are not rounding; otherwise a length that does not reach it.
+    The step ends clearly after the singular position that the attempt approached or crossed, if the terms of
+    the series that are not rounding allow it. Otherwise it ends before the position.
     """
     step = memory.step
     near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * step.start_pivot
@@ -123,7 +122,7 @@ def next_length(h, regular, memory):
 
 @kernel
 def order_of_least_term(h, memory):
-    """Return the order, below the last, of the smallest term at a distance h (s): terms beyond are
+    """Return the order, below the last, of the smallest term at a distance h (s): later terms are
     rounding."""
     best, least, power = 2, 1e300, h
     for k in range(2, memory.step.last_order):
@@ -139,7 +138,7 @@ def order_of_least_term(h, memory):
 def save_series_without_pole(memory):
     """Save the series that starts here, without its rounding pole unless that makes steps short.
 
-    Very near a singular position few orders may be left that rounding does not outgrow.
+    Very near to a singular position rounding may dominate all but a few orders.
     """
     save_series(memory)
     pole = time_of_pole(memory)
@@ -160,11 +159,10 @@ def save_start(memory):
 
 @kernel
 def judge_step(h, last, memory):
-    """Return OK where rows and accelerations at the end of a step are off by no more than the tolerance
-    explains.
+    """Return OK if rows and accelerations at the end of a step differ by no more than the tolerance explains.
 
-    Behind a position where a spring has no length, the time since then counts in which accelerations are
-    off.
+    After a position at which a spring has zero length, errors of the accelerations act for the remaining time
+    only.
     """
     step, order, state, terms = memory.step, memory.mode.order, memory.state, memory.series.terms
     if not step.violation <= LOST_ROWS * memory.mode.tolerance + ROW_ROUNDING:

@@ -205,7 +205,7 @@ def test_a_hinge_in_the_plane_of_a_plane_mechanism_is_probably_a_slip():
 def test_a_scene_without_joints_is_probably_a_slip():
     scene = find_scene("planar_slider_crank")
     assert probable_slips(scene.with_(joint=[])) == [
-        "joint: there is none, so nothing holds crank, rod, slider"
+        "joint: there is none, so nothing connects crank, rod, slider"
     ]
 
 

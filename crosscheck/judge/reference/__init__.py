@@ -1,1 +1,2 @@
-"""References: the motion of any scene by two formulations that share nothing but the scene, and its bound."""
+"""References: the motion of any scene computed by two independent formulations, and the bound that follows
+from their difference."""

@@ -1,8 +1,9 @@
-"""Bound on the distance of a reference from the true motion, from the difference of independent motions.
+"""Bound on the error of a reference, from the difference of independently computed motions.
 
-The bound is SAFETY times the largest difference so far, and never less than LEAST.  Where two formulations of
-held-out scenes with truths of forty digits differed by d, formulation A was off by at most 1.5 d and B by at
-most 2.5 d; a second run of A alone can be closer to the first by chance, which ten times allows for.
+The bound is SAFETY times the largest difference so far, and never less than LEAST.  In test scenes with
+truths of forty digits, let d be the difference of the two formulations: the error of A was at most 1.5 d, of
+B at most 2.5 d. A second run of A alone can be nearer to the first by chance, which a factor of ten allows
+for.
 """
 
 from __future__ import annotations
@@ -32,19 +33,21 @@ def differences(scene: Scene, one: Motion, other: Motion) -> np.ndarray:
 
 
 def bounds(apart: np.ndarray) -> np.ndarray:
-    """Bounds (k,) on the error at each sample, from differences (k,) of the motions there."""
+    """Return bounds (k,) on the error at each sample, from the differences (k,) of the motions."""
     return np.maximum(SAFETY * np.maximum.accumulate(apart), LEAST)
 
 
 def rounding(scene: Scene, motion: Motion) -> np.ndarray:
-    """By how much doubles of a motion's positions may be off (k,), over the scene's length: far from the
-    origin more than LEAST."""
+    """Return the rounding error (k,) of a motion's positions in double precision, over the scene's length.
+
+    Far from the origin it exceeds LEAST.
+    """
     farthest = np.linalg.norm(doubles(motion.position), axis=-1).max(axis=-1, initial=0.0)
     return np.finfo(float).eps * farthest / scene_length(scene)
 
 
 def _angles(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Angles (k, nb) between orientations (k, nb, 4), exact to the rounding of the arithmetic."""
+    """Return the angles (k, nb) between orientations (k, nb, 4), exact to the rounding of the arithmetic."""
     pw, qw, pv, qv = p[..., :1], q[..., :1], p[..., 1:], q[..., 1:]
     across = np.stack(
         [pv[..., i - 2] * qv[..., i - 1] - pv[..., i - 1] * qv[..., i - 2] for i in range(3)], -1

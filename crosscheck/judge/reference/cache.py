@@ -1,4 +1,5 @@
-"""References kept on disk: one file a scene, found by what determines the motion, and checked when read."""
+"""References on disk: one file for each scene, whose name is a hash of all data that determine the motion;
+files are checked when read."""
 
 from __future__ import annotations
 
@@ -34,7 +35,7 @@ DIGEST = hashlib.sha256().digest_size
 
 
 def load(scene: Scene) -> dict[str, np.ndarray]:
-    """The arrays kept for a scene; none where there is no whole file."""
+    """Return the stored arrays of a scene; empty if there is no complete file."""
     try:
         content = _path(scene).read_bytes()
     except OSError:
@@ -48,9 +49,10 @@ def load(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
-    """Keep the arrays of a scene; a reader sees the old file or the new one, never a part."""
+    """Store the arrays of a scene; a reader sees the old file or the new one, never a part."""
     body, path = io.BytesIO(), _path(scene)
-    named: dict[str, Any] = {**arrays}  # of one type, they would count as the switch that savez also takes
+    # without this annotation an array named ``allow_pickle`` would be taken as an option of savez
+    named: dict[str, Any] = {**arrays}
     np.savez(body, **named)
     with contextlib.suppress(OSError):  # without a writable cache the result is not stored
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -60,12 +62,12 @@ def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
 
 
 def canonical(scene: Scene) -> str:
-    """All fields of a scene that determine its motion, as JSON: all but its name and duration."""
+    """Return all fields of a scene that determine its motion, as JSON: all except name and duration."""
     return json.dumps({**scene.to_dict(), "name": "", "duration": 0.0}, sort_keys=True)
 
 
 def mechanism(scene: Scene) -> str:
-    """A short hash of all fields of a scene that determine its motion."""
+    """Return a short hash of all fields of a scene that determine its motion."""
     return hashlib.sha256(canonical(scene).encode()).hexdigest()[:16]
 
 
@@ -76,5 +78,5 @@ def _path(scene: Scene) -> Path:
 
 @functools.cache
 def version() -> str:
-    """Hash of the code that makes references."""
+    """Return a hash of the code that computes references."""
     return hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest()

@@ -1,9 +1,9 @@
-"""Certified references: the motion of a scene to so many digits by both formulations, as a table to be kept.
+"""Certified references: the motion of a scene to a number of digits by both formulations, as a table.
 
-The scene's doubles count as exact.  The digits are those on which formulations A and B agree in arithmetics
-of more; the bound is ten times their difference.  Where redundant rows contradict each other, the table is of
-the mechanism without them, and names the joints that were replaced.  Tables are never edited, only
-superseded.
+The scene's doubles count as exact. Formulations A and B are computed with more digits, and the table has the
+digits on which they agree. The bound is ten times their difference. If redundant rows contradict each other,
+the table belongs to the mechanism without these rows and names the replaced joints. Tables are never edited,
+but replaced.
 """
 
 from __future__ import annotations
@@ -27,17 +27,19 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
-SPARE = (6, 12)  # digits beyond those asked for, of a step's tolerance; more where fewer do not do
-POSES = 101  # along a motion
+# digits of a step's tolerance beyond the requested ones; the larger number if the smaller one does not
+# suffice
+SPARE = (6, 12)
+POSES = 101  # number of poses along a motion at which the rank is checked
 METHODS = {
     "A": "natural coordinates, Taylor series",
     "B": "joint coordinates of a spanning tree, Chebyshev–Picard panels",
 }
-ACROSS = {"A": METHODS["A"], "A again": "of more digits and another order, where B keeps too few"}
+ACROSS = {"A": METHODS["A"], "A again": "with more digits and another order, because B loses too many digits"}
 """Through singular positions."""
 
-FEWEST_DIGITS = 4  # series of fewer have too few terms
-MOST_DIGITS = 100  # tolerances of many more are below the smallest double
+FEWEST_DIGITS = 4  # series for fewer digits have too few terms
+MOST_DIGITS = 100  # tolerances for many more digits are below the smallest double
 
 Shown = Callable[[str], AbstractContextManager[Progress]]
 """Shows the progress of the formulation named while the context lasts."""
@@ -47,24 +49,26 @@ RATES = ("velocity", "angular_velocity")
 
 
 def unshown(_: str) -> AbstractContextManager[Progress]:
-    """Show nothing."""
+    """Ignore the progress."""
     return nullcontext(no_progress)
 
 
 class NotCertified(ArithmeticError):
-    """The formulations do not agree to the digits asked for, or one of them ends before."""
+    """The formulations do not agree to the requested digits, or one of them ends early."""
 
 
 def certified(
     scene: Scene, times: np.ndarray, digits: int, seconds: float = np.inf, shown: Shown = unshown
 ) -> dict[str, Any]:
-    """A table of positions (m), orientations (w, x, y, z) and velocities of both kinds (m/s, rad/s; world) at
-    ascending times (k,) as decimal strings, with its ``id`` (of scene and times), ``digits``, ``bound``,
-    ``rate_bound`` (of velocities, each relative to the largest of its kind), both ``methods``, the
-    ``replaced`` joints where there are any, and the ``hash`` of all this.
+    """Return a table of positions (m), orientations (w, x, y, z), velocities (m/s) and angular velocities
+    (rad/s; world) at increasing times (k,).
 
-    ``seconds`` of CPU time are for all formulations together.  Raises NotCertified, and ImportError without
-    python-flint.
+    All numbers are decimal strings. Further entries are ``id`` (of scene and times), ``digits``, ``bound``,
+    ``rate_bound`` (for velocities, relative to the largest of their kind), both ``methods``, the ``replaced``
+    joints if there are any, and the ``hash`` of all entries.
+
+    ``seconds`` limits the CPU time of all formulations together.  Raises NotCertified, and ImportError
+    without python-flint.
     """
     try:
         with within(seconds):
@@ -74,7 +78,7 @@ def certified(
 
 
 def _agreed(scene: Scene, times: np.ndarray, digits: int, shown: Shown) -> dict[str, Any]:
-    """The table on whose digits the formulations agree; raises NotCertified."""
+    """Return the table of the digits on which the formulations agree; raises NotCertified."""
     for spare in SPARE:
         moved, a, b = _motions(scene, times, digits, spare, shown)
         bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))
@@ -88,8 +92,11 @@ def _agreed(scene: Scene, times: np.ndarray, digits: int, shown: Shown) -> dict[
 def _motions(
     scene: Scene, times: np.ndarray, digits: int, spare: int, shown: Shown
 ) -> tuple[Scene, Motion, Motion]:
-    """The mechanism without contradictions, its motion by A, and by B or, through singular positions, where
-    B keeps too few digits, by A with other digits and another order."""
+    """Return the mechanism without contradictory rows, its motion by A, and its motion by B.
+
+    If B loses too many digits at singular positions, the second motion is by A with other digits and another
+    order.
+    """
 
     def by_a(of: Scene, order: int, places: int) -> Motion:
         with shown("formulation A") as progress:
@@ -112,7 +119,7 @@ def _motions(
 
 
 def _poses(scene: Scene, end: float) -> list[Pose]:
-    """Poses along the motion to a time (s), in double precision."""
+    """Return poses along the motion up to a time (s), in double precision."""
     motion = natural_motion(scene, np.linspace(0.0, end, POSES), EXTENDED)
     return list(
         zip(motion.times.tolist(), doubles(motion.position), doubles(motion.orientation), strict=True)
@@ -120,19 +127,20 @@ def _poses(scene: Scene, end: float) -> list[Pose]:
 
 
 def _apart(one: np.ndarray, other: np.ndarray) -> float:
-    """The largest difference of two arrays, relative to the largest of the first."""
+    """Return the largest difference of two arrays, relative to the largest entry of the first."""
     largest, apart = (np.abs(doubles(values)).max(initial=0.0) for values in (one, one - other))
     return float(apart / largest) if largest else float(apart)
 
 
 def _refuse_ended(scene: Scene, motion: Motion, name: str) -> None:
-    """Raise NotCertified where a formulation's motion ended early."""
+    """Raise NotCertified if a formulation's motion ended early."""
     if motion.reason:
         raise NotCertified(f"{scene.name}: {name} ends at t = {motion.reached:.6g} s: {motion.reason}")
 
 
 def _by_a(scene: Scene, times: np.ndarray, order: int, places: int, progress: Progress) -> Motion:
-    """By formulation A to so many places a step, in arithmetic of twice the order."""
+    """Return the motion by formulation A with a tolerance of ``places`` digits for a step, in arithmetic with
+    twice as many digits as the order."""
     exact = many_digits(2 * order)
     return natural_motion(scene, times, exact, order=2 * order, tolerance=10.0**-places, progress=progress)
 
@@ -162,13 +170,13 @@ def _table(
 
 
 def digest(table: dict[str, Any]) -> str:
-    """The hash of a table, its own ``hash`` left out."""
+    """Return the hash of a table without its entry ``hash``."""
     content = {key: value for key, value in table.items() if key != "hash"}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
 def _decimals(values: Any, digits: int) -> Any:
-    """Numbers as decimal strings of two digits more than asked for, nested as the array."""
+    """Return numbers as decimal strings with two digits more than requested, nested like the array."""
     if isinstance(values, np.ndarray):
         return [_decimals(value, digits) for value in values]
     return values.str(digits + 2, radius=False) if float(values) else "0"

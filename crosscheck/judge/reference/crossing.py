@@ -1,9 +1,9 @@
-"""Singular positions inside a panel: found by the smallest singular value, bridged by a polynomial.
+"""Singular positions inside a panel: located by the smallest singular value, and bridged by a polynomial.
 
 On a smooth branch that crosses a singular position transversally, the least singular value of the constraint
 Jacobian is |s(t)| with s smooth and s(t*) = 0.  The accelerations stay smooth, but the equations for them
-lose digits near t*; there they are taken from a polynomial through the other points.  Where the iteration
-does not settle with these, the panel before is continued over the singular position (tree.py, panels.py).
+lose digits near t*; there they are taken from a polynomial through the other points.  If the iteration then
+does not converge, the previous panel is extended across the singular position (tree.py, panels.py).
 """
 
 from __future__ import annotations
@@ -11,20 +11,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.polynomial import chebyshev
 
-NEAR = 0.15  # fraction of the median distance from singularity: nearer points are interpolated
+NEAR = 0.15  # distance from singularity / its median; accelerations at nearer points are interpolated
 MOST = 0.25  # largest fraction of interpolated points
-DEGREE = 8  # degree of the polynomial that tests whether the distance changes its sign
-WINDOW = 12  # points on either side that it goes through
-SIGNED = 0.1  # misfit of the signed distance, relative to the misfit of the unsigned distance
+DEGREE = 8  # degree of the polynomial by which a change of sign is detected
+WINDOW = 12  # points on either side to which the bridging polynomial is fitted
+SIGNED = 0.1  # misfit of the signed distance / misfit of the unsigned distance, below which the sign changes
 
 
 def near_singular(distance: np.ndarray) -> np.ndarray:
-    """Which points (K,) are near a singular position that the panel crosses."""
+    """Return which points (K,) are near a singular position that the panel crosses."""
     return distance < NEAR * np.median(distance)
 
 
 def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
-    """Where in [-1, 1] the distances (K,) from singularity, given as absolute values, change their sign."""
+    """Return the place in [-1, 1] at which the distance from singularity (K,), given as absolute values,
+    changes its sign."""
     near = near_singular(distance)
     if not np.isfinite(distance).all() or not _inside(near):
         return None
@@ -42,12 +43,13 @@ def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
 
 
 def _inside(near: np.ndarray) -> bool:
-    """Whether there are points to be bridged, not too many and with others on both sides."""
+    """Return whether there are points to be bridged, not too many, with other points on both sides."""
     return bool(near.any() and near.sum() <= MOST * len(near) and not near[0] and not near[-1])
 
 
 def singular_ahead(nodes: np.ndarray, distance: np.ndarray) -> float | None:
-    """Where in (1, 3) the distances (K,) will come to zero if they go on as at the panel's end."""
+    """Return the place in (1, 3) at which the distance (K,) from singularity becomes zero if it continues as
+    at the panel's end."""
     x, d = nodes[-WINDOW // 2 :], distance[-WINDOW // 2 :]
     slope, _ = np.polyfit(x, d, 1)
     ahead = 1 - d[-1] / slope if slope < 0 else np.inf
@@ -61,7 +63,8 @@ def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def bridged(nodes: np.ndarray, rates: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Rates (K, n) with those near the singular position from the polynomial through the others."""
+    """Return rates (K, n) in which those near the singular position come from the polynomial through the
+    others."""
     near = near_singular(distance)
     if not _inside(near):
         return rates

@@ -1,4 +1,4 @@
-"""Taylor coefficients of a motion in natural coordinates, and how far they reach.
+"""Taylor series of a motion in natural coordinates, and the length of the steps for which it is accurate.
 
 Of order k the unknowns X_{k+2} and λ_k enter linearly, with one and the same matrix [M Gᵀ; G 0] at the time
 of expansion (J. D. Pryce, BIT 41, 2001, on Taylor series of differential-algebraic equations), so that one
@@ -61,25 +61,26 @@ class Expansion:
 
     @property
     def turned(self) -> list[np.ndarray]:
-        """The series of the joint coordinates."""
+        """Return the series of the joint coordinates."""
         return [coordinate.value for coordinate in self._gears.coordinates]
 
     def _grow(self, k: int) -> None:
-        """Order k of all that follows from order k of the coordinates."""
+        """Compute order k of all quantities that follow from order k of the coordinates."""
         self._u[k], self._w[k] = self._held.u(self.x[k]), self._held.w(self.x[k])
         self._products[k] = convolved(self._u, self._w, k).sum(axis=0)
         self._loads.grow(k, self.x)
         self._gears.grow(k, self.x)
 
     def _solve(self, k: int) -> None:
-        """Order k of the equations of motion and order k + 2 of the rows."""
+        """Compute order k of the multipliers and order k + 2 of the coordinates from the equations of motion
+        and the rows."""
         j = k + 2
-        self._products[j] = convolved(self._u, self._w, j).sum(axis=0)  # all but X_j
+        self._products[j] = convolved(self._u, self._w, j).sum(axis=0)  # all terms without X_j
         self._gears.grow(j, self.x)
         gap = np.concatenate(
             [self._drives.combined(self._products, j) - self._drives.c[j], self._gears.gaps(j)]
         )
-        self._factors[k] = self._drives.spread(self._multipliers, k)  # all but λ_k
+        self._factors[k] = self._drives.spread(self._multipliers, k)  # all terms without λ_k
         force = self._loads.order(k, self.x) - self._reaction(k) - self._gears.pull(k)
         x, found = self._system.solve(force[:, :-4], -gap * (j * (j - 1)))
         count = self._multipliers.shape[1]
@@ -90,17 +91,17 @@ class Expansion:
         self._grow(j)
 
     def _reaction(self, k: int) -> np.ndarray:
-        """Order k (3, n) of Gᵀ λ."""
+        """Return order k (3, n) of Gᵀ λ."""
         factors = self._factors[:, None]
         on_u, on_w = convolved(factors, self._w, k), convolved(factors, self._u, k)
         return self._held.to_u(on_u) + self._held.to_w(on_w)
 
 
 class Series:
-    """The coordinates about a time: sizes of the terms, from which it is known how far they reach.
+    """Series of the coordinates about a time, and the sizes of its terms, which determine the possible steps.
 
-    A term counts with the next one, so that a series of even orders alone is not cut too soon; the series
-    ends with its smallest term: beyond it there is rounding noise that grows from order to order.
+    The size of a term is the larger of it and the next one, so that a series with even orders only is not cut
+    too early. The series ends with its smallest term, because later terms contain growing rounding noise.
     """
 
     def __init__(self, x: np.ndarray):
@@ -110,13 +111,13 @@ class Series:
         self._logs -= self._logs[0]
 
     def reach(self, tolerance: float) -> float:
-        """The longest step (s) whose smallest term is not above the tolerance."""
+        """Return the longest step (s) whose smallest term is not above the tolerance."""
         with np.errstate(over="ignore"):
             each = np.exp((np.log(tolerance) - self._logs[1:]) / self._orders[1:])
         return float(np.minimum(each[:-1], each[1:])[LEAST_TERMS - 1 :].max())
 
     def left_out(self, h: float) -> float:
-        """Size of the first term left out at a step h (s), relative to the coordinates."""
+        """Return the size of the first omitted term for a step h (s), relative to the coordinates."""
         return float(np.exp(self._pairs(h).min()))
 
     def terms(self, h: float) -> int:
@@ -129,7 +130,7 @@ class Series:
 
 
 def value(series: np.ndarray, d: Any, derivative: int = 0) -> Any:
-    """A series (terms, …), or a derivative of it, at a distance d (s), by Horner's scheme."""
+    """Return a series (terms, …), or a derivative of it, at a distance d (s), by Horner's scheme."""
     for _ in range(derivative):
         series = series[1:] * np.arange(1, len(series)).reshape(-1, *(1,) * (series.ndim - 1))
     total = series[-1]

@@ -1,6 +1,7 @@
-"""Which rows of a scene in natural coordinates are held, and their drivers as Taylor series.
+"""Selection of independent constraint rows of a scene in natural coordinates, and the Taylor series of their
+drivers.
 
-Redundant rows are left out: columns of Gᵀ are taken in the order of a QR factorisation with column pivoting.
+Redundant rows are left out by a QR factorisation of Gᵀ with column pivoting.
 """
 
 from __future__ import annotations
@@ -22,9 +23,9 @@ from mbref.scene import TimeFunction
 
 
 class HeldRows:
-    """Some of a scene's rows: m rows of joints (``numbers``) and ``couplings``, ``count`` in all.
+    """Selected rows of a scene: m rows of joints (``numbers``) and ``couplings``, ``count`` in all.
 
-    The rows of joints are made of p products; ``gears`` are the rows of couplings and of all armatures.
+    The rows of joints consist of p products; ``gears`` are the rows of couplings and of all armatures.
     """
 
     def __init__(self, of: NaturalCoordinates, rows: Iterable[int]):
@@ -46,7 +47,7 @@ class HeldRows:
         self._dense = u, w
 
     def drives(self, t: Any, terms: int) -> Drives:
-        """The rows' dependence on time about t, as series of so many terms."""
+        """Return the rows' dependence on time about t, as series with the given number of terms."""
         value = self._arithmetic.zeros(terms, len(self.numbers))
         value[0] = self._c
         for at, driver in self._moved:
@@ -55,18 +56,18 @@ class HeldRows:
         return Drives(value, [(at, to, *cos_sin_series(angle)) for at, to, angle in angles])
 
     def gradient(self, x: np.ndarray, drives: Drives) -> np.ndarray:
-        """G (m, 3, n): derivatives of the rows by the coordinates x (3, n)."""
+        """Return G (m, 3, n): derivatives of the rows by the coordinates x (3, n)."""
         u, w = self._dense
         products = self.w(x).T[:, :, None] * u[:, None, :] + self.u(x).T[:, :, None] * w[:, None, :]
         return drives.combined(products[None], 0)
 
     def all_gradients(self, x: np.ndarray, drives: Drives) -> np.ndarray:
-        """G (m + g, 3, n - 4) of the rows and of the gears."""
+        """Return G (m + g, 3, n - 4) of the rows and of the gears."""
         own = self.gradient(x, drives)[:, :, :-4]
         return np.concatenate([own, self._joints.gradients(self.gears, x)]) if self.gears else own
 
     def compliance(self, zeros: Any) -> np.ndarray:
-        """Reciprocal inertias (m + g,) of armatures, zeros for other rows."""
+        """Return reciprocal inertias (m + g,) of armatures, zeros for all other rows."""
         found = zeros(len(self.numbers) + len(self.gears))
         for k, gear in enumerate(self.gears, len(self.numbers)):
             if gear.inertia is not None:
@@ -74,7 +75,8 @@ class HeldRows:
         return np.asarray(found)
 
     def unit_gradient(self, x: np.ndarray, t: Any) -> np.ndarray:
-        """G (count, 3 (n - 4)) in double precision, every row of length one, without the ground's columns."""
+        """Return G (count, 3 (n - 4)) in double precision with rows of unit length, without the ground's
+        columns."""
         rows = doubles(self.gradient(x, self.drives(t, 1)))[:, :, :-4].reshape(len(self.numbers), -1)
         if self.couplings:
             coupled = doubles(self._joints.gradients(self.couplings, x))
@@ -83,14 +85,14 @@ class HeldRows:
 
 
 class Drives:
-    """The rows of products y about one time: right-hand sides c (terms, m), and of driven angles
-    cos ψ y_row + sin ψ y_second."""
+    """Series of the rows about one time: right-hand sides c (terms, m); a driven angle ψ gives the row cos ψ
+    y_row + sin ψ y_second of products y."""
 
     def __init__(self, c: np.ndarray, turns: list[tuple[int, int, np.ndarray, np.ndarray]]):
         self.c, self._turns = c, turns
 
     def combined(self, products: np.ndarray, k: int) -> np.ndarray:
-        """Order k of the rows (m, …) from series of the products (terms, p, …)."""
+        """Return order k of the rows (m, …) from series of the products (terms, p, …)."""
         rows = products[k][: self.c.shape[1]].copy()
         each = (-1,) + (1,) * (products.ndim - 2)
         for at, second, cosine, sine in self._turns:
@@ -99,7 +101,7 @@ class Drives:
         return rows
 
     def spread(self, multipliers: np.ndarray, k: int) -> np.ndarray:
-        """Order k of the products' factors (p,) from series of the rows' multipliers (terms, m)."""
+        """Return order k of the products' factors (p,) from series of the rows' multipliers (terms, m)."""
         factors = np.concatenate([multipliers[k], 0 * multipliers[k][: len(self._turns)]])
         for at, second, cosine, sine in self._turns:
             factors[at] = convolved(cosine, multipliers[:, at], k)
@@ -108,8 +110,11 @@ class Drives:
 
 
 def independent(rows: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of independent rows among unit rows (m, n), in ascending order, and the pivots (min(m, n),)
-    relative to the first; weights (m,) near one decide between rows that do equally well."""
+    """Return numbers of independent rows among unit rows (m, n), in increasing order, and the pivots (min(m,
+    n),) relative to the first.
+
+    Weights (m,) near one decide between rows that are equally good.
+    """
     if not len(rows):
         return np.zeros(0, dtype=int), np.zeros(0)
     r, order = qr((rows * weights[:, None]).T, mode="r", pivoting=True, check_finite=False)
@@ -137,7 +142,7 @@ def function_series(function: TimeFunction, t: Any, terms: int, arithmetic: Arit
 
 
 def cos_sin_series(angle: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Taylor coefficients of the cosine and the sine of a series (terms,)."""
+    """Return Taylor coefficients of the cosine and the sine of a series (terms,)."""
     cosine, sine = 0 * angle, 0 * angle
     cosine[0], sine[0] = np.cos(angle[0]), np.sin(angle[0])
     rate = angle[1:] * np.arange(1, len(angle))

@@ -1,7 +1,9 @@
-"""A mechanism without its redundant rows: joints replaced by weaker ones as long as no freedom is added.
+"""A mechanism without redundant rows: joints are replaced by joints with fewer rows as long as no degree of
+freedom is added.
 
-Redundant rows whose anchors and axes are rounded contradict each other by about 1e-16, and a mechanism as its
-doubles have it then moves on one set of independent rows or on another, but has no motion to more digits.
+Redundant rows whose anchors and axes are rounded contradict each other by about 1e-16. With its doubles taken
+as exact, such a mechanism moves according to one set of independent rows or another, and no motion with more
+digits exists.
 """
 
 from __future__ import annotations
@@ -24,15 +26,16 @@ WEAKER = {
 }
 """Types whose rows are among those of a type, with the same anchor and axis; the fewest rows first."""
 REMOVED = "removed"
-KEPT = 0.02  # smallest singular value without the removed rows / with them
+# smallest singular value without the removed rows / with them; a smaller ratio forbids the removal
+KEPT = 0.02
 Pose = tuple[float, np.ndarray, np.ndarray]
 """Time, positions (nb, 3) and orientations (nb, 4)."""
 
 
 def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
-    """The scene with redundant joints removed or replaced by weaker ones, the last joints first; its rank at
-    t = 0, and at the poses along its motion, stays the same.  Joints whose coordinate is used are
-    kept; where they leave redundant rows, the scene stays as it is."""
+    """Return the scene with redundant joints removed or replaced by weaker ones, the last joints first. The
+    rank at t = 0 and at poses along the motion is unchanged.  Joints whose coordinate is used are unchanged;
+    if redundant rows remain among them, the scene is unchanged."""
     poses = [(0.0, *initial_poses(scene)), *along]
     rank = _rank(scene)
     least = [_singular_value(scene, rank, pose) for pose in poses]
@@ -59,15 +62,19 @@ def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
 
 
 def replaced(scene: Scene, by: Scene) -> dict[str, str]:
-    """The joints of a scene that another one lacks or has weaker ones for, by name: their type or REMOVED."""
+    """Return the joints of a scene that another scene lacks or replaces by weaker ones, by name: their new
+    type or REMOVED."""
     types = {joint.name: joint.type for joint in by.joint}
     kept = {joint.name: types.get(joint.name, REMOVED) for joint in scene.joint}
     return {joint.name: kept[joint.name] for joint in scene.joint if kept[joint.name] != joint.type}
 
 
 def _weaker(joint: Joint) -> Iterator[tuple[Joint, ...]]:
-    """No joint, and then the weaker ones; of a revolute joint last the universal ones, which also turn about
-    one of the two directions normal to its axis."""
+    """Return the possible replacements of a joint: none, then weaker joints.
+
+    For a revolute joint the last ones are universal joints, which also turn about one of two directions
+    normal to its axis.
+    """
     yield ()
     axis = next(iter(joint.directions), None)
     for kind in WEAKER.get(joint.type, ()):
@@ -82,19 +89,19 @@ def _weaker(joint: Joint) -> Iterator[tuple[Joint, ...]]:
 
 
 def _with(scene: Scene, joint: Joint, others: tuple[Joint, ...]) -> Scene:
-    """The scene with others in place of a joint."""
+    """Return the scene with other joints in place of one joint."""
     parts = [others if j.name == joint.name else (j,) for j in scene.joint]
     return scene.with_(joint=tuple(j for part in parts for j in part))
 
 
 def _rank(scene: Scene) -> int:
-    """Rank of the rows at t = 0, with drivers."""
+    """Return the rank of the rows at t = 0, drivers included."""
     values = _singular_values(scene, (0.0, *initial_poses(scene)))
     return int((values > RANK * values.max(initial=0.0)).sum())
 
 
 def _singular_value(scene: Scene, number: int, pose: Pose) -> float:
-    """One of the rows' singular values, counted from 1, the largest; infinite for number 0."""
+    """Return one of the rows' singular values; number 1 is the largest, and number 0 gives infinity."""
     return float(_singular_values(scene, pose)[number - 1]) if number else np.inf
 
 

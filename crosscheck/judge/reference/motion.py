@@ -1,7 +1,7 @@
-"""The motion of a scene as a formulation of the reference gives it, in the formulation's own arithmetic.
+"""Result of a formulation of the reference: the motion of a scene in the formulation's arithmetic.
 
-Both formulations are functions ``(scene, times, arithmetic, *, seconds) -> Motion``: ``times`` (k,) ascend
-from t ≥ 0, and after so many CPU seconds of the calling thread the motion ends where it has got.
+Both formulations are functions ``(scene, times, arithmetic, *, seconds) -> Motion``: ``times`` (k,) increase
+from t ≥ 0. After ``seconds`` of CPU time of the calling thread the motion ends early.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ OVER = str(TimeIsUp())
 
 
 def no_progress(_: float) -> None:
-    """Tell nobody the time that a motion has reached."""
+    """Ignore the time that a motion has reached."""
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Samples at the times reached: k of those asked for, of nb bodies, world frame, SI units.
+    """Samples at the k requested times that were reached, of nb bodies, world frame, SI units.
 
     ``position`` (k, nb, 3) of the centres of mass and ``orientation`` (k, nb, 4), unit quaternions
     (w, x, y, z) body to world of either sign, with ``velocity``, ``angular_velocity``, ``acceleration`` and
-    ``angular_acceleration`` (k, nb, 3); elements are the arithmetic's.  ``reached`` (s) is the last time
-    asked for, or where the motion ended before, with the ``reason`` as a clause ("" when complete).
-    ``crossings`` (s) are the singular positions passed, ``seconds`` CPU time; ``contradiction`` is the
-    largest residual of redundant rows, relative to the largest coordinate, where that was looked at.
-    ``formulation`` is A or B.
+    ``angular_acceleration`` (k, nb, 3); elements belong to the arithmetic. ``reached`` (s) is the last
+    requested time, or the time of an early end, with the ``reason`` as a clause ("" if complete).
+    ``crossings`` (s) are the times of singular positions that were passed, ``seconds`` is CPU time.
+    ``contradiction`` is the largest residual of redundant rows, relative to the largest coordinate, if it was
+    computed. ``formulation`` is A or B.
     """
 
     times: np.ndarray

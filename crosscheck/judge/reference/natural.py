@@ -50,9 +50,9 @@ class Row:
 class NaturalCoordinates:
     """A scene's rows, mass matrix and start in an arithmetic, with nb bodies and n = 4 nb + 4.
 
-    Coordinates X (3, n) hold the ground's [0 1] last.  Lengths are in the unit ``length`` (m), a power of two
-    near the scene's size, so that all coordinates are about one and no digit changes.  Products 0 … m - 1 are
-    the rows' products; further ones are the second products of driven angles.
+    The last columns of X (3, n) are the ground's [0 1]. Lengths are in the unit ``length`` (m), a power of
+    two near the scene's size. So all coordinates are about one, and the scaling changes no digit.  Products 0
+    … m - 1 are the rows' products; further ones are the second products of driven angles.
     """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
@@ -77,33 +77,34 @@ class NaturalCoordinates:
             self.c = np.where(np.abs(doubles(self.c)) <= RIGHT_ANGLE, 0 * self.c, self.c)
 
     def lengths(self, values: Any) -> np.ndarray:
-        """Lengths, or what is proportional to them, in the unit of the coordinates."""
+        """Return lengths, or numbers proportional to lengths, in the unit of the coordinates."""
         return self.arithmetic.array(values) / self.length
 
     def direction(self, body: int, vector: np.ndarray) -> np.ndarray:
-        """The form e (n,) with X e a direction that is ``vector`` (world) at t = 0, fixed in a body."""
+        """Return the form e (n,) such that X e is a body-fixed direction that equals ``vector`` (world) at t
+        = 0."""
         return self._form(body, 0.0, vector if body < 0 else vector @ self.axes[body])
 
     def point(self, body: int, place: Sequence[float]) -> np.ndarray:
-        """The form e (n,) with X e a point that is at ``place`` (world, m) at t = 0, fixed in a body."""
+        """Return the form e (n,) such that X e is a body-fixed point at ``place`` (world, m) at t = 0."""
         at = self.lengths(place)
         if body < 0:
             return self._form(body, 1.0, at)
         return self._form(body, 1.0, (at - self.lengths(self.scene.body[body].position)) @ self.axes[body])
 
     def frame(self, axis: Sequence[float]) -> np.ndarray:
-        """Three perpendicular unit vectors (rows), the last along an axis."""
+        """Return three perpendicular unit vectors (rows), the last along an axis."""
         along = self._unit(self.arithmetic.array(axis))
         across = self._unit(np.cross(EYE[np.argmin(np.abs(doubles(along)))], along))
         return np.array([across, np.cross(along, across), along])
 
     def indices(self, names: Sequence[str]) -> list[int]:
-        """Body indices, -1 the ground's."""
+        """Return body indices, -1 for the ground."""
         return [self.scene.body_index(name) for name in names]
 
     def start(self) -> tuple[np.ndarray, np.ndarray]:
-        """X, X' (3, n) at t = 0, the velocities still zero; raises SceneError where the scene's contradict
-        its joints."""
+        """Return X, X' (3, n) at t = 0 with zero velocities; raises SceneError if the scene's velocities
+        contradict its joints."""
         constraints.initial_twists(self.scene)
         x, v = self.arithmetic.zeros(2, 3, 4 * self.nb + 4)
         x[:, -3:] = self.arithmetic.array(EYE)
@@ -113,7 +114,8 @@ class NaturalCoordinates:
         return x, v
 
     def given_velocities(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Forms (g, 3 (n - 4)) of the given velocities at coordinates x, and their values (g,), weighted."""
+        """Return forms (g, 3 (n - 4)) of the given velocities at coordinates x, and their values (g,), both
+        weighted."""
         asked = given(self.scene)
         angular = asked.components % 6 > 2
         values = self.lengths(asked.values) * self.arithmetic.array(asked.weights)
@@ -121,7 +123,8 @@ class NaturalCoordinates:
         return weights[:, None] * self._twists(x)[asked.components], values
 
     def _twists(self, x: np.ndarray) -> np.ndarray:
-        """Forms (6 nb, 3 (n - 4)) of the bodies' velocities and angular velocities in X' of rigid bodies."""
+        """Return forms (6 nb, 3 (n - 4)) of the bodies' velocities and angular velocities in X' of rigid
+        bodies."""
         forms = self.arithmetic.zeros(self.nb, 6, 3, 4 * self.nb)
         for b, i in itertools.product(range(self.nb), range(3)):
             axes = slice(4 * b + 1, 4 * b + 4)
@@ -133,8 +136,8 @@ class NaturalCoordinates:
         return forms.reshape(6 * self.nb, -1)
 
     def bodies(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> Sampled:
-        """Positions, orientations, velocities, angular velocities and both accelerations, as in Motion, of
-        coordinates and their derivatives (k, 3, n)."""
+        """Return positions, orientations, velocities, angular velocities and both accelerations, as in
+        Motion, from coordinates and their derivatives (k, 3, n)."""
         blocks = [s[..., :-4].reshape(len(s), 3, self.nb, 4).transpose(0, 2, 1, 3) for s in (x, v, a)]
         places = [self.length * block[..., 0] for block in blocks]
         axes, rates, bends = (block[..., 1:] for block in blocks)
@@ -152,7 +155,8 @@ class NaturalCoordinates:
         return vector / np.sqrt((vector * vector).sum())
 
     def _orientation(self, body: Body) -> np.ndarray:
-        """Rotation matrix (3, 3) of the body's quaternion, which is of unit length to rounding only."""
+        """Return the rotation matrix (3, 3) of the body's quaternion, whose length is one up to rounding
+        only."""
         q = self.arithmetic.array(body.orientation)
         w, v = q[0], q[1:]
         outer = v[:, None] * v
@@ -160,14 +164,14 @@ class NaturalCoordinates:
         return turned / (q * q).sum()
 
     def _rigidity(self) -> Iterator[Row]:
-        """Six rows a body: its axes are of length one and perpendicular."""
+        """Return six rows for each body: its axes have length one and are perpendicular."""
         for b in range(self.nb):
             for i, j in itertools.combinations_with_replacement(range(3), 2):
                 scale = 0.5 if i == j else 1.0
                 yield Row(scale * self._axis(b, i), self._axis(b, j), scale * (i == j))
 
     def _axis(self, body: int, i: int) -> np.ndarray:
-        """The form of a body's own axis, or of a world axis (body -1)."""
+        """Return the form of a body's own axis, or of a world axis (body -1)."""
         return self._form(body, 0.0, self.arithmetic.array(EYE[i]))
 
     def _joints(self) -> Iterator[Row]:
@@ -215,9 +219,10 @@ class NaturalCoordinates:
         return Row(e[1], f[0], 0.0, driver, -1 * e[0])
 
     def _mass(self) -> np.ndarray:
-        """M (4 nb, 4 nb) with ½ Σ Ẋ M Ẋᵀ the kinetic energy: each body's mass and ½ tr(J) 1 - J.
+        """Return M (4 nb, 4 nb) such that ½ Σ Ẋ M Ẋᵀ is the kinetic energy: mass and ½ tr(J) 1 - J of each
+        body.
 
-        Bodies without mass have unit ones: they matter only where the drivers leave nothing to choose.
+        Bodies without mass have unit ones, which have no influence if the drivers determine the motion.
         """
         mass = self.arithmetic.zeros(4 * self.nb, 4 * self.nb)
         for b, body in enumerate(self.scene.body):
@@ -232,20 +237,21 @@ class NaturalCoordinates:
 
 
 def skew(v: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) of the vector product with v (3,)."""
+    """Return the matrix (3, 3) of the vector product with v (3,)."""
     zero = 0 * v[0]
     return np.array([[zero, -v[2], v[1]], [v[2], zero, -v[0]], [-v[1], v[0], zero]])
 
 
 def axial(matrices: np.ndarray) -> np.ndarray:
-    """The vectors (…, 3) of the skew parts of matrices (…, 3, 3)."""
+    """Return the vectors (…, 3) of the skew parts of matrices (…, 3, 3)."""
     a = matrices
     parts = [a[..., 2, 1] - a[..., 1, 2], a[..., 0, 2] - a[..., 2, 0], a[..., 1, 0] - a[..., 0, 1]]
     return np.stack(parts, axis=-1) / 2
 
 
 def quaternions(a: np.ndarray) -> np.ndarray:
-    """Unit quaternions (…, 4) of rotation matrices (…, 3, 3): the largest column of 4 q qᵀ, normalised."""
+    """Return unit quaternions (…, 4) of rotation matrices (…, 3, 3): the largest column of 4 q qᵀ,
+    normalised."""
     x, y, z = np.moveaxis(2 * axial(a), -1, 0)
     xx, yy, zz = (a[..., i, i] for i in range(3))
     xy, yz, zx = (a[..., i, j] + a[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0)))

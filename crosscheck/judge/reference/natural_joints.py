@@ -2,8 +2,8 @@
 
 An angle follows from θ' = C S' - S C' with C = e₁ · f₁ and S = e₂ · f₁ of the cross axes e of the first body
 and f of the second, a displacement is a · d.  Order j of both is linear in X_j, with the gradient at the time
-of expansion, so that a coupling is a row with a multiplier like the others.  An armature I is one, too: its
-multiplier is μ = I q'', which stands on the diagonal as -1 / I.
+of expansion, so that a coupling is a row with a multiplier. An armature I is a row, too: its multiplier is μ
+= I q'', with the diagonal entry -1 / I.
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ import numpy as np
 from mbref.scene import Joint
 from mbref.scene_joints import ANGLE
 
-SETTLING = 3  # corrections of an angle, each of which leaves the cube of the last
+SETTLING = 3  # corrections of an angle, each of which leaves the cube of the previous error
 
 
 def convolved(a: np.ndarray, b: np.ndarray, k: int) -> Any:
-    """Order k of the product of two series: Σ a_i b_{k-i}, i = 0 … k."""
+    """Return order k of the product of two series: Σ a_i b_{k-i}, i = 0 … k."""
     return (a[: k + 1] * b[k::-1]).sum(axis=0)
 
 
 class AngleForm:
-    """A joint's cross axes e₁, e₂ on its first body and f₁ on its second."""
+    """Angle of a joint: its cross axes e₁, e₂ on the first body and f₁ on the second."""
 
     turns = True
 
@@ -37,11 +37,12 @@ class AngleForm:
         self.f, self.zeros = of.direction(second, frame[0]), of.arithmetic.zeros
 
     def series(self, start: Any, terms: int) -> AngleSeries:
-        """The angle as a series of so many terms, from its value at the time of expansion."""
+        """Return the angle as a series with the given number of terms, from its value at the time of
+        expansion."""
         return AngleSeries(self, start, terms)
 
     def value(self, x: np.ndarray, near: Any) -> Any:
-        """The angle at coordinates x (3, n), which is within rounding of another."""
+        """Return the angle at coordinates x (3, n), which differs from ``near`` by rounding only."""
         f = x @ self.f
         cosine, sine = (x @ self.e1 * f).sum(), (x @ self.e2 * f).sum()
         for _ in range(SETTLING):
@@ -49,7 +50,7 @@ class AngleForm:
         return near
 
     def rate(self, x: np.ndarray, v: np.ndarray) -> Any:
-        """The rate of the angle at coordinates and rates (3, n)."""
+        """Return the rate of the angle at coordinates and rates (3, n)."""
         f, f_rate = x @ self.f, v @ self.f
         (c, c_rate), (s, s_rate) = (
             ((x @ e * f).sum(), (v @ e * f).sum() + (x @ e * f_rate).sum()) for e in (self.e1, self.e2)
@@ -57,7 +58,7 @@ class AngleForm:
         return c * s_rate - s * c_rate
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives (3, n) of the angle by coordinates x (3, n)."""
+        """Return the derivatives (3, n) of the angle by coordinates x (3, n)."""
         e1, e2, f = x @ self.e1, x @ self.e2, x @ self.f
         c, s = (e1 * f).sum(), (e2 * f).sum()
         on_f = c * e2 - s * e1
@@ -65,7 +66,7 @@ class AngleForm:
 
 
 class AngleSeries:
-    """An angle and its pull, about one time."""
+    """Series of an angle and of the force that a moment about it exerts, about one time."""
 
     def __init__(self, form: AngleForm, start: Any, terms: int):
         self._form = form
@@ -75,7 +76,7 @@ class AngleSeries:
         self.value[0] = start
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of the axes, of cosine and sine, and of the angle."""
+        """Compute order k of the axes, of cosine and sine, and of the angle."""
         self._e1[k], self._e2[k], self._f[k] = x[k] @ self._form.e1, x[k] @ self._form.e2, x[k] @ self._form.f
         self._cos[k] = convolved(self._e1, self._f, k).sum()
         self._sin[k] = convolved(self._e2, self._f, k).sum()
@@ -87,7 +88,7 @@ class AngleSeries:
             self.value[k] = (i * turn).sum() / k
 
     def pull(self, moment: np.ndarray, k: int) -> np.ndarray:
-        """Order k (3, n) of a moment (terms,) times the gradient, C δS - S δC."""
+        """Return order k (3, n) of a moment (terms,) times the gradient, C δS - S δC."""
         form = self._form
         self._mcos[k], self._msin[k] = convolved(moment, self._cos, k), convolved(moment, self._sin, k)
         cosine, sine = self._mcos[:, None], self._msin[:, None]
@@ -97,7 +98,8 @@ class AngleSeries:
 
 
 class SlideForm:
-    """The axis of a joint on its first body, and the vector between its anchors, in the unit of length."""
+    """Displacement of a joint: its axis on the first body, and the vector between its anchors, in the unit of
+    length."""
 
     turns = False
 
@@ -111,36 +113,36 @@ class SlideForm:
         )
 
     def series(self, start: Any, terms: int) -> SlideSeries:
-        """The displacement as a series of so many terms."""
+        """Return the displacement as a series with the given number of terms."""
         return SlideSeries(self, terms)
 
     def value(self, x: np.ndarray, near: Any) -> Any:
-        """The displacement at coordinates x (3, n)."""
+        """Return the displacement at coordinates x (3, n)."""
         return (x @ self.axis * (x @ self.apart)).sum()
 
     def rate(self, x: np.ndarray, v: np.ndarray) -> Any:
-        """The rate of the displacement at coordinates and rates (3, n)."""
+        """Return the rate of the displacement at coordinates and rates (3, n)."""
         return (v @ self.axis * (x @ self.apart)).sum() + (x @ self.axis * (v @ self.apart)).sum()
 
     def gradient(self, x: np.ndarray) -> np.ndarray:
-        """Derivatives (3, n) of the displacement by coordinates x (3, n)."""
+        """Return the derivatives (3, n) of the displacement by coordinates x (3, n)."""
         return (x @ self.apart)[:, None] * self.axis + (x @ self.axis)[:, None] * self.apart
 
 
 class SlideSeries:
-    """A displacement and its pull, about one time."""
+    """Series of a displacement and of the force that acts along it, about one time."""
 
     def __init__(self, form: SlideForm, terms: int):
         self._form, self.value = form, form.zeros(terms)
         self._axis, self._apart = form.zeros(2, terms, 3)
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of axis, vector and displacement."""
+        """Compute order k of axis, vector and displacement."""
         self._axis[k], self._apart[k] = x[k] @ self._form.axis, x[k] @ self._form.apart
         self.value[k] = convolved(self._axis, self._apart, k).sum()
 
     def pull(self, force: np.ndarray, k: int) -> np.ndarray:
-        """Order k (3, n) of a force (terms,) times the gradient."""
+        """Return order k (3, n) of a force (terms,) times the gradient."""
         on_axis, on_apart = (convolved(force[:, None], v, k) for v in (self._apart, self._axis))
         return np.asarray(on_axis[:, None] * self._form.axis + on_apart[:, None] * self._form.apart)
 
@@ -150,14 +152,16 @@ Form = AngleForm | SlideForm
 
 @dataclass(frozen=True)
 class Gear:
-    """The row Σ weight × coordinate, by numbers of coordinates; 0 of a coupling, the multiplier over the
-    ``inertia`` in its second derivative of an armature."""
+    """The row Σ weight × coordinate, with coordinates given by number.
+
+    For a coupling it is 0. For an armature its second derivative is the multiplier over the ``inertia``.
+    """
 
     terms: tuple[tuple[int, Any], ...]
     inertia: Any = None
 
     def total(self, values: Sequence[Any]) -> Any:
-        """Σ weight × value, of one value for each coordinate."""
+        """Return Σ weight × value, with one value for each coordinate."""
         return sum(
             (weight * values[i] for i, weight in self.terms[1:]), self.terms[0][1] * values[self.terms[0][0]]
         )
@@ -166,7 +170,7 @@ class Gear:
 class JointCoordinates:
     """The joint coordinates on which couplings and armatures act, and a row for each coupling and armature.
 
-    ``of`` are the natural coordinates of the scene.
+    ``of`` is the scene in natural coordinates.
     """
 
     def __init__(self, of: Any):
@@ -192,7 +196,7 @@ class JointCoordinates:
         return Gear(((i, self._of.arithmetic.number(1.0)),), inertia)
 
     def _number(self, joint: Joint, coordinate: str) -> int:
-        """The number of a coordinate, which is taken in where it is new."""
+        """Return the number of a coordinate, which is appended if it is new."""
         key = joint.name, coordinate
         if key not in self._numbers:
             self._numbers[key] = len(self.forms)
@@ -200,21 +204,22 @@ class JointCoordinates:
         return self._numbers[key]
 
     def start(self) -> list[Any]:
-        """The coordinates at t = 0."""
+        """Return the coordinates at t = 0."""
         return [self._of.arithmetic.number(0.0) for _ in self.forms]
 
     def values(self, x: np.ndarray, near: Sequence[Any]) -> list[Any]:
-        """The coordinates at X (3, n), angles within rounding of others."""
+        """Return the coordinates at X (3, n); angles differ from ``near`` by rounding only."""
         return [form.value(x, old) for form, old in zip(self.forms, near, strict=True)]
 
     def rates(self, x: np.ndarray, v: np.ndarray) -> list[Any]:
-        """The rates of the coordinates at X and X' (3, n)."""
+        """Return the rates of the coordinates at X and X' (3, n)."""
         return [form.rate(x, v) for form in self.forms]
 
     def gaps(
         self, couplings: Sequence[Gear], x: np.ndarray, v: np.ndarray, near: Sequence[Any]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals (g,) of couplings and of their time derivatives; angles are within rounding of others."""
+        """Return residuals (g,) of couplings and of their time derivatives; angles differ from ``near`` by
+        rounding only."""
         if not couplings:
             return (self._of.arithmetic.zeros(0),) * 2
         levels = self.values(x, near), self.rates(x, v)
@@ -222,7 +227,7 @@ class JointCoordinates:
         return first, second
 
     def mass(self, x: np.ndarray) -> np.ndarray:
-        """The armatures' part (3 (n - 4), 3 (n - 4)) of the mass matrix at coordinates x (3, n)."""
+        """Return the armatures' part (3 (n - 4), 3 (n - 4)) of the mass matrix at coordinates x (3, n)."""
         size = 3 * (x.shape[1] - 4)
         total = self._of.arithmetic.zeros(size, size)
         for gear, gradient in zip(self.armatures, self.gradients(self.armatures, x), strict=True):
@@ -230,7 +235,7 @@ class JointCoordinates:
         return np.asarray(total)
 
     def gradients(self, gears: Sequence[Gear], x: np.ndarray) -> np.ndarray:
-        """Derivatives (g, 3, n - 4) of the rows of gears by coordinates x (3, n)."""
+        """Return derivatives (g, 3, n - 4) of the rows of gears by coordinates x (3, n)."""
         if not gears:
             return self._of.arithmetic.zeros(0, 3, x.shape[1] - 4)
         found = [form.gradient(x)[:, :-4] for form in self.forms]
@@ -238,7 +243,7 @@ class JointCoordinates:
 
 
 class GearSeries:
-    """The joint coordinates, and the multipliers of gears, about one time."""
+    """Series of the joint coordinates, and of the multipliers of gears, about one time."""
 
     def __init__(
         self, of: JointCoordinates, gears: Sequence[Gear], start: Sequence[Any], terms: int, zeros: Any
@@ -248,24 +253,24 @@ class GearSeries:
         self._moments, self._nothing = zeros(len(of.forms), terms), zeros(len(gears))
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Take order k of the coordinates X (terms, 3, n) in."""
+        """Add order k of the coordinates X (terms, 3, n)."""
         for coordinate in self.coordinates:
             coordinate.grow(k, x)
 
     def gaps(self, k: int) -> np.ndarray:
-        """Order k (g,) of the rows."""
+        """Return order k (g,) of the rows."""
         found = self._nothing.copy()
         for g, gear in enumerate(self.gears):
             found[g] = gear.total([coordinate.value[k] for coordinate in self.coordinates])
         return np.asarray(found)
 
     def pull(self, k: int) -> Any:
-        """Order k (3, n) of the gradients times the multipliers, 0 without gears."""
+        """Return order k (3, n) of the gradients times the multipliers; 0 without gears."""
         pairs = zip(self.coordinates, self._moments, strict=True)
         return sum((coordinate.pull(moment, k) for coordinate, moment in pairs), 0)
 
     def put(self, multipliers: np.ndarray, k: int) -> None:
-        """Take order k of the multipliers (g,) in."""
+        """Add order k of the multipliers (g,)."""
         for value, gear in zip(multipliers, self.gears, strict=True):
             for i, weight in gear.terms:
                 self._moments[i, k] = self._moments[i, k] + weight * value

@@ -1,6 +1,6 @@
 """Loads of a scene in natural coordinates, as Taylor series.
 
-A force F (3, n) on the coordinates X (3, n) does the work Σ F δX.  Each load adds its order k once the
+A force F (3, n) on the coordinates X (3, n) does the work Σ F δX.  Each load contributes its order k when the
 coordinates are known to order k + 1, which dampers need.
 """
 
@@ -70,7 +70,7 @@ class Loads:
 
 
 class LoadSeries:
-    """The loads about one time."""
+    """Series of the loads about one time."""
 
     def __init__(self, loads: Loads, t: Any, angles: Sequence[Any], terms: int):
         self._loads = loads
@@ -90,12 +90,12 @@ class LoadSeries:
         ]
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Take order k of the coordinates in; x (terms, 3, n)."""
+        """Add order k of the coordinates x (terms, 3, n)."""
         for load in self._all:
             load.grow(k, x)
 
     def order(self, k: int, x: np.ndarray) -> np.ndarray:
-        """Order k (3, n) of the force; the coordinates are known to order k + 1."""
+        """Return order k (3, n) of the force; the coordinates must be known to order k + 1."""
         force = self._loads.constant if k == 0 else 0 * self._loads.constant
         for load in self._all:
             force = force + load.order(k)
@@ -121,7 +121,7 @@ class SpringForm:
 
 
 class SpringSeries:
-    """Its pull (k (1 - l₀ / l) + c l' / l) d, with l² = d · d and 1 / l by their recurrences."""
+    """Series of a spring's force (k (1 - l₀ / l) + c l' / l) d, with recurrences for l² = d · d and 1 / l."""
 
     def __init__(self, form: SpringForm, terms: int):
         self._form = form
@@ -129,7 +129,7 @@ class SpringSeries:
         self._length, self._inverse, self._rate, self._pull = form.zeros(4, terms)
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of the vector, of its length and of that's inverse, and order k - 1 of its rate."""
+        """Compute order k of the vector, of its length and of 1 / length, and order k - 1 of the rate."""
         self._d[k] = x[k] @ self._form.vector
         square = convolved(self._d, self._d, k).sum()
         if k == 0:
@@ -142,7 +142,7 @@ class SpringSeries:
         self._rate[k - 1] = k * self._length[k]
 
     def order(self, k: int) -> np.ndarray:
-        """Order k (3, n) of the force."""
+        """Return order k (3, n) of the force."""
         form = self._form
         elastic = -form.stiffness * form.rest * self._inverse[k]
         self._pull[k] = elastic + form.damping * convolved(self._rate, self._inverse, k)

@@ -1,9 +1,10 @@
-"""Chebyshev–Picard panels: integrals of whole stretches of time at once, in any arithmetic.
+"""Chebyshev–Picard panels: the differential equation is solved on a whole interval of time (panel) at once,
+in any arithmetic.
 
 The rates at the Chebyshev points of a panel are interpolated and integrated exactly, and the iteration is
-repeated until it stands still (Clenshaw and Norton, Computer Journal 6, 1963; Bai and Junkins, Journal of
-the Astronautical Sciences 58, 2011).  Positions follow from the velocities of the same sweep, which about
-halves the number of sweeps.
+repeated until it converges (Clenshaw and Norton, Computer Journal 6, 1963; Bai and Junkins, Journal of the
+Astronautical Sciences 58, 2011).  Positions follow from the velocities of the same sweep, which about halves
+the number of sweeps.
 """
 
 from __future__ import annotations
@@ -18,41 +19,52 @@ from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
-MANY = 35  # iterations: after more of them the next panel is not longer
-SETTLED = 2000.0  # rounding units of the last change, and of the end of the series
+MANY = 35  # iterations; after more of them the next panel is not longer
+SETTLED = 2000.0  # rounding units; limit of the last change and of the last coefficients of the series
 BRIDGED = 1e4  # factor on the tolerance across a singular position
-TELLING = 1e-3  # change below which the series determines the length of a panel
+TELLING = 1e-3  # change of an iterate below which its series determines the length of a panel
 ROUGHLY = 1.2  # safety factor on the length that the series of an iterate gives
 SPARE = 0.9  # panel length / longest length that the series resolves
-LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5  # factors on the length of the next panel
-FLOOR = 1e-3  # fraction of the largest column: smaller columns count as small
+# factors on the length of the next panel: largest, after a failed panel, smallest
+LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5
+FLOOR = 1e-3  # fraction of the largest column that is the least scale of a column
 DIVERGES = 1e3
-LAST = 3  # coefficients of a series that must be small
-FLAT = 0.1  # ratio of its last eighth to the one before, from which on a series ends in rounding noise
+LAST = 3  # number of last coefficients of a series that must be small
+# ratio of the last eighth of the coefficients to the eighth before, above which a series ends in rounding
+# noise
+FLAT = 0.1
 NOISE = 4.0  # multiple of the last eighth of the coefficients: noise level of an iteration
 NOISIEST = 1e5  # multiple of the tolerance: largest noise of a converged panel
 
 
 class Equations(Protocol):
-    """y' of states (K, n): the rates of the first ``light`` columns are cheap and follow from all columns."""
+    """Differential equations y' of states (K, n).
+
+    The rates of the first ``light`` columns are cheap to compute, and follow from all columns.
+    """
 
     light: int
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
-        """(K, light) rates of the first columns."""
+        """Return the rates (K, light) of the first columns."""
 
     def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(K, n - light) rates of the others, and the distance (K,) of their equations from singularity."""
+        """Return the rates (K, n - light) of all other columns, and the distance (K,) of their equations from
+        singularity."""
 
     def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """States nearer to obeying the constraints, off which rates near singular positions lose digits."""
+        """Return states that violate the constraints less; near singular positions, rates of other states
+        lose digits."""
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A stretch of time: start, length, states (nodes, n) and rates of the columns after the light ones;
-    whether the iteration has settled, and a factor on the length for the next panel, or for another try;
-    where in [-1, 1] a singular position is crossed, and where one is foreseen (from -1 on)."""
+    """An interval of time: start, length, states (nodes, n) and rates of the columns after the light ones.
+
+    Further fields are: whether the iteration has converged, a factor on the length for the next panel or
+    another attempt, and the places in [-1, 1] of a crossed singular position and (from -1 on) of a predicted
+    one.
+    """
 
     start: Any
     length: Any
@@ -65,12 +77,12 @@ class Panel:
     sweeps: int = 0
 
     def time(self, place: float | None) -> float | None:
-        """The time (s) of a place."""
+        """Return the time (s) of a place."""
         return None if place is None else float(self.start + self.length * (place + 1) / 2)
 
 
 class Panels:
-    """The matrices of so many Chebyshev points, and the iteration on them."""
+    """Matrices for a number of Chebyshev points, and the iteration on these points."""
 
     def __init__(self, arithmetic: Arithmetic, nodes: int):
         self.arithmetic, self.count = arithmetic, nodes
@@ -81,11 +93,11 @@ class Panels:
         self.series = cosine[(i[:, None] * (last - i)) % (2 * last)] * 2 / last
         self.series[:, [0, last]] = self.series[:, [0, last]] / 2
         self.series[[0, last]] = self.series[[0, last]] / 2
-        values = cosine[(np.arange(nodes + 1) * (last - i)[:, None]) % (2 * last)]  # of T_0 … T_nodes
+        values = cosine[(np.arange(nodes + 1) * (last - i)[:, None]) % (2 * last)]  # values of T_0 … T_nodes
         self.integral = self.times(_antiderivatives(values), self.series)
 
     def times(self, matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Matrix products (m, n) (n, k); Arb's own where elements are objects."""
+        """Return matrix products (m, n) (n, k); Arb's own products if elements are objects."""
         if not self.arithmetic.digits:
             return matrix @ values
         from flint import arb_mat
@@ -95,7 +107,7 @@ class Panels:
         return self.arithmetic.settled(out.reshape(matrix.shape[0], values.shape[1]))
 
     def panel(self, equations: Equations, start: Any, length: Any, guess: np.ndarray) -> Panel:
-        """The solution from the first state of a guess (nodes, n) on."""
+        """Return the solution that starts at the first state of a guess (nodes, n)."""
         t, places = start + length / 2 * (self.nodes + 1), doubles(self.nodes)
         y, last, crossing = guess, np.inf, None
         for sweep in range(1, SWEEPS):
@@ -120,8 +132,8 @@ class Panels:
     def _integrated(
         self, equations: Equations, y: np.ndarray, rates: np.ndarray, length: Any
     ) -> tuple[np.ndarray, np.ndarray]:
-        """States (nodes, n) from the first one on with rates of the columns after the light ones, and the
-        columns' sizes (n,)."""
+        """Return states (nodes, n) from the first one on, for given rates of the columns after the light
+        ones, and the columns' sizes (n,)."""
         light, half, better = equations.light, length / 2, y.copy()
         better[:, light:] = y[0, light:] + half * self.times(self.integral, rates)
         moves = equations.light_rates(better)
@@ -131,7 +143,8 @@ class Panels:
     def _progress(self, panel: Panel, size: np.ndarray, change: float, distance: np.ndarray) -> Panel | None:
         """Return the panel once an iterate has converged, or the factor by which it must be shorter."""
         tolerance = self.tolerance * (1 if panel.crossing is None else BRIDGED)
-        if change > (TELLING if panel.crossing is None else tolerance):  # bridged iterates tell nothing
+        # a change of iterates across a singular position does not decrease regularly
+        if change > (TELLING if panel.crossing is None else tolerance):
             return None
         series = self._series(panel.rates * panel.length, size[-panel.rates.shape[1] :])
         tolerance = max(tolerance, self._noise(series))
@@ -147,12 +160,15 @@ class Panels:
         )
 
     def _series(self, moved: np.ndarray, size: np.ndarray) -> np.ndarray:
-        """Largest Chebyshev coefficients (nodes,) of columns (nodes, n) of such sizes (n,)."""
+        """Return the largest Chebyshev coefficients (nodes,) of columns (nodes, n), relative to the sizes
+        (n,)."""
         return (np.abs(doubles(self.times(self.series, moved))) / size).max(axis=1, initial=0.0)
 
     def _noise(self, series: np.ndarray) -> float:
-        """The noise that the rates of ill-conditioned equations leave in an iterate; 0 where its series falls
-        to the end, or to the tolerance."""
+        """Return the noise of an iterate that ill-conditioned equations cause.
+
+        It is 0 if the series decreases to its end, or to the tolerance.
+        """
         few = len(series) // 8
         before, last = series[-2 * few : -few].max(), series[-few:].max()
         noisy = self.tolerance < last < NOISIEST * self.tolerance and last > FLAT * before
@@ -173,7 +189,7 @@ class Panels:
 
     @staticmethod
     def _size(y: np.ndarray, moved: np.ndarray, light: int) -> np.ndarray:
-        """(n,) scales of the columns' changes."""
+        """Return the scales (n,) of the columns' changes."""
         size = np.maximum(np.abs(doubles(y)).max(axis=0), np.abs(doubles(moved)).max(axis=0))
         for group in (slice(None, light), slice(light, None)):
             largest = size[group].max(initial=0.0)
@@ -181,14 +197,17 @@ class Panels:
         return size
 
     def sampled(self, panel: Panel, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """States (k, n) and rates of the columns after the light ones at times (k,) of a panel."""
+        """Return states (k, n) and rates of the columns after the light ones at times (k,) of a panel."""
         x = (t - panel.start) / panel.length * 2 - 1
         values = _summed(self._coefficients(panel), x[:, None])
         return values[:, : panel.states.shape[1]], values[:, panel.states.shape[1] :]
 
     def continued(self, panel: Panel, times: float, singular: float) -> tuple[Panel, float]:
-        """The panel, so many times longer, over a singular position (s), by the series cut at their smallest
-        terms at the new end; and the size of the first terms left out, relative to the states' columns."""
+        """Return the panel extended by the factor ``times`` over a singular position (s), and its error.
+
+        The series are cut at their smallest terms at the new end. The error is the size of the first omitted
+        terms, relative to the states' columns.
+        """
         c, n = self._coefficients(panel), panel.states.shape[1]
         size = self._size(panel.states, 0 * panel.states, n - panel.rates.shape[1])
         growth = np.polynomial.chebyshev.chebvander(2 * times - 1, self.count - 1)
@@ -202,12 +221,12 @@ class Panels:
         return longer, float(pairs[cut])
 
     def _coefficients(self, panel: Panel) -> np.ndarray:
-        """Chebyshev coefficients (nodes, ·) of states and rates."""
+        """Return the Chebyshev coefficients (nodes, ·) of states and rates."""
         return self.times(self.series, np.concatenate([panel.states, panel.rates], axis=1))
 
 
 def _summed(c: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Values (k, n) of Chebyshev series (m, n) at places x (k, 1), by Clenshaw's recurrence."""
+    """Return values (k, n) of Chebyshev series (m, n) at places x (k, 1), by Clenshaw's recurrence."""
     b, ahead = 0 * x + c[-1], 0 * x
     for row in c[-2:0:-1]:
         b, ahead = 2 * x * b - ahead + row, b
@@ -215,7 +234,8 @@ def _summed(c: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _antiderivatives(values: np.ndarray) -> np.ndarray:
-    """(nodes, nodes) integrals of T_j from -1 to each node, from the values (nodes, nodes + 1) of T_j."""
+    """Return integrals (nodes, nodes) of T_j from -1 to each node, from the values (nodes, nodes + 1) of
+    T_j."""
     nodes = len(values)
     out = values[:, :nodes] * 0
     out[:, 0], out[:, 1] = values[:, 1] + 1, (values[:, 2] - 1) / 4
@@ -226,7 +246,8 @@ def _antiderivatives(values: np.ndarray) -> np.ndarray:
 
 
 def _cosines(arithmetic: Arithmetic, n: int) -> np.ndarray:
-    """cos(π k / n) (2 n,); π by Gauss's arithmetic-geometric mean (Brent, Journal of the ACM 23, 1976)."""
+    """Return cos(π k / n) (2 n,); π by Gauss's arithmetic-geometric mean (Brent, Journal of the ACM 23,
+    1976)."""
     a, gap, power = arithmetic.array([1.0]), arithmetic.array([0.25]), 1
     b = np.sqrt(a / 2)
     while float(a[0] - b[0]) > arithmetic.eps**0.5:

@@ -1,10 +1,10 @@
 """The reference motion of any scene: two formulations, their agreement, and the bound that follows from it.
 
-Formulation A moves the scene twice, by series of different orders and with other rows where some are
-redundant; formulation B moves it once.  Where redundant rows contradict each other, because the scene's
-numbers are rounded, joints are displaced by as much in the second run.  Where B ends before A, as
-in a singular position, the two runs of A bound each other; where A has no time left before B, as with stiff
-dampers, B moves the scene twice, and two runs of B bound each other after A's end.
+Formulation A computes the motion twice, by series of different orders and with other independent rows if some
+are redundant. Formulation B computes it once. If redundant rows contradict each other, because the scene's
+numbers are rounded, joints are displaced by that amount in the second run. If B ends before A, as at a
+singular position, the difference of the two runs of A gives the bound. If A runs out of time before B, as
+with stiff dampers, B is run twice, and the difference of the two runs of B gives the bound from there on.
 """
 
 from __future__ import annotations
@@ -28,8 +28,9 @@ SECOND_RUN_ORDER, SECOND_RUN_NODES, SECOND_RUN_SEED = (
     1.8,
     1,
 )  # second runs: order of A, nodes per digit of B, seed
-CONSISTENT = 32 * EXTENDED.eps  # residual that is of the motion's own rounding, not of the scene's
-SHARE = 0.4  # fraction of the time that is left for each run of A
+# residual that is due to the rounding of the motion, not to the scene's numbers
+CONSISTENT = 32 * EXTENDED.eps
+SHARE = 0.4  # fraction of the remaining time for each run of A
 FIELDS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 _computing: dict[str, Lock] = {}  # locks, keyed by the data that determine a motion
@@ -38,8 +39,11 @@ _computing: dict[str, Lock] = {}  # locks, keyed by the data that determine a mo
 @dataclass(frozen=True)
 class Reference:
     """Samples of the reference motion in double precision, as in Motion, and the ``bound`` (k,) on their
-    error: distance over the scene's length, or angle (rad).  ``both`` (k,) marks where A and B agree and
-    not two runs of one of them alone; ``seconds`` of CPU time were spent."""
+    error.
+
+    The bound is a distance over the scene's length, or an angle (rad). ``both`` (k,) is True where A and B
+    agree, and False where two runs of one of them agree. ``seconds`` is the CPU time.
+    """
 
     times: np.ndarray
     position: np.ndarray
@@ -61,7 +65,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class NoReference:
-    """Why a scene has no reference at all times asked for, and the samples it has, up to ``until`` (s)."""
+    """A scene has no reference at all requested times: the reason, and the samples up to ``until`` (s)."""
 
     reason: str
     until: float
@@ -69,10 +73,10 @@ class NoReference:
 
 
 def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference | NoReference:
-    """The reference motion at times (k,) ≥ 0, from the cache where it has them.
+    """Return the reference motion at times (k,) ≥ 0, from the cache if it contains them.
 
-    Takes about so many CPU seconds of the calling thread at most; of several threads that ask for a scene,
-    the first computes.  Raises SceneError where the scene's velocities contradict its joints.
+    It takes at most about ``seconds`` of CPU time of the calling thread. If several threads request a scene,
+    the first one computes it.  Raises SceneError where the scene's velocities contradict its joints.
     """
     wanted = np.unique(np.asarray(times, dtype=float))
     with _computing.setdefault(cache.canonical(scene), Lock()):
@@ -83,7 +87,7 @@ def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference
 
 
 def _known(scene: Scene, wanted: np.ndarray, seconds: float) -> _Kept:
-    """From the cache, or computed and put there, with the times that it had."""
+    """Return the motion from the cache, or compute and store it, together with the times that were stored."""
     kept = _load(scene)
     if kept is None or not kept.answers(wanted, seconds):
         known = wanted if kept is None else np.union1d(wanted, kept.samples.times)
@@ -93,8 +97,11 @@ def _known(scene: Scene, wanted: np.ndarray, seconds: float) -> _Kept:
 
 
 def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motion, Motion]:
-    """The motion at ascending times (k,) by A, by A in its other way, and by B; where A has no time left and
-    B goes on, as with stiff dampers, by B, by B in its other way, and by A."""
+    """Return the motion at increasing times (k,) by A, by a second run of A, and by B.
+
+    If A runs out of time and B continues, as with stiff dampers, return the motion by B, by a second run of
+    B, and by A.
+    """
     a = natural_motion(scene, times, EXTENDED, seconds=SHARE * seconds)
     left, moved = seconds - a.seconds, max(DATA, a.contradiction) if a.contradiction > CONSISTENT else 0.0
     if a.reason == OVER:
@@ -109,7 +116,7 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
 
 
 def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
-    """By A, of another order and with other rows, the joints displaced."""
+    """Return the second run of A: of another order and with other rows, with displaced joints."""
     return natural_motion(
         scene,
         times,
@@ -122,7 +129,7 @@ def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) 
 
 
 def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
-    """By B, on fewer points and with other rows, the joints displaced."""
+    """Return the second run of B: on fewer points and with other rows, with displaced joints."""
     return tree_motion(
         scene,
         times,
@@ -163,21 +170,21 @@ def judged(
 
 @dataclass(frozen=True)
 class _Kept:
-    """A scene's motion as far as it is known: samples, why none are later, and the CPU time given."""
+    """The known part of a scene's motion: samples, the reason for its end, and the CPU time allowed."""
 
     samples: Reference
     reason: str
     seconds: float
 
     def answers(self, times: np.ndarray, seconds: float) -> bool:
-        """Whether nothing more would be known at the times (k,) from another run of so many seconds."""
+        """Return whether another run within these CPU seconds would not give more at the times (k,)."""
         missing = times[~np.isin(times, self.samples.times)]
         return not len(missing) or (
             missing.min() > self.until() and self.seconds >= seconds and bool(self.reason)
         )
 
     def until(self) -> float:
-        """The last time (s) at which the motion is known."""
+        """Return the last time (s) at which the motion is known."""
         return float(self.samples.times.max(initial=0.0))
 
     def arrays(self) -> dict[str, np.ndarray]:

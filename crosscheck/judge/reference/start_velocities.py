@@ -1,10 +1,11 @@
-"""Velocities at the start by the documented rule, to the last digit of any arithmetic.
+"""Initial velocities by the documented rule, to the last digit of any arithmetic.
 
-Of the velocities that obey the rows, those nearest to the given ones; of those, where some freedoms are left,
-the ones of least kinetic energy.  Each solution is corrected by pseudo-inverses in double precision until its
-residuals, in the arithmetic itself, are of rounding (Å. Björck, Numerical Methods for Least Squares Problems,
-1996, section 2.9).  Taken in double precision alone, the start would differ from the rule's by 1e-16, and
-near singular positions by 1e-13, in all formulations alike.
+Among the velocities that satisfy the rows, the rule selects those nearest to the given ones. If degrees of
+freedom are left, it selects the velocities of least kinetic energy. Each solution is corrected by
+pseudo-inverses in double precision until its residuals, computed in the arithmetic itself, are at rounding
+level (Å. Björck, Numerical Methods for Least Squares Problems, 1996, section 2.9). In double precision alone
+the start would differ from the rule's by 1e-16, and near singular positions by 1e-13, in all formulations
+alike.
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ from crosscheck.judge.deadline import ask
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 
-ROUNDS = 40  # correction steps at most
+ROUNDS = 40  # largest number of correction steps
 STALLED = 0.5  # ratio of successive corrections above which the iteration ends
 
 
 @dataclass(frozen=True)
 class Given:
-    """The velocities that a scene gives: numbers of the ``components`` among (nb, 6) velocities and angular
-    velocities, their ``values`` (g,), and the ``weights`` (g,), the scene's length for angular ones."""
+    """The velocities that a scene gives: the ``components`` among (nb, 6) velocities and angular velocities,
+    their ``values`` (g,), and ``weights`` (g,).
+
+    The weight of an angular velocity is the scene's length.
+    """
 
     components: np.ndarray
     values: np.ndarray
@@ -34,7 +38,7 @@ class Given:
 
 
 def given(scene: Scene) -> Given:
-    """The given velocities of a scene."""
+    """Return the given velocities of a scene."""
     left_out = (np.nan,) * 3
     rows = [(*(b.velocity or left_out), *(b.angular_velocity or left_out)) for b in scene.body]
     values = np.array(rows, dtype=float).ravel()
@@ -51,8 +55,11 @@ def start_velocities(
     wanted: np.ndarray,
     mass: np.ndarray,
 ) -> np.ndarray:
-    """z (n,) with rows (m, n) z = rates (m,), then |fit (g, n) z - wanted (g,)| least, then zᵀ mass (n, n) z
-    least; the rows are independent."""
+    """Return z (n,) with rows (m, n) z = rates (m,), then with least |fit (g, n) z - wanted (g,)|, then with
+    least zᵀ mass (n, n) z.
+
+    The rows must be independent.
+    """
     z = least_squares(arithmetic, rows, rates)
     free = null_space(arithmetic, rows)
     fitted = arithmetic.settled(fit @ free)
@@ -63,7 +70,7 @@ def start_velocities(
 
 
 def least_squares(arithmetic: Arithmetic, matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """x (n,) with |matrix (m, n) x - wanted (m,)| least."""
+    """Return x (n,) with least |matrix (m, n) x - wanted (m,)|."""
     inverse = np.linalg.pinv(doubles(matrix), rcond=RANK)
     x, left, last = arithmetic.zeros(matrix.shape[1]), wanted, np.inf
     for _ in range(ROUNDS):
@@ -79,7 +86,7 @@ def least_squares(arithmetic: Arithmetic, matrix: np.ndarray, wanted: np.ndarray
 
 
 def null_space(arithmetic: Arithmetic, matrix: np.ndarray) -> np.ndarray:
-    """A basis (n, k) of the vectors that a matrix (m, n) takes to zero, nearly orthonormal."""
+    """Return a nearly orthonormal basis (n, k) of the null space of a matrix (m, n)."""
     near = doubles(matrix)
     _, s, vt = np.linalg.svd(near, full_matrices=True)
     rank = int((s > RANK * s.max(initial=0.0)).sum())

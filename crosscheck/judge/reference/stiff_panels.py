@@ -1,10 +1,11 @@
 """Panels of stiff motions: the collocation equations solved by Newton's method instead of Picard's iteration.
 
-Picard's iteration needs panels of a few times the shortest decay, however smooth the motion is.  Newton's
-needs the rates' slopes, which are taken in double precision: corrections from residuals in the arithmetic
-itself gain so many digits each.  The rates at the start, which are not collocated, follow from the others'
-polynomial, so that fast decays are damped at any length (E. Hairer and G. Wanner, Solving Ordinary
-Differential Equations II, 1996, section IV.3: the stability function vanishes at infinity).
+Picard's iteration needs panels of a few times the shortest decay time, however smooth the motion is. Newton's
+method needs the derivatives of the rates. They are computed in double precision, while residuals use the
+arithmetic itself, so that each correction gains digits. The rates at the start of a panel are no unknowns:
+they follow from the polynomial through the other rates, so that fast decays are damped for any panel length
+(E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, section IV.3: the stability
+function vanishes at infinity).
 """
 
 from __future__ import annotations
@@ -29,17 +30,17 @@ from crosscheck.judge.reference.panels import (
     Panels,
 )
 
-MOST = 2500  # unknowns of a panel
+MOST = 2500  # largest number of unknowns of a panel
 STIFF = 4.0  # panel length / fastest decay time above which a panel is stiff
 SWEEPS = 25  # corrections before a panel is shortened
-AGAIN = 1e-4  # change from which on slopes are not taken again
+AGAIN = 1e-4  # change below which derivatives are not computed again
 GROWS = 2.0  # ratio of successive changes above which the iteration diverges
 RESOLVED = 0.1  # fraction of the tolerance: largest last coefficients of a resolved series
 STEP = 1e-5  # increment of difference quotients / largest entry of the column
 
 
 class SlopedEquations(Equations, Protocol):
-    """Equations with the same in double precision."""
+    """Interface of equations that can return a version of themselves in double precision."""
 
     def in_doubles(self) -> Equations:
         """Return these equations in double precision."""
@@ -51,11 +52,11 @@ class StiffPanels:
     def __init__(self, panels: Panels):
         self.panels = panels
         signs = np.where(np.arange(panels.count) % 2, 2, -2)
-        signs[-1] //= 2  # the last Chebyshev coefficient of the rates vanishes
+        signs[-1] //= 2  # the last Chebyshev coefficient of the rates is zero
         self.integral = panels.integral[1:, 1:] + panels.integral[1:, :1] * signs[1:]
 
     def is_for(self, equations: SlopedEquations, t: Any, length: float, state: np.ndarray) -> bool:
-        """Whether a state (n,) has decays much shorter than a panel, and few enough numbers."""
+        """Return whether a state (n,) has decays much shorter than a panel, and the panel is small enough."""
         if len(state) * self.panels.count > MOST:
             return False
         at = doubles(self.panels.arithmetic.zeros(1) + t)
@@ -63,7 +64,7 @@ class StiffPanels:
         return bool(np.isfinite(slopes).all() and -np.linalg.eigvals(slopes).real.min() * length > STIFF)
 
     def panel(self, equations: SlopedEquations, start: Any, length: Any, guess: np.ndarray) -> Panel:
-        """The solution from the first state of a guess (nodes, n) on."""
+        """Return the solution that starts at the first state of a guess (nodes, n)."""
         settled, light, last = self.panels.arithmetic.settled, equations.light, np.inf
         t, half, y = start + length / 2 * (self.panels.nodes + 1), length / 2, guess
         for sweep in range(SWEEPS):
@@ -86,7 +87,8 @@ class StiffPanels:
         return Panel(start, length, guess, rates, False, SHORTER)
 
     def _judged(self, panel: Panel, size: np.ndarray, distance: np.ndarray) -> Panel:
-        """A settled panel, or one that its points do not resolve or that crosses a singular position."""
+        """Return a converged panel, or a failed one if its points do not resolve the motion or it crosses a
+        singular position."""
         fits = self._fits(panel.states, size)
         crossing = singular_time(doubles(self.panels.nodes), distance)
         if fits < 1 or crossing is not None:
@@ -110,7 +112,7 @@ class StiffPanels:
         return self.panels._size(y, 0 * y, light)
 
     def _factorised(self, equations: Equations, t: np.ndarray, y: np.ndarray, half: float) -> Any:
-        """Factors of 1 - half · integral ⊗ slopes."""
+        """Return factors of 1 - half · integral ⊗ derivatives."""
         slopes = _slopes(equations, t, y)[1:]
         nodes, n = len(slopes), slopes.shape[-1]
         matrix = -half * np.einsum("ij,jab->iajb", doubles(self.integral), slopes).reshape(
@@ -123,7 +125,7 @@ class StiffPanels:
 
 
 def _slopes(equations: Equations, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Derivatives (K, n, n) of the rates by the states (K, n), by central differences."""
+    """Return derivatives (K, n, n) of the rates by the states (K, n), by central differences."""
     n, steps = y.shape[1], STEP * np.maximum(np.abs(y).max(axis=0), 1.0)
     moved = (steps * np.eye(n))[:, None]
     ends = [_rates(equations, t, y + side * moved) for side in (1, -1)]
@@ -131,7 +133,7 @@ def _slopes(equations: Equations, t: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def _rates(equations: Equations, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Rates (…, K, n) of states (…, K, n)."""
+    """Return rates (…, K, n) of states (…, K, n)."""
     ask()
     many, flat = np.tile(t, len(y)), y.reshape(-1, y.shape[-1])
     other, _ = equations.other_rates(many, flat)

@@ -1,8 +1,8 @@
 """The motion of a scene by formulation A: Taylor series of high order, step after step.
 
 Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14,
-2005); after each the coordinates are projected onto the rows.  A singular position, near which the series is
-lost in rounding noise, is crossed by one step, along the branch that the series continues.
+2005); after each the coordinates are projected onto the rows.  Near a singular position rounding noise
+dominates the series, so one step crosses the position, along the branch that the series continues.
 """
 
 from __future__ import annotations
@@ -27,27 +27,30 @@ from crosscheck.judge.time_functions import next_end
 from mbref.scene import Scene
 
 ORDER = 28
-NEW_ROW = 1e-4  # pivot from which a row that was dependent at the start has become independent
-ILL_CONDITIONED = 0.25  # smallest singular value / best value: below it rows are selected again
-WELL_CONDITIONED = 0.5  # smallest singular value of the new rows / best value: required,
-BETTER = 1e3  # or: smallest singular value of the new rows / of the old rows
-NEAR = 0.4  # smallest singular value / usual value: below it a singular position is near
+NEW_ROW = 1e-4  # a row that was dependent at the start counts as independent from this pivot on
+# smallest singular value / value of the best selection: below it rows are selected again
+ILL_CONDITIONED = 0.25
+# new rows are accepted if their smallest singular value / value of the best selection is above this,
+WELL_CONDITIONED = 0.5
+BETTER = 1e3  # or if their smallest singular value is larger than the old rows' by this factor
+NEAR = 0.4  # smallest singular value / usual value, below which a singular position is near
 PREFERENCE = 0.2  # largest relative change of a row's weight
-USUAL = 50  # steps whose median conditioning is the usual one
-DATA = float(np.finfo(float).eps)  # rounding of a scene's numbers
-ENOUGH = 100.0  # multiples of the tolerance that a step across may lose without a second attempt
-TRIED = 24  # lengths at which a singular position is looked for
+USUAL = 50  # number of steps whose median of the smallest singular value is the usual value
+DATA = float(np.finfo(float).eps)  # rounding unit of a scene's numbers
+# multiple of the tolerance: largest error of a step across a singular position without a second attempt
+ENOUGH = 100.0
+TRIED = 24  # number of step lengths at which a singular position is searched
 FINE = 1e-6  # relative accuracy of the time of the singular position
-DEPENDENT = 0.02  # smallest singular value / present value: below it the rows are dependent
+DEPENDENT = 0.02  # smallest singular value / present value, below which rows count as dependent
 SHORTER = 0.8  # factor on a step that ends too near to a singular position
-LEAST_STEP = 1e-6  # s, where no time is left
+LEAST_STEP = 1e-6  # s; shortest step near the time limit
 SHORTEST = 1e-9  # step / time reached: a shorter step ends the run
 STEPS_END = "its steps end: its series cannot be continued over a singular position there"
 WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia: smaller ones count as zero
 
 
 class Ended(ArithmeticError):
-    """The motion cannot be followed further; the message is the reason, a clause."""
+    """The motion cannot be followed further; the message is the reason, as a clause."""
 
 
 def natural_motion(
@@ -62,12 +65,11 @@ def natural_motion(
     displaced: float = 0.0,
     progress: Progress = no_progress,
 ) -> Motion:
-    """The motion at ascending times (k,) ≥ 0 in natural coordinates (see Motion), by series of an order.
-
-    ``tolerance`` is of a step, relative (default: the arithmetic's rounding unit).  Another ``seed`` prefers
-    other rows where some are redundant, and displaces joints by up to ``displaced``, relative to the largest
-    coordinate.  ``seconds`` limits the CPU time of the thread; ``progress`` receives the time of every step.
-    """
+    """Return the motion at increasing times (k,) ≥ 0 in natural coordinates (see Motion), by Taylor series of
+    an order. ``tolerance`` is the relative tolerance of a step (default: the arithmetic's rounding unit).
+    Another ``seed`` selects other rows if some are redundant, and displaces joints by up to ``displaced``,
+    relative to the largest coordinate. ``seconds`` limits the CPU time of the thread; ``progress`` receives
+    the time of every step."""
     began, reason, samples = time.thread_time(), "", []
     stepper = Stepper(scene, arithmetic, order, tolerance or arithmetic.eps, (seed, displaced))
     try:
@@ -91,7 +93,7 @@ def natural_motion(
 
 
 class Stepper:
-    """The coordinates of a scene at a time ``t``, and the steps that take them on."""
+    """The coordinates of a scene at a time ``t``, and the steps that advance them."""
 
     def __init__(
         self, scene: Scene, arithmetic: Arithmetic, order: int, tolerance: float, way: tuple[int, float]
@@ -111,7 +113,8 @@ class Stepper:
         self._held, self._conditioning = self._every, [0.0]
 
     def _varied(self, seed: int, displaced: float) -> np.ndarray:
-        """Weights (m,) of the rows, near one, that prefer other rows by the seed; joints are displaced."""
+        """Return row weights (m,) near one that depend on the seed, so that other rows are selected; also
+        displace the joints."""
         if not seed:
             return np.ones(self.of.count)
         self.of.take_right_angles()
@@ -140,7 +143,7 @@ class Stepper:
             progress(float(self.t))
 
     def _start(self) -> None:
-        """Put the coordinates onto the rows, and take the velocities that the rule asks for."""
+        """Project the coordinates onto the rows, and compute the velocities by the documented rule."""
         self._project()
         held, v = self._held, self._v[:, :-4].ravel()
         rows = held.all_gradients(self._x, held.drives(self.t, 1))[: held.count].reshape(held.count, v.size)
@@ -167,11 +170,11 @@ class Stepper:
         self.contradiction = max(self.contradiction, largest(self._gaps(self._every)[0]) / self._size())
 
     def _size(self) -> float:
-        """The largest coordinate, and no less than one."""
+        """Return the largest coordinate, at least one."""
         return max(1.0, largest(self._x))
 
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
-        """Rows that are independent at the coordinates x, and how many are well so."""
+        """Return independent rows at the coordinates x, and the number of well-conditioned ones."""
         rows, pivots = independent(self._every.unit_gradient(x, t), self._weights)
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
@@ -181,15 +184,15 @@ class Stepper:
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
-        """Hold other rows where these have become blunt and the position is not singular: blunt rows magnify
-        what redundant ones contradict each other by."""
+        """Select other rows if the present ones are ill-conditioned and the position is not singular.
+        Ill-conditioned rows amplify the contradictions of redundant rows."""
         now, best = self._conditioning[-1], max(self._conditioning)
         if now <= ILL_CONDITIONED * best:
             self._hold_others(self._x, self.t, min(WELL_CONDITIONED * best, BETTER * now))
 
     def _hold_others(self, x: np.ndarray, t: Any, least: float) -> bool:
-        """Hold the rows that are independent at coordinates x, if they are sharper than ``least`` there, and
-        sharper than the held ones here; whether they are."""
+        """Select the rows that are independent at coordinates x if they are better conditioned than ``least``
+        there and than the present rows here. Returns whether the selection changed."""
         before, now = self._held, self._conditioning[-1]
         self._held = self._choice(x, t)[0]
         here, there = self._sharp(self._x, self.t), self._sharp(x, t)
@@ -200,15 +203,15 @@ class Stepper:
         return False
 
     def _refuse_singular_start(self, series: np.ndarray, d: Any) -> None:
-        """Raise Ended where more rows are independent a little later than at the start."""
+        """Raise Ended if more rows are independent shortly after the start than at the start."""
         if self._choice(value(series, d), self.t + d)[1] > self._held.count:
             raise Ended(
-                "it starts in a singular position, from which more than one motion goes on: "
-                "give poses and velocities a little later on the branch meant"
+                "it starts in a singular position, from which several motions are possible: give poses and "
+                "velocities of a later time on the intended branch"
             )
 
     def _refuse_undetermined(self) -> None:
-        """Raise Ended where a freedom has neither driver nor inertia."""
+        """Raise Ended if a degree of freedom has neither driver nor inertia."""
         rows = self._held.unit_gradient(self._x, self.t)
         free = np.linalg.svd(rows, full_matrices=True)[2][len(rows) :].reshape(-1, 3, 4 * self.of.nb)
         if not self.of.scene.has_mass() and len(free):
@@ -222,7 +225,7 @@ class Stepper:
             raise Ended(f"body {self.of.scene.body[way.argmax() // 4].name!r} can turn without inertia")
 
     def _gaps(self, held: HeldRows) -> tuple[np.ndarray, np.ndarray]:
-        """Residuals (m,) of rows and of their time derivatives."""
+        """Return residuals (m,) of rows and of their time derivatives."""
         drives = held.drives(self.t, 2)
         u, w = (np.stack([form(self._x), form(self._v)]) for form in (held.u, held.w))
         products = np.stack([(u[0] * w[0]).sum(axis=0), (u[0] * w[1] + u[1] * w[0]).sum(axis=0)])
@@ -231,10 +234,8 @@ class Stepper:
         return np.concatenate([own[0], coupled[0]]), np.concatenate([own[1], coupled[1]])
 
     def _project(self) -> None:
-        """Put coordinates and velocities onto the rows, with the least change in the sense of the masses.
-
-        Raises Ended where the rows are dependent in the digits of the arithmetic.
-        """
+        """Project coordinates and velocities onto the rows, with the least mass-weighted change. Raises Ended
+        if the rows are dependent to the digits of the arithmetic."""
         arithmetic, held = self.of.arithmetic, self._held
         if not held.count:
             return
@@ -273,11 +274,9 @@ class Stepper:
         return expansion, self._shortened(expansion.x, series, h, ahead)
 
     def _shortened(self, x: np.ndarray, series: Series, h: float, ahead: float) -> float:
-        """The length (s) of a step that does not end much nearer to a singular position; ``ahead`` is the
-        conditioning at the end of a step of length h.  Raises Ended where no length is short enough.
-
-        The conditioning at the start is computed again, because the correction of the coordinates changed it.
-        """
+        """Return the length (s) of a step that does not end much nearer to a singular position; ``ahead`` is
+        the conditioning at the end of a step of length h. Raises Ended if no length is short enough. The
+        conditioning at the start is computed again, because the correction of the coordinates changed it."""
         if ahead >= NEAR * self._conditioning[-1]:
             return h
         least, now = SHORTEST * max(1e-3, float(self.t)), self._sharp(self._x, self.t)
@@ -289,8 +288,8 @@ class Stepper:
         return h
 
     def _others_serve(self, series: np.ndarray, middle: float) -> bool:
-        """Whether only the held rows are dependent so far ahead (s), and others are not, which are then held:
-        the position there is not singular."""
+        """Return whether only the selected rows are dependent at a distance (s) ahead, but other rows are
+        not. Then the position is not singular, and the other rows are selected."""
         d = self.of.arithmetic.number(middle)
         if not self._hold_others(value(series, d), self.t + d, self._conditioning[-1]):
             return False
@@ -298,7 +297,7 @@ class Stepper:
         return True
 
     def _ahead(self, x: np.ndarray, series: Series, h: float) -> float:
-        """Sharpness at the end of a step."""
+        """Return the conditioning of the selected rows at the end of a step."""
         d = self.of.arithmetic.number(h)
         return self._sharp(value(x[: series.terms(h)], d), self.t + d)
 

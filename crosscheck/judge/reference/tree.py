@@ -1,8 +1,10 @@
-"""Formulation B of the reference: joint coordinates of a spanning tree, closures, d'Alembert's principle.
+"""Formulation B of the reference: joint coordinates of a spanning tree, loop closures, d'Alembert's
+principle.
 
-At all points of a panel of time at once, twists and their drifts are carried outwards along the tree
-(tree_joints.py), and the joint accelerations q'' and multipliers λ solve [M Gᵀ; G 0] (q'', λ) = (Q, γ),
-with mass matrix M and forces Q of tree_loads.py and the closures' Jacobian G of tree_closures.py.
+At all points of a panel (interval of time) at once, twists and their rates without joint accelerations are
+propagated outwards along the tree (tree_joints.py), and the joint accelerations q'' and multipliers λ solve
+[M Gᵀ; G 0] (q'', λ) = (Q, γ), with mass matrix M and forces Q of tree_loads.py and the closures' Jacobian G
+of tree_closures.py.
 """
 
 from __future__ import annotations
@@ -25,14 +27,14 @@ from mbref.scene import Scene
 NODES_PER_DIGIT = 2.1
 FIRST = 0.1  # length of the first panel / duration
 LEAST = 1e-10  # shortest panel / duration
-SLOW = 20  # Picard iterations: a panel that needs more may be stiff
-NEAR_END = 0.7  # fraction of a panel: a singular position later than this is too near its end
+SLOW = 20  # Picard iterations; a panel that needs more may be stiff
+NEAR_END = 0.7  # fraction of a panel; a singular position later than this is too near to its end
 BEYOND = (
     0.35  # half lengths: largest distance of a singular position from the end of a panel that steps across it
 )
-LEAST_LOST = 1e6  # rounding units that a step across may lose without a second attempt
+LEAST_LOST = 1e6  # rounding units that a step across a singular position may lose without a second attempt
 MOST_LOST = 1e-7  # largest error of a step across a singular position, before closures are corrected
-SEVERAL = 3  # panels across a singular position that may fail to converge before a step across it
+SEVERAL = 3  # failed panels across a singular position before a step across it is tried
 
 
 def tree_motion(
@@ -46,12 +48,12 @@ def tree_motion(
     displaced: float = 0.0,
     progress: Progress = no_progress,
 ) -> Motion:
-    """The motion of a scene at ascending times (k,) ≥ 0 in an arithmetic; see Motion.
+    """Return the motion of a scene at increasing times (k,) ≥ 0 in an arithmetic; see Motion.
 
-    Another ``seed`` prefers other rows where some are redundant, and displaces the joints that close loops by
-    up to ``displaced``, relative to the scene's length.  The motion ends early, with the reason, after so
-    many CPU seconds, where the loops do not stay closed, and where no panel of time is short enough.
-    ``progress`` receives the time of every panel.  Raises SceneError if start velocities violate the joints.
+    Another ``seed`` selects other rows if some are redundant, and displaces the joints that close loops by up
+    to ``displaced``, relative to the scene's length. The motion ends early, with the reason, after
+    ``seconds`` of CPU time, if loops open, or if no panel is short enough. ``progress`` receives the time of
+    every panel.  Raises SceneError if start velocities violate the joints.
     """
     clock = time.thread_time()
     equations = TreeEquations(scene, arithmetic, (seed, displaced))
@@ -65,7 +67,7 @@ def tree_motion(
 
 
 class _Run:
-    """Panels from t = 0 on, and the samples that fell into them."""
+    """Panels from t = 0 on, and the samples inside them."""
 
     def __init__(self, equations: TreeEquations, times: np.ndarray, nodes_per_digit: float):
         self.equations, self.arithmetic, self.times = equations, equations.arithmetic, times
@@ -74,7 +76,7 @@ class _Run:
         self.state = self.arithmetic.zeros(0)
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
-        self.foreseen = 0.0  # time of the next singular position, or a past one
+        self.foreseen = 0.0  # time of the next singular position, or of the last one
         self.unsettled, self.lost = (
             0,
             np.inf,
@@ -83,7 +85,7 @@ class _Run:
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
     def through(self, progress: Progress) -> str:
-        """Run to the last time; return the reason where the motion ends before."""
+        """Run to the last time; return the reason if the motion ends before."""
         ask()
         self.state = self.equations.start()
         if reason := self.equations.undetermined():
@@ -117,7 +119,8 @@ class _Run:
         return step_across or panel
 
     def _accepts(self, panel: Panel) -> bool:
-        """Takes samples, and the state at the end, of a settled panel; false where a loop is open then."""
+        """Take the samples and the end state of a converged panel; returns False if a loop is open at its
+        end."""
         after = panel.start + panel.length
         state = self.equations.closed(after, panel.states[-1])
         if self.equations.gap(after, state) > OPEN:
@@ -127,7 +130,8 @@ class _Run:
         return True
 
     def _panel(self, length: Any, guess: np.ndarray) -> Panel:
-        """By Picard's iteration, or by Newton's method while decays are short against the panel."""
+        """Solve a panel by Picard's iteration, or by Newton's method while decays are short against the
+        panel."""
         solver = self.stiff if self.is_stiff else self.panels
         panel = solver.panel(self.equations, self.t, length, guess)
         if self.is_stiff or panel.sweeps >= SLOW:
@@ -135,15 +139,20 @@ class _Run:
         return panel
 
     def _before_singular(self, length: Any) -> Any:
-        """A length with which no panel ends near a singular position: one ends half a length before, and the
-        next has it in the middle."""
+        """Return a length with which no panel ends near a singular position.
+
+        One panel ends half a length before the position, and the next one has it in the middle.
+        """
         gap = self.foreseen - float(self.t)
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)
         return self.arithmetic.number(gap) - length / 2 if near else length
 
     def _step_across(self, singular: float | None) -> Panel | None:
-        """A panel over a singular position (s) that has no panel of its own, as the iteration there gains no
-        digits: a panel that ends before it, continued by its series; None where nearer ones lose less."""
+        """Return a panel across a singular position (s) at which the iteration does not converge.
+
+        A panel that ends before the position is extended by its series; None if shorter panels lose less
+        accuracy.
+        """
         if singular is None or singular <= self.t:
             return None
         self.unsettled += 1
@@ -186,7 +195,7 @@ class _Run:
             self.unsettled, self.lost = 0, np.inf
 
     def motion(self, reason: str, seconds: float) -> Motion:
-        """The samples as the motion of the bodies."""
+        """Return the samples as the motion of the bodies."""
         equations, numbers = self.equations, self.arithmetic
         if not self.samples:
             self.samples.append((numbers.zeros(0, int(equations.ends[-1])), numbers.zeros(0, equations.nv)))

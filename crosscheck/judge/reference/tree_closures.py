@@ -2,7 +2,8 @@
 
 With d from a point of the first body to one of the second, and directions a of the first and b of the second,
 they are a · d = 0, d · d / 2 = constant and a · b = constant.  The rate of each is linear in the two bodies'
-twists; its coefficients are a wrench on each body, and wrenches times the tree's columns are the Jacobian.
+twists; its coefficients form a wrench on each body, and wrenches times the columns of the tree's Jacobian are
+the Jacobian of the closures.
 """
 
 from __future__ import annotations
@@ -16,7 +17,8 @@ from crosscheck.judge.arithmetic import Arithmetic, doubles
 from crosscheck.judge.reference.tree_joints import Placed, Tree, joint_frame
 from crosscheck.judge.reference.vectors import apply, cross, dot, unit
 
-Carried = tuple[np.ndarray, np.ndarray, np.ndarray]  # value, rate and drift (K, m, 3)
+# value, first rate, and second rate without joint accelerations (K, m, 3)
+Carried = tuple[np.ndarray, np.ndarray, np.ndarray]
 SLIDING = {"translational": (0, 1), "cylindrical": (0, 1), "planar": (2,), "inline": (0, 1)}
 """Numbers of the directions (two normal to the axis, the axis) that nothing may slide along; else all."""
 ALL, TILTS = ((1, 2), (0, 2), (0, 1)), ((2, 0), (2, 1))
@@ -26,8 +28,11 @@ LOCKED = {"fixed": ALL, "translational": ALL, "revolute": TILTS, "cylindrical": 
 
 @dataclass(frozen=True)
 class Rows:
-    """Equations at K samples: values, the parts ``drift`` of their second rates that joint accelerations do
-    not cause (K, m), and the Jacobian (K, m, nv), which times the joint rates is their rate."""
+    """Equations at K samples: values (K, m), the parts ``drift`` (K, m) of their second rates without joint
+    accelerations, and the Jacobian (K, m, nv).
+
+    The Jacobian times the joint rates is the rate of the values.
+    """
 
     value: np.ndarray
     drift: np.ndarray
@@ -39,13 +44,13 @@ class Rows:
         return Rows(*(np.concatenate(pair, axis=1) for pair in pairs))
 
     def among(self, rows: np.ndarray) -> Rows:
-        """Some of the rows, by their numbers."""
+        """Return some of the rows, by number."""
         return Rows(self.value[:, rows], self.drift[:, rows], self.jacobian[:, rows])
 
 
 class Closures:
-    """The closures of a tree's cut joints, packed: of each kind the bodies (m, 2) and, fixed to them, the
-    arms or directions (m, ·, 3)."""
+    """Closures of a tree's cut joints as arrays: for each kind the bodies (m, 2) and, fixed to them, vectors
+    to points, or directions (m, ·, 3)."""
 
     def __init__(self, tree: Tree):
         shifts: list[Any] = []
@@ -77,7 +82,7 @@ class Closures:
         return np.concatenate([np.full(counts[0], length), length * spans, np.ones(counts[1])])
 
     def rows(self, placed: Placed, displaced: np.ndarray) -> Rows:
-        """The closures of placed bodies, of joints displaced by so much (m,)."""
+        """Return the rows for placed bodies, with joints displaced by the given amounts (m,)."""
         kinds = ((self.shifts, self._shifts), (self.lengths, self._lengths), (self.angles, self._angles))
         rows = none(placed)
         for packed, equations in kinds:
@@ -105,7 +110,7 @@ class Closures:
 
 
 class Measured:
-    """Coordinates of joints that are not in the tree, angles first: rows whose values are integrated."""
+    """Coordinates of joints that are not in the tree, angles first, as rows whose values are integrated."""
 
     def __init__(self, tree: Tree, turning: list[Any], sliding: list[Any]):
         def pair(joint: Any) -> tuple[int, ...]:
@@ -121,10 +126,10 @@ class Measured:
         ]
         self.packed = _Packed(tree.arithmetic, axes, 1)
         self._slides = _Packed(tree.arithmetic, places, 3)
-        self.sizes = np.repeat([False, True], [len(turning), len(sliding)])  # whether it is a length
+        self.sizes = np.repeat([False, True], [len(turning), len(sliding)])  # True for a length
 
     def rows(self, placed: Placed, value: np.ndarray) -> Rows:
-        """The rows of placed bodies with the angles and displacements (K, m)."""
+        """Return the rows for placed bodies and given angles and displacements (K, m)."""
         count = len(self.packed.bodies)
         found = self._angles(placed, value[:, :count]) if count else none(placed)
         if not len(self._slides.bodies):
@@ -142,7 +147,7 @@ class Measured:
 
 
 def shift_rows(shifts: _Packed, placed: Placed) -> Rows:
-    """The rows a · d of arms on both bodies and directions of the first."""
+    """Return the rows a · d for vectors to points on both bodies and directions on the first."""
     p, q, a = shifts.carried(placed)
     d = shifts.offset(placed, p, q)
     drift = dot(a[2], d[0]) + 2 * dot(a[1], d[1]) + dot(a[0], d[2])
@@ -152,13 +157,14 @@ def shift_rows(shifts: _Packed, placed: Placed) -> Rows:
 
 
 def none(placed: Placed) -> Rows:
-    """No rows, for as many samples."""
+    """Return zero rows for as many samples."""
     empty = placed.velocity[:, 0, :0]
     return Rows(empty, empty, placed.columns[:, 0, :, :0].swapaxes(1, 2))
 
 
 class _Packed:
-    """Rows of one kind: ``bodies`` (m, 2) and vectors (m, size, 3), the second fixed to the second body."""
+    """Rows of one kind: ``bodies`` (m, 2) and vectors (m, size, 3), the second one fixed to the second
+    body."""
 
     def __init__(self, arithmetic: Arithmetic, rows: list[tuple[Any, Any]], size: int):
         self.bodies = np.array([pair for pair, _ in rows], dtype=int).reshape(-1, 2)
@@ -166,7 +172,7 @@ class _Packed:
         self._carriers = self.bodies[:, [0, 1, 0][:size]]
 
     def carried(self, placed: Placed) -> list[Carried]:
-        """Value, rate and drift (K, m, 3) of each vector."""
+        """Return value, first rate, and second rate without joint accelerations (K, m, 3) of each vector."""
         value = apply(placed.rotation[:, self._carriers], self.vectors)
         spin = placed.spin[:, self._carriers]
         rate = cross(spin, value)
@@ -174,17 +180,18 @@ class _Packed:
         return [(value[:, :, k], rate[:, :, k], drift[:, :, k]) for k in range(self.vectors.shape[1])]
 
     def offset(self, placed: Placed, p: Carried, q: Carried) -> list[np.ndarray]:
-        """Value, rate and drift (K, m, 3) from arm p of the first body to arm q of the second."""
+        """Return value, first rate, and second rate without joint accelerations (K, m, 3) of the vector from
+        point p of the first body to point q of the second."""
         first, second = self.bodies.T
         centres = (placed.position, placed.velocity, placed.drift)
         return [x[:, second] - x[:, first] + b - a for x, a, b in zip(centres, p, q, strict=True)]
 
     def jacobian(self, placed: Placed, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-        """(K, m, nv) of wrenches (K, m, 6) on the two bodies."""
-        columns = placed.columns[:, self.bodies]  # (K, m, 2, nv, 6)
+        """Return the Jacobian (K, m, nv) of wrenches (K, m, 6) on the two bodies."""
+        columns = placed.columns[:, self.bodies]  # shape (K, m, 2, nv, 6)
         return apply(columns, np.stack([first, second], axis=2)).sum(axis=2)
 
 
 def _arms(tree: Tree, bodies: tuple[int, ...], points: Any) -> np.ndarray:
-    """(2, 3) points relative to the bodies' centres at t = 0."""
+    """Return points (2, 3) relative to the bodies' centres at t = 0."""
     return tree.arithmetic.array(points) - tree.start[list(bodies)]

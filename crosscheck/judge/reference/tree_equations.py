@@ -1,4 +1,4 @@
-"""The equations of motion of a scene on its spanning tree: rates of states, and states that obey the joints.
+"""Equations of motion of a scene on its spanning tree: rates of states, and states that satisfy the joints.
 
 A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the coordinates of
 joints outside the tree that a driver, a load, a coupling or an armature uses, and the joint rates.
@@ -25,15 +25,15 @@ from mbref.scene import Scene
 from mbref.scene_joints import ANGLE, DISPLACEMENT
 
 COORDINATES = (ANGLE, DISPLACEMENT)
-WORSE = 0.5  # conditioning / best conditioning: below it other rows are selected
-CORRECTIONS = 8  # Newton iterations at most that close the loops
+WORSE = 0.5  # conditioning / best conditioning, below which other rows are selected
+CORRECTIONS = 8  # largest number of Newton iterations that close the loops
 PREFERENCE = 0.2  # largest relative change of a row's weight
-OPEN = 1e-9  # residual, relative to the scene's length, of rows that were taken as redundant and are not
+OPEN = 1e-9  # residual, relative to the scene's length, above which rows that were taken as redundant are not
 
 
 @dataclass(frozen=True)
 class Instant:
-    """Parts of the equations of K states: bodies, joint coordinates (see ``coordinates``), the rows
+    """Parts of the equations at K states: bodies, joint coordinates (see ``coordinates``), the rows
     of closures and drivers with their rates ``speed`` (K, m), and the joint rates (K, nv)."""
 
     placed: Placed
@@ -44,10 +44,10 @@ class Instant:
 
 
 class TreeEquations:
-    """Rates of states; ``kept`` are the independent ones of the rows of closures and drivers.
+    """Equations for the rates of states; ``kept`` are the independent rows of closures and drivers.
 
-    ``way``: a seed, by which other rows are preferred where some are redundant, and how far, relative to the
-    scene's length, joints that close loops are displaced.
+    ``way`` is a seed that selects other rows if some are redundant, and the displacement of loop-closing
+    joints, relative to the scene's length.
     """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic, way: tuple[int, float] = (0, 0.0)):
@@ -76,8 +76,8 @@ class TreeEquations:
         self._varied(*way)
 
     def _varied(self, seed: int, displaced: float) -> None:
-        """Sizes of the joint rates and of the rows of closures and drivers, weights of these rows, near one,
-        and by how much closures are displaced."""
+        """Return the sizes of the joint rates and of the rows of closures and drivers, row weights near one,
+        and the displacements of closures."""
         rng, closing = np.random.default_rng(seed), self.closures.sizes(self.length)
         self._rate_sizes = np.where(self.tree.turning, 1.0, self.length)
         sizes = self._coordinate_sizes()
@@ -88,19 +88,22 @@ class TreeEquations:
         self._displaced = self.arithmetic.array(displaced * closing * rng.uniform(-1, 1, len(closing)))
 
     def _coordinate_sizes(self) -> np.ndarray:
-        """The scene's length for displacements, one for angles, of the joint coordinates and twists."""
+        """Return the size of each joint coordinate and twist: the scene's length for displacements, one for
+        angles."""
         away = np.where(self.measured.sizes, self.length, 1.0)
         return np.concatenate([self._rate_sizes[: self.tree.scalars], away])
 
     def light_rates(self, y: np.ndarray) -> np.ndarray:
-        """Rates (K, light) of scalars and quaternions, the latter half spin times quaternion."""
+        """Return the rates (K, light) of scalars and quaternions; a quaternion's rate is half spin times
+        quaternion."""
         scalar, ball, _, rate = self._split(y)
         spin = rate[:, self.tree.scalars :].reshape(len(y), len(self.tree.balls), 3)
         moves = product(np.concatenate([0 * spin[..., :1], spin], axis=-1), ball) / 2
         return np.concatenate([rate[:, : scalar.shape[1]], moves.reshape(len(y), 4 * moves.shape[1])], axis=1)
 
     def other_rates(self, t: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rates (K, ·) of angles and joint rates at times t (K,), and the distance (K,) from singularity."""
+        """Return the rates (K, ·) of angles and joint rates at times t (K,), and the distance (K,) from
+        singularity."""
         at = self.at(t, y)
         mass, force = self.loads.terms(at.placed, at.coordinates, at.rate, t, self.since)
         jacobian, drift = at.rows.jacobian[:, self.kept], at.rows.drift[:, self.kept]
@@ -116,7 +119,7 @@ class TreeEquations:
         return self._doubles
 
     def at(self, t: np.ndarray, y: np.ndarray) -> Instant:
-        """Everything of states (K, n) at times (K,)."""
+        """Return the parts of the equations at states (K, n) and times (K,)."""
         scalar, ball, angle, rate = self._split(y)
         placed = self.tree.placed(scalar, unit(ball), rate)
         own = scalar[..., None] * 0 + np.eye(self.tree.scalars, self.nv, dtype=int)
@@ -132,7 +135,7 @@ class TreeEquations:
         return Instant(placed, coordinates, rows, np.concatenate(speed, axis=1), rate)
 
     def _coupled(self, coordinates: Rows) -> Rows:
-        """q₂ - ratio q₁ of the couplings."""
+        """Return q₂ - ratio q₁ of the couplings."""
         first, second = map(coordinates.among, self.coupled)
         by_rate = self.ratio[:, None] * first.jacobian
         return Rows(
@@ -142,8 +145,8 @@ class TreeEquations:
         )
 
     def start(self) -> np.ndarray:
-        """The state (n,) at t = 0 with the velocities of the documented rule; raises SceneError where the
-        scene's contradict its joints."""
+        """Return the state (n,) at t = 0 with the velocities of the documented rule; raises SceneError if the
+        scene's velocities contradict its joints."""
         constraints.initial_twists(self.scene)
         y = self.arithmetic.zeros(int(self.ends[-1]))
         y[self.tree.scalars : self.light : 4] = self.arithmetic.number(1.0)
@@ -159,15 +162,15 @@ class TreeEquations:
         return self.closed(now, y)
 
     def _given(self, placed: Placed) -> tuple[np.ndarray, np.ndarray]:
-        """Twists (g, nv) per joint rate in the components that the scene gives, and their values (g,), all
-        weighted."""
+        """Return twists (g, nv) for unit joint rates in the components that the scene gives, and their values
+        (g,), both weighted."""
         asked, (columns,) = given(self.scene), placed.columns
         weights = self.arithmetic.array(asked.weights)
         twists = np.swapaxes(columns[:-1], 1, 2).reshape(6 * (len(columns) - 1), self.nv)
         return weights[:, None] * twists[asked.components], weights * self.arithmetic.array(asked.values)
 
     def closed(self, t: Any, y: np.ndarray) -> np.ndarray:
-        """The state (n,) nearest in the mass metric to one at time t whose loops are closed."""
+        """Return the state (n,) with closed loops at time t that is nearest in the mass metric."""
         y, t, last = y[None], self.arithmetic.zeros(1) + t, np.inf
         self._choose(self.at(t, y))
         for _ in range(CORRECTIONS):
@@ -179,7 +182,7 @@ class TreeEquations:
         return y[0]
 
     def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """States (K, n) after one Newton step towards closed loops, and towards rates that keep them so."""
+        """Return states (K, n) after one Newton step towards closed loops and consistent rates."""
         at = self.at(t, y)
         step, _ = self._solve(at, 0 * at.rate, -1 * at.rows.value)
         better = self._moved(y, step, at.coordinates.jacobian)
@@ -187,12 +190,13 @@ class TreeEquations:
         return better
 
     def gap(self, t: Any, y: np.ndarray) -> float:
-        """Largest residual of any row, kept or not, of a state (n,), relative to the scene's length."""
+        """Return the largest residual of all rows at a state (n,), relative to the scene's length."""
         at = self.at(self.arithmetic.zeros(1) + t, y[None])
         return float(np.abs(doubles(at.rows.value)).max(initial=0.0)) / self.length
 
     def undetermined(self) -> str:
-        """Why a scene without masses has no motion; empty where drivers determine it or masses are there."""
+        """Return the reason why a scene without masses has no motion; empty if drivers determine it or masses
+        are given."""
         missing = [body.name for body in self.scene.body if body.mass is None]
         assert self.kept is not None
         if not missing or len(self.kept) == self.nv:
@@ -200,12 +204,12 @@ class TreeEquations:
         return f"bodies without mass move freely: {', '.join(missing)}"
 
     def _split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Scalars (K, ·), balls (K, ·, 4), angles (K, ·) and joint rates (K, nv)."""
+        """Return scalars (K, ·), balls (K, ·, 4), angles (K, ·) and joint rates (K, nv) of states."""
         scalar, ball, angle, rate = np.split(y, self.ends[:-1], axis=1)
         return scalar, ball.reshape(len(y), len(self.tree.balls), 4), angle, rate
 
     def _moved(self, y: np.ndarray, step: np.ndarray, coordinates: np.ndarray) -> np.ndarray:
-        """States after a small displacement (K, nv) of the joint coordinates."""
+        """Return the states after a small displacement (K, nv) of the joint coordinates."""
         y = y.copy()
         y[:, self.ends[2] :] = step
         moves = self.light_rates(y)
@@ -221,7 +225,8 @@ class TreeEquations:
         return saddle_solve(mass, at.rows.jacobian[:, self.kept], force, right[:, self.kept])
 
     def _choose(self, at: Instant) -> None:
-        """Keeps a largest set of independent rows: the first one while it is well enough conditioned."""
+        """Select a largest set of independent rows; the first selection is used while it is well enough
+        conditioned."""
         rows = doubles(at.rows.jacobian[0])
         if self.kept is None:
             self.rank = self._rank(rows)
@@ -234,7 +239,8 @@ class TreeEquations:
     def _rank(self, rows: np.ndarray) -> int:
         """Return the number of independent rows (m, nv)."""
         size = np.linalg.norm(rows, axis=1, keepdims=True)
-        largest = max(size.max(initial=0.0), min(1.0, self.length**2))  # one joint rate moves so much
+        # the motion of a unit joint rate is at most this
+        largest = max(size.max(initial=0.0), min(1.0, self.length**2))
         rows = rows / np.where(size > RANK * largest, size, largest)  # rows of rounding size stay small
         pivots = np.abs(np.diag(qr(rows.T, mode="r", pivoting=True)[0]))
         return int((pivots > RANK).sum())
@@ -249,5 +255,5 @@ class TreeEquations:
 
 
 def _least(rows: np.ndarray) -> float:
-    """Least singular value; infinite without rows."""
+    """Return the least singular value; infinite without rows."""
     return float(np.linalg.svd(rows, compute_uv=False).min(initial=np.inf))

@@ -1,9 +1,9 @@
-"""The spanning tree of a scene: joint coordinates, and the bodies' motion carried outwards from the ground.
+"""The spanning tree of a scene: joint coordinates, and the motion of the bodies, propagated outwards from the
+ground.
 
-Every body hangs on one joint, or moves freely; the joints left over close the loops.  A body's frame is the
-world's at t = 0, so that the directions and points of the scene's data are its own, too.
-A twist about the world's origin is the sum of the joints' (Featherstone, Rigid Body Dynamics Algorithms,
-2008, ch. 2).
+One joint carries each body, or the body moves freely; all other joints close loops. A body's frame equals the
+world frame at t = 0, so that the scene's directions and points need no conversion. A twist about the world's
+origin is the sum of the joint twists (Featherstone, Rigid Body Dynamics Algorithms, 2008, ch. 2).
 """
 
 from __future__ import annotations
@@ -27,12 +27,13 @@ RIGIDITY = {
     "planar": 3,
     "spherical": 3,
 }
-PREFERRED = 10  # weight of joints whose coordinate is used, so that they stay in the tree
+PREFERRED = 10  # weight of joints whose coordinate is used, so that they are in the tree
 
 
 @dataclass(frozen=True)
 class Link:
-    """A body on its parent (-1 ground) by a joint (None: free); ``sign`` -1 where it points inwards."""
+    """A body on its parent (-1: ground) by a joint (None: free); ``sign`` is -1 if the joint's second body is
+    the parent."""
 
     body: int
     parent: int
@@ -40,14 +41,14 @@ class Link:
     sign: int
 
     def slides(self, numbers: Arithmetic) -> list[np.ndarray]:
-        """Directions of displacement, fixed to the parent."""
+        """Return the directions of displacement, fixed to the parent."""
         kind = self.joint.type if self.joint else "free"
         frame = self.sign * joint_frame(numbers, self.joint)
         among = {"free": frame, "planar": frame[:2], "translational": frame[2:], "cylindrical": frame[2:]}
         return list(among.get(kind, ()))
 
     def turns(self, numbers: Arithmetic) -> list[np.ndarray]:
-        """Axes of rotation, the first fixed to the parent; of two, the second is fixed to the body."""
+        """Return the axes of rotation, the first fixed to the parent; a second one is fixed to the body."""
         kind = self.joint.type if self.joint else "free"
         if kind == "universal":
             return list(unit(numbers.array(self.joint.axes))[:: self.sign])
@@ -55,16 +56,18 @@ class Link:
         return [self.sign * joint_frame(numbers, self.joint)[2]] if turning else []
 
     def is_ball(self) -> bool:
-        """Whether the rotation is any."""
+        """Return whether all rotations are free."""
         return self.joint is None or self.joint.type == "spherical"
 
 
 @dataclass(frozen=True)
 class Placed:
-    """Bodies at K instants, the ground last: ``position`` (K, nb + 1, 3) of the centres of mass, quaternions
-    and matrices of the ``turn`` since t = 0, twists ``velocity`` and ``spin``, the parts ``drift`` and
-    ``spin_drift`` of their rates that joint accelerations do not cause, and ``columns`` (K, nb + 1, nv, 6):
-    the twist per joint rate."""
+    """Bodies at K times, the ground last.
+
+    Fields are ``position`` (K, nb + 1, 3) of the centres of mass, quaternions and matrices of the ``turn``
+    since t = 0, and twists ``velocity`` and ``spin``. ``drift`` and ``spin_drift`` are the parts of their
+    rates without joint accelerations. ``columns`` (K, nb + 1, nv, 6) are the twists for unit joint rates.
+    """
 
     position: np.ndarray
     turn: np.ndarray
@@ -77,8 +80,11 @@ class Placed:
 
 
 class Tree:
-    """A spanning tree with its joint coordinates: ``scalars`` displacements and angles, then one unit
-    quaternion for each of the ``balls``; joint rates in the same order, three for a ball."""
+    """A spanning tree with its joint coordinates.
+
+    ``scalars`` are displacements and angles, then follows one unit quaternion for each of the ``balls``.
+    Joint rates have an equal order, with three for a ball.
+    """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
         self.scene, self.arithmetic = scene, arithmetic
@@ -91,9 +97,10 @@ class Tree:
         self.unmoved = np.array([1, 0, 0, 0]) + arithmetic.zeros(4)
 
     def _list_coordinates(self) -> None:
-        """Axes, carriers and kinds of the joint rates, and the scalars of each joint, slides first."""
+        """Store axes, carriers and kinds of the joint rates, and the scalars of each joint, slides first."""
         self.coordinate: dict[str, list[int]] = {}
-        rates: list[tuple[np.ndarray, int, bool, int]] = []  # axis, carrier, turning, link
+        # axis, body that carries the axis, whether it is a rotation, link
+        rates: list[tuple[np.ndarray, int, bool, int]] = []
         for n, link in enumerate(self.links):
             first, carriers = len(rates), (link.parent, link.body)
             rates += [(axis, link.parent, False, n) for axis in link.slides(self.arithmetic)]
@@ -112,7 +119,8 @@ class Tree:
         self.slides = np.array(slides, dtype=int).reshape(len(self.links), len(rates))[:, : self.scalars]
 
     def _list_arms(self) -> None:
-        """Vectors at t = 0 from a parent's centre to the joint and from there to the body's centre."""
+        """Store the vectors at t = 0 from a parent's centre to the joint, and from there to the body's
+        centre."""
         nb = len(self.scene.body)
         self.body = np.array([link.body for link in self.links])
         self.parent = np.array([link.parent for link in self.links])
@@ -121,14 +129,15 @@ class Tree:
         ]
         anchor = self.arithmetic.array(anchors)
         self.inner, self.outer = anchor - self.start[self.parent], self.start[self.body] - anchor
-        self.carried = np.zeros((nb + 1, len(self.links)), dtype=int)  # body hangs on link
+        # entry is 1 if the link carries the body, directly or through others
+        self.carried = np.zeros((nb + 1, len(self.links)), dtype=int)
         for n, link in enumerate(self.links):
             self.carried[link.body] = self.carried[link.parent]
             self.carried[link.body, n] = 1
-        self.moved = self.carried[:, self.link]  # (nb + 1, nv)
+        self.moved = self.carried[:, self.link]  # shape (nb + 1, nv)
 
     def placed(self, scalar: np.ndarray, ball: np.ndarray, rate: np.ndarray) -> Placed:
-        """The bodies for joint coordinates (K, scalars) and (K, balls, 4) and joint rates (K, nv)."""
+        """Return the bodies for joint coordinates (K, scalars) and (K, balls, 4) and joint rates (K, nv)."""
         turn = self._turns(scalar, ball)
         rotation = matrices(turn)
         axis = apply(rotation[:, self.carrier], self.axis)
@@ -152,7 +161,7 @@ class Tree:
         return Placed(position, turn, rotation, velocity, spin, drift, spin_drift, columns)
 
     def _turns(self, scalar: np.ndarray, ball: np.ndarray) -> np.ndarray:
-        """(K, nb + 1, 4) quaternions of the bodies' rotations since t = 0."""
+        """Return quaternions (K, nb + 1, 4) of the bodies' rotations since t = 0."""
         half = scalar[..., None] / 2
         single = np.concatenate([np.cos(half), np.sin(half) * self.axis[: self.scalars]], axis=-1)
         turn = np.repeat((0 * ball.sum(axis=(1, 2)))[:, None, None] + self.unmoved, len(self.carried), axis=1)
@@ -176,7 +185,7 @@ def used_coordinates(scene: Scene) -> set[tuple[str, str]]:
 
 
 def spanning_tree(scene: Scene) -> list[Link]:
-    """The links from the ground outwards; joints that hold more are taken first (Kruskal)."""
+    """Return the links from the ground outwards; joints with more rows are selected first (Kruskal)."""
     favoured = {name for _, name in used_coordinates(scene)}
 
     def weight(joint: Any) -> int:
@@ -216,7 +225,8 @@ def _touches(scene: Scene, joint: Any, reached: set[int]) -> bool:
 
 
 def joint_frame(numbers: Arithmetic, joint: Any) -> np.ndarray:
-    """(3, 3) directions of a joint: two normal to its axis, then the axis; the world's where it has none."""
+    """Return the directions (3, 3) of a joint: two normal to its axis, then the axis; the world axes if it
+    has no axis."""
     if not hasattr(joint, "axis"):
         return numbers.array(AXES)
     z = unit(numbers.array(joint.axis))

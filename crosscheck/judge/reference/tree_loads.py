@@ -20,11 +20,11 @@ from mbref.scene import Force, JointLoad, Moment, Spring
 
 
 class Loads:
-    """Masses, inertias, armatures, gravity and loads, packed; ``measured`` has the rows of joint coordinates
-    by kind and joint.
+    """Masses, inertias, armatures, gravity and loads as arrays; ``measured`` has the rows of joint
+    coordinates by kind and joint.
 
-    A scene without all its masses has no loads, and mass 1 and inertia 1 stand for the missing ones: its
-    drivers determine the motion, whatever they are.
+    If masses are missing, there are no loads, and missing masses and inertias are 1: drivers determine the
+    motion, so these values have no influence.
     """
 
     def __init__(self, tree: Tree, measured: dict[tuple[str, str], int]):
@@ -46,7 +46,7 @@ class Loads:
         self.armature = numbers.array([joint.reflected_inertia for joint in geared])
 
     def mass_matrix(self, placed: Placed, coordinates: Rows) -> np.ndarray:
-        """(K, nv, nv)."""
+        """Return the mass matrix (K, nv, nv)."""
         return self._mass_matrix(placed, coordinates, self._world_inertia(placed))
 
     def terms(
@@ -75,12 +75,12 @@ class Loads:
 
     @staticmethod
     def _with_ground(wrench: np.ndarray) -> np.ndarray:
-        """A row for the ground, on which wrenches do nothing."""
+        """Return wrenches with a row of zeros for the ground."""
         return np.concatenate([wrench, 0 * wrench[:, :1]], axis=1)
 
     @staticmethod
     def _project(placed: Placed, wrench: np.ndarray) -> np.ndarray:
-        """(K, nv) generalised force of wrenches (K, nb + 1, 6)."""
+        """Return the generalised force (K, nv) of wrenches (K, nb + 1, 6)."""
         return apply(_over_bodies(placed.columns), wrench.reshape(len(wrench), -1))
 
     def _mass_matrix(self, placed: Placed, coordinates: Rows, inertia: np.ndarray) -> np.ndarray:
@@ -129,7 +129,8 @@ class Loads:
     def _point(
         self, placed: Placed, body: int, point: Sequence[float]
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Arm, position and velocity (K, 3) of a point, given in the world at t = 0, of a body."""
+        """Return vector from the centre, position and velocity (K, 3) of a body-fixed point, given in the
+        world at t = 0."""
         arm = apply(placed.rotation[:, body], self.tree.arithmetic.array(point) - self.tree.start[body])
         return (
             arm,
@@ -146,7 +147,7 @@ LOADS = (Moment, Force, Spring, JointLoad)
 
 
 def _over_bodies(columns: np.ndarray) -> np.ndarray:
-    """(K, nv, bodies · 6) of columns (K, bodies, nv, 6)."""
+    """Return (K, nv, bodies · 6) from columns (K, bodies, nv, 6)."""
     samples, bodies, rates, _ = columns.shape
     return np.swapaxes(columns, 1, 2).reshape(samples, rates, 6 * bodies)
 
@@ -157,7 +158,7 @@ def _push(wrench: np.ndarray, body: int, arm: np.ndarray, force: np.ndarray) -> 
 
 
 def _inertias(tree: Tree) -> np.ndarray:
-    """(nb, 3, 3) along the world's axes at t = 0."""
+    """Return inertia matrices (nb, 3, 3) along the world's axes at t = 0."""
     scene, numbers = tree.scene, tree.arithmetic
     frames = matrices(unit(numbers.array([b.orientation for b in scene.body])))
     return frames @ numbers.array(inertia_matrices(scene)) @ np.swapaxes(frames, -1, -2)

@@ -31,14 +31,14 @@ JOINTS: dict[str, Callable[[Any], list[Primitive]]] = {
 
 
 def primitives_of(joint: Joint) -> list[Primitive]:
-    """The primitive constraints of a joint; raises SceneError naming the joint where its type has none."""
+    """Return the primitive constraints of a joint; raises SceneError for a joint type without equations."""
     if joint.type not in JOINTS:
         raise SceneError([f"joint {joint.name!r}: mbref has no equations for joints of type {joint.type!r}"])
     return JOINTS[joint.type](joint)
 
 
 def driver_primitive(joint: Joint) -> Primitive:
-    """The row of a driver of the joint; raises SceneError naming the joint where it cannot be driven."""
+    """Return the row of a driver of the joint; raises SceneError if the joint cannot be driven."""
     if joint.facts.driven is None:
         raise SceneError([f"joint {joint.name!r}: joints of type {joint.type!r} cannot be driven"])
     axis, anchor = joint.directions[0], joint.anchor_pair[0]

@@ -16,7 +16,8 @@ ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, ANGLE: 1, SLIDE: 1}
 
 
 class Primitive(NamedTuple):
-    """One primitive equation; world vectors and points at t = 0, ``first`` fixed in the first body."""
+    """One primitive equation; vectors and points are in the world at t = 0, ``first`` is fixed in the first
+    body."""
 
     kind: int
     point_first: Vector = ZERO
@@ -24,24 +25,24 @@ class Primitive(NamedTuple):
     first: Vector = ZERO
     second: Vector = ZERO
     turning: Vector = ZERO  # for drivers: direction in the first body, perpendicular to `first`
-    length: float = 0.0  # of a distance; the factor of a joint coordinate
+    length: float = 0.0  # length of a distance constraint, or the factor of a joint coordinate
     driven: bool = False
 
 
 def unit(v: Sequence[float]) -> Vector:
-    """v / |v|."""
+    """Return v / |v|."""
     x, y, z = map(float, v)
     length = sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
 
 def cross(a: Vector, b: Vector) -> Vector:
-    """a × b."""
+    """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def frame(axis: Sequence[float]) -> tuple[Vector, Vector, Vector]:
-    """A right-handed triad (x, y, z) with z along the axis."""
+    """Return a right-handed triad (x, y, z) with z along the axis."""
     z = unit(axis)
     sizes = [abs(c) for c in z]
     helper = AXES[sizes.index(min(sizes))]
@@ -50,37 +51,40 @@ def frame(axis: Sequence[float]) -> tuple[Vector, Vector, Vector]:
 
 
 def coincident(anchor: Vector) -> Primitive:
-    """The points of both bodies at the anchor stay together."""
+    """Return the constraint that the points of both bodies at the anchor coincide."""
     return Primitive(POINT, point_first=anchor, point_second=anchor)
 
 
 def perpendicular(first: Vector, second: Vector) -> Primitive:
-    """A direction fixed in each body stay perpendicular."""
+    """Return the constraint that a direction of each body stays perpendicular to the other."""
     return Primitive(DOT1, first=first, second=second)
 
 
 def in_plane(anchor: Vector, normal: Vector) -> Primitive:
-    """The second body's anchor stays in the plane through the first body's with that normal."""
+    """Return the constraint that the second body's anchor stays in the plane through the first body's anchor
+    with that normal."""
     return Primitive(DOT2, point_first=anchor, point_second=anchor, first=normal)
 
 
 def driven_angle(axis: Vector) -> Primitive:
-    """The second body turns about the axis by the driver's angle."""
+    """Return the constraint that the second body turns about the axis by the driver's angle."""
     x, y, _ = frame(axis)
     return Primitive(DOT1, first=x, turning=y, second=x, driven=True)
 
 
 def driven_displacement(anchor: Vector, axis: Vector) -> Primitive:
-    """The second body's anchor advances along the axis by the driver's displacement."""
+    """Return the constraint that the second body's anchor moves along the axis by the driver's
+    displacement."""
     return Primitive(DOT2, point_first=anchor, point_second=anchor, first=unit(axis), driven=True)
 
 
 def coordinate_angle(axis: Sequence[float], factor: float) -> Primitive:
-    """The angle of the second body about the axis, times a factor, as a part of a row."""
+    """Return the angle of the second body about the axis, times a factor, as a part of a row."""
     x, y, _ = frame(axis)
     return Primitive(ANGLE, first=x, turning=y, second=x, length=factor)
 
 
 def coordinate_displacement(anchor: Vector, axis: Sequence[float], factor: float) -> Primitive:
-    """The displacement of the second body's anchor along the axis, times a factor, as a part of a row."""
+    """Return the displacement of the second body's anchor along the axis, times a factor, as a part of a
+    row."""
     return Primitive(SLIDE, point_first=anchor, point_second=anchor, first=unit(axis), length=factor)

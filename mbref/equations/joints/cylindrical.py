@@ -5,7 +5,7 @@ from mbref.scene import Cylindrical
 
 
 def primitives(joint: Cylindrical) -> list[Primitive]:
-    """Rotation about and displacement along the axis."""
+    """Return the rows that allow rotation about and displacement along the axis."""
     x, y, z = frame(joint.axis)
     return [
         perpendicular(x, z), perpendicular(y, z), in_plane(joint.anchor, x), in_plane(joint.anchor, y),

@@ -8,6 +8,6 @@ from mbref.scene import Distance
 
 
 def primitives(joint: Distance) -> list[Primitive]:
-    """A massless link with a spherical joint at each end."""
+    """Return the row of a massless link with a spherical joint at each end."""
     first, second = joint.anchors
     return [Primitive(DISTANCE, point_first=first, point_second=second, length=math.dist(first, second))]

@@ -5,6 +5,6 @@ from mbref.scene import Fixed
 
 
 def primitives(joint: Fixed) -> list[Primitive]:
-    """No relative motion."""
+    """Return the rows that allow no relative motion."""
     x, y, z = AXES
     return [coincident(joint.anchor), perpendicular(x, y), perpendicular(y, z), perpendicular(z, x)]

@@ -5,6 +5,6 @@ from mbref.scene import Inline
 
 
 def primitives(joint: Inline) -> list[Primitive]:
-    """Displacement along the axis and free rotation."""
+    """Return the rows that allow displacement along the axis and free rotation."""
     x, y, _ = frame(joint.axis)
     return [in_plane(joint.anchor, x), in_plane(joint.anchor, y)]

@@ -5,6 +5,6 @@ from mbref.scene import Planar
 
 
 def primitives(joint: Planar) -> list[Primitive]:
-    """Displacement in the plane and rotation about its normal."""
+    """Return the rows that allow displacement in the plane and rotation about its normal."""
     x, y, z = frame(joint.axis)
     return [perpendicular(x, z), perpendicular(y, z), in_plane(joint.anchor, z)]

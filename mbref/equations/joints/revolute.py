@@ -5,6 +5,6 @@ from mbref.scene import Revolute
 
 
 def primitives(joint: Revolute) -> list[Primitive]:
-    """Rotation about the axis."""
+    """Return the rows that allow rotation about the axis."""
     x, y, z = frame(joint.axis)
     return [coincident(joint.anchor), perpendicular(x, z), perpendicular(y, z)]

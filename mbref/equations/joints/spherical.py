@@ -5,5 +5,5 @@ from mbref.scene import Spherical
 
 
 def primitives(joint: Spherical) -> list[Primitive]:
-    """Free rotation about a common point."""
+    """Return the rows that allow free rotation about a common point."""
     return [coincident(joint.anchor)]

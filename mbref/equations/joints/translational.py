@@ -5,7 +5,7 @@ from mbref.scene import Translational
 
 
 def primitives(joint: Translational) -> list[Primitive]:
-    """Displacement along the axis."""
+    """Return the rows that allow displacement along the axis."""
     x, y, z = frame(joint.axis)
     return [
         perpendicular(x, z), perpendicular(y, z), perpendicular(x, y),

@@ -5,6 +5,6 @@ from mbref.scene import Universal
 
 
 def primitives(joint: Universal) -> list[Primitive]:
-    """The axis of each body stay perpendicular at a common point."""
+    """Return the rows for a common point and two axes, one of each body, that stay perpendicular."""
     first, second = joint.axes
     return [coincident(joint.anchor), perpendicular(unit(first), unit(second))]

@@ -1,8 +1,8 @@
-"""Judge singular positions: detect, cross or refuse them (docs/internals/singular-positions.md).
+"""Treatment of singular positions: detect, cross or refuse them (docs/internals/singular-positions.md).
 
-``thresholds`` lists all thresholds.  ``detection`` decides whether a step contains a singular position,
-``determinants`` and ``location`` evaluate the test function and find its zeros, ``acceptance`` judges the
-step, ``uniqueness`` bounds the sensitivity of the continuation, ``rounding_pole`` removes the pole due to
-rounding, ``start`` judges a motion that begins near a singular position, and ``short_crossing`` takes a run
-across one.
+``thresholds`` lists all thresholds. ``detection`` decides whether a step contains a singular position.
+``determinants`` evaluates the test function, and ``location`` finds its zeros. ``acceptance`` judges a step
+near a singular position. ``uniqueness`` bounds the sensitivity of the continuation. ``rounding_pole`` removes
+the pole that rounding causes. ``start`` judges a motion that starts near a singular position.
+``short_crossing`` and ``long_crossing`` take a run across one.
 """

@@ -1,14 +1,15 @@
 """Acceptance of a step that comes near a singular position or crosses one, and the tolerance of such steps.
 
-- Where two branches miss each other by a gap g, the series of one side goes straight on to the other side.
-  Beyond the gap it violates the rows by at least g.  A step near a singular position is therefore as
+- If two branches are separated by a gap g, the series of one side continues straight to the other side.
+Beyond the gap it violates the rows by at least g.  A step near a singular position is therefore as
   accurate as rounding allows, and accepted only if the violation at its end is due to rounding.
-- Near a singular position rounding moves the state along the vanishing direction by its ratio to the pivot,
-  and turns the velocity by as much again.  A motion that comes nearer than MIN_PIVOT and does not cross is
+- Near a singular position rounding moves the state along the nearly free direction by (rounding / pivot), and
+changes the direction of the velocity by that displacement over the pivot.  A motion that comes nearer than
+MIN_PIVOT and does not cross is
   UNDECIDED.  Rounding of the lengths may open a gap that a motion meets before it turns back nearer than
   MIN_PIVOT_FREE: that is UNDECIDED too.  ``uniqueness`` judges other motions.
 - A correction that moves the state by as much as its distance from the singular position may change the
-  branch.  Where a driver stands still there, the pivot itself is a result of the correction.
+  branch.  If a driver stands still there, the pivot itself depends on the correction.
 """
 
 from __future__ import annotations
@@ -52,13 +53,14 @@ def relative_distance(memory):
 
 @kernel
 def step_tolerance(memory):
-    """Return the tolerance of a step: a motion bends the more, the nearer it is to a singular position."""
+    """Return the tolerance of a step, which is smaller near a singular position, because the motion is more
+    curved there."""
     return memory.mode.tolerance * min(1.0, relative_distance(memory))
 
 
 @kernel
 def crossing_tolerance(memory):
-    """Return the tolerance of a step that crosses, whose last terms are rounding over the distance."""
+    """Return the tolerance of a step that crosses; its last terms are rounding divided by the distance."""
     distance = relative_distance(memory)
     if is_accurate(memory) and memory.step.approaching and distance < CROSSING_START:
         return max(memory.mode.tolerance, CROSSING_NOISE / distance)

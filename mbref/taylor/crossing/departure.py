@@ -1,7 +1,7 @@
-"""Departures of a series from a singular position: along a branch that is asked for, and at the start.
+"""Departure of a series from a singular position, along a requested branch or at the start of a run.
 
-A state a little behind the singular position is corrected until the series about it comes from there with the
-velocities of the branch.
+A state slightly behind the singular position is corrected until the series about it, evaluated backwards,
+gives the singular position with the velocities of the branch.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ State = tuple[np.ndarray, np.ndarray]  # coordinates (7 nb,) and velocities (n,)
 
 
 class Departure:
-    """The departures of a run whose exact steps have begun.
+    """Departures of a run that uses high-accuracy steps.
 
     ``expand`` begins a series at the present state, ``state_at`` evaluates it at a distance (s).
     """
@@ -37,8 +37,8 @@ class Departure:
         self._run, self._taylor, self._expand, self._state_at = run, taylor, expand, state_at
 
     def along_branch(self, passed: Passed) -> int:
-        """Go on from a singular position just passed along another branch than the smooth one: PAUSED, or the
-        reason why that cannot be."""
+        """Continue from a singular position just passed along another branch than the smooth one; return
+        PAUSED or the failure status."""
         crossing, run = singular_position(self._run.model, passed), self._run
         velocities, clock = crossing.velocities[crossing.taken - 1], run.memory.loop.clock
         clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
@@ -50,7 +50,7 @@ class Departure:
         return self._come_from(crossing, velocities, ahead, moved)
 
     def from_start(self, way: Leaving) -> int:
-        """Go on from a singular position at t = 0: PAUSED or the reason why that cannot be."""
+        """Continue from a singular position at t = 0; return PAUSED or the failure status."""
         q, v, acceleration = way
         moves = np.any(v)
         ahead = self._time_in_which(v) if moves else self._time_in_which(0.5 * acceleration) ** 0.5
@@ -64,7 +64,8 @@ class Departure:
         return status
 
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
-        """Return whether the series, a time ahead (s) of its beginning, misses coordinates and velocities."""
+        """Return whether the series, evaluated a time ``ahead`` (s) before its beginning, differs from
+        coordinates and velocities."""
         there = self._state_at(-ahead)
         moved, changed = displacement(q, there[0]), there[1] - v
         self._state_at(0.0)
@@ -87,8 +88,8 @@ class Departure:
         self._state_at(0.0)
 
     def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
-        """Put sample k; multipliers balance the forces in the least-squares sense, at rest along the branch
-        alone."""
+        """Record sample k; multipliers balance the forces by least squares, or at rest only along the
+        branch."""
         run = self._run
         samples, terms = run.memory.loop.samples, run.model.terms(float(run.times[k]), q, v)
         samples.coordinates[k], samples.velocities[k], samples.accelerations[k] = q, v, acceleration
@@ -98,9 +99,9 @@ class Departure:
     def _come_from(
         self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
     ) -> int:
-        """Continue a time ahead (s) of a singular position that is left with velocities (n,).
+        """Continue at a time ``ahead`` (s) after a singular position that is left with velocities (n,).
 
-        ``moved`` is a state near the motion, which is corrected.  Return PAUSED or the failure status.
+        ``moved`` is a state near the motion, which is corrected. Return PAUSED or the failure status.
         """
         memory, progress = self._run.memory, self._taylor.progress
         memory.loop.clock.time = start.time + ahead
@@ -130,8 +131,8 @@ class Departure:
     def _corrected(
         self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
     ) -> int:
-        """Correct the state until its series comes from a singular position with velocities (n,); return
-        the status."""
+        """Correct the state until its series, evaluated backwards, gives the singular position with
+        velocities (n,); return the status."""
         (q, v), state = moved, self._run.memory.state
         for _ in range(DEPARTURE_CORRECTIONS):
             state.coordinates[:], state.velocities[:] = q, v
@@ -143,12 +144,10 @@ class Departure:
         return OK
 
     def _least_pivot_at(self, q: np.ndarray, crossing: np.ndarray) -> float:
-        """Return the least pivot that counts at coordinates near a singular position, before their
-        correction.
+        """Return the least pivot of independent rows at uncorrected coordinates near a singular position.
 
-        Rows of spherical loops depend on others where the constraints hold: a state that violates them by
-        the square of its distance has pivots of that size, and those that the distance leaves are as large
-        as it.
+        Rows of spherical loops depend on each other if the constraints are satisfied. A state that violates
+        them by the square of its distance gives them pivots of that size, and these are ignored.
         """
         moved = displacement(q, crossing).reshape(-1, 6)
         places = np.abs(moved[:, :3] / self._run.model.data.lengths[:, None]).max()
@@ -156,7 +155,7 @@ class Departure:
         return max(self._run.memory.equations.system.settings.rank_tolerance, DEPARTURE_PIVOT * distance)
 
     def _time_in_which(self, velocities: np.ndarray) -> float:
-        """Return time (s) in which the fastest body moves by DEPARTURE."""
+        """Return the time (s) in which the fastest body moves by DEPARTURE."""
         rates = velocities.reshape(-1, 6)
         places = np.abs(rates[:, :3] / self._run.model.data.lengths[:, None]).max()
         return DEPARTURE / float(max(places, np.abs(rates[:, 3:]).max()))

@@ -1,10 +1,10 @@
-"""Detection of singular positions: the one decision whether a step of free or driven motion contains one.
+"""Detection of singular positions: the decision whether a step of free or driven motion contains one.
 
-Pivots of equal rows and variables with equal signs at both ends have vanished twice or never, and twice
-takes a distance that is long compared with them.  Otherwise the determinant of the gradients decides
-(``determinants``).  Branches of several loops that cross at once keep its sign, and so do two crossings:
-therefore it is also evaluated where it is smallest if pivots change their signs, and where a least pivot
-that falls and rises linearly vanishes.
+If rows, variables and signs of the pivots are equal at both ends, pivots have vanished twice or never, and
+twice needs a distance that is long compared with the pivots. Otherwise the determinant of the gradients
+decides (``determinants``). Its sign is unchanged if branches of several loops cross at once, or after two
+crossings. So it is also evaluated at its minimum if pivots change their signs, and at the place where a
+linearly falling least pivot vanishes.
 """
 
 from __future__ import annotations
@@ -117,8 +117,8 @@ def contains_singular_position(h, pivot, memory):
 def determinant_changes_sign(h, parts, memory):
     """Return whether the determinant of the gradients at both ends of a step of h seconds is negative.
 
-    A long step is judged in parts, because rows that turn by a right angle change the sign too, and two
-    changes keep it.
+    A long step is judged in parts, because rows that turn by a right angle also change the sign, and two
+    changes cancel.
     """
     changes, square = False, freedoms(memory) == 0
     if has_one_null_vector(memory):
@@ -167,7 +167,8 @@ def stays_level(h, largest, memory):
 
 @kernel
 def dips_to_zero(h, pivot, memory):
-    """Return whether the determinant vanishes where a linear least pivot does, in a step of h seconds.
+    """Return whether the determinant vanishes at the place, in a step of h seconds, where a linear least
+    pivot vanishes.
 
     A high-accuracy step that starts far away spans the position: there the minimum itself is evaluated.
     """

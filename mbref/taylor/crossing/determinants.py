@@ -1,6 +1,6 @@
 """Determinant det(G₁ G₀ᵀ) of the constraint gradients at two times of a step, by its sign and logarithm.
 
-It changes its sign where two branches cross, and keeps it where the rank of G stays (a bordered test
+It changes its sign if two branches cross, and keeps it if the rank of G is unchanged (a bordered test
 function:  W.  Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000).  G₀ is the
 gradient at the start of the step.  For a square G it is det G₁ det G₀, and det G at both ends is the
 product of the pivots.  With one degree of freedom the minors of G are the product of the pivots times the
@@ -16,7 +16,7 @@ from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
 from mbref.taylor.partition import evaluate_gradient, freedoms
 
-SMALLEST = 1e-300  # a smaller number is replaced before its logarithm is taken
+SMALLEST = 1e-300  # smaller numbers are replaced by this one before their logarithm is computed
 
 
 @kernel
@@ -142,9 +142,11 @@ def null_vectors_oppose(memory):
 
 @kernel
 def rates_oppose(memory):
-    """Return whether a motion without drivers goes along the minors at one end of the step only.
+    """Return whether the motion, without drivers, has the direction of the minors' null vector at one end of
+    the step only.
 
-    It does where branches cross, however far the minors turn in between: they are smooth, and vanish there.
+    This happens if branches cross, because the minors are smooth and vanish at the crossing, however far they
+    turn in between.
     """
     solver, past, terms, before, after = memory.solver, memory.series.past, memory.series.terms, 0.0, 0.0
     for i in range(solver.pivot_columns.shape[0]):

@@ -1,4 +1,4 @@
-"""Where the determinant of the gradients vanishes inside a step, or is smallest."""
+"""Location of the zero or the minimum of the determinant of the gradients inside a step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from mbref.taylor.crossing.thresholds import (
 from mbref.taylor.samples import evaluate_series
 
 GOLDEN = 0.6180339887498949  # ratio of the golden section
-NEGATIVE = -1e300  # in place of the logarithm of a negative determinant
+NEGATIVE = -1e300  # stands for the logarithm of a negative determinant
 
 
 @kernel

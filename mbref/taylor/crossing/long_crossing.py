@@ -1,9 +1,9 @@
-"""Long crossings: high-accuracy steps across singular positions until clear of them, confirmed by a
-perturbed run.
+"""Long crossings: high-accuracy steps across singular positions until the distance is large enough, confirmed
+by a perturbed run.
 
-A long crossing follows where a short one (``short_crossing``) cannot show that the motion is determined.
-The order of the steps is lower here, because lower orders magnify rounding less.  Unless drivers prescribe
-the whole motion, a perturbed run repeats the crossing (``uniqueness``).
+A long crossing follows if a short one (``short_crossing``) cannot show that the motion is determined. The
+order of the steps is lower here, because lower orders amplify rounding less. Unless drivers prescribe the
+whole motion, a perturbed run repeats the crossing (``uniqueness``).
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ def cross_position(memory):
 
 @entry(INT(SERIES))
 def continue_crossing(memory):
-    """Cross the next singular position, which is recorded, or step clear of all of them.
+    """Cross the next singular position, which is recorded, or continue until no singular position is near.
 
-    Return PAUSED, DONE at the end, or the reason why the motion cannot be followed.  ``progress.is_clear``
+    Return PAUSED, DONE at the end, or the failure status.  ``progress.is_clear``
     is set when regular steps can follow: the least pivot is large enough, and not smaller than a step ago.
     """
     return step_until_clear(memory)
@@ -92,8 +92,8 @@ def judge_clearance(memory):
 def end_crossing(status, memory):
     """Return to regular steps after a crossing that ended with a status.
 
-    Return PAUSED or DONE, or the reason why the motion cannot be followed:  UNDECIDED where a perturbed run
-    ends elsewhere.  Steps of that run are not counted.
+    Return PAUSED, DONE or the failure status; UNDECIDED if a perturbed run ends at another state. Steps of
+    that run are not counted.
     """
     run, counts = memory.run, memory.run.equations.system.counts
     if status == PAUSED or status == DONE:  # noqa: SIM109 - no containers in kernels

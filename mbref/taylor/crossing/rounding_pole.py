@@ -1,10 +1,10 @@
 """Removal of the rounding pole from a series near a singular position.
 
-Rounding puts a state on a motion that misses the singular position by a gap g.  At a time d from it, with a
-least pivot p, that motion differs from the motion that meets it by (g / p) d / (d - t) along the direction
-in which the rows fail there: a pole at t = d.  Its coefficients (g / p) / d^k grow faster than the
-coefficients of the motion, so that the last ones show it alone.  Without it a step may be many times as
-long as d.
+Rounding moves a state to a motion that passes the singular position at a gap g. Let d be the time to the
+singular position and p the least pivot. That motion differs from the exact one by (g / p) d / (d - t) along
+the direction in which the rows lose rank: a pole at t = d. Its coefficients (g / p) / d^k grow faster than
+the coefficients of the motion, so that the last ones contain the pole only. After its removal a step may be
+many times as long as d.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ from mbref.taylor.simd import WIDTH, load, store
 def time_of_pole(memory):
     """Return the time (s) of the pole in the series in use; 0 without one.
 
-    The last coefficients have to show a pole alone, whose gap rounding explains.  A negative time is of a
-    position behind.
+    The last coefficients must contain a pole only, with a gap that rounding explains. A negative time belongs
+    to a position in the past.
     """
     past, order, start_pivot = memory.series.past, memory.mode.order, memory.step.start_pivot
     is_near = start_pivot < CROSSING_START * memory.progress.largest_pivot
@@ -50,7 +50,7 @@ def time_of_pole(memory):
 
 @kernel
 def remove_pole(distance, memory):
-    """Subtract the pole at a time (s) from the series in use, and find its last order above rounding."""
+    """Subtract the pole at a time (s) from the series in use, and compute its last order above rounding."""
     step = memory.step
     subtract_pole(distance, memory)
     step.last_order = last_order(distance, memory)
@@ -69,7 +69,8 @@ def variable_of_largest_term(order, memory):
 
 @kernel
 def subtract_pole(distance, memory):
-    """Subtract coefficients of the ratio 1 / distance that end with the last ones of the series."""
+    """Subtract the pole: coefficients with the ratio 1 / distance that agree with the last coefficients of
+    the series."""
     series, order, factor = memory.series, memory.mode.order, 1.0
     past, variable, angles = series.past, series.variable, series.past_angles
     lanes = past.shape[1]
@@ -85,7 +86,7 @@ def subtract_pole(distance, memory):
 
 @kernel
 def last_order(distance, memory):
-    """Return the last order whose coefficients do not grow as fast as rounding does with the order."""
+    """Return the last order whose coefficients grow less with the order than rounding does."""
     k, growth = memory.mode.order - POLE_ORDERS, POLE_GROWTH / (distance * distance)
     size, one_less = largest_used(k, memory), largest_used(k - 1, memory)
     while k > MIN_ORDER_LEFT:

@@ -1,8 +1,7 @@
-"""Short crossings: a few high-accuracy steps across a singular position, where the speed bounds the
-sensitivity.
+"""Short crossings: a few high-accuracy steps across a singular position, if the speed bounds the sensitivity.
 
-If the bound of ``uniqueness`` is too large, or the steps do not cross, all is restored, and a long crossing
-with a perturbed run takes over.
+If the bound of ``uniqueness`` is too large, or the steps do not cross, the state is restored, and a long
+crossing with a perturbed run follows.
 """
 
 from __future__ import annotations
@@ -36,14 +35,14 @@ def switches_branch(crossing, memory):
 
 @kernel
 def is_full(memory):
-    """Return whether memory has no room for the crossings of another step, two at most."""
+    """Return whether memory has no room for the crossings of another step, at most two."""
     return memory.progress.recorded + 2 > memory.crossings.time.shape[0]
 
 
 @kernel
 def switches_branch_in_pair(before, memory):
-    """Return whether the last step crossed twice, after a number of crossings, and another branch than the
-    smooth one is requested at one of both."""
+    """Return whether the last step crossed twice, after ``before`` crossings, and another branch than the
+    smooth one is requested at one of them."""
     if memory.run.equations.system.counts.crossings < before + 2:
         return False
     return switches_branch(before + 1, memory) or switches_branch(before + 2, memory)
@@ -96,7 +95,7 @@ def restore_step_start(memory):
 
 @kernel
 def take_crossing_steps(memory):
-    """Take a few high-accuracy steps until one crosses; return whether it did on a motion that is
+    """Take a few high-accuracy steps until one crosses; return whether it did and the motion is
     determined."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     crossings, is_free = counts.crossings, freedoms(memory) > 0

@@ -1,5 +1,5 @@
-"""Judgement of a motion that starts near a singular position, where rounding may hide its freedoms or
-velocity."""
+"""Judgement of a motion that starts near a singular position, where rounding may hide its degrees of freedom
+or velocity."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ def judge_start(status, memory):
 
 @kernel
 def hides_rank(memory):
-    """Return whether rounding hides the freedoms of a start at which rows are nearly dependent.
+    """Return whether rounding hides the degrees of freedom of a start at which rows are nearly dependent.
 
-    Natural coordinates then count another number, or the motion could change to another branch.
+    Natural coordinates then give another number, or the motion could change to another branch.
     """
     is_moving = largest(memory.run.state.velocities) > 0.0
     if freedoms(memory) > 0 and least_pivot(memory) < (MIN_PIVOT_RESOLVED if is_moving else MIN_PIVOT_FREE):
@@ -53,8 +53,9 @@ def hides_rank(memory):
 def misses_state(memory):
     """Return whether the series misses the state in memory.
 
-    Then numbers were taken for rounding, or rounding over the distance from a singular position has turned
-    the velocities.  Velocities that drivers prescribe keep the motion in spite of it.
+    Then small numbers were wrongly treated as rounding, or rounding divided by the distance from a singular
+    position has changed the direction of the velocities. Velocities that drivers prescribe determine the
+    motion nevertheless.
     """
     state, before = memory.run.state, memory.run.previous
     copy_state(state, before)
@@ -71,19 +72,20 @@ def misses_state(memory):
 
 @kernel
 def rests_near(memory):
-    """Return whether a motion starts from rest so near a singular position that rounding may turn it."""
+    """Return whether a motion starts from rest so near to a singular position that rounding may change its
+    direction."""
     at_rest = freedoms(memory) > 0 and not largest(memory.run.state.velocities) > 0.0
     return at_rest and least_pivot(memory) < REST_PIVOT
 
 
 @kernel
 def is_turned(memory):
-    """Return whether rounding turns a motion that started at rest near a singular position and is still
-    near.
+    """Return whether rounding changes the direction of a motion that started at rest near a singular position
+    and is still near.
 
-    A row that is off by rounding moves the state by its ratio to the least pivot p, and turns the motion by
-    as much again, which over a distance p gets a fraction √p of its speed.  Rows of equal loops may be off
-    by nothing.
+    A rounding error of a row moves the state by (error / p) with the least pivot p. This changes the
+    direction of the motion, which gains a fraction √p of its speed over a distance p. Rows of loops with
+    equal dimensions may have no rounding error.
     """
     progress, pivot = memory.progress, least_pivot(memory)
     progress.rests_near = progress.rests_near and pivot < REST_PIVOT

@@ -1,16 +1,15 @@
-"""Uniqueness of the continuation: bound or measure how much a crossing magnifies an error of its start.
+"""Uniqueness of the continuation: bound or measure the amplification of an error of the start by a crossing.
 
-The state before a singular position is known to the tolerance only.  Drivers that prescribe the whole
-motion leave nothing to magnify.
+The state before a singular position is known to the tolerance only. If drivers prescribe the whole motion,
+errors are not amplified.
 
-A mechanism of one degree of freedom without drivers moves along a curve.  In the arc length σ of the metric
-of M, σ'' = Q(σ) - c(σ) σ' with c ≥ 0, because loads and dampers do not depend on time.  By Liouville's
-formula a motion that starts faster by a fraction ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, W =
-exp(-∫ c dt) ≤ 1, and its variables by at most ε x' ∫ v₀² / v² dt.  If this bound is small, no further run
-is needed.
+A mechanism of one degree of freedom without drivers moves along a curve. In the arc length σ of the metric of
+M, σ'' = Q(σ) - c(σ) σ' with c ≥ 0, because loads and dampers do not depend on time. By Liouville's formula a
+motion that starts faster by a fraction ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, W = exp(-∫ c dt)
+≤ 1, and its variables by at most ε x' ∫ v₀² / v² dt. If this bound is small, no further run is needed.
 
-Otherwise a perturbed run repeats the crossing from velocities that are slightly larger: the motion is
-determined if both end in nearby states.
+Otherwise a perturbed run repeats the crossing from slightly larger velocities: the motion is determined if
+both runs end in nearby states.
 """
 
 from __future__ import annotations
@@ -52,7 +51,7 @@ def energy_in_middle(memory):
 
 @kernel
 def keeps_moving(least, first, memory):
-    """Return whether a motion has neither reversed in the last step nor lost nearly all of its first
+    """Return whether the motion has not reversed in the last step, and has not lost nearly all of its first
     energy."""
     moved = kinetic_energy(memory.series.past, memory) > 0.0
     reverses = moved and turns_back(memory.series.terms, memory)
@@ -61,7 +60,8 @@ def keeps_moving(least, first, memory):
 
 @kernel
 def is_bounded(delay, memory):
-    """Return whether ``delay`` = ∫ v₀² / v² dt (s) of a crossing keeps a perturbed motion near."""
+    """Return whether ``delay`` = ∫ v₀² / v² dt (s) of a crossing bounds the distance of a perturbed
+    motion."""
     change = memory.options.velocity_change
     speed = largest_coefficient(memory.series.terms, 1, memory.solver.pivot_columns.shape[0])
     near = STRICTER * min(MAX_GAIN * change, MAX_APART)
@@ -71,10 +71,10 @@ def is_bounded(delay, memory):
 # --- perturbed run --------------------------------------------------------------------------------------
 @kernel
 def perturbed_run_agrees(rtol, memory):
-    """Return whether a perturbed run of the crossing ends near the state about which the series now begins.
+    """Return whether a perturbed run of the crossing ends near the state at which the series now begins.
 
-    The limit is stricter if the perturbed run counts another number of singular positions: a step may cross
-    two.
+    The limit is stricter if the perturbed run counts another number of singular positions, because a step may
+    cross two.
     """
     run, end, terms = memory.run, memory.crossing_end, memory.series.terms
     counted, change = run.equations.system.counts.crossings, max(rtol, MIN_CHANGE)
@@ -94,13 +94,13 @@ def perturbed_run_agrees(rtol, memory):
 
 @kernel
 def run_perturbed(change, until, memory):
-    """Repeat the crossing until a time (s) from velocities larger by a fraction; return whether it gets
-    there."""
+    """Repeat the crossing until a time (s) from velocities larger by a fraction; return whether the run
+    reaches that time."""
     run, clock, counts = memory.run, memory.run.loop.clock, memory.run.equations.system.counts
     restore_state(memory.crossing_start, run)
     for i in range(run.state.velocities.shape[0]):
         run.state.velocities[i] *= 1.0 + change
-    clock.sample, memory.progress.end = run.loop.times.shape[0], until  # no samples of its own
+    clock.sample, memory.progress.end = run.loop.times.shape[0], until  # the perturbed run takes no samples
     status = memory.kernels.begin(memory)
     while status == OK and clock.time < until and counts.steps < run.control.most_steps:
         status = memory.kernels.step(memory)

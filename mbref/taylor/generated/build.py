@@ -66,7 +66,7 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
 
 
 def rank_of_rows(taylor: TaylorMemory) -> int:
-    """Return the rank of the rows where all of the start's freedoms are left."""
+    """Return the rank of the rows that leaves the start's degrees of freedom."""
     return taylor.solver.pivot_columns.size - int(taylor.options.start_freedoms)
 
 

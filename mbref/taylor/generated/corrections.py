@@ -15,7 +15,8 @@ POINTERS = {"violation": 2, "close": 4, "close_rate": 4}  # terms, phi; response
 
 
 class Correction:
-    """Violations of the rows, and the least changes of variables and rates that take them away."""
+    """Code for the violations of the rows, and for the least changes of variables and rates that remove
+    them."""
 
     def __init__(self, taylor: TaylorMemory, write: Instructions):
         self._taylor, self._write = taylor, write
@@ -27,7 +28,7 @@ class Correction:
         self._terms, self._phi = write.pointers[:2]
 
     def violation(self) -> None:
-        """Write Φ of all rows at the variables."""
+        """Generate code for Φ of all rows at the variables."""
         terms = self._write.row(self._terms, 0, self._lanes)
         constants = self._taylor.polynomials.rows.constant
         for b in self._of_rows:
@@ -39,11 +40,11 @@ class Correction:
             self._write.store([self._write.total(parts)], self._phi, b * WIDTH)
 
     def close(self) -> None:
-        """Change the variables so that Φ vanishes."""
+        """Generate code that changes the variables so that Φ vanishes."""
         self._subtract(0)
 
     def close_rate(self) -> None:
-        """Change the rates so that Φ' vanishes."""
+        """Generate code that changes the rates so that Φ' vanishes."""
         terms, rates = (self._write.row(self._terms, k * self._lanes, self._lanes) for k in (0, 1))
         for b in self._of_rows:
             parts = []

@@ -1,7 +1,7 @@
-"""Machine code of the orders of a driven scene's series: rows that determine all variables.
+"""Machine code for the orders of a driven scene's series, in which rows determine all variables.
 
-No force moves any variable, and no multiplier is needed.  Only products of rows remain; a row may have
-several lanes, whose sums the response adds up.
+Forces have no influence, and no multiplier is needed. Only products of rows remain; a row may use several
+lanes, whose sums the response matrix adds.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class DrivenOrders(MultiplierOrders):
 
 
 def _lanes_of(terms: list[list[Term]]) -> list[tuple[int, list[Term]]]:
-    """Return the row of each lane and its products, the most first: lanes of a vector that rows leave go to
-    those with the most."""
+    """Return the row of each lane and its products, the longest first: unused lanes of a vector are given to
+    the rows with the most products."""
     count = [1] * len(terms)
     for _ in range(WIDTH - len(terms) if terms else 0):
         count[max(range(len(terms)), key=lambda row: len(terms[row]) / count[row])] += 1

@@ -1,7 +1,8 @@
 """Machine code of a scene's linear system: ``mbref.taylor.solver`` for one scene, without loops.
 
-Rows and dependent variables are chosen while a motion runs: only the elimination has them, in memory; behind
-it all places are known.  The mass matrix and the rows' coefficients stand in the code.
+Rows and dependent variables are chosen at run time and read from memory during the elimination; after it all
+positions are known when the code is generated. The mass matrix and the rows' coefficients are constants of
+the code.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ POINTERS = 6, 2  # terms, tableau, particular, null_space, response, last; row, 
 
 
 class Elimination:
-    """The response at the first coefficients, for a rank of the rows."""
+    """Code for the response matrix at the first coefficients, for a given rank of the rows."""
 
     def __init__(self, taylor: TaylorMemory, rank: int, write: Instructions):
         self._taylor, self._write = taylor, write
@@ -124,8 +125,8 @@ class Elimination:
         self._put_rows(forces)
 
     def _put_inverse(self) -> None:
-        """Write the response of rows that determine all variables: no force moves any, and no multiplier is
-        needed."""
+        """Generate code for the response of rows that determine all variables: forces have no influence, and
+        no multiplier is needed."""
         for i in range(self._nz):
             self._store({}, i)
         self._put_rows([self._one(i) for i in range(self._nz)])
@@ -154,7 +155,7 @@ class Elimination:
         return motions, [self._momentum(f, motion) for f, motion in enumerate(motions)]
 
     def _reduced(self, motions: list[Row], momenta: list[Row], solved: list[Row]) -> list[Row]:
-        """Solve right-hand sides by the reduced mass matrix, whose pivots are kept."""
+        """Generate code that solves right-hand sides by the reduced mass matrix, and stores its pivots."""
         free = range(len(motions))
         reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]
         solved = list(solved)

@@ -1,4 +1,4 @@
-"""LLVM instructions of a function on vectors of numbers, for code of a scene's own."""
+"""LLVM instructions of a function on vectors of numbers, for code generated for a scene."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ DOUBLE, PLACE = ir.DoubleType(), ir.IntType(32)
 WHOLE = WORD
 PLACES = ir.VectorType(PLACE, WIDTH)
 FUSED = ("contract",)
-CHAINS = 4  # sums that are added up side by side: one would wait for each of its products
+CHAINS = 4  # sums that are added in parallel, since one sum would wait for each of its products
 
 Vectors = list[ir.Value]
 
 
 class Instructions:
-    """A function of arrays of doubles and of whole numbers, and of whole numbers, that is being written."""
+    """A function under construction, whose arguments are arrays of doubles, arrays of integers, and
+    integers."""
 
     def __init__(self, module: ir.Module, name: str, doubles: int, wholes: int = 0, counts: int = 0):
         function = ir.Function(module, function_type(doubles, wholes, counts), name)
@@ -39,7 +40,8 @@ class Instructions:
         vectors: Vectors,
         body: Callable[[ir.Value, Vectors], Vectors],
     ) -> Vectors:
-        """Repeat a body for the whole numbers from the first one on, below the end: it makes vectors anew."""
+        """Repeat a body for the integers from ``first`` to below ``end``; the body returns new values of the
+        vectors."""
         before, write = self._builder.block, self._builder
         head, inside, behind = (self._function.append_basic_block() for _ in range(3))
         write.branch(head)

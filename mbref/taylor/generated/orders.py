@@ -1,8 +1,8 @@
 """Machine code of the orders of a scene's series: the loop over them, and the products of series.
 
-The orders are a loop of few instructions, so that code fetched once serves all of them.  The numbers that
-meet in a product are known, so that vectors are shuffled in registers.  A sum may take a product in before it
-is rounded, as in the kernels.  ``multiplier_orders``, ``driven_orders`` and ``power_orders`` find each order.
+The orders are a short loop, so that its instructions are fetched once. The factors of each product are known
+in advance, so that vectors are shuffled in registers. Products are added with fused multiply-add, as in the
+kernels.  ``multiplier_orders``, ``driven_orders`` and ``power_orders`` find each order.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ Newest = dict[int, tuple[ir.Value, ...]]
 """The products of a slot with the newest factors, by its place."""
 Term = tuple[int, int, float]
 """A product's factors and minus its weight."""
-AT_ONCE = 8  # slots whose sums a processor keeps in its registers
-COUNTS = 1  # the last order of multipliers
+AT_ONCE = 8  # slots whose sums fit into the registers of a processor
+COUNTS = 1  # number of integer arguments: the last order of multipliers
 
 
 class Factors(NamedTuple):
-    """Both factors of a slot's products that a row of terms gives, and the left one times the weight."""
+    """Both factors of a slot's products that a row of terms gives, the left one times the weight."""
 
     left: ir.Value
     right: ir.Value
@@ -39,9 +39,9 @@ class Factors(NamedTuple):
 
 
 class Orders(ABC):
-    """The orders of a series from the first two; two at a time share their factors.
+    """Code for the orders of a series from the first two; two orders at a time share their factors.
 
-    Factors of ``products``, and of others that make so many slots, are kept in ``left`` and ``right``.
+    Factors of ``products``, and of further ones that give ``slots``, are stored in ``left`` and ``right``.
     """
 
     def __init__(self, taylor: TaylorMemory, write: Instructions, products: Products, slots: int):

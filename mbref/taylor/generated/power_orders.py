@@ -1,4 +1,4 @@
-"""Machine code of the orders of a series with one freedom and no drivers, without multipliers.
+"""Machine code for the orders of a series with one degree of freedom and no drivers, without multipliers.
 
 The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w =
 0 with w = M a - Q (P.  E.  B.  Jourdain, Quart.  J.  Pure Appl.  Math. 40, 1909).  With the rows it gives
@@ -9,8 +9,8 @@ with v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
     z_{k+2} = B z_{k+1} - R s_k + v_0 (v_0 · M z_{k+2}) / (v_0 · M v_0),
 
 where R is the response to rows, s_k sums the products in Φ of z_2 … z_k, and B = -R G' with the rate of G:
-so little is left between one order and the next.  At rest no velocity determines the motion; there and
-where it turns back the orders have multipliers.
+so few operations separate one order from the next. At rest and at turning points the velocity does not
+determine the motion, and the orders with multipliers are used.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ ZERO, HALF = constant([0.0] * WIDTH), constant([0.5] * WIDTH)
 
 
 def serves(taylor: TaylorMemory) -> bool:
-    """Return whether a scene has one freedom and no drivers, and power takes no more products than
-    multipliers."""
+    """Return whether a scene has one degree of freedom and no drivers, and needs no more products by power
+    than with multipliers."""
     if taylor.options.start_freedoms != 1 or taylor.polynomials.given.driver.size:
         return False
     products, nz, nr = (

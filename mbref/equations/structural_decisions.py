@@ -1,8 +1,9 @@
-"""Evidence: the answers of a scene's numbers on which the choice of its primitives, rows and columns rests.
+"""Structural decisions: the properties of a scene's numbers on which the choice of its primitives, rows and
+columns depends.
 
-Numbers decide only by whether they are zero, constant, perpendicular or redundant.  Scenes of one structure
-that give the same answers lead to the same choice.  Rows and columns that act on a block may differ, as
-roundings of zero do, where they reach the same.
+Numbers matter only by whether they are zero, constant, perpendicular or redundant. Scenes of one structure
+with equal properties lead to equal choices. Rows and columns that act on a block may differ, as roundings of
+zero do, if they reach equal rows and columns.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ from mbref.equations.static_constraints import MOST, ROUNDING, SMALL, Asked, are
 
 
 class Answers(NamedTuple):
-    """The answers of s scenes: those that decide, (s, …), among them the active entries of each round of
-    states, (s, rounds, m, 12); and rows and columns (s, rounds, m + n) on which something acts."""
+    """Properties of s scenes: the deciding ones (s, …), among them the active entries of each round of
+    states, (s, rounds, m, 12), and the acting rows and columns (s, rounds, m + n)."""
 
     decisive: np.ndarray
     entries: np.ndarray
     acting: np.ndarray
 
 
-class Evidence:
+class StructuralDecisions:
     """Structural decisions about a scene's parameters on which its reduction depends.
 
     The choice of active ``entries`` (m, 12) evaluates the terms at each of ``read``; the choice of statically
@@ -49,11 +50,11 @@ class Evidence:
         self._reached = self._reach(model, self._found.acting[0])
 
     def agrees(self, model: Model, start: Start, terms: Terms) -> bool:
-        """Return whether a scene of equal structure gives equal answers, from its ``terms``."""
+        """Return whether a scene of equal structure has equal properties, computed from its ``terms``."""
         return bool(self._agree(model, self._of_one(model, start, terms))[0])
 
     def terms(self, model: Model, start: Start) -> Terms:
-        """The terms (1, k, …) of a scene at ``states``."""
+        """Return the terms (1, k, …) of a scene at ``states``."""
         part, places, velocities = self.states(start.q[None], start.v[None])
         found = model.along(part * model.scene.duration, places[0], velocities[0])
         return Terms(*(value[None] for value in vars(found).values()))
@@ -61,15 +62,19 @@ class Evidence:
     def which_agree(
         self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
     ) -> np.ndarray:
-        """Return which of s scenes of equal structure give equal answers.
+        """Return which of s scenes of equal structure have equal properties.
 
-        From their starts q (s, 7 nb) and v (s, 6 nb), masses (s, 6 nb) and terms (s, k, …) at ``states``.
+        Arguments are their starts q (s, 7 nb) and v (s, 6 nb), masses (s, 6 nb) and terms (s, k, …) at
+        ``states``.
         """
         return self._agree(model, self._answers(model, q, v, mass, terms))
 
     def states(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The k states read about the starts q (s, 7 nb), v (s, 6 nb) of s scenes, the start first: times as
-        parts of the duration (k,), coordinates (s, k, 7 nb) and velocities (s, k, 6 nb)."""
+        """Return k states about the starts q (s, 7 nb), v (s, 6 nb) of s scenes, the start first.
+
+        A state has a time as a fraction of the duration (k,), coordinates (s, k, 7 nb) and velocities (s, k,
+        6 nb).
+        """
         part, displacement, velocity = self._states
         places = np.repeat(q, len(part), axis=0)
         displace_all(places, np.concatenate([displacement] * len(q)), np.zeros(q.shape[1]))
@@ -90,7 +95,8 @@ class Evidence:
         return same
 
     def _reach(self, model: Model, acting: np.ndarray) -> list[bytes]:
-        """The columns and rows that are reached in each round, from those (rounds, m + n) that act there."""
+        """Return the columns and rows that are reached in each round, from the acting ones (rounds, m +
+        n)."""
         entries = np.logical_or.accumulate(self._found.entries[0], axis=0)
         rounds = zip(entries, acting, strict=True)
         found = (reached(model, e, a[: model.m], a[model.m :] | self._moves) for e, a in rounds)
@@ -100,7 +106,7 @@ class Evidence:
         return self._answers(model, start.q[None], start.v[None], model.mass[None], terms)
 
     def _answers(self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms) -> Answers:
-        """The answers of each of s scenes."""
+        """Return the properties of each of s scenes."""
         shape = terms.phi.shape[:2]
         found = np.concatenate([one.reshape(*shape, -1) for one in nonzero(model, terms)], axis=2)
         found = found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
@@ -111,14 +117,16 @@ class Evidence:
         return Answers(joined, entries.reshape(*found.shape[:2], *model.entry_columns.shape), acting)
 
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
-        """Which active entries and rows are other than zero in each round, and which rows could hold."""
+        """Return which active entries and rows are nonzero in each round, and which rows could keep columns
+        at rest."""
         samples, rounds = terms.jacobian[:, self._split :], self._rounds[1]
         left = _of_rounds((samples != 0) & self._entries, rounds)
         return [left, _of_rounds(terms.nu[:, self._split :] != 0, rounds), *self._trials.answers(samples)]
 
 
 def _of_rounds(found: np.ndarray, rounds: int) -> np.ndarray:
-    """Whether something is so at one of the states (s, k, …) of a round, which have as many each."""
+    """Return whether a property holds at one of the states (s, k, …) of each round; all rounds have equally
+    many states."""
     scenes, states = found.shape[:2]
     each: np.ndarray = found.reshape(scenes, rounds, states // max(rounds, 1), *found.shape[2:])
     return np.any(each, axis=2)
@@ -142,7 +150,8 @@ class Trials:
         self._one, self._other = np.array(pairs, dtype=int).reshape(-1, 2).T
 
     def answers(self, samples: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Which rows have a constant length, and which pairs are perpendicular, in blocks (s, k, m, 12)."""
+        """Return which rows have a constant length, and which pairs are perpendicular, in blocks (s, k, m,
+        12)."""
         if not self._row.size:
             return (np.zeros((len(samples), 0), dtype=bool),) * 2
         places = self._sample[:, :, None], self._row[:, None, None], self._entry[:, None, :]
@@ -159,5 +168,5 @@ class Trials:
 
 
 def _entries(columns_of_row: list[int], columns: Sequence[int]) -> list[int]:
-    """The entries of a row in these columns, filled up with -1."""
+    """Return the entries of a row in these columns, padded with -1."""
     return [columns_of_row.index(column) for column in columns] + [-1] * (MOST - len(columns))
