@@ -112,12 +112,13 @@ def compiled(scene: Scene) -> Compiled:
     )
 
 
-def description(scene: Scene, tree: Tree) -> Any:
-    """Return the scene's tree as a MjSpec with bodies ``link k``, joints ``joint k.i`` and placeholder
-    masses."""
+def description(scene: Scene, tree: Tree) -> tuple[Any, list[tuple[str, float, Factor | None]]]:
+    """Return the scene's tree as a MjSpec of bodies ``link k``, joints ``joint k.i``, stand-ins for masses;
+    and the joint, amount and factor of each force or torque along a joint."""
     import mujoco
 
-    return _built(mujoco, scene, tree).spec
+    built = _built(mujoco, scene, tree)
+    return built.spec, built.pushed
 
 
 def _built(mujoco: Any, scene: Scene, tree: Tree) -> _Builder:

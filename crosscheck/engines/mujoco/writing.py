@@ -7,7 +7,7 @@ centre of mass. A cut joint carries a part of its body's mass on its other side,
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,10 @@ from crosscheck.engines.mujoco.model import COUPLING, description
 from crosscheck.engines.spanning_tree import Link, Tree, spanning_tree
 from mbref import rotations
 from mbref.formats import Exported
-from mbref.scene import Force, Moment, Scene, SceneError
+from mbref.scene import Force, JointForce, JointTorque, Moment, Scene, SceneError
 
 CONSTANT = (Moment, Force)  # loads that MJCF cannot describe
+KEYFRAME = "loads"  # with the control values of motors that stand for forces and torques of joints
 
 
 def write(scene: Scene) -> Exported:
@@ -26,9 +27,10 @@ def write(scene: Scene) -> Exported:
     masses."""
     if not scene.has_mass():
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
-    bare = scene.with_(driver=(), load=[load for load in scene.load if not isinstance(load, CONSTANT)])
+    kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
+    bare = scene.with_(driver=(), load=kept)
     tree = spanning_tree(bare)
-    spec = description(bare, tree)
+    spec, pushed = description(bare, tree)
     spec.modelname = scene.name
     names = _names(scene, tree)
     for k, link in enumerate(tree.links):
@@ -36,11 +38,15 @@ def write(scene: Scene) -> Exported:
         _true_inertia(body, link)
         body.name = names[k]
     new = _name_joints(spec, scene, tree)
-    return Exported(_text(spec, new), tuple(_left_out(scene)))
+    motors = [(new[name], amount) for name, amount, _ in pushed]
+    return Exported(_text(spec, new, motors), tuple(_left_out(scene)))
 
 
-def _text(spec: Any, new: dict[str, str]) -> str:
-    """Return the MJCF text with all digits: MuJoCo's own writer prints six."""
+def _text(spec: Any, new: dict[str, str], motors: Sequence[tuple[str, float]]) -> str:
+    """Return the MJCF text with all digits: MuJoCo's own writer prints six.
+
+    ``motors`` are joints with their forces or torques, the control values of the keyframe ``loads``.
+    """
     root = ET.Element("mujoco", model=spec.modelname)
     ET.SubElement(root, "compiler", angle="radian")
     ET.SubElement(root, "option", gravity=_digits(spec.option.gravity))
@@ -66,7 +72,13 @@ def _text(spec: Any, new: dict[str, str]) -> str:
         )
         for i in range(2):
             ET.SubElement(element, "site", site=f"{spring.name}.{i}")
-    for section in (equalities, tendons):
+    actuators = ET.SubElement(root, "actuator")
+    for k, (joint, _) in enumerate(motors):
+        ET.SubElement(actuators, "motor", name=f"motor {k} of {joint}", joint=joint)
+    keyframes = ET.SubElement(root, "keyframe")
+    if motors:
+        ET.SubElement(keyframes, "key", name=KEYFRAME, ctrl=_digits([amount for _, amount in motors]))
+    for section in (equalities, tendons, actuators, keyframes):
         if not len(section):
             root.remove(section)
     ET.indent(root)
@@ -149,6 +161,10 @@ def _left_out(scene: Scene) -> Iterator[str]:
     for i, load in enumerate(scene.load):
         if isinstance(load, CONSTANT):
             yield f"load[{i}] ({load.type} on {load.body}): apply it by mjData.xfrc_applied"
+        elif load.over_time:
+            yield f"load[{i}] ({load.type} of {load.joint}): MJCF has no loads over time"
+        elif isinstance(load, JointTorque | JointForce):
+            yield f"load[{i}] ({load.type} of {load.joint}): its motor is controlled in keyframe {KEYFRAME!r}"
     for body in scene.body:
         if body.velocity is not None or body.angular_velocity is not None:
             yield f"initial velocity of {body.name}: set mjData.qvel"

@@ -18,7 +18,7 @@ from crosscheck.engines.mujoco.importing.posing import Poses
 from crosscheck.judge.constraints import closure, inertia_matrices, jacobian
 from crosscheck.judge.joint_coordinates import reflected
 from mbref import rotations
-from mbref.scene import Scene, SceneError, Spring
+from mbref.scene import Scene, SceneError
 
 AGREE = 1e-8  # largest difference / largest entry; rounding of inertias and poses leaves less than 1e-10
 RANK = 1e-8  # fraction of the largest singular value of rows of length one
@@ -189,16 +189,14 @@ def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: 
 
 
 def _pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarray) -> np.ndarray:
-    """Return weight and forces of the scene's springs (6 nb,)."""
+    """Return weight and forces of the scene's springs (6 nb,); actuators are off in the comparison."""
     found = np.zeros((len(scene.body) + 1, 6))  # the last entry is the ground's
     found[:-1, :3] = np.outer([body.mass or 0.0 for body in scene.body], np.array(scene.gravity))
+    actions = {"spring": _spring, "torsion_spring": _torsion, "slide_spring": _slide}
     for load in scene.load:
-        for body, wrench in (
-            _spring(scene, load, pose, motion)
-            if isinstance(load, Spring)
-            else _torsion(scene, load, pose, motion)
-        ):
-            found[body] += wrench
+        if action := actions.get(load.type):
+            for body, wrench in action(scene, load, pose, motion):
+                found[body] += wrench
     return found[:-1].reshape(-1)
 
 
@@ -234,6 +232,26 @@ def _torsion(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
     return [
         (b, np.concatenate([np.zeros(3), sign * moment * axis]))
         for b, sign in zip(bodies, (1, -1), strict=True)
+    ]
+
+
+def _slide(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
+    joint = scene.joint_named(load.joint)
+    bodies = [scene.body_index(name) for name in joint.bodies]
+    turns = [np.eye(3) if b < 0 else _turn(scene, pose, b) for b in bodies]
+    axis = turns[0] @ np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    places, rates = [], []
+    for b, turn, point in zip(bodies, turns, joint.anchor_pair, strict=True):
+        arm = np.zeros(3) if b < 0 else turn @ (np.array(point) - scene.body[b].position)
+        places.append(np.array(point) if b < 0 else pose[0][b] + arm)
+        rates.append(np.zeros(3) if b < 0 else motion[b, :3] + np.cross(motion[b, 3:], arm))
+    apart, spin = places[1] - places[0], np.zeros(3) if bodies[0] < 0 else motion[bodies[0], 3:]
+    rate = axis @ (rates[1] - rates[0]) + np.cross(spin, axis) @ apart
+    push = (load.stiffness * (axis @ apart - load.natural_displacement) + load.damping * rate) * axis
+    arms = [places[1] - (np.zeros(3) if b < 0 else pose[0][b]) for b in bodies]
+    return [
+        (b, np.concatenate([sign * push, np.cross(arm, sign * push)]))
+        for b, arm, sign in zip(bodies, arms, (1, -1), strict=True)
     ]
 
 

@@ -19,7 +19,7 @@ KINDS = {  # kinds of parts that change the motion → their description
     "fluid": "forces of a fluid around the bodies",
     "friction": "dry friction of joints and tendons",
     "gravity-compensation": "bodies whose weight is compensated",
-    "motors": "actuators with a control value",
+    "motors": "actuators with a control value, except motors of single joints",
     "springs": "springs of joints and tendons that no load of a scene describes",
 }
 EVERYTHING = "everything"
@@ -52,9 +52,8 @@ def refuse_others(parts: Collection[Part], without: frozenset[str]) -> None:
         raise SceneError(faults)
 
 
-def of_model(mujoco: Any, model: Any, keyframe: int, kept: Collection[int]) -> Iterator[Part]:
-    """Return parts that change the motion: armature, friction, fluid, compensation, flexible bodies, and
-    motors controlled by a keyframe.
+def of_model(model: Any, kept: Collection[int]) -> Iterator[Part]:
+    """Return parts that change the motion: armature, friction, fluid, compensation, flexible bodies.
 
     Armature of the coordinates ``kept`` is in the scene.
     """
@@ -72,12 +71,6 @@ def of_model(mujoco: Any, model: Any, keyframe: int, kept: Collection[int]) -> I
         yield Part("gravity-compensation", f"compensation of the weight of {_listed(found)}")
     if model.nflex:
         yield Part("flexible-bodies", f"{model.nflex} flexible bodies")
-    if keyframe >= 0 and (found := _controlled(model, keyframe)):
-        yield Part("motors", f"control values of {_listed(found)} in the keyframe")
-
-
-def _controlled(model: Any, keyframe: int) -> list[str]:
-    return [model.actuator(int(a)).name or f"actuator {a}" for a in np.flatnonzero(model.key_ctrl[keyframe])]
 
 
 def _joint_names(model: Any, numbers: np.ndarray) -> list[str]:
@@ -112,7 +105,8 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
         "limits of joints": int(np.sum(model.jnt_limited != 0)),
     }
     if model.nu:
-        yield f"{model.nu} actuators{f', {servos} of them servos' if servos else ''}: the scene has no motors"
+        kinds = f"{model.nu} actuators{f', {servos} of them servos' if servos else ''}"
+        yield f"{kinds}: only motors with a control value in the keyframe act"
     yield from (f"{number} {what}" for what, number in counts.items() if number)
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"

@@ -10,12 +10,15 @@ import numpy as np
 from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
-from mbref.scene import Joint, Load, Spring, TorsionSpring
+from mbref.scene import Joint, JointForce, JointTorque, Load, SlideSpring, Spring, TorsionSpring
+from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
+
+COORDINATES: dict[str, Coordinate] = {"hinge": ANGLE, "slide": DISPLACEMENT}
 
 
 def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
-    """Return a torsion spring for every hinge with stiffness or damping; all other springs are parts to be
-    left out.
+    """Return a spring for every hinge and slide with stiffness or damping; all other springs are parts to
+    be left out.
 
     ``joint_of`` maps a MuJoCo joint to the scene's joint if that consists of it alone.
     """
@@ -24,14 +27,65 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
         if not stiffness and not damping:
             continue
         q, joint = int(model.jnt_qposadr[j]), joint_of.get(j)
-        if joint is None or not joint.facts.takes_torsion_spring or kind_of(mujoco, model, j) != "hinge":
+        coordinate = COORDINATES.get(kind_of(mujoco, model, j))
+        if joint is None or coordinate not in joint.facts.loaded:
             yield from _unknown(model, j, bool(stiffness), bool(damping))
             model.jnt_stiffness[j] = 0
             model.dof_damping[_dofs(model, j)] = 0
             continue
-        angle = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
-        yield TorsionSpring(joint=joint.name, stiffness=stiffness, damping=damping, natural_angle=angle)
+        rest = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
+        numbers = {"joint": joint.name, "stiffness": stiffness, "damping": damping}
+        if coordinate == ANGLE:
+            yield TorsionSpring(**numbers, natural_angle=rest)
+        else:
+            yield SlideSpring(**numbers, natural_displacement=rest)
     yield from _polynomials(model)
+
+
+def of_motors(mujoco: Any, model: Any, key: int, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
+    """Return a torque or force for every motor of a joint with a control value in a keyframe.
+
+    Servos, other transmissions and activation dynamics with a control value are parts to be left out.
+    """
+    for a in controlled(mujoco, model, key):
+        j, name = int(model.actuator_trnid[a, 0]), model.actuator(a).name or f"actuator {a}"
+        joint = joint_of.get(j) if is_motor(mujoco, model, a) else None
+        coordinate = None if joint is None else COORDINATES.get(kind_of(mujoco, model, j))
+        if joint is None or coordinate not in joint.facts.loaded:
+            yield Part("motors", f"control value of {name!r} in the keyframe, no motor of a joint")
+        elif coordinate == ANGLE:
+            yield JointTorque(joint=joint.name, torque=motor_force(model, key, a))
+        else:
+            yield JointForce(joint=joint.name, force=motor_force(model, key, a))
+
+
+def controlled(mujoco: Any, model: Any, key: int) -> list[int]:
+    """Return the actuators with a control value in a keyframe; none if the file disables actuators."""
+    is_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    return [] if key < 0 or is_off else np.flatnonzero(model.key_ctrl[key]).tolist()
+
+
+def motor_force(model: Any, key: int, a: int) -> float:
+    """Return the force or torque along its joint of a motor with the control value of a keyframe."""
+    control = _within(model.key_ctrl[key, a], model.actuator_ctrllimited[a], model.actuator_ctrlrange[a])
+    force = float(model.actuator_gainprm[a, 0]) * control
+    force = _within(force, model.actuator_forcelimited[a], model.actuator_forcerange[a])
+    return float(model.actuator_gear[a, 0]) * force
+
+
+def is_motor(mujoco: Any, model: Any, a: int) -> bool:
+    """Return whether an actuator exerts gain times control along a joint."""
+    kinds = (
+        (model.actuator_trntype, mujoco.mjtTrn.mjTRN_JOINT),
+        (model.actuator_gaintype, mujoco.mjtGain.mjGAIN_FIXED),
+        (model.actuator_biastype, mujoco.mjtBias.mjBIAS_NONE),
+        (model.actuator_dyntype, mujoco.mjtDyn.mjDYN_NONE),
+    )
+    return all(int(found[a]) == int(wanted) for found, wanted in kinds)
+
+
+def _within(number: float, is_limited: Any, limits: np.ndarray) -> float:
+    return float(np.clip(number, *limits)) if is_limited else float(number)
 
 
 def _springs(mujoco: Any, model: Any, j: int) -> tuple[float, float]:

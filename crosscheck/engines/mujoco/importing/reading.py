@@ -130,8 +130,7 @@ class _Reader:
         self._close()
         self._read_joints(closures)
         self._read_loads()
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, self.options.keyframe or "\0")
-        self.parts += left_out.of_model(mujoco, model, key, self.kept)
+        self.parts += left_out.of_model(model, self.kept)
         if self.text is not None:
             self.parts += urdf.couplings(self.text.root)
         self.notes += unclosed(self.groups, self.poses.data, self.frames, closures, self.poses.extent)
@@ -303,8 +302,10 @@ class _Reader:
 
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, self.options.keyframe or "\0")
         both = [
             *loads.of_joints(mujoco, model, data, self.joint_of),
+            *(() if "motors" in self.without else loads.of_motors(mujoco, model, key, self.joint_of)),
             *loads.of_tendons(mujoco, model, data, self.groups),
         ]
         self.parts += [part for part in both if isinstance(part, Part)]

@@ -1,0 +1,170 @@
+"""Loads along joints and over time / closed forms, both formulations of the reference, MuJoCo, MJCF."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from crosscheck.conformance.features import FACTORS, feature_scenes
+from crosscheck.engine import Owner, engine
+from crosscheck.engines.mujoco.files import FORMAT
+from crosscheck.judge import time_functions
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.energy import energy_drift
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from mbref.formats import ImportOptions
+from mbref.scene import Factor, Scene, SceneError
+from tests import loads_over_time as scenes
+from tests.loads_over_time import AXIS, WAVY
+
+TIMES = np.array([0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0])
+FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, seconds=100.0)}
+EVERY = (scenes.sprung_slide, scenes.wheel, scenes.thrown, scenes.arm, scenes.driven_arm, scenes.driven_wheel)
+PROBES = {name: scene for name, scene in feature_scenes().items() if "time" in name or "_" in name}
+
+
+@pytest.mark.parametrize("name", FORMULATIONS)
+def test_formulations_have_the_closed_forms(name):
+    def moved(scene: Scene) -> np.ndarray:
+        motion = FORMULATIONS[name](scene, TIMES, EXTENDED)
+        assert not motion.reason
+        return doubles(motion.position[:, 0])
+
+    start = np.array(scenes.sprung_slide().body[0].position)
+    along = (moved(scenes.sprung_slide()) - start) @ AXIS
+    assert np.abs(along - scenes.sprung_displacement(TIMES)).max() < 1e-15
+    assert np.abs(moved(scenes.thrown()) @ AXIS - scenes.switched(TIMES)).max() < 1e-15
+    motion = FORMULATIONS[name](scenes.wheel(), TIMES, EXTENDED)
+    turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)
+    apart = turned - scenes.turned(TIMES)
+    assert np.abs(apart - 2 * np.pi * np.round(apart / 2 / np.pi)).max() < 4e-15
+
+
+@pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
+def test_both_formulations_agree(make):
+    a, b = (run(make(), TIMES, EXTENDED) for run in FORMULATIONS.values())
+    assert np.abs(doubles(a.position - b.position)).max() < 1e-15
+    assert np.abs(doubles(a.acceleration - b.acceleration)).max() < 1e-13
+
+
+@pytest.mark.parametrize("make", (scenes.sprung_slide, scenes.thrown), ids=lambda make: make.__name__)
+def test_gauss_s_principle_has_the_motion_of_the_reference(make):
+    found, exact = gauss_motion(make(), tuple(TIMES)), natural_motion(make(), TIMES, EXTENDED)
+    assert np.abs(found.position - doubles(exact.position)).max() < 1e-9
+    assert np.abs(found.acceleration - doubles(exact.acceleration)).max() < 1e-7
+
+
+def test_the_judge_s_spline_is_the_one_of_de_boor():
+    """Against SciPy's cubic spline, values and three derivatives, between rows and after the last."""
+    spline = CubicSpline(*zip(*WAVY, strict=True))
+    for t in np.linspace(0.0, 2.4, 49):
+        k = max(i for i, (time, _) in enumerate(WAVY[:-1]) if time <= t)
+        for order in range(4):
+            found = time_functions.value(Factor(table=WAVY), t, order, since=WAVY[k][0])
+            assert float(found) == pytest.approx(float(spline(t, order)), abs=1e-11)
+
+
+def test_functions_are_right_continuous_where_they_switch():
+    factor = Factor(polynomial=(2.0,), start=0.5, stop=1.5)
+    assert time_functions.value(factor, np.array([0.49, 0.5, 1.49, 1.5])).tolist() == [0.0, 2.0, 2.0, 0.0]
+    assert time_functions.ends(factor) == (0.5, 1.5)
+
+
+def test_energy_of_constant_loads_of_joints_is_balanced():
+    scene = scenes.arm()
+    still = [
+        load.model_copy(update={"damping": 0.0} if load.action.stiffness else {"factor": None})
+        for load in scene.load
+        if hasattr(load, "joint")
+    ]
+    scene = scene.with_(load=still)
+    motion = gauss_motion(scene, tuple(np.linspace(0.0, 1.0, 41)))
+    assert energy_drift(scene, motion).max() < 1e-8
+    assert energy_drift(scenes.arm(), motion) is None
+
+
+@pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
+def test_mujoco_moves_loads_of_joints(name):
+    check(PROBES[name], 1e-12)
+
+
+@pytest.mark.parametrize("kind", FACTORS)
+def test_mujoco_moves_loads_over_time(kind):
+    check(PROBES[f"{kind} loads over time"].with_(duration=0.12), 1e-11)
+
+
+def check(scene: Scene, within: float) -> None:
+    """MuJoCo's motion by its best setting / the reference, m and of the largest acceleration."""
+    times, simulator = np.linspace(0.0, scene.duration, 4), engine("mujoco")
+    run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
+    exact = natural_motion(scene, times, EXTENDED)
+    assert run.outcome.name == "COMPLETED"
+    assert np.abs(run.position - doubles(exact.position)).max() < within
+    largest = np.abs(doubles(exact.acceleration)).max()
+    assert np.abs(run.acceleration - doubles(exact.acceleration)).max() < 100 * within * largest
+
+
+def test_engines_without_functions_of_time_refuse_them():
+    assert not engine("mujoco").cannot(PROBES["table loads over time"])
+    for name in ("pinocchio", "exudyn"):
+        refused = engine(name).cannot(PROBES["sine loads over time"])
+        assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
+
+
+MOTORS = """<mujoco><option timestep="0.001" integrator="RK4"/><worldbody>
+<body name="arm" pos="0.3 0 0"><inertial mass="1.5" pos="0 0 0" diaginertia="0.02 0.05 0.06"/>
+<joint name="turn" type="hinge" axis="0 0 1" pos="-0.3 0 0" damping="0.1"/>
+<body name="head" pos="0.4 0.1 0"><inertial mass="0.5" pos="0 0 0" diaginertia="0.01 0.02 0.03"/>
+<joint name="slide" type="slide" axis="1 0.5 0" stiffness="40" damping="0.7" springref="0.05"/></body></body>
+</worldbody><actuator><motor name="m" joint="turn" gear="20"/>
+<general name="p" joint="slide" gainprm="3" gear="-2" ctrllimited="true" ctrlrange="-1 1"/>
+SERVO</actuator><keyframe><key name="on" ctrl="0.05 4SERVED"/></keyframe></mujoco>"""
+
+
+def read(tmp_path: Path, text: str, **options: object):
+    (tmp_path / "model.xml").write_text(text)
+    return FORMAT.read(tmp_path / "model.xml", ImportOptions(**options))
+
+
+def test_springs_of_slides_and_motors_of_a_keyframe_are_loads(tmp_path):
+    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
+    scene = read(tmp_path, plain, keyframe="on").scene
+    found = {load.type: load for load in scene.load}
+    assert found["slide_spring"].natural_displacement == 0.05 and found["slide_spring"].damping == 0.7
+    assert found["joint_torque"].torque == pytest.approx(1.0) and found["joint_force"].force == -6.0
+    model = mujoco.MjModel.from_xml_string(plain)
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 500)
+    mujoco.mj_forward(model, data)
+    exact = natural_motion(scene, np.array([0.0, 0.5]), EXTENDED)
+    assert np.abs(doubles(exact.position)[-1] - data.xipos[1:]).max() < 1e-9
+    assert not {"joint_torque", "joint_force"} & {load.type for load in read(tmp_path, plain).scene.load}
+
+
+def test_servos_with_a_control_value_are_refused_by_name(tmp_path):
+    servo = MOTORS.replace("SERVO", '<position name="s" joint="turn" kp="3"/>').replace("SERVED", " 0.2")
+    with pytest.raises(SceneError, match=r"'s' in the keyframe, no motor of a joint.*--without motors"):
+        read(tmp_path, servo, keyframe="on")
+    left = read(tmp_path, servo, keyframe="on", without=("motors",)).scene
+    assert {load.type for load in left.load} == {"torsion_spring", "slide_spring"}
+
+
+def test_loads_of_joints_return_from_mjcf(tmp_path):
+    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
+    scene = read(tmp_path, plain, keyframe="on").scene
+    exported = FORMAT.write(scene)
+    assert "its motor is controlled in keyframe 'loads'" in " ".join(exported.left_out)
+    again = read(tmp_path, exported.text, keyframe="loads").scene
+    kinds = sorted(load.type for load in scene.load)
+    assert sorted(load.type for load in again.load) == kinds
+    motions = [natural_motion(each, np.array([0.0, 0.5]), EXTENDED) for each in (scene, again)]
+    assert np.abs(doubles(motions[0].position - motions[1].position)).max() < 1e-9
+    timed = scene.with_("load[2].factor", Factor(start=0.2))
+    assert "MJCF has no loads over time" in " ".join(FORMAT.write(timed).left_out)
