@@ -117,15 +117,15 @@ class Engine(ABC):
     integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
     options: Mapping[str, str] = {}  # option of a setting → its description, with the unit
 
-    @abstractmethod
     def version(self) -> str:
-        """Return the version of the engine.
+        """Return the version of the engine; by default the version of ``package``.
 
         Raises
         ------
         ImportError
             If its package is not installed.
         """
+        return metadata.version(self.package)
 
     def cannot(self, scene: Scene) -> Cannot | None:
         """Return the refusal of a scene, or None if the engine can run it.

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import metadata
 
 import numpy as np
 
@@ -43,10 +42,6 @@ class Bullet(Engine):
     package = "pybullet"
     supports = replace(EVERYTHING, couplings=(), armatures=())
     families, options = FAMILIES, OPTIONS
-
-    def version(self) -> str:
-        """Version of PyBullet; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         import pybullet  # noqa: F401

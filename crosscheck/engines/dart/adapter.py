@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import metadata
 
 import numpy as np
 
@@ -49,10 +48,6 @@ class Dart(Engine):
     package = "dartpy"
     supports = EVERYTHING
     families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
-
-    def version(self) -> str:
-        """Version of dartpy; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         import dartpy  # noqa: F401

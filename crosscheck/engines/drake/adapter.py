@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -51,10 +50,6 @@ class Drake(Engine):
     package = "drake"
     supports = EVERYTHING
     families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
-
-    def version(self) -> str:
-        """Version of Drake; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         from pydrake.multibody import plant, tree  # noqa: F401

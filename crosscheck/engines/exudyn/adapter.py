@@ -8,7 +8,6 @@ import os
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -53,9 +52,6 @@ class Exudyn(Engine):
     package = "exudyn"
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, ("tuned",)
-
-    def version(self) -> str:
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         _exudyn()

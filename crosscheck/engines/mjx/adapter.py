@@ -6,7 +6,6 @@ Code is compiled for each model before the timed run, which takes 5 to 30 s.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -26,10 +25,6 @@ class Mjx(Engine):
     package = "mujoco-mjx"
     supports = SUPPORTS
     families, options = FAMILIES, OPTIONS
-
-    def version(self) -> str:
-        """Version of MJX; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         _mjx()

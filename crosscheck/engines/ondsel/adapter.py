@@ -10,16 +10,15 @@ by 1e-3 and 0.3 of their size; they and the reactions are then left out.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import replace
-from importlib import metadata
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engines.fixed_steps import simulated
 from crosscheck.engines.ondsel.model import ACCURATE_ON_GROUND, SUPPORTS, Assembly, Table, is_reversed, table
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
+from crosscheck.engines.sampling import Counts, Failed, Sample, step_count
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
@@ -41,10 +40,6 @@ class Ondsel(Engine):
     package = "pyondsel"
     supports = SUPPORTS
     families, options = FAMILIES, {"step": "largest step from pose to pose, s"}
-
-    def version(self) -> str:
-        """Version of pyondsel; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         import pyondsel.solve_raw  # noqa: F401
@@ -71,18 +66,9 @@ class Ondsel(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
-        if setting.family != FAMILY:
-            raise ValueError(f"ondsel has no family {setting.family!r}")
-        start = time.process_time()
-        run = _OndselSimulation(scene, np.array(times, dtype=float), setting.options["step"])
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
-        built = time.process_time() - start
-        trajectory = run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+        trajectory = simulated(
+            self, scene, times, setting, lambda: _OndselSimulation(scene, times, setting.options["step"])
+        )
         if any(joint.type in ACCURATE_ON_GROUND and GROUND not in joint.bodies for joint in scene.joint):
             return replace(trajectory, acceleration=None, angular_acceleration=None, reactions=None)
         return trajectory
@@ -94,7 +80,8 @@ class _OndselSimulation:
     def __init__(self, scene: Scene, times: np.ndarray, step: float):
         from pyondsel.solve_raw import solve_asmt_raw
 
-        self.solve, self.scene, self.times, self.step = solve_asmt_raw, scene, times, step
+        self.solve, self.scene, self.step = solve_asmt_raw, scene, step
+        self.times = np.array(times, dtype=float)
         self.assemblies = [Assembly(scene), Assembly(scene, tilted=True)]
         self.counts = Counts()
         self.samples: dict[float, Sample] = {}

@@ -36,9 +36,8 @@ from crosscheck.engines.pinocchio.families import (
 from crosscheck.engines.pinocchio.model import SUPPORTS, Loads, Mechanism
 from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4, run_through
-from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions
+from crosscheck.engines.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
-from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -141,7 +140,6 @@ class _PinocchioSimulation:
         self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
         self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])
         self.frames = [mechanism.frame(k) for k in range(len(mechanism.tree.links))]
-        self.start = np.array([body.orientation for body in scene.body])
         self.still = self.loads.fixed and not self.loads.torsion and not self.driven
         self.y = np.concatenate([mechanism.q0, mechanism.v0])
         self._configure(setting)
@@ -284,18 +282,8 @@ class _PinocchioSimulation:
         """Return poses, velocities and reactions of the scene's bodies and joints."""
         q, v = self.split(t, self.y)
         motion = self.link_motion(t, q, v)
-        own = list(self.mechanism.tree.own)
-        turned = rotations.from_matrix(motion.rotation[own])
         scene, tree = self.mechanism.scene, self.mechanism.tree
-        return Sample(
-            position=motion.position[own],
-            orientation=rotations.multiply(turned, self.start),
-            velocity=motion.velocity[own],
-            angular_velocity=motion.angular_velocity[own],
-            acceleration=motion.acceleration[own],
-            angular_acceleration=motion.angular_acceleration[own],
-            reactions=joint_reactions(scene, tree, motion, self.closing()) if scene.has_mass() else {},
-        )
+        return sample_of(scene, tree, motion, self.closing() if scene.has_mass() else None)
 
     def link_motion(self, t: float, q: np.ndarray, v: np.ndarray) -> LinkMotion:
         """Return the motion of the links; the closure forces of this state are then in the closures' data."""

@@ -8,20 +8,18 @@ steps, so these are missing in the cost.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from importlib import metadata
 from typing import Any
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engines.fixed_steps import simulated
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.sampling import Counts, Failed, Sample
 from crosscheck.engines.simbody.model import SUPPORTS, Mechanism
 from crosscheck.engines.spanning_tree import GROUND_LINK
-from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
-from mbref import rotations
+from crosscheck.engines.tree_reactions import LinkMotion, sample_of, wrench
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -42,10 +40,6 @@ class Simbody(Engine):
     package = "opensim"
     supports = SUPPORTS
     families, options = FAMILIES, OPTIONS
-
-    def version(self) -> str:
-        """Version of OpenSim; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         import opensim  # noqa: F401
@@ -75,35 +69,26 @@ class Simbody(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
-        if setting.family not in INTEGRATORS:
-            raise ValueError(f"simbody has no family {setting.family!r}")
-        start = time.process_time()
-        run = _SimbodySimulation(scene, INTEGRATORS[setting.family], setting.options["accuracy"])
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
-        built = time.process_time() - start
-        return run_through(scene, times, run.advance, run.sample, Counts(), built, labels)
+        return simulated(self, scene, times, setting, lambda: _SimbodySimulation(scene, setting))
 
 
 class _SimbodySimulation:
     """One simulation: the mechanism, its state and the integrator."""
 
-    def __init__(self, scene: Scene, integrator: str, accuracy: float):
+    def __init__(self, scene: Scene, setting: Setting):
         self.scene, self.mechanism = scene, Mechanism(scene)
         self.state = self.mechanism.start()
         opensim = self.mechanism.opensim
         self.manager = manager = opensim.Manager(self.mechanism.model)
-        manager.setIntegratorMethod(getattr(opensim.Manager, f"IntegratorMethod_{integrator}"))
-        manager.setIntegratorAccuracy(accuracy)
+        manager.setIntegratorMethod(
+            getattr(opensim.Manager, f"IntegratorMethod_{INTEGRATORS[setting.family]}")
+        )
+        manager.setIntegratorAccuracy(setting.options["accuracy"])
         manager.setWriteToStorage(False)
         manager.setPerformAnalyses(False)
         manager.setRecordStatesTrajectory(False)
         manager.initialize(self.state)
-        self.start = np.array([body.orientation for body in scene.body])
+        self.counts = Counts()
 
     def advance(self, t0: float, t1: float) -> None:
         """Move the state from t0 to t1; raises Failed."""
@@ -116,18 +101,8 @@ class _SimbodySimulation:
     def sample(self, t: float) -> Sample:
         """Return poses, velocities, accelerations and reactions."""
         motion = self._motion()
-        own = list(self.mechanism.tree.own)
-        weighed = self.scene.has_mass()
-        closing = self._closing(motion) if weighed else []
-        return Sample(
-            position=motion.position[own],
-            orientation=rotations.multiply(rotations.from_matrix(motion.rotation[own]), self.start),
-            velocity=motion.velocity[own],
-            angular_velocity=motion.angular_velocity[own],
-            acceleration=motion.acceleration[own],
-            angular_acceleration=motion.angular_acceleration[own],
-            reactions=joint_reactions(self.scene, self.mechanism.tree, motion, closing) if weighed else {},
-        )
+        closing = self._closing(motion) if self.scene.has_mass() else None
+        return sample_of(self.scene, self.mechanism.tree, motion, closing)
 
     def _motion(self) -> LinkMotion:
         """Return the motion of the links."""

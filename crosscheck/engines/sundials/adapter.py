@@ -14,15 +14,13 @@ The residual is computed by numpy, which takes most of the time.  The one option
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
-from importlib import metadata
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Supports
+from crosscheck.engines.fixed_steps import simulated
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.sampling import run_through
 from crosscheck.engines.sundials.ida import Run
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -53,10 +51,6 @@ class Sundials(Engine):
         loads=("moment", "force", "spring", "torsion_spring"),
     )
 
-    def version(self) -> str:
-        """Version of scikit-sundae; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
-
     def prepare(self, families: Sequence[str]) -> None:
         import sksundae.ida  # noqa: F401
 
@@ -70,20 +64,13 @@ class Sundials(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
-        if setting.family != FAMILY:
-            raise ValueError(f"sundials has no family {setting.family!r}")
-        from sksundae.ida import IDA
+        return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
 
-        start = time.process_time()
-        run = Run(IDA, scene, setting.options["rtol"])
-        labels = {
-            "engine": self.name,
-            "version": self.version(),
-            "method": setting.family,
-            "settings": dict(setting.options),
-        }
-        built = time.process_time() - start
-        return run_through(scene, times, run.advance, run.sample, run.counts, built, labels)
+
+def _simulation(scene: Scene, setting: Setting) -> Run:
+    from sksundae.ida import IDA
+
+    return Run(IDA, scene, setting.options["rtol"])
 
 
 ENGINE = Sundials()

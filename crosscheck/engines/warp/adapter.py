@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -24,10 +23,6 @@ class Warp(Engine):
     supports = SUPPORTS
     families, options = FAMILIES, OPTIONS
     rounding = 2.0**-23
-
-    def version(self) -> str:
-        """Version of MuJoCo Warp; raises ImportError when it is not installed."""
-        return metadata.version(self.package)
 
     def prepare(self, families: Sequence[str]) -> None:
         _warp()
