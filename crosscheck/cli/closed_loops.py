@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from crosscheck.cli import request
 from crosscheck.cli.running import COMPLETED, console, notice
@@ -48,7 +49,7 @@ def _table(cells: dict[str, dict[str, Cell]], is_best: bool) -> Table:
         found = [cell.best() if is_best else cell.defaults() for cell in row.values()]
         if is_best or any(map(is_run, found)):
             texts = [shown(record) for record in found]
-            table.add_row(name, *(f"[{LOOKS.get(t[:1], 'dim')}]{t}[/]" if t else "" for t in texts))
+            table.add_row(name, *(Text(text, LOOKS.get(text[:1], "dim")) for text in texts))
     return table
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, is_run, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.closed_loops.records import TIME_LIMIT
+from crosscheck.engine import engine_names
 from crosscheck.study.grid import Record
 
 HEAD = """# Who closes a loop
@@ -32,7 +33,9 @@ Cells = Mapping[str, Mapping[str, Cell]]
 def page(records: Sequence[Record]) -> str:
     """Return the page in Markdown."""
     cells = matrix(records)
-    parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), DEFAULTS, "", *_table(cells, False)]
+    left_out = [name for name in engine_names() if name not in cells]
+    missing = [f"Engines that were not measured: {', '.join(left_out)}.", ""] if left_out else []
+    parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), *missing, DEFAULTS, "", *_table(cells, False)]
     parts += ["## The mechanisms", "", *_mechanisms(), "## The runs", ""]
     parts += [line for name, row in cells.items() for line in _engine(name, row)]
     return "\n".join(parts).rstrip() + "\n"
@@ -57,7 +60,7 @@ def _table(cells: Cells, is_best: bool) -> Iterator[str]:
 
 
 def _linked(cell: Cell, record: Record | None) -> str:
-    return f"[{shown(record)}](#{cell.place})" if record else ""
+    return f"[{shown(record)}](#{cell.place})" if record else shown(None)
 
 
 def _mechanisms() -> Iterator[str]:

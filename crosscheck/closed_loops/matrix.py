@@ -18,7 +18,7 @@ from crosscheck.study.verdict import DEFAULTS, Grade, grade
 from mbref.trajectory import Outcome
 
 SIGNS = {Grade.RIGHT: "✓", Grade.INACCURATE: "≈", Grade.WRONG: "✗", Grade.FAILED: "!", Grade.UNJUDGED: "?"}
-REFUSES, NOT_RUN = "–", ""
+REFUSES, NOT_RUN = "–", "○"
 NO_FAMILY = "no family of the engine's own steps serves this mechanism here"
 LEGEND = {
     "✓ 3e-12": f"right: the largest error, at most {FLOOR:g} of the mechanism's length or rad",
@@ -26,6 +26,7 @@ LEGEND = {
     "✗ 0.95": "wrong: the run completes without a message, and this is its error",
     "! ended": "the run ended early with a message, crashed, or did not end within its limit of CPU time",
     REFUSES: "refused: the engine or crosscheck's adapter cannot model it; the reason is below",
+    NOT_RUN: "not measured",
 }
 PLACES = {column.scene: column.place() for column in DIFFICULTIES}
 

@@ -55,7 +55,7 @@ def _map(cells: Cells, is_best: bool, caption: str) -> HeatMap:
 
 def _shown(cell: Cell, record: Record | None) -> Shown:
     if record is None:
-        return Shown("", "")
+        return Shown(shown(None), "")
     if is_refusal(record):
         return Shown(shown(record), "", href=_place(cell))
     digits = -math.log10(max(error(record), 1e-16)) if grade(record) is not Grade.FAILED else 0.0

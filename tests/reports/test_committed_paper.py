@@ -25,7 +25,7 @@ def records():
 
 
 def test_text_is_rendered_from_the_records(records):
-    text = render.markdown(paper.render(*records), program.OF_PAPER)
+    text = render.markdown(paper.render(*records), program.TITLES[program.PAPER,])
     kept = (FOLDER / "report.md").read_text()
     assert text == kept, "crosscheck report --section paper --render reports/paper renews it"
 
