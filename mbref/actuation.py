@@ -138,5 +138,5 @@ def _world_axis(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
 
 
 def _rate(joint: JointMotion) -> np.ndarray:
-    """Return the rate (k,) of the angle, or where there is none of the displacement."""
+    """Return the rate (k,) of the angle, or of the displacement if the joint has no angle."""
     return np.asarray(joint.displacement_rate if joint.rate is None else joint.rate)

@@ -167,7 +167,7 @@ class Exported:
 
 
 class Format(Protocol):
-    """A kind of file; ``reads`` and ``writes`` are the endings of its names."""
+    """A file format; ``reads`` and ``writes`` are the suffixes of its file names."""
 
     reads: tuple[str, ...]
     writes: tuple[str, ...]
@@ -208,7 +208,7 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
 
 
 def _found(path: str | Path, does: str) -> Format:
-    """The format that reads or writes a path; ValueError where no installed one does."""
+    """Return the format that reads or writes a path; raises ValueError if no installed format does."""
     formats: list[Format] = [point.load() for point in entry_points(group=GROUP)]
     ending = Path(path).suffix
     for item in formats:

@@ -52,7 +52,7 @@ joints and loads of each engine.
 
 
 class Kind(NamedTuple):
-    """A kind of mechanism: its heading, how a reader recognises it, and the scenes that stand for it."""
+    """A kind of mechanism: its heading, how a reader recognises it, and its scenes."""
 
     title: str
     about: str

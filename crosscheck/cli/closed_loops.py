@@ -20,7 +20,7 @@ LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
 
 
 def closed_loops(arguments: argparse.Namespace) -> int:
-    """Measure if asked to, write the page if asked to, and print the matrix."""
+    """Measure engines and write the page if requested, and print the matrix."""
     path = Path(arguments.records)
     if arguments.run:
         _measure(arguments, path)

@@ -173,8 +173,8 @@ def _add_tune(commands: Commands) -> None:
         "--closure",
         type=length,
         metavar="GAP",
-        help="the widest gap of closed joints, such as 1mm, instead of an error; angles count times the "
-        "mechanism's length",
+        help="largest gap of any joint, such as 1mm, as the criterion in place of an error; an angle "
+        "counts as its arc over the mechanism's length",
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser)

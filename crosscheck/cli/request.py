@@ -172,7 +172,8 @@ def plan(
 def _single(
     scenes: Sequence[Scene], name: str, setting: Setting, times: Sequence[np.ndarray], time_limit: float
 ) -> list[Case]:
-    """One run a scene; RequestError for the scenes that the engine cannot run."""
+    """Return one run of each scene with the given setting; raises RequestError for scenes that the engine
+    refuses."""
     gaps = {s.name: engine(name).cannot(s) for s in scenes if not of_file(name, s)}
     if faults := [f"{name} cannot run {scene}: {gap}" for scene, gap in gaps.items() if gap]:
         raise RequestError(*faults)
@@ -186,7 +187,8 @@ def _single(
 
 
 def _with_file(scene: Scene, name: str, setting: Setting) -> Setting:
-    """The setting with the options of the file that the scene was read from, where it runs that file."""
+    """Return the setting, with the options of the scene's original file if the setting runs the model of that
+    file."""
     own = next((s for s in of_file(name, scene) if s.family == setting.family), None)
     return setting if own is None else Setting(setting.family, {**own.options, **setting.options})
 

@@ -42,7 +42,7 @@ class Asked(NamedTuple):
 
 
 def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
-    """The request of a command line; RequestError where it cannot be carried out."""
+    """Return the request of a command line; raises RequestError if it cannot be carried out."""
     scenes = scene_request.find_scenes(arguments.scene, options_of(arguments), notice)
     engines = request.find_engines(arguments.engine, notice)
     named = [*(arguments.method or ()), *(arguments.setting or ())]

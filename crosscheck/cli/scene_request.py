@@ -29,10 +29,11 @@ Notice = Callable[[str], None]  # takes one sentence for the user
 def find_scenes(
     names: Sequence[str], reading: ImportOptions | None = None, notice: Notice = lambda _: None
 ) -> list[Scene]:
-    """The scenes; RequestError with every fault of every scene, and when two have the same name.
+    """Return the scenes of the given names.
 
-    A file of another program is read with the options ``reading``; parts of it that the scene does not have
-    are reported by ``notice``.
+    Raises RequestError with every fault of every scene, and if two scenes have the same name. A file of
+    another program is read with the options ``reading``; ``notice`` reports the parts of the file that the
+    scene does not contain.
     """
     scenes, faults = [], []
     for name in names:
@@ -50,7 +51,10 @@ def find_scenes(
 
 
 def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
-    """The scene; SceneError with lines where the velocities that a file gives contradict its joints."""
+    """Return the scene.
+
+    Raises SceneError with line numbers if the initial velocities of its file contradict its joints.
+    """
     if formats.is_readable(name):
         return _imported(name, reading, notice)
     scene = held(find_scene(name), reading.hold)
@@ -63,7 +67,8 @@ def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
 
 
 def _imported(name: str, reading: ImportOptions, notice: Notice) -> Scene:
-    """The scene of another program's file, whose own runs the engines then offer."""
+    """Return the scene in another program's file; the engines then also offer runs of the file's own
+    model."""
     try:
         found = formats.read(name, reading)
     except (OSError, ValueError) as error:
@@ -77,7 +82,7 @@ def _imported(name: str, reading: ImportOptions, notice: Notice) -> Scene:
 
 
 def held(scene: Scene, names: Sequence[str]) -> Scene:
-    """The scene with some bodies fixed to the ground; SceneError for an unknown body."""
+    """Return the scene with some bodies fixed to the ground; raises SceneError for an unknown body."""
     known = {body.name: body for body in scene.body}
     if unknown := [name for name in names if name not in known]:
         raise SceneError(
@@ -88,7 +93,7 @@ def held(scene: Scene, names: Sequence[str]) -> Scene:
 
 
 def find_certifiable(name: str) -> Scene:
-    """The scene of that name or file, or the random mechanism ``random_N`` that the tests draw from seed N;
+    """Return the scene of a name or file, or the random mechanism with seed N for the name ``random_N``;
     raises RequestError."""
     seed = name.removeprefix("random_")
     if seed == name or not seed.isdecimal():

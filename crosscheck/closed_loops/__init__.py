@@ -1,1 +1,2 @@
-"""Engines on mechanisms with closed loops: which of them close a loop, and how accurately."""
+"""Engines on mechanisms with closed loops: which engines keep the joints of the loops closed, and how
+accurate their motions are."""

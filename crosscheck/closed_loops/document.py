@@ -1,4 +1,4 @@
-"""The matrix as a page of the documentation, from the stored records alone."""
+"""The matrix of engines and closed-loop mechanisms as a page of the documentation, from stored records."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _engine(name: str, row: Mapping[str, Cell]) -> Iterator[str]:
 
 
 def _cell(cell: Cell) -> Iterator[str]:
-    """The runs of a cell by family, the best run's command below."""
+    """Return the runs of a cell by family, with the command of the best run."""
     best = cell.best()
     if best is None:
         return

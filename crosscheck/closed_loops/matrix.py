@@ -1,4 +1,5 @@
-"""The matrix from its records: the grade of every engine on every mechanism, at best and by defaults."""
+"""The matrix of engines and closed-loop mechanisms, from records: a grade for each engine on each mechanism,
+at its best settings and at its defaults."""
 
 from __future__ import annotations
 
@@ -33,7 +34,10 @@ PLACES = {column.scene: column.place() for column in DIFFICULTIES}
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """An engine on a mechanism: the records of its runs, or its refusal alone; none where nothing ran."""
+    """Results of an engine on a mechanism: the records of its runs, or the record of its refusal.
+
+    Both are missing if nothing was run.
+    """
 
     row: str
     column: Difficulty
@@ -55,7 +59,7 @@ class Cell:
 
     @property
     def place(self) -> str:
-        """The id of the cell's records in a page."""
+        """Id of the cell's records in a page."""
         return f"{self.row} {self.column.scene}".replace("_", "-").replace(" ", "-").replace(",", "")
 
 
@@ -97,7 +101,7 @@ def _of(records: Sequence[Record], column: Difficulty) -> list[Record]:
 
 
 def _unserved(own: Sequence[Record], on_terms: Sequence[Record]) -> list[Record]:
-    """Return refusals of the scenes that an engine runs by its terms alone."""
+    """Return refusals of the scenes that an engine can run only by its terms in crosscheck's integrator."""
     served = {record["scene"] for record in own}
     reason = {"outcome": REFUSED, "message": NO_FAMILY, "owner": Owner.ADAPTER.value}
     return [{**record, **reason} for record in on_terms if record["scene"] not in served]
@@ -120,7 +124,7 @@ def _ended(record: Record) -> str:
 
 
 def _size(record: Record) -> str:
-    """The error to one digit, or the truth's own bound where that is larger."""
+    """Return the error with one digit, or the truth's own bound if that is larger."""
     value, bound = error(record), error_bound(record)
     if value < bound:
         return f"<{bound:.0e}"
@@ -128,7 +132,7 @@ def _size(record: Record) -> str:
 
 
 def sentence(record: Record) -> str:
-    """Return what a record says: its setting and its error, or the reason of a refusal or an end."""
+    """Return the setting and the error of a record, or the reason of a refusal or an early end."""
     if is_refusal(record):
         return f"refused: {record['message']} ({record['owner']})"
     options = ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in _options(record))

@@ -1,4 +1,4 @@
-"""Records of the matrix: runs and refusals, kept without their motions in one small file."""
+"""Records of the matrix of closed loops: runs without their motions, and refusals, in one small file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Scenes whose exact motions are formulas of this module, as a second source beside the judge's truths."""
+"""Scenes whose exact motions are formulas of this module, as a second source in addition to the judge's
+truths."""
 
 from __future__ import annotations
 

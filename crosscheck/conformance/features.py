@@ -77,7 +77,7 @@ DRIVERS = {
 def feature_scenes() -> dict[str, Scene]:
     """Return a scene for each feature: types of joint, driver and load; loops; kinematics.
 
-    No scene reaches a singular position, behind which motions need not be unique.
+    No scene reaches a singular position, after which motions need not be unique.
     """
     probes = {f"{kind} joint": _probe(kind, joint) for kind, joint in JOINTS.items()}
     probes |= {

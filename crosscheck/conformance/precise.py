@@ -19,7 +19,7 @@ from mbref.trajectory import Trajectory
 def double_precision(bench: Bench) -> Finding | Outside:
     """Numbers are not rounded to single precision, unless the engine declares single precision."""
     if bench.rounding > ROUNDING:
-        return Outside(f"the engine says that its numbers are rounded to {bench.rounding:.1e}")
+        return Outside(f"the engine declares that its numbers are rounded to {bench.rounding:.1e}")
     single = single_precision(bench.scene, bench.close)
     return Finding(float(len(single)), 0.0, ", ".join(single[:3]))
 
@@ -31,8 +31,7 @@ def smooth(bench: Bench) -> Finding:
 
 
 def refined(bench: Bench) -> Finding | Outside:
-    """Check that differences of successive settings decrease to the engine's rounding, in scenes without
-    joints."""
+    """Without joints, differences of successive settings decrease to the engine's rounding."""
     if len(bench.sweep) < SWEPT:
         return Outside("the engine offers fewer than three settings that complete")
     allowed = max(SAME_MOTION, GRAINS * bench.rounding, bench.steps_before)
@@ -40,8 +39,7 @@ def refined(bench: Bench) -> Finding | Outside:
 
 
 def settled(bench: Bench) -> Finding | Outside:
-    """Check that errors of velocities, accelerations and reactions are explained by the differences between
-    settings."""
+    """Differences between settings explain the errors of velocities, accelerations and reactions."""
     if len(bench.settings) < 2:
         return Outside("the engine offers one setting")
     if np.isnan(bench.exact.velocity).any():

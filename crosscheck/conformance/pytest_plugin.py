@@ -38,7 +38,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--in-process", action="store_true", help="run in this process: fast, but a crash ends all"
     )
     group.addoption("--time-limit", type=float, default=60.0, metavar="T", help="of a run, s (60)")
-    group.addoption("--findings", metavar="DIR", help="keep what fails as small scene files there")
+    group.addoption(
+        "--findings", metavar="DIR", help="folder in which failing scenes are stored, reduced to small ones"
+    )
     group.addoption(
         "--resume", action="store_true", help="reuse passed checks of earlier runs from pytest's cache"
     )

@@ -57,7 +57,7 @@ def swapped(scene: Scene) -> Scene | Outside:
     Axes are reversed, so that drivers and torsion springs keep their direction.
     """
     if not scene.joint:
-        return Outside("it has no joint")
+        return Outside("the scene has no joint")
     return scene.with_(joint=tuple(map(_exchanged, scene.joint)))
 
 
@@ -82,7 +82,7 @@ def stretched(scene: Scene) -> Scene | Outside:
 def duplicated(scene: Scene) -> Scene | Outside:
     """Return the scene with its last joint given twice, which makes rows redundant."""
     if not scene.joint:
-        return Outside("it has no joint")
+        return Outside("the scene has no joint")
     return scene.with_(joint=(*scene.joint, replaced(scene.joint[-1], name="again")))
 
 
@@ -91,7 +91,7 @@ def satisfied(scene: Scene) -> Scene | Outside:
     redundant."""
     hinges = [joint for joint in scene.joint if joint.type == "revolute"]
     if not hinges:
-        return Outside("it has no revolute joint on whose axis another could be")
+        return Outside("the scene has no revolute joint, on whose axis a second joint could be added")
     hinge = hinges[0]
     axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
     place = np.array(hinge.anchor) + 0.3 * axis

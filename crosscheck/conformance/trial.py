@@ -166,7 +166,7 @@ class Bench:
         return self.runner.refuses(scene, self.settings[-1].family)
 
     def observed(self, scene: Scene, times: np.ndarray, setting: Setting) -> Observation:
-        """Return a run in a process of its own, with its printed text and the files it left."""
+        """Return a run in a separate process, with its printed text and the files it left."""
         return self.runner.observe(scene, times, setting)
 
     @property
@@ -285,7 +285,7 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
     if len(run.times) != samples:
         raise Broken(f"the run claims to have completed, with {len(run.times)} of {samples} samples")
     if lost := not_finite(run):
-        raise Broken(f"it says it completed, with numbers that are not finite: {lost[0]}")
+        raise Broken(f"the run claims to have completed, with numbers that are not finite: {lost[0]}")
     return in_scene_order(scene, run)
 
 

@@ -125,7 +125,7 @@ class Simulation:
         return np.diag(found)
 
     def _terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
-        """The engine's terms, with the armatures in the mass matrix."""
+        """Return the engine's terms, with the armatures in the mass matrix."""
         found = self.mechanism.terms(q, v)
         return found._replace(mass=found.mass + self.rotors)
 

@@ -18,7 +18,7 @@ the engine alone. Made by `python -m crosscheck.findings.document docs/findings.
 
 
 def page() -> str:
-    """The page in Markdown."""
+    """Return the page in Markdown."""
     return "\n".join([HEAD, *_table(), *(line for found in findings() for line in _entry(found))]) + "\n"
 
 

@@ -18,7 +18,7 @@ class TimeIsUp(ArithmeticError):
     """The CPU time for the work has passed."""
 
     def __init__(self) -> None:
-        super().__init__("the time for it was up")
+        super().__init__("the CPU time has passed")
 
 
 class GivenUp(Exception):

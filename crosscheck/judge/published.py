@@ -49,7 +49,9 @@ class Published:
     @property
     def level(self) -> str:
         """Return the accepted error in words."""
-        return f"{self.acceptance:g}" + (", ours: none is published" if self.acceptance == OURS else "")
+        return f"{self.acceptance:g}" + (
+            " (level of this project; none is published)" if self.acceptance == OURS else ""
+        )
 
     def times(self) -> np.ndarray:
         """Return sample times (samples,), dense enough to count the turns of joints."""

@@ -56,9 +56,9 @@ def run_isolated(
 def run_in_turn(
     engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
 ) -> Trajectory:
-    """Run like `run_isolated`, in a child that continues to serve after failed runs.
+    """Run like `run_isolated`, in a child that is used again after failed runs.
 
-    This suits many short runs of an engine that ends by itself and leaves nothing behind.
+    This suits many short runs of an engine that ends by itself and leaves no files.
     """
     _check(engine_name)
     with _in_use(engine_name) as child:

@@ -12,7 +12,7 @@ from crosscheck.study.grid import TIME_LIMIT, Record
 
 
 def command(record: Record, scene: str) -> str:
-    """``crosscheck run`` with what the record was asked for.
+    """Return the ``crosscheck run`` command that repeats a record.
 
     ``scene`` is a built-in name or a path with options for reading it, as words of a shell.
     """

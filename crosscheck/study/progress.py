@@ -159,7 +159,7 @@ class _Working(ProgressColumn):
         self._under_way = under_way
 
     def render(self, task: Task) -> Text:
-        """The column's text."""
+        """Return the column's text."""
         return Text(str(self._under_way) or task.fields["last"])
 
 

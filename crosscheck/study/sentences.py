@@ -36,7 +36,7 @@ class Verdict(NamedTuple):
     file: str = ""
 
     def labelled(self) -> dict[str, str]:
-        """The sentences below the headline, by what they answer."""
+        """Return the sentences below the headline, each with its question."""
         own = {"How wrong the file is": self.file} if self.file else {}
         answers = {**own, "Who is right": self.right, "How fast": self.fast, "Where each breaks": self.breaks}
         return {**answers, "How the truth is known": self.truth}

@@ -128,4 +128,4 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
-    return text + (f". Elsewhere the fastest is {listed(others)}." if others else ".")
+    return text + (f". On all other scenes the fastest is {listed(others)}." if others else ".")

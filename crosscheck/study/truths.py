@@ -85,7 +85,7 @@ def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]
 
 def _of_reference(scene: Scene, times: np.ndarray, reference_time: float) -> dict[str, Any]:
     if not reference_time:
-        return _nothing("none was asked for")
+        return _nothing("no reference was requested")
     found = reference(scene, times.tolist(), reference_time)
     part = found.part if isinstance(found, NoReference) else found
     if not part.times.max(initial=0.0) > 0:

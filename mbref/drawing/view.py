@@ -23,7 +23,7 @@ class View:
 
     @staticmethod
     def parse(text: str) -> View:
-        """The view of a name, or of ``AZIMUTH,ELEVATION`` in degrees; raises ValueError."""
+        """Return the view of a name, or of ``AZIMUTH,ELEVATION`` in degrees; raises ValueError."""
         try:
             azimuth, elevation = NAMED.get(text) or map(float, text.split(","))
         except ValueError:
@@ -43,9 +43,10 @@ class View:
 
 
 def view_of(points: np.ndarray, axes: Sequence[Sequence[float]]) -> View:
-    """The view across the coordinate plane in which points (n, 3) stay and which the axes are normal to.
+    """Return the view normal to the coordinate plane that contains the points (n, 3) and is normal to the
+    axes.
 
-    An oblique view where there is none.
+    Return an oblique view if there is no such plane.
     """
     spans = np.ptp(points, axis=0)
     thin = np.flatnonzero(spans <= FLAT * max(spans.max(), 1e-300))
@@ -66,7 +67,8 @@ class Page:
 
     @staticmethod
     def around(points: np.ndarray, view: View, width: float, margin: float, tallest: float) -> Page:
-        """The page of a width (px) that shows all of points (n, 3), not taller than ``tallest`` (px)."""
+        """Return the page of a width (px) that shows all of points (n, 3), not taller than ``tallest``
+        (px)."""
         flat = points @ view.axes[:2].T
         least, most = flat.min(axis=0), flat.max(axis=0)
         spans = np.maximum(most - least, 1e-3 * max((most - least).max(), 1e-300))

@@ -29,7 +29,8 @@ Z = (0.0, 0.0, 1.0)
 
 
 def andrews_squeezer() -> Scene:
-    """At rest in the published position, for 0.03 s; the links' frames are turned by their angles."""
+    """Return the mechanism at rest in the published position, for 0.03 s; the links' frames are rotated by
+    their angles."""
     k1, k2, k3, k4, k5, k6, k7 = ANGLES
     f = _on((0.0, 0.0), k1, RR)
     e = _on(f, k2, -D)
@@ -77,6 +78,6 @@ def andrews_squeezer() -> Scene:
 
 
 def _on(start: tuple[float, float], angle: float, along: float, across: float = 0.0) -> tuple[float, float]:
-    """A point of a link that is turned by an angle, from its start."""
+    """Return a point of a link that is rotated by an angle, relative to its start."""
     c, s = math.cos(angle), math.sin(angle)
     return start[0] + along * c - across * s, start[1] + along * s + across * c

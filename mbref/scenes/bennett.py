@@ -20,7 +20,7 @@ OPENING = 1.0  # rad, the first hinge's angle
 
 
 def bennett() -> Scene:
-    """From rest at an opening of 1 rad; the first link is the ground's."""
+    """Return the linkage at rest at an opening of 1 rad; the first link is the ground."""
     twist = math.asin(LONG * math.sin(TWIST) / SHORT)
     ratio = math.sin((twist + TWIST) / 2) / math.sin((twist - TWIST) / 2)
     second = 2 * math.atan(ratio / math.tan(OPENING / 2))

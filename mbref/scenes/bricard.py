@@ -25,7 +25,7 @@ SIDE = 0.1  # m, of the square section
 
 
 def bricard(thin: bool = False, name: str = "bricard") -> Scene:
-    """Rods of square section, or thin ones."""
+    """Return the mechanism with rods of square section, or with thin ones."""
     across, about = (1 / 12, 0.0) if thin else ((1 + SIDE**2) / 12, SIDE**2 / 6)
     bodies = []
     for n, (start, end) in enumerate(itertools.pairwise(POINTS), start=1):

@@ -14,12 +14,12 @@ from mbref.scenes.links import about_z, link
 
 
 def five_bar(theta0: float = math.pi / 2, name: str = "five_bar") -> Scene:
-    """Driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
+    """Return the linkage driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
     return driven(_with_bar(theta0, name))
 
 
 def five_bar_gravity(theta0: float = 0.3, name: str = "five_bar_gravity") -> Scene:
-    """Released from rest at θ₂ = theta0 under gravity along -y."""
+    """Return the linkage released from rest at θ₂ = theta0 under gravity along -y."""
     return _with_bar(theta0, name).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
 
 

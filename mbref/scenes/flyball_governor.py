@@ -20,7 +20,7 @@ Z = (0.0, 0.0, 1.0)
 
 
 def flyball_governor() -> Scene:
-    """From the published position, all parts turning with the shaft."""
+    """Return the governor in the published position; all parts turn with the shaft."""
     mass = DENSITY * LENGTH * SIDE**2
     across, about = mass * (LENGTH**2 + SIDE**2) / 12, mass * SIDE**2 / 6
     shaft = _part("shaft", mass, (across, across, about), (0.0, 0.0, LENGTH / 2))
@@ -49,7 +49,7 @@ def _part(
     position: Triple,
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0),
 ) -> Body:
-    """A body that turns with the shaft."""
+    """Return a body that turns with the shaft."""
     velocity = (-SPIN * position[1], SPIN * position[0], 0.0)
     return Body(
         name=name,
@@ -63,7 +63,7 @@ def _part(
 
 
 def _arm(side: float, rod: float, across: float, about: float) -> Body:
-    """A rod with its ball, x outwards along it; the centre of mass is near the ball."""
+    """Return a rod with its ball, x outwards along it; the centre of mass is near the ball."""
     mass = rod + BALL
     reach = (rod * LENGTH / 2 + BALL * LENGTH) / mass
     across = across + rod * (reach - LENGTH / 2) ** 2 + BALL * (LENGTH - reach) ** 2

@@ -19,12 +19,13 @@ X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def four_bar(theta0: float = math.pi / 2, name: str = "four_bar") -> Scene:
-    """Driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
+    """Return the linkage driven at -124.8 rad/s from θ₂ = theta0 (rad)."""
     return driven(parallelogram(theta0, name))
 
 
 def driven(linkage: Scene) -> Scene:
-    """With the crank driven; the rates name the branch, which a singular start leaves open."""
+    """Return the linkage with a driven crank and given rates, which choose the branch if the start is
+    singular."""
     turning = {"crank": -CRANK_RATE, "rocker": -CRANK_RATE}
     body = tuple(
         b.model_copy(update={"angular_velocity": (0.0, 0.0, turning.get(b.name, 0.0))}) for b in linkage.body
@@ -34,12 +35,13 @@ def driven(linkage: Scene) -> Scene:
 
 
 def four_bar_gravity(theta0: float = 0.3, name: str = "four_bar_gravity") -> Scene:
-    """Released from rest at θ₂ = theta0 under gravity along -y: the inverted parallelogram swing."""
+    """Return the linkage released from rest at θ₂ = theta0 under gravity along -y; the inverted parallelogram
+    swings."""
     return parallelogram(theta0, name).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
 
 
 def parallelogram(theta0: float, name: str) -> Scene:
-    """The linkage without driver or load."""
+    """Return the linkage without driver or load."""
     across = (LENGTH * math.cos(theta0), LENGTH * math.sin(theta0), 0.0)
     a, d = (0.0, 0.0, 0.0), (LENGTH, 0.0, 0.0)
     b, c = across, (LENGTH + across[0], across[1], 0.0)
@@ -60,8 +62,11 @@ def parallelogram(theta0: float, name: str) -> Scene:
 
 
 def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
-    """Under gravity, a rhombus whose rocker is the crank of another one, on a frame turned by an angle (rad):
-    both are flat within one step."""
+    """Return, under gravity, a rhombus whose rocker is the crank of a second one with its frame turned by an
+    angle (rad).
+
+    Both pass their flat positions within one step.
+    """
     first = parallelogram(angle, "two_rhombi")
     x, y = LENGTH * math.cos(apart), LENGTH * math.sin(apart)
     pin = next(joint.anchor_pair[0] for joint in first.joint if joint.name == "C")

@@ -21,7 +21,7 @@ INERTIA = (1e-3, 1 / 12, 1 / 12)  # kg m² about the link and across it
 
 
 def four_bar_chain(loops: int = 2, name: str = "four_bar_chain") -> Scene:
-    """A chain of loops, from the upright position at -1 rad/s."""
+    """Return a chain of loops in the upright position, moving at -1 rad/s."""
     upright, level = about_z(math.pi / 2), about_z(0.0)
     bodies = [_upright(i, upright) for i in range(loops + 1)]
     bodies += [

@@ -13,7 +13,7 @@ WIDTH, ARM = 1.0, 0.4  # m between the hinges, m from their axis to the frame's 
 
 
 def h_frame() -> Scene:
-    """From rest with the frame level, gravity along -z, the hinges along y."""
+    """Return the frame at rest in the level position, gravity along -z, the hinges along y."""
     frame = Body(name="frame", mass=2.0, inertia=(0.2, 0.05, 0.24), position=(ARM, 0.0, 0.0))
     block = Body(name="block", mass=5.0, inertia=(0.02, 0.02, 0.02), position=(2 * ARM, WIDTH / 4, 0.0))
     joints = (

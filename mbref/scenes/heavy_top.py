@@ -10,7 +10,8 @@ from mbref.scene import Body, Scene, Spherical
 
 
 def heavy_top() -> Scene:
-    """From the published position, for 2 s; the velocity of the centre of mass follows from the joint."""
+    """Return the top in the published position, for 2 s; the velocity of its centre of mass follows from the
+    joint."""
     top = Body(
         name="top",
         mass=15.0,

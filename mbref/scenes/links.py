@@ -15,23 +15,23 @@ CRANK_RATE = 124.8  # rad/s, of every driven crank in the paper
 
 
 def triple(values: Iterable[float]) -> Point:
-    """Three numbers, of an array or an expression, as a scene takes them."""
+    """Return three numbers of an array as a tuple."""
     x, y, z = map(float, values)
     return x, y, z
 
 
 def midpoint(start: Point, end: Point) -> Point:
-    """The point half way between two."""
+    """Return the point half way between two points."""
     return triple((p + q) / 2 for p, q in zip(start, end, strict=True))
 
 
 def about_z(angle: float) -> tuple[float, float, float, float]:
-    """Quaternion of a rotation about world z."""
+    """Return the quaternion of a rotation about world z."""
     return (math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2))
 
 
 def rod_inertia(mass: float, length: float) -> tuple[float, float, float]:
-    """Principal moments of a round rod, axis along x: m r²/2 and m (3 r² + L²)/12."""
+    """Return the principal moments of a round rod, axis along x: m r²/2 and m (3 r² + L²)/12."""
     across = mass * (3 * ROD_RADIUS**2 + length**2) / 12
     return (mass * ROD_RADIUS**2 / 2, across, across)
 
@@ -44,7 +44,7 @@ def link(
     length: float,
     **velocities: tuple[float, float, float],
 ) -> Body:
-    """A rod of 1 kg per metre between two points; its x axis runs from start to end."""
+    """Return a rod of 1 kg per metre between two points; its x axis runs from start to end."""
     (a, b, c), (x, y, z) = start, end
     mass = DENSITY * length
     return Body(
@@ -58,5 +58,5 @@ def link(
 
 
 def slider(position: tuple[float, float, float], name: str = "slider") -> Body:
-    """The slider of both slider-cranks: 1 kg, 0.001 kg m² about every axis."""
+    """Return the slider of both slider-cranks: 1 kg, 0.001 kg m² about every axis."""
     return Body(name=name, mass=1.0, inertia=(1e-3, 1e-3, 1e-3), position=position)

@@ -20,17 +20,18 @@ FLYWHEEL = 104.125  # kg m², puts the first singular position at 1.81 s, as in 
 
 
 def planar_slider_crank(a: float = 0.304, b: float = 0.4048, name: str = "planar_slider_crank") -> Scene:
-    """100 N m on the crank, from rest at θ = 0; crank a, rod b (m)."""
+    """Return the mechanism under 100 N m on the crank, from rest at θ = 0; crank a, rod b (m)."""
     return slider_crank(a, b, 0.0, name).with_(load=(Moment(body="crank", moment=TORQUE),), duration=0.4)
 
 
 def planar_slider_crank_equal(name: str = "planar_slider_crank_equal") -> Scene:
-    """Crank and rod of 0.308 m: passes singular positions at θ = ±π/2."""
+    """Return the mechanism with crank and rod of 0.308 m, which passes singular positions at θ = ±π/2."""
     return planar_slider_crank(0.308, 0.308, name).with_(duration=0.2)
 
 
 def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
-    """a = b = 0.308 m with a flywheel disc on the crank: 61 singular positions in 20 s."""
+    """Return the mechanism with a = b = 0.308 m and a flywheel on the crank: 61 singular positions in 20
+    s."""
     length = 0.308
     base = planar_slider_crank(length, length, name)
     along, across, _ = rod_inertia(DENSITY * length, length)
@@ -40,14 +41,15 @@ def planar_slider_crank_heavy(name: str = "planar_slider_crank_heavy") -> Scene:
 
 
 def planar_slider_crank_gravity(name: str = "planar_slider_crank_gravity") -> Scene:
-    """Under gravity along -y, from θ = 0.3 at 30 rad/s."""
+    """Return the mechanism under gravity along -y, from θ = 0.3 at 30 rad/s."""
     return slider_crank(0.304, 0.4048, 0.3, name, rate=30.0).with_(gravity=(0.0, -9.81, 0.0), duration=1.0)
 
 
 def slider_crank(
     a: float, b: float, theta0: float, name: str, rate: float | None = None, suffix: str = "", z: float = 0.0
 ) -> Scene:
-    """Without load: crank a and rod b (m) from θ = theta0 (rad) at ``rate`` (rad/s), in the plane at z."""
+    """Return the mechanism without load: crank a and rod b (m) from θ = theta0 (rad) at ``rate`` (rad/s), in
+    the plane at z."""
     phi = -math.asin(a * math.sin(theta0) / b)
     pin = (a * math.cos(theta0), a * math.sin(theta0), z)
     end = (pin[0] + b * math.cos(phi), 0.0, z)

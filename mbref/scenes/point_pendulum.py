@@ -9,7 +9,7 @@ from mbref.scene import Body, Revolute, Scene
 
 
 def point_pendulum() -> Scene:
-    """The pendulum as published; a point has no moment of inertia."""
+    """Return the pendulum as published; a point has no moment of inertia."""
     mass = Body(name="mass", mass=1.0, inertia=(0.0, 0.0, 0.0), position=(-1.0, 0.0, 0.0))
     pivot = Revolute(name="pivot", bodies=("ground", "mass"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     return Scene(

@@ -19,7 +19,8 @@ X = (1.0, 0.0, 0.0)
 
 
 def rigid_slider_crank(middle: bool = False, name: str = "rigid_slider_crank") -> Scene:
-    """From the crank's upright position at 6 rad/s, its centre of mass at the pivot or in its middle."""
+    """Return the mechanism with the crank upright at 6 rad/s; the crank's centre of mass is at the pivot or
+    in its middle."""
     pin = (0.0, PIVOT[1], PIVOT[2] + CRANK)
     end = (math.sqrt(ROD**2 - pin[1] ** 2 - pin[2] ** 2), 0.0, 0.0)
     centre = (0.0, PIVOT[1], PIVOT[2] + CRANK / 2) if middle else PIVOT

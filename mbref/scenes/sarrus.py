@@ -16,7 +16,7 @@ PLATFORM, MOMENT = 1.0, 0.01  # kg, kg m²
 
 
 def sarrus() -> Scene:
-    """From rest, the bars at 60 degrees to the ground."""
+    """Return the linkage at rest, with the bars at 60 degrees to the ground."""
     rise, reach = LENGTH * math.sin(SLOPE), LENGTH * math.cos(SLOPE)
     platform = Body(name="platform", mass=PLATFORM, inertia=(MOMENT,) * 3, position=(0.0, 0.0, 2 * rise))
     bodies, joints = [platform], []
@@ -37,7 +37,7 @@ def sarrus() -> Scene:
 
 
 def _bar(name: str, middle: Point, turn: float, tilt: float) -> Body:
-    """A bar along its x axis: turned about z, then tilted about its own y."""
+    """Return a bar along its x axis, turned about z and then tilted about its own y."""
     ct, st, c, s = math.cos(turn / 2), math.sin(turn / 2), math.cos(tilt / 2), math.sin(tilt / 2)
     orientation = (ct * c, -st * s, ct * s, st * c)
     return Body(

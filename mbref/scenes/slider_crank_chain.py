@@ -17,7 +17,7 @@ PITCH, PHASE = 0.1, 2 * math.pi / 3
 
 
 def slider_crank_chain(loops: int = 2, name: str = "slider_crank_chain") -> Scene:
-    """A chain of slider-cranks."""
+    """Return a chain of slider-cranks."""
     cylinders = [
         slider_crank(0.304, 0.4048, 0.3 + PHASE * i, name, 30.0, suffix=str(i), z=PITCH * i)
         for i in range(1, loops + 1)

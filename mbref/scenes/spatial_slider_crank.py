@@ -21,19 +21,19 @@ Y = (0.0, 1.0, 0.0)
 
 
 def spatial_slider_crank(name: str = "spatial_slider_crank") -> Scene:
-    """100 N m about +y on the crank, from rest at θ = 0."""
+    """Return the mechanism under 100 N m about +y on the crank, from rest at θ = 0."""
     return _mechanism(0.0, name).with_(load=(Moment(body="crank", moment=(0.0, 100.0, 0.0)),), duration=0.05)
 
 
 def spatial_slider_crank_driven(name: str = "spatial_slider_crank_driven") -> Scene:
-    """The crank driven at 124.8 rad/s from θ = 0."""
+    """Return the mechanism with its crank driven at 124.8 rad/s from θ = 0."""
     return _mechanism(0.0, name).with_(
         driver=(Driver(joint="A", polynomial=(0.0, CRANK_RATE)),), duration=0.2
     )
 
 
 def spatial_slider_crank_gravity(name: str = "spatial_slider_crank_gravity") -> Scene:
-    """Under gravity along -y, from θ = 0.3 at 30 rad/s."""
+    """Return the mechanism under gravity along -y, from θ = 0.3 at 30 rad/s."""
     return _mechanism(0.3, name, rate=30.0).with_(gravity=(0.0, -9.81, 0.0), duration=0.5)
 
 

@@ -28,7 +28,8 @@ Cells = Mapping[str, Mapping[str, Cell]]
 
 
 def render(records: Sequence[Record]) -> list[Block]:
-    """The matrix at best and by defaults, the mechanisms, and the runs behind each cell."""
+    """Return the matrix at the best settings and at the defaults, the mechanisms, and the runs of each
+    cell."""
     cells = matrix(records)
     return [
         Heading("Who closes a loop", 2),

@@ -63,7 +63,8 @@ def _runs(records: Iterable[Record]) -> dict[str, Runs]:
 
 
 def is_false(record: Record) -> bool:
-    """Whether a run completed with an error above ALLOWED, or of other engines above FALSE_SUCCESS."""
+    """Return whether a run completed with an error above ALLOWED, or above FALSE_SUCCESS for other
+    engines."""
     allowed = ALLOWED if record["engine"] == MBREF else FALSE_SUCCESS
     return is_completed(record) and not error(record) <= allowed
 

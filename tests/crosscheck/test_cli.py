@@ -108,7 +108,7 @@ def test_a_scene_of_no_family_is_judged_by_its_reference(capsys, tmp_path, monke
 def test_a_scene_without_a_truth_and_why(capsys, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     asked = ("--engine", FAKE, "--setting", "plain", "--samples", "3")
-    sentence = "There is no reference for two: none was asked for."
+    sentence = "There is no reference for two: no reference was requested."
     scene = two_blocks(tmp_path)
     for reference_time, times in (("0", 1), ("20", 0)):
         out = run_main(capsys, "run", scene, *asked, "--reference-time", reference_time)[1]
@@ -441,7 +441,7 @@ def test_a_motion_without_a_truth_is_told_by_tune(capsys, tmp_path, monkeypatch)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     asked = ("tune", FAKE, two_blocks(tmp_path), "--reference-time", "0")
     status, out, _ = run_main(capsys, *asked)
-    assert status == 1 and "There is no reference for two: none was asked for." in out, out
+    assert status == 1 and "There is no reference for two: no reference was requested." in out, out
 
 
 def test_versions_of_engines(capsys):

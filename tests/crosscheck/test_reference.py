@@ -549,7 +549,7 @@ def test_bodies_without_mass_have_to_be_driven():
 def test_time_is_limited():
     scene = SCENES["planar_slider_crank"]()
     motion = natural_motion(scene, np.linspace(0.0, 100.0, 3), EXTENDED, seconds=0.2)
-    assert motion.reason == "the time for it was up"
+    assert motion.reason == "the CPU time has passed"
     assert len(motion.times) == 1 and 0 < motion.reached < 50
 
 

@@ -94,7 +94,8 @@ class _Reader:
     notes: list[str] = field(default_factory=list)
 
     def scene(self, name: str, gravity: Any, hold: Any) -> Scene:
-        """The scene of all models, with some bodies fixed to the ground; SceneError for an unknown one."""
+        """Return the scene of all models, with some bodies fixed to the ground; raises SceneError for an
+        unknown one."""
         known = {body.name: body for body in self.bodies}
         if unknown := [body for body in hold if body not in known]:
             raise SceneError([f"--hold {unknown[0]}: no such link that moves; known: {', '.join(known)}"])
@@ -187,7 +188,8 @@ class _Reader:
         self.couplings.append(Coupling(name=f"{made.name} thread", joints=pair, ratio=pitch / (2 * math.pi)))
 
     def _dynamics(self, axis: ET.Element, made: Joint) -> None:
-        """A torsion spring and damper of a hinge; friction and others are parts to leave out."""
+        """Return a torsion spring with damper for a hinge; friction and other dynamics are parts to be left
+        out."""
         found = axis.find("dynamics")
         if found is None:
             return
@@ -263,7 +265,7 @@ def _inertia(element: ET.Element | None, link: str) -> np.ndarray:
 
 
 def _plain(inertia: np.ndarray) -> Any:
-    """Return principal moments where the matrix is diagonal, else the matrix."""
+    """Return principal moments if the matrix is diagonal, otherwise the matrix."""
     inertia = (inertia + inertia.T) / 2
     diagonal = np.diag(inertia)
     is_diagonal = np.abs(inertia - np.diag(diagonal)).max() <= 1e-15 * np.abs(inertia).max()

@@ -179,7 +179,7 @@ class Stepper:
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
     def _sharp(self, x: np.ndarray, t: Any) -> float:
-        """Return the smallest singular value of the held rows, scaled to unit length."""
+        """Return the smallest singular value of the selected rows, scaled to unit length."""
         ask()
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
@@ -313,7 +313,7 @@ class Stepper:
         return True
 
     def _crossing(self, x: np.ndarray, series: Series, h: float) -> float:
-        """Return the time (s) until the held rows become dependent, by the series; 0 if they stay
+        """Return the time (s) until the selected rows become dependent, by the series; 0 if they stay
         independent."""
 
         def sharp(length: float) -> float:

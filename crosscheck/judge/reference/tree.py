@@ -103,7 +103,10 @@ class _Run:
             if not panel.settled and length < LEAST * end:
                 return "no panel of time is short enough"
             if panel.settled and not self._accepts(panel):
-                return "rows that were redundant at the start are not later: it is a singular position"
+                return (
+                    "rows that were redundant at the start are independent later, so the start is a "
+                    "singular position"
+                )
             progress(float(self.t))
         return ""
 

@@ -12,8 +12,8 @@ from mbref.scene import SceneError
 def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any:
     """Return the model of an MJCF file in which some bodies have no joint to the world.
 
-    They stay at the pose of the keyframe, or of the reference.  Raises SceneError for a body that does not
-    hang on the world by joints, ValueError where MuJoCo cannot read the file.
+    They stay at the pose of the keyframe, or of the reference. Raises SceneError for a body without joints to
+    the world, ValueError if MuJoCo cannot read the file.
     """
     if not hold:
         return mujoco.MjModel.from_xml_path(str(path))

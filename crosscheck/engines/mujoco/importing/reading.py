@@ -73,7 +73,7 @@ def source(path: Path, options: ImportOptions) -> Source:
 
 
 def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None]:
-    """The compiled model, and the text of a URDF."""
+    """Return the compiled model, and the text of a URDF."""
     try:
         if path.suffix != ".urdf":
             path.read_bytes()  # raises OSError, which MuJoCo does not
