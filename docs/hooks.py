@@ -86,14 +86,8 @@ def on_files(files: Any, config: Any) -> Any:
     for path in sorted(
         {link for file in files.documentation_pages() for link in _outside(file.content_string)}
     ):
-        shown = _shown(path)
-        files.append(File.generated(config, f"source/{shown}", content=(ROOT / shown).read_bytes()))
+        files.append(File.generated(config, f"source/{path}", content=(ROOT / path).read_bytes()))
     return files
-
-
-def _shown(path: str) -> str:
-    """Return the file that the site shows for a link: the page of a report for its Markdown."""
-    return re.sub(r"^(reports/\w+)/report\.md$", r"\1/index.html", path)
 
 
 def _outside(text: str) -> list[str]:
@@ -136,7 +130,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     markdown = markdown.replace("<!-- paper -->", paper())
     up = "../" * page.file.src_uri.count("/")
     for path in _outside(markdown):
-        markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{_shown(path)})", markdown)
+        markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{path})", markdown)
     markdown = re.sub(r"\]\((?:\.\./)+[^)#]*?([^)#/]+)/?\)", _directory, markdown)
     return formulas(markdown)
 
