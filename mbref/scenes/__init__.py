@@ -64,6 +64,8 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "h_frame": h_frame,
 }
 
+OTHER_FILES = (".xml", ".urdf", ".sdf")  # suffixes of MJCF, URDF and SDF files
+
 # chains with any number of loops, by default two: four_bar_chain[40]
 CHAINS: dict[str, Callable[[int, str], Scene]] = {
     "four_bar_chain": four_bar_chain,
@@ -90,6 +92,9 @@ def find_scene(name: str) -> Scene:
     chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)
     if chain and chain[1] in CHAINS:
         return CHAINS[chain[1]](int(chain[2]), name)
+    if Path(name).suffix in OTHER_FILES:
+        makes = f"`mbref import {name}` makes one, and `crosscheck compare {name}` reads it as it is"
+        raise SceneError([f"{name}: is no scene file; {makes}"])
     if Path(name).exists():
         return Scene.from_file(name)
     if name.endswith(".toml"):

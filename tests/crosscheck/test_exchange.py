@@ -273,6 +273,13 @@ def test_commands_import_and_export(tmp_path, capsys):
     assert main(["import", str(tmp_path / "none.xml")]) == 2
 
 
+@pytest.mark.parametrize("name", ["robot.xml", "robot.urdf", "robot.sdf"])
+def test_a_file_of_another_program_is_no_scene_but_can_be_imported(name, capsys):
+    assert main(["diagnose", name]) == 2
+    said = capsys.readouterr().err
+    assert f"{name}: is no scene file; `mbref import {name}` makes one" in said
+
+
 def test_the_project_declares_the_plug_in():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     assert project["entry-points"][formats.GROUP] == {
