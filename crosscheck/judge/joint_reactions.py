@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,6 +28,7 @@ from mbref.scene_joints import Coordinate
 from mbref.trajectory import Trajectory
 
 LEAST = 1e-3  # m/s²; forces that would accelerate the masses by less count as zero
+POSES = 64  # poses whose undetermined wrenches are kept
 SAMPLES = 11  # number of compared samples, spread over the trajectory
 
 
@@ -62,6 +64,17 @@ def shared_wrenches(
     ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s). It must satisfy the joints so
     accurately that singular values below ``rank`` times the largest count as zero.
     """
+    pose = np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(orientation, dtype=float)
+    return dict(_shared(scene, float(t), pose[0].tobytes(), pose[1].tobytes(), rank))
+
+
+@lru_cache(maxsize=POSES)
+def _shared(
+    scene: Scene, t: float, positions: bytes, orientations: bytes, rank: float
+) -> dict[str, np.ndarray]:
+    """Return the bases of `shared_wrenches`; all runs of a comparison have the exact motion's poses."""
+    position = np.frombuffer(positions).reshape(-1, 3)
+    orientation = np.frombuffer(orientations).reshape(-1, 4)
     rows, _ = jacobian(scene, t, position, orientation)
     units, found = np.repeat([1.0, scene_length(scene)], 3), {}
     lengths = np.linalg.norm(rows, axis=1)

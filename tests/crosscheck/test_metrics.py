@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.judge import metrics
+from crosscheck.judge import joint_reactions, metrics, reaction_balance
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.metrics import METRICS, cost_at_error, measure, order_of_convergence
@@ -252,6 +252,22 @@ def test_reaction_error_and_one_percent_put_in():
     assert measure(scene, exact, truth)["reaction_error"] is None, (
         "a run without reactions has no error of them"
     )
+
+
+def test_the_exact_reactions_of_a_comparison_are_found_once(monkeypatch):
+    """The second run, and a run of the same scene with one other velocity: as if measured alone."""
+    scene = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.02)
+    truth, asked = truth_for(scene), []
+    exact = truth.poses(np.linspace(0.0, 0.02, 5))
+    true = with_exact_reactions(scene, exact)
+    first = measure(scene, true, truth)["reaction_error"]
+    for module in (reaction_balance, joint_reactions):
+        counted = module.jacobian
+        monkeypatch.setattr(module, "jacobian", lambda *a, of=counted: asked.append(1) or of(*a))
+    assert measure(scene, true, truth)["reaction_error"] == first and not asked
+    faster = replace(exact, velocity=exact.velocity * 1.5, angular_velocity=exact.angular_velocity * 1.5)
+    assert metrics.reaction_error(scene, true, faster) is not None
+    assert len(asked) == 5, "reactions of another motion at five samples; the poses are known"
 
 
 def test_a_run_beyond_the_truth_is_judged_on_the_part_that_is_known():
