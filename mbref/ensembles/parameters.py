@@ -33,10 +33,12 @@ class Parameters:
 
 
 def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
-    """Return the arrays of memory of the equations, each with the values of all scenes."""
+    """Return the arrays of memory of the equations in which the scenes differ from it, each with the values
+    of all scenes; no kernel changes these arrays."""
     system = equations.system
     masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
-    return [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]
+    pairs = [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]
+    return [(array, of_all) for array, of_all in pairs if (array != of_all).any()]
 
 
 def _arrays_of(values: Sequence[Any]) -> Iterator[np.ndarray]:
