@@ -135,6 +135,8 @@ def test_springs_mimic_joints_and_screws(tmp_path):
     found = read(tmp_path, pair(more=dynamics))
     (spring,) = found.scene.load
     assert (spring.joint, spring.stiffness, spring.damping, spring.natural_angle) == ("B", 2.0, 0.1, 0.3)
+    (slide,) = read(tmp_path, pair("prismatic", dynamics)).scene.load
+    assert (slide.type, slide.stiffness, slide.natural_displacement) == ("slide_spring", 2.0, 0.3)
     assert found.scene.gravity == (0.0, 0.0, -9.8) and "gravity is 9.8" in found.notes[0]
     mimic = '<mimic joint="A"><multiplier>-2</multiplier><offset>0</offset><reference>0</reference></mimic>'
     (coupling,) = read(tmp_path, pair(more=mimic)).scene.coupling
@@ -172,7 +174,7 @@ def test_a_link_is_held_on_request(tmp_path):
         (pair("gearbox"), "joint 'B': type 'gearbox' is none of"),
         (pair("screw"), "joint 'B': a screw needs screw_thread_pitch"),
         (pair(more="<dynamics><friction>1</friction></dynamics>"), "dry friction of joint 'B': it changes"),
-        (pair("prismatic", "<dynamics><damping>1</damping></dynamics>"), "damping of joint 'B': it changes"),
+        (pair("universal", "<dynamics><damping>1</damping></dynamics>"), "damping of joint 'B': it changes"),
         (pair().replace("<parent>a<", "<parent>c<"), "frame 'c': is attached to no link"),
         (
             pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="q">0 0 1 0 0 0<'),

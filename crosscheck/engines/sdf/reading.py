@@ -25,6 +25,7 @@ from mbref.scene import (
     Revolute,
     Scene,
     SceneError,
+    SlideSpring,
     Spherical,
     TorsionSpring,
     Translational,
@@ -188,23 +189,25 @@ class _Reader:
         self.couplings.append(Coupling(name=f"{made.name} thread", joints=pair, ratio=pitch / (2 * math.pi)))
 
     def _dynamics(self, axis: ET.Element, made: Joint) -> None:
-        """Return a torsion spring with damper for a hinge; friction and other dynamics are parts to be left
-        out."""
+        """Add a spring and damper of a hinge or a slide; friction and springs of other joints are parts to be
+        left out."""
         found = axis.find("dynamics")
         if found is None:
             return
-        damping, friction, angle, stiffness = (
+        damping, friction, rest, stiffness = (
             _number(found.find(tag), f"joint {made.name!r}: {tag}", 0.0)
             for tag in ("damping", "friction", "spring_reference", "spring_stiffness")
         )
         if friction:
             self.parts.append(Part("friction", f"dry friction of joint {made.name!r}"))
-        if made.facts.takes_torsion_spring and made.type == "revolute":
-            if damping or stiffness:
-                load = TorsionSpring(
-                    joint=made.name, stiffness=stiffness, damping=damping, natural_angle=angle
-                )
-                self.loads.append(load)
+        given = {"joint": made.name, "stiffness": stiffness, "damping": damping}
+        if not (damping or stiffness):
+            return
+        if made.type == "revolute":
+            self.loads.append(TorsionSpring(**given, natural_angle=rest))
+            return
+        if made.type == "translational":
+            self.loads.append(SlideSpring(**given, natural_displacement=rest))
             return
         for kind, number in (("damping", damping), ("springs", stiffness)):
             if number:
