@@ -136,10 +136,10 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Tables and formulas can be reached by keyboard, since they scroll where they are wide."""
-    return html.replace("<table>", '<table tabindex="0">').replace(
-        'display="block">', 'display="block" tabindex="0">'
-    )
+    """Let tables, formulas and outputs be reached by keyboard, since they scroll where they are wide."""
+    for wide in ("<table>", 'display="block">', '<code class="language-console">'):
+        html = html.replace(wide, wide.replace(">", ' tabindex="0">'))
+    return html
 
 
 def on_post_page(output: str, **_: Any) -> str:
