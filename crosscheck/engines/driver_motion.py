@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.judge import time_functions
 from crosscheck.judge.arithmetic import DOUBLE
-from mbref.scene import Driver, JointLoad, Scene, Spring
+from mbref.scene import Driver, JointLoad, Scene, Spring, TimeFunction
 from mbref.scene_joints import ANGLE
 from mbref.trajectory import Outcome, Trajectory
 
@@ -19,13 +19,16 @@ SCOUT = (2000, 16000)  # numbers of steps of the coarse run that measures the sc
 SCOUT_TURN = 0.5  # rad; largest rotation in a step of the coarse run
 
 
-def motion(driver: Driver, t: float, since: float | None = None) -> tuple[float, float, float]:
-    """Return value, rate and acceleration of a driver at time t (rad or m, and per second).
+def motion(driver: TimeFunction, t: float, since: float | None = None) -> tuple[float, float, float]:
+    """Return value, rate and acceleration of a driver, or of a factor of a load, at time t (s).
 
-    Of the piece of a table that acts from ``since`` (s) on, by default of the one at t.
+    The piece is the one that acts from ``since`` (s) on, by default the one at t.
     """
     value = rate = acceleration = 0.0
-    for c in reversed(driver.polynomial):
+    start, stop = driver.interval
+    if not start <= (t if since is None else since) < stop:
+        return 0.0, 0.0, 0.0
+    for c in reversed(driver.coefficients):
         acceleration = acceleration * t + 2 * rate
         rate = rate * t + value
         value = value * t + c
@@ -43,15 +46,15 @@ def motion(driver: Driver, t: float, since: float | None = None) -> tuple[float,
     return value, rate, acceleration
 
 
-def _cubic(driver: Driver, since: float) -> tuple[float, tuple[float, ...]]:
-    """Knot and coefficients of the piece of a driver's table that acts from a time (s) on."""
+def _cubic(driver: TimeFunction, since: float) -> tuple[float, tuple[float, ...]]:
+    """Return knot and coefficients of the piece of a driver's table that acts from a time (s) on."""
     begins, pieces = _pieces(driver)
     return pieces[bisect.bisect_right(begins, since)]
 
 
 @functools.lru_cache(maxsize=64)
-def _pieces(driver: Driver) -> tuple[tuple[float, ...], list[tuple[float, tuple[float, ...]]]]:
-    """The ends of pieces, and knot and coefficients of each."""
+def _pieces(driver: TimeFunction) -> tuple[tuple[float, ...], list[tuple[float, tuple[float, ...]]]]:
+    """Return the ends of pieces, and knot and coefficients of each."""
     ends, found = time_functions.ends(driver), []
     for begin in (0.0, *ends):
         piece = time_functions.piece_of(driver, begin, DOUBLE)

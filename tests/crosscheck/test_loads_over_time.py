@@ -90,30 +90,36 @@ def test_energy_of_constant_loads_of_joints_is_balanced():
 
 
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
-def test_mujoco_moves_loads_of_joints(name):
-    check(PROBES[name], 1e-12)
+def test_engines_move_loads_of_joints(name):
+    check("mujoco", PROBES[name], 1e-12)
+    check("exudyn", PROBES[name], 1e-10)
 
 
 @pytest.mark.parametrize("kind", FACTORS)
 def test_mujoco_moves_loads_over_time(kind):
-    check(PROBES[f"{kind} loads over time"].with_(duration=0.12), 1e-11)
+    check("mujoco", PROBES[f"{kind} loads over time"].with_(duration=0.12), 1e-11)
 
 
-def check(scene: Scene, within: float) -> None:
-    """MuJoCo's motion by its best setting / the reference, m and of the largest acceleration."""
-    times, simulator = np.linspace(0.0, scene.duration, 4), engine("mujoco")
+def test_exudyn_moves_smooth_loads_over_time():
+    check("exudyn", PROBES["polynomial loads over time"].with_(duration=0.1), 1e-10)
+
+
+def check(name: str, scene: Scene, within: float) -> None:
+    """An engine's motion by its best setting / the reference, m and of the largest acceleration."""
+    times, simulator = np.linspace(0.0, scene.duration, 4), engine(name)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
     exact = natural_motion(scene, times, EXTENDED)
     assert run.outcome.name == "COMPLETED"
     assert np.abs(run.position - doubles(exact.position)).max() < within
     largest = np.abs(doubles(exact.acceleration)).max()
-    assert np.abs(run.acceleration - doubles(exact.acceleration)).max() < 100 * within * largest
+    off = np.abs(run.acceleration - doubles(exact.acceleration)).max()
+    assert off < 100 * within * max(largest, 1.0)
 
 
 def test_engines_without_functions_of_time_refuse_them():
     assert not engine("mujoco").cannot(PROBES["table loads over time"])
-    for name in ("pinocchio", "exudyn"):
-        refused = engine(name).cannot(PROBES["sine loads over time"])
+    for name, kind in (("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")):
+        refused = engine(name).cannot(PROBES[f"{kind} loads over time"])
         assert refused.owner is Owner.ADAPTER and "load[0]" in refused.reason
 
 

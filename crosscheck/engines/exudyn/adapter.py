@@ -22,6 +22,7 @@ from crosscheck.engines.exudyn.reactions import reactions
 from crosscheck.engines.exudyn.static import drive
 from crosscheck.engines.written import Written
 from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.time_functions import ends
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import Driver, Scene
@@ -61,6 +62,10 @@ class Exudyn(Engine):
             return Cannot(
                 Owner.MODEL, "without masses only a mechanism whose whole motion is driven can be analysed"
             )
+        for k, load in enumerate(scene.load):
+            if load.over_time and ends(load.over_time):
+                reason = f"load[{k}] follows a table or is switched, but steps do not end where its pieces do"
+                return Cannot(Owner.ADAPTER, reason)
         return None
 
     def serves(self, scene: Scene, family: str) -> bool:

@@ -10,7 +10,8 @@ import numpy as np
 from crosscheck.engine import Supports
 from crosscheck.engines.geometry import joint_frame as frame_along
 from crosscheck.engines.geometry import unit
-from mbref.scene import Joint
+from crosscheck.refusals import FACTOR
+from mbref.scene import LOAD_TYPES, Joint
 
 X, Y, Z = 0, 1, 2
 LOCAL = {"ForceLocal": 3, "TorqueLocal": 3}
@@ -48,7 +49,8 @@ JOINTS = {
 SUPPORTS = Supports(
     joints=tuple(JOINTS),
     drivers=("angle", "displacement"),
-    loads=("moment", "force", "spring", "torsion_spring"),
+    loads=tuple(LOAD_TYPES),
+    over_time=(FACTOR,),
     couplings=("angle", "displacement"),
 )
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.driver_motion import moving
+from crosscheck.engines.driver_motion import motion, moving
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
 from crosscheck.engines.geometry import unit
 from crosscheck.judge.constraints import initial_twists
@@ -180,12 +180,14 @@ class _Parts:
         getattr(self, f"_{load.type}")(load)
 
     def _moment(self, load: Any) -> None:
-        marker = self.marker(load.body, self.position[load.body])
-        self.mbs.AddLoad(self.items.LoadTorqueVector(markerNumber=marker, loadVector=load.moment))
+        marker, over_time = self.marker(load.body, self.position[load.body]), _vector_over_time(load)
+        self.mbs.AddLoad(
+            self.items.LoadTorqueVector(markerNumber=marker, loadVector=load.moment, **over_time)
+        )
 
     def _force(self, load: Any) -> None:
-        marker = self.marker(load.body, load.point)
-        self.mbs.AddLoad(self.items.LoadForceVector(markerNumber=marker, loadVector=load.force))
+        marker, over_time = self.marker(load.body, load.point), _vector_over_time(load)
+        self.mbs.AddLoad(self.items.LoadForceVector(markerNumber=marker, loadVector=load.force, **over_time))
 
     def _spring(self, load: Any) -> None:
         spring = self.items.ObjectConnectorSpringDamper(
@@ -209,6 +211,31 @@ class _Parts:
         )
         self.mbs.AddObject(spring)
 
+    def _slide_spring(self, load: Any) -> None:
+        fixed = self.mbs.AddNode(self.items.NodePointGround())
+        ends = [self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=fixed, coordinate=0))]
+        ends.append(self._translation(self.scene.joint_named(load.joint)))
+        spring = self.items.ObjectConnectorCoordinateSpringDamper(
+            markerNumbers=ends,
+            stiffness=load.stiffness,
+            damping=load.damping,
+            offset=load.natural_displacement,
+        )
+        self.mbs.AddObject(spring)
+
+    def _joint_torque(self, load: Any) -> None:
+        self._push(load, self._rotation(self.scene.joint_named(load.joint)), load.torque)
+
+    def _joint_force(self, load: Any) -> None:
+        self._push(load, self._translation(self.scene.joint_named(load.joint)), load.force)
+
+    def _push(self, load: Any, marker: int, amount: float) -> None:
+        """A force or torque on a relative coordinate."""
+        given: dict[str, Any] = {}
+        if load.factor is not None:
+            given["loadUserFunction"] = lambda mbs, t, size: amount * motion(load.factor, t)[0]
+        self.mbs.AddLoad(self.items.LoadCoordinate(markerNumber=marker, load=amount, **given))
+
     def sensors(self, node: int) -> list[int]:
         kinds = [getattr(self.exu.OutputVariableType, name) for name in SENSED]
         return [
@@ -219,6 +246,14 @@ class _Parts:
             )
             for kind in kinds
         ]
+
+
+def _vector_over_time(load: Any) -> dict[str, Any]:
+    """The user function of a force or moment over time; none of a constant one."""
+    if load.factor is None:
+        return {}
+    vector = np.array(load.force if load.type == "force" else load.moment)
+    return {"loadVectorUserFunction": lambda mbs, t, given: (motion(load.factor, t)[0] * vector).tolist()}
 
 
 def _world_inertia(body: Any) -> np.ndarray:

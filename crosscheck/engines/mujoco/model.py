@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
+from crosscheck.engines.driver_motion import motion
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.spanning_tree import (
     BALL_JOINT,
@@ -25,7 +26,6 @@ from crosscheck.engines.spanning_tree import (
     Tree,
     spanning_tree,
 )
-from crosscheck.judge.time_functions import value
 from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
 from mbref.scene import LOAD_TYPES, Coupling, Driver, Factor, Force, JointLoad, Moment, Scene, Spring
@@ -76,7 +76,7 @@ class Compiled:
         data.xfrc_applied[:], data.qfrc_applied[:] = self.applied, self.pushed
         for factor, number, force in self.timed:
             target = data.xfrc_applied if force.ndim else data.qfrc_applied
-            target[number] += force * float(value(factor, data.time, since=since))
+            target[number] += force * motion(factor, data.time, since)[0]
 
 
 def compiled(scene: Scene) -> Compiled:
