@@ -1,0 +1,128 @@
+"""Energies and works of one body whose states are put in / each term worked out by hand, J."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.energy import energy_drift, energy_series, kinetic_energy, potential_energy
+from mbref.scene import Body, Force, Moment, Revolute, Scene, Spring, TorsionSpring
+from mbref.trajectory import Trajectory
+
+HINGE = Revolute(name="A", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+START = (2.0, 0.0, 0.0)  # m, of the centre of mass
+
+
+def scene(*loads: Any, hinge: bool = True, **parts: Any) -> Scene:
+    body = Body(name="b", mass=3.0, inertia=(0.2, 0.4, 0.6), position=START)
+    given = {"gravity": (0.0, 0.0, 0.0), "joint": (HINGE,) if hinge else (), **parts}
+    return Scene(name="s", body=(body,), load=loads, duration=1.0, **given)
+
+
+def still(*places: tuple[float, float, float], angles: tuple[float, ...] = (), **rates: Any) -> Trajectory:
+    """A run at rest at places, turned by angles (rad) about z, at times 0, 0.5, 1, … s."""
+    k = len(places)
+    turned = np.array([[math.cos(a / 2), 0.0, 0.0, math.sin(a / 2)] for a in angles or (0.0,) * k])
+    rest = np.zeros((k, 1, 3))
+    arrays = {"velocity": rest, "angular_velocity": rest, **rates}
+    return Trajectory(
+        "s",
+        "e",
+        "1",
+        "m",
+        {},
+        0.5 * np.arange(k),
+        ("b",),
+        np.array(places)[:, None],
+        turned[:, None],
+        **arrays,
+    )
+
+
+def drift(of: Scene, run: Trajectory) -> list[float]:
+    found = energy_drift(of, run)
+    assert found is not None
+    return [float(value) for value in found]
+
+
+def test_kinetic_energy_of_translation_and_turning_about_world_axes():
+    """Turned by a quarter about z, the body's x and y axes exchange: ½ (3·4 + 0.4·1 + 0.2·9 + 0.6·16)."""
+    quarter = [[math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]]
+    states = ([START], quarter, [[0.0, 2.0, 0.0]], [[1.0, 3.0, 4.0]])
+    found = kinetic_energy(scene(), *(np.array([state]) for state in states))
+    assert found == pytest.approx([(12.0 + 0.4 + 1.8 + 9.6) / 2])
+
+
+def test_armature_turns_with_its_joint():
+    """½ · 0.5 kg m² · (4 rad/s)² beside the body's own."""
+    hinge = HINGE.model_copy(update={"armature": 0.5})
+    states = ([START], [[1.0, 0.0, 0.0, 0.0]], [[0.0, 8.0, 0.0]], [[0.0, 0.0, 4.0]])
+    found = kinetic_energy(scene(joint=(hinge,)), *(np.array([state]) for state in states))
+    assert found == pytest.approx([(3.0 * 64.0 + 0.6 * 16.0 + 0.5 * 16.0) / 2])
+
+
+def test_potential_of_weight_and_spring():
+    """Weight along -y and a spring of 50 N/m, 1 m long, from (2, 0, 3): at (2, 4, 0) it has 5 m."""
+    spring = Spring(
+        bodies=("ground", "b"), points=((2.0, 0.0, 3.0), START), stiffness=50.0, natural_length=1.0
+    )
+    found = potential_energy(
+        scene(spring, gravity=(0.0, -10.0, 0.0), hinge=False),
+        np.array([[START], [[2.0, 4.0, 0.0]]]),
+        np.array([[[1.0, 0.0, 0.0, 0.0]]] * 2),
+    )
+    assert found == pytest.approx([50.0 * 2.0**2 / 2, 3.0 * 10.0 * 4.0 + 50.0 * 4.0**2 / 2])
+
+
+def test_work_of_a_force_at_a_point_of_the_body():
+    """A force of 5 N along y at 1 m beside the centre, which rises by 0.2 m and turns by a quarter."""
+    force = Force(body="b", point=(3.0, 0.0, 0.0), force=(0.0, 5.0, 0.0))
+    run = still(START, (2.0, 0.2, 0.0), angles=(0.0, math.pi / 2))
+    assert drift(scene(force, hinge=False), run) == pytest.approx([0.0, 5.0 * (0.2 + 1.0)])
+
+
+def test_work_of_a_torsion_spring_from_its_natural_angle():
+    """½ · 8 · ((0.5 + 0.3)² - 0.3²) J for a natural angle of -0.3 rad, at 0.5 rad."""
+    twist = TorsionSpring(joint="A", stiffness=8.0, natural_angle=-0.3)
+    turning = np.array([[[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.0]]])
+    place = (2.0 * math.cos(0.5), 2.0 * math.sin(0.5), 0.0)
+    run = still(START, place, angles=(0.0, 0.5), angular_velocity=turning)
+    gained = 4.0 * (0.8**2 - 0.3**2)
+    kinetic = 0.6 / 2  # of 1 rad/s, which the scene does not begin with
+    assert drift(scene(twist), run) == pytest.approx([kinetic, gained + kinetic])
+
+
+@pytest.mark.parametrize("hinge", [True, False])
+def test_work_of_a_moment_about_the_hinge_and_on_a_free_body(hinge):
+    """2 N m over 0.5 rad: by the angle where the hinge keeps the axis, else by the power at the samples."""
+    spin = np.full((3, 1, 3), (0.0, 0.0, 0.5))
+    body = scene().body[0].model_copy(update={"angular_velocity": (0.0, 0.0, 0.5)})
+    of = scene(Moment(body="b", moment=(0.0, 0.0, 2.0)), hinge=hinge).with_(body=(body,))
+    places = [(2.0 * math.cos(a), 2.0 * math.sin(a), 0.0) if hinge else START for a in (0.0, 0.25, 0.5)]
+    velocity = np.zeros((3, 1, 3))
+    if hinge:
+        velocity[:, 0] = [(-p[1] * 0.5, p[0] * 0.5, 0.0) for p in places]
+    run = still(*places, angles=(0.0, 0.25, 0.5), angular_velocity=spin, velocity=velocity)
+    start = energy_drift(of, still(*places[:1], angular_velocity=spin[:1], velocity=velocity[:1]))
+    assert start == pytest.approx([0.0], abs=1e-12)
+    assert drift(of, run) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)
+
+
+def test_drift_over_the_largest_energy_seen():
+    """Lifted by 2 m against 10 m/s² and at rest: all of the 60 J that are seen are drift."""
+    of = scene(gravity=(0.0, -10.0, 0.0), hinge=False)
+    run = still(START, (2.0, 2.0, 0.0), (2.0, -1.0, 0.0))
+    assert drift(of, run) == pytest.approx([0.0, 60.0, 30.0])
+    assert energy_series(of, run) == pytest.approx([0.0, 1.0, 0.5])
+
+
+def test_energies_below_rounding_have_no_drift():
+    """2e-12 of what weight and motion can cause is an energy, 0.5e-12 is rounding."""
+    of = scene(gravity=(0.0, -10.0, 0.0))
+    possible = 2.0 * 30.0 + 3.0 * (2.0 / 0.5) ** 2 / 2
+    for part, is_known in ((2e-12, True), (0.5e-12, False)):
+        run = still(START, (2.0, part * possible / 30.0, 0.0))
+        assert (energy_series(of, run) is not None) is is_known, part
