@@ -189,6 +189,8 @@ def fast(text: str, records: Sequence[Record], ours: Mapping[str, Sequence[str]]
     for name, multiple in said.items():
         true = reached[name][0] / least
         assert float(multiple) == float(f"{true:.1f}" if true < 9.95 else f"{true:.0f}"), (text, name, true)
+    is_compiled = [r["family"].endswith(", compiled") for r in records]
+    assert ("called by crosscheck's Python adapter" in text) == any(is_compiled), text
     never = re.search(r"\. ([^.]*?) do(?:es)? not reach it\.", text)
     assert (engines(never[1]) if never else []) == [n for n, c in costs.items() if c is None], text
     for name, (_, family) in reached.items():

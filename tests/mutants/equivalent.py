@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from tests.mutants.operators import Mutant
 
-REASONS: dict[tuple[str, str, str], str] = {}
+ERRORS = "position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)"
+REASONS: dict[tuple[str, str, str], str] = {
+    ("crosscheck/judge/metrics.py", ERRORS, "position_error_series(scene, exact, trajectory)"): (
+        "The distance of two points is the same in both directions."
+    ),
+    ("crosscheck/judge/metrics.py", ERRORS, "rotation_error_series(scene, exact, trajectory)"): (
+        "The angle between two orientations is the same in both directions."
+    ),
+}
 """By file, the line of the source and the new text of the mutant."""
 
 

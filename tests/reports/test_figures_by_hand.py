@@ -11,7 +11,7 @@ from mbref.scene import Body, Revolute, Scene
 from mbref.trajectory import Outcome, Trajectory
 from reports.blocks import Figure, Matrix, Plot, Table, Text
 from reports.runs import Run, SceneRuns
-from reports.sections import energy, outcomes, speed, summary, verdict, violation
+from reports.sections import accelerations, energy, least_errors, outcomes, speed, summary, verdict, violation
 
 BLOCK = Body(name="b", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
 SCENE = Scene(name="block", body=(BLOCK,), gravity=(0.0, 0.0, 0.0), duration=1.0)
@@ -242,3 +242,30 @@ def test_violations_over_the_length_of_the_scene():
     places, rates = figure.draw().axes
     assert places.lines[1].get_ydata() == pytest.approx([1e-17, 2e-3, 1e-17])
     assert rates.lines[1].get_ydata() == pytest.approx([1e-17, 5e-2, 1e-17])
+
+
+def test_least_errors():
+    first, second = (block for block in least_errors.render([group()]) if isinstance(block, Table))
+    assert first.caption == "0 of 3 pairs of scene and engine are within 1e-8 of the truth."
+    assert [first.header[k] for k in sorted(first.right)] == ["Least error", "Time (s)", "Families"]
+    assert [tuple(row) for row in first.rows] == [
+        ("block", "a", "x", "rtol=1e-09", "9.00e-08", "8", "0 of 1"),
+        ("block", "b", "y", "step=0.01", "1.00e-07", "4", "0 of 1"),
+        ("block", "c", "z", "step=0.1", "timed out", "20", "0 of 1"),
+    ]
+    assert [tuple(row) for row in second.rows] == [
+        ("block", "a", "", "x 9.00e-08"),
+        ("block", "b", "", "y 1.00e-07"),
+        ("block", "c", "", "z timed out"),
+    ]
+
+
+def test_initial_accelerations_of_a_body_at_rest():
+    """Where the true accelerations are zero, differences are not over their size."""
+    still = np.zeros((3, 1, 3))
+    run = moving("a", "x", (1.0, 1.0, 1.0))
+    bodies = {"b": {**run.record["bodies"]["b"], "acceleration": still[:, 0].tolist()}}
+    bodies["b"]["angular_acceleration"] = [[0.0, 0.0, 0.25]] * 3
+    table = of(Table, accelerations.render(SceneRuns(SCENE, [Run({**run.record, "bodies": bodies})])))
+    [(engine, family, off)] = table.rows
+    assert (engine, family) == ("a", "x") and float(off) > 0
