@@ -14,6 +14,7 @@ from mbref import rotations
 OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "REFSAFE")
 NO_SOFTNESS = -1e-300  # stiffness and damping of closures: reference accelerations are those of exact joints
 RTOL, RANK = 1e-11, 1e-9
+LEAST = 1e-4  # m: a shorter way is of a structure whose loops leave no motion
 
 
 def own_motion(model, found: Source, times) -> np.ndarray:
@@ -70,5 +71,6 @@ def apart(model, found: Source, end: float) -> float:
     times = (0.0, end / 2, end)
     run = gauss_motion(found.imported.scene, times, RTOL)
     moved = np.linalg.norm(run.position - run.position[0], axis=-1).max()
+    moved = max(moved, LEAST)
     off = np.linalg.norm(run.position - own_motion(model, found, times), axis=-1).max()
     return float(off / moved)
