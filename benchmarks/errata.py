@@ -65,8 +65,8 @@ def basis(table: dict[str, Any] | None, motions: dict[str, Motion]) -> str:
     if table is not None:
         version, bounds = table["version"], (table["bound"], table["rate_bound"])
         said = [
-            f"Ours: version {version} of the certified table; the bound on errors of positions is {bounds[0]}, "
-            f"of velocities {bounds[1]}."
+            f"Ours: version {version} of the certified table; the bound on errors of positions is "
+            f"{bounds[0]}, of velocities {bounds[1]}."
         ]
     said += [f"{name} ends at {m.reached:.6g} s: {m.reason}." for name, m in motions.items() if m.reason]
     return " ".join(said) + "\n"
