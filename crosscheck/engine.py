@@ -51,11 +51,14 @@ __all__ = [
     "rotations",
 ]
 
-BRANCHES = "branches"  # the option that chooses branches at singular positions, where an engine has one
-BEST = "tuned"  # the family that is an engine's best, where it has one of that name
+# name of the option that chooses the branch at a singular position, in engines that have such an option
+BRANCHES = "branches"
+# family of the most accurate settings of an engine, in engines that have a family of this name
+BEST = "tuned"
 AS_IN_FILE = "as in file"  # the family that runs the file from which a scene was read, at its own settings
 ORIGIN = ("file", "import")  # the options of that family that say where the file is and how it is read
-FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]  # kind of part → name → options and defaults
+# part of a method (such as "integrators") → name → its options with their defaults
+FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]
 
 
 @dataclass(frozen=True)

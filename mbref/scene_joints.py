@@ -12,7 +12,7 @@ from pydantic import Discriminator, field_validator
 from mbref.scene_fields import Entry, Name, NotNegative, Pair, Point, PointPair, Vector, VectorPair, direction
 
 X, Y, Z = 0, 1, 2
-SKEW = 0.05  # cosine between the axes of a universal joint that is no rounding of a right angle
+SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
 RIGHT_ANGLE = 1e-15  # the same of axes that are perpendicular to the rounding of their numbers
 Coordinate = Literal["angle", "displacement"]
 ANGLE: Coordinate = "angle"

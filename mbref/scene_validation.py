@@ -184,7 +184,7 @@ def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
 
 
 def _text(entry: Any, key: str) -> str:
-    """A text of an entry, empty where there is none."""
+    """Return a text of an entry, empty if it is missing."""
     return found if isinstance(found := field_of(entry, key), str) else ""
 
 
@@ -278,7 +278,10 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
         if start := initial_value(driver):
             message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
             if rows_of(driver):
-                message = f"the value at t = 0 must be 0, motion is measured from there; got {start:g}"
+                message = (
+                    "the value at t = 0 must be 0, because the motion is measured from its "
+                    f"start; got {start:g}"
+                )
             yield f"driver[{i}].polynomial", message
 
 

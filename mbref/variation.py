@@ -92,7 +92,7 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
 
 def _drawn(variation: Variation, random: np.random.Generator, value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise SceneError([f"{variation.path}: the scene gives no number there"])
+        raise SceneError([f"{variation.path}: the scene has no number at this path"])
     return variation.draw(random)
 
 

@@ -17,12 +17,13 @@ from mbref.scene import SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
-NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}  # package by module
+# module → package to install
+NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}
 PAPER, STABILITY, CLOSED_LOOPS = "paper", "stability", "closed_loops"
 OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # the sections whose runs are their own
 TITLES = {  # titles of pages of one section
     (PAPER,): "Stabilisation methods for redundant constraints",
-    (CLOSED_LOOPS,): "Who closes a loop: engines against truth",
+    (CLOSED_LOOPS,): "Engines on closed loops, compared with the true motion",
 }
 
 
@@ -53,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             _notice(fault)
         return 2
     except KeyboardInterrupt:
-        _notice(f"interrupted; what has been run is in {arguments.out}, the same command goes on from there")
+        _notice(f"interrupted; the finished runs are in {arguments.out}, the same command resumes from there")
         return 130
     _write(blocks, Path(arguments.out), names)
     return 0

@@ -60,7 +60,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 
 def tune(arguments: argparse.Namespace) -> int:
-    """Print the cheapest settings of an engine that reach an error; returns 1 where none does."""
+    """Print the cheapest settings of an engine that reach an error; returns 1 if no setting reaches it."""
     reading = options_of(arguments)
     (scene,) = scene_request.find_scenes([arguments.scene], reading, notice)
     path = shlex.join([arguments.scene, *reading.words()])

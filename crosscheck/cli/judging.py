@@ -20,7 +20,10 @@ from crosscheck.recorded.reading import read
 
 
 def judge(arguments: argparse.Namespace) -> int:
-    """Print the judgement of a table; 0 where all columns are right.  Raises RequestError, SceneError."""
+    """Print the errors of a recorded table; returns 0 if all columns are right.
+
+    Raises RequestError and SceneError.
+    """
     (scene,) = scene_request.find_scenes([arguments.scene])
     columns = dict(_assigned(text) for text in arguments.column)
     try:
@@ -61,7 +64,10 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
 
 
 def write_reference(arguments: argparse.Namespace) -> int:
-    """Write the reference as a table; 0 where it reaches the end.  Raises RequestError."""
+    """Write the reference motion as a table; returns 0 if it reaches the end time.
+
+    Raises RequestError.
+    """
     (scene,) = scene_request.find_scenes([arguments.scene])
     scene = request.lasting(scene, arguments.times, arguments.duration)
     times = request.sample_times(scene, arguments.times, arguments.samples)

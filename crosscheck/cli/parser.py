@@ -231,7 +231,7 @@ def _add_findings(commands: Commands) -> None:
 
 def _add_closed_loops(commands: Commands) -> None:
     about = (
-        "who closes a loop: every engine on mechanisms that are hard in one way each, from stored records; "
+        "show engines on closed-loop mechanisms, each hard in one way, from stored records; "
         "--run measures installed engines again"
     )
     parser = _add(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")

@@ -10,7 +10,7 @@ from crosscheck.closed_loops.records import TIME_LIMIT
 from crosscheck.engine import engine_names
 from crosscheck.study.grid import Record
 
-HEAD = """# Who closes a loop
+HEAD = """# Engines on closed loops
 
 This page helps to choose an engine for a mechanism with closed loops. An engine closes a loop where the last
 joint of the loop stays closed and the motion is right. Each row is an engine, each column a mechanism that

@@ -151,7 +151,8 @@ class Simulation:
     def accelerations(
         self, t: float, q: np.ndarray, v: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, LinkMotion, _Rows]:
-        """v' (nv,), the closures' forces λ (m,), the links' motion with these accelerations, and the rows."""
+        """Return v' (nv,), the closures' forces λ (m,), the links' motion with these accelerations, and the
+        rows."""
         terms = self._terms(q, v)
         motion_now, rows = self._motion(terms, q, v), self._rows(terms, q, v)
         a = np.zeros(self.at.nv)

@@ -32,8 +32,8 @@ _idle: list[tuple[str, Child]] = []  # idle children with their engines, the lat
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # keyed by engine
 _asked: set[str] = set()  # engines that have answered a question
-_starting: dict[int, Child] = {}  # keyed by thread: children that are made ready
-_prepared: set[tuple[str, str]] = set()  # engines and families that a child has made ready
+_starting: dict[int, Child] = {}  # children that are being prepared, keyed by thread
+_prepared: set[tuple[str, str]] = set()  # engines and families that a child has prepared
 
 
 def run_isolated(

@@ -39,7 +39,7 @@ class LeastError:
 
     @property
     def best(self) -> Record:
-        """The run of least error; if none completed, the one that got furthest."""
+        """Return the run of least error; if none completed, the run that ended last."""
         return min(self.families.values(), key=rank)
 
     @property

@@ -39,7 +39,7 @@ METHODS = (
     "alf+baumgarte",
     "lm1+baumgarte",
 )
-RANK_TOLERANCE = "rank_tolerance"  # the ladder whose difficulty is an option of mbref's methods
+RANK_TOLERANCE = "rank_tolerance"  # name of the ladder whose rungs change an option of mbref's methods
 FAMILIES = {"mujoco": "projected", "pinocchio": "tuned", "exudyn": "tuned"}
 MBREF = "mbref"
 

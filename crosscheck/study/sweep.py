@@ -20,7 +20,8 @@ QUICK_SCENES = {  # name → end time (s)
     "five_bar": 0.05,
 }
 QUICK_FAMILIES = (AS_IN_FILE, "defaults", "tuned", "forward, compiled", "newton, compiled")  # else: the first
-MOST_FAMILIES, MOST_SETTINGS = 2, 3  # quick sweep: families of an engine, settings of a family
+# quick sweep: largest number of families of an engine, and of settings of a family
+MOST_FAMILIES, MOST_SETTINGS = 2, 3
 QUICK_SAMPLES, SAMPLES = 31, 101
 QUICK_LIMIT, LIMIT = 5.0, 120.0  # CPU seconds of a run
 

@@ -40,8 +40,8 @@ def by_error(level: float) -> Criterion:
 
 
 def by_closure(gap: float, scene: Scene) -> Criterion:
-    """Return the criterion that closures open by no more than a gap, m; angles count times the scene's
-    length."""
+    """Return the criterion that no closed joint opens by more than a gap (m); angles are multiplied by the
+    scene's length."""
 
     def measure(record: Record) -> float:
         return closure_gap(record, scene)

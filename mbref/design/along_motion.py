@@ -63,7 +63,7 @@ def along_motion(scene: Scene) -> AlongMotion:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
     times = np.linspace(0.0, scene.duration, SAMPLES)
     motion = simulate(scene, None, times, Limits(most_steps=MOST_STEPS))
-    if not motion.times.size:  # the axes of joints may be rounded
+    if not motion.times.size:  # rounding of joint axes may be the cause
         limits = Limits(most_steps=MOST_STEPS, rank_tolerance=ROUNDING)
         motion = simulate(scene, None, times, limits)
     if not motion.times.size:

@@ -140,7 +140,7 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
     """
     if not 1 <= number <= len(equilibrium.oscillating):
         raise ValueError(
-            f"mode: there are {len(equilibrium.oscillating)} vibrations, there is no number {number}"
+            f"mode: there are {len(equilibrium.oscillating)} vibrations, there is none with number {number}"
         )
     which = equilibrium.oscillating[number - 1]
     model, shape = Model(without_armatures(equilibrium.scene)), equilibrium.shapes[which]

@@ -13,14 +13,16 @@ from mbref.drawing.marks import Stage
 from mbref.drawing.shapes import anchors, moved, shapes
 from mbref.drawing.svg import COLOURS, INK
 
-LETTER, LINE = 7.4, 15.0  # px, width of a letter of the picture's font on average, and height of a line
-SIGN = 8.0  # px, half the width of a joint's sign
-OVER_NAME, OVER_SIGN, OVER_BAR = 8.0, 3.0, 1.0  # cost of an area of a name that covers one of these
-BEADS = 25  # boxes that stand for a bar
-ANCHOR = 9.0  # px, from an anchor to the nearest edge of its name
-AROUND = ((-1, -1), (1, -1), (-1, 1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))  # left or right, up or down
-RINGS = (1.0, 2.0, 3.5)  # distances from an anchor, relative to ANCHOR
-ALONG = (0.5, 0.35, 0.65, 0.25, 0.75)  # places along a bar
+LETTER, LINE = 7.4, 15.0  # px; mean width of a letter, and height of a line
+SIGN = 8.0  # px; half the width of a joint's symbol
+# cost of the area by which a name covers a name, a symbol or a bar
+OVER_NAME, OVER_SIGN, OVER_BAR = 8.0, 3.0, 1.0
+BEADS = 25  # number of boxes that represent a bar
+ANCHOR = 9.0  # px; distance from an anchor to the nearest edge of its name
+# directions: left or right, up or down
+AROUND = ((-1, -1), (1, -1), (-1, 1), (1, 1), (0, -1), (0, 1), (-1, 0), (1, 0))
+RINGS = (1.0, 2.0, 3.5)  # distances from an anchor / ANCHOR
+ALONG = (0.5, 0.35, 0.65, 0.25, 0.75)  # positions along a bar / its length
 GAPS = (7.0, 16.0, 30.0)  # px, between a bar and the box of its name
 
 
@@ -104,7 +106,7 @@ def _of_bodies(stage: Stage) -> Iterator[Label]:
 
 
 def _places(name: str, is_plate: bool, frames: np.ndarray) -> np.ndarray:
-    """Return the middles (c, k, 2), px, that the name of a body with points (k, n, 2) may have."""
+    """Return the possible centres (c, k, 2), px, of the name of a body with points (k, n, 2)."""
     half = np.array([LETTER * len(name), LINE]) / 2
     if frames.shape[1] == 1:
         side = half[0] + 25.0

@@ -201,7 +201,7 @@ def load_mark(stage: Stage, load: Load) -> str:
 
 
 def _short_zigzag(stage: Stage, axis: np.ndarray) -> str:
-    """A spring along an axis from the origin."""
+    """Return a zigzag for a spring along an axis from the origin."""
     end = ARROW * stage.page.directions(axis)
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in _zigzag(np.zeros((1, 2)), end[None], 8)[0])
     return f'<polyline points="{path}" stroke="{ACTION}" stroke-width="1.6" fill="none"/>'

@@ -1,4 +1,4 @@
-"""Who closes a loop: engines on mechanisms that are hard in one way each, from crosscheck's own records."""
+"""Section: engines on mechanisms with closed loops, each hard in one way, from crosscheck's own records."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def render(records: Sequence[Record]) -> list[Block]:
     cell."""
     cells = matrix(records)
     return [
-        Heading("Who closes a loop", 2),
+        Heading("Engines on closed loops", 2),
         Text(ABOUT),
         _map(
             cells, True, "Each engine by its best family of settings, at the finest setting of each family."

@@ -134,8 +134,9 @@ def _engines(verified: Sequence[Verified]) -> str:
         counts = {status: sum(v["status"] == status for v in found["verdicts"]) for status in MARKS}
         violated = f"{counts[FAIL]} violated" if counts[FAIL] else "none violated"
         sentences.append(
-            f"{title(found['engine'])} {found['version']}: {counts[PASS]} verdicts hold, {violated}, "
-            f"{counts[CANNOT]} cannot be asked, {counts[OUTSIDE]} are outside their check's domain."
+            f"{title(found['engine'])} {found['version']}: {counts[PASS]} checks passed, {violated}, "
+            f"{counts[CANNOT]} do not apply because the engine refuses the mechanism, {counts[OUTSIDE]} do "
+            "not apply to the mechanism."
         )
     return f"The command crosscheck verify makes the checks of all engines. {' '.join(sentences)}"
 

@@ -14,7 +14,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     blocks: list[Block] = [Heading("The mechanism"), _counts(scene_runs)]
     shown = _most_accurate(scene_runs)
     if shown is None:
-        return [*blocks, Text("No run left a state, so there is no motion to draw.")]
+        return [*blocks, Text("No run reached a sample, so there is no motion to show.")]
     caption = (
         f"Poses of {shown.label} ({scene_runs.varied_settings(shown) or 'no settings'}; "
         f"error {shown.said}) from t = {shown.trajectory.times[0]:g} s to "

@@ -272,7 +272,7 @@ def _reason(cell: Cell, records: Records) -> str:
     if same:
         parts.append(f"{len(same)} of {draws(cell)} draws end as printed")
     if varied:
-        parts.append(f"it ends as printed with the setting: {', '.join(varied)}")
+        parts.append(f"the run ends as printed if the setting is: {', '.join(varied)}")
     times = sorted({round(Run(r).t_end, 4) for r in found(records, cell, ("drawn", "sweep")).values()})
     if times and not same and not varied:
         parts.append(

@@ -70,7 +70,7 @@ def _crossings(found: Sequence[Sequence[Any]]) -> Table:
         for start, t, k, rank, value in found
     ]
     header = ("Start θ₂", "t (s)", "θ₂", "Rank of 19 rows", "Smallest singular value", "The fold")
-    return Table("The crossings up to 0.06 s.", header, rows, right=frozenset({1, 3, 4}))
+    return Table("Singular positions up to 0.06 s.", header, rows, right=frozenset({1, 3, 4}))
 
 
 def _alf_near_a_crossing(iterations: Sequence[Sequence[int]]) -> Table:

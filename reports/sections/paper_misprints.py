@@ -12,7 +12,11 @@ MISPRINTS = (
         "Φ_q q̈_i in the load's second term",
         "the velocity violation Φ_q q' − ν: the dimensions of a velocity times 2 ω μ",
     ),
-    ("Eq. 19", "ω² Φ_q in the third term", "ω² Φ, a vector as the others; β, said to be used, is not"),
+    (
+        "Eq. 19",
+        "ω² Φ_q in the third term",
+        "ω² Φ, which is a vector like the other terms; β is mentioned in the text and not used",
+    ),
     ("Sect. 4.1", "q̈ of the unconstrained system is M⁻¹ q", "M⁻¹ g, with g of Eq. 5"),
     ("Eq. 27", "U is m × n and square", "U is m × m, S is m × n"),
     (
@@ -23,8 +27,9 @@ MISPRINTS = (
     ),
     (
         "Table III",
-        "ALF takes 36.84 s, as LM2 + CP does",
-        "3286 steps a second cannot cost as much as 103: one of the two is probably a copy",
+        "Table III: ALF takes 36.84 s for 20 s of motion, exactly as LM2 with partitioning",
+        "ALF needs 3286 steps for a second and LM2 with partitioning 103, so equal times are impossible: one "
+        "number is probably a copy",
     ),
 )
 

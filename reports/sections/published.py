@@ -20,8 +20,8 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
     """Return one table for each published problem among the scenes."""
     found = [group for group in groups if problem_of(group.scene)]
     text = (
-        "Problems of the literature, each with an error measure and a level of acceptance of its own; of "
-        "every family the run of least error against the truth."
+        "Benchmark problems from the literature, each with its own error measure and accepted error. A row "
+        "has the run of a family whose error, compared with the truth, is least."
     )
     return [Heading("Published problems", 2), Text(text), *map(_table, found)] if found else []
 

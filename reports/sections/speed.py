@@ -71,8 +71,8 @@ def _strip(scene_runs: SceneRuns) -> str:
     if len(scene_runs.completed()) == len(scene_runs.runs):
         return ""
     return (
-        " The failed runs stand in the strip on the right at the time they took, or at its foot if that is "
-        "less than the time of any completed run; the key gives their reasons."
+        " Failed runs are in the strip on the right at the time they took, or at its lower end if that is "
+        "less than the time of any completed run; the key lists the reasons."
     )
 
 

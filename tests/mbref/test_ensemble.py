@@ -141,7 +141,7 @@ def test_several_numbers_of_one_entry_vary():
         ("body[0].mas=1:2", "the scene has no 'mas' there; did you mean 'mass'?"),
         ("body[3].mass=1:2", "body[3].mass: the scene has no '3'"),
         ("body[0].weight=1:2", "body[0].weight: the scene has no 'weight'"),
-        ("body[0].name=1:2", "body[0].name: the scene gives no number there"),
+        ("body[0].name=1:2", "body[0].name: the scene has no number at this path"),
         ("body[0].mass=-2:-1", "variant 0: body[crank].mass: must be positive"),
     ],
 )

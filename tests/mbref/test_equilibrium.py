@@ -156,7 +156,7 @@ def test_a_vibration_moves_on_the_constraints_by_its_amplitude():
     assert 0.2 * 0.05 < np.abs(moved).max() < 0.06
     assert np.allclose(motion.position[0], motion.position[-1], atol=1e-12)
     assert np.abs(moved[0]).max() > 0.9 * np.abs(moved).max(), "it begins displaced"
-    with pytest.raises(ValueError, match="there is no number 2"):
+    with pytest.raises(ValueError, match="there is none with number 2"):
         motion_of_mode(each, 2)
 
 

@@ -107,8 +107,8 @@ def test_caption_and_key_of_the_speed_plot():
     assert plot.caption.endswith(f"call an engine without Python. {asked}"), plot.caption
     assert plot.figure.name == "block-speed"
     assert plot.figure.caption == plot.caption + (
-        " The failed runs stand in the strip on the right at the time they took, or at its foot if that is "
-        "less than the time of any completed run; the key gives their reasons."
+        " Failed runs are in the strip on the right at the time they took, or at its lower end if that is "
+        "less than the time of any completed run; the key lists the reasons."
     )
     assert [tuple(row) for row in of(Table, blocks).rows] == [
         ("1", "b", "y", "2", "NOT_CONVERGED", "0.125 … 0.25", "NOT_CONVERGED at 0.125"),

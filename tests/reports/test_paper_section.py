@@ -125,7 +125,7 @@ def test_differing_cells_and_their_reasons(blocks):
     assert len(reasons) == 3, reasons
     late = reasons["I", "θ₂ = π/4", "MPI (SVD)"]
     assert "θ₂ = -2π" in late and "1 of 20 draws end as printed; " in late, late
-    assert "it ends as printed with the setting: rtol 1e-5" in late, late
+    assert "the run ends as printed if the setting is: rtol 1e-5" in late, late
     assert "passes every singular position" in reasons["II", "five-bar", "MPI (SVD) + CP"], reasons
     assert reasons["III", "spatial slider-crank, driven", "LM2"].startswith("drift"), reasons
 

@@ -172,7 +172,7 @@ def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypa
 
     monkeypatch.setattr(comparisons, "study", interrupted)
     assert program.main(["--quick", "--out", str(tmp_path)]) == 130
-    assert "the same command goes on from there" in capsys.readouterr().err
+    assert "the same command resumes from there" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])

@@ -31,7 +31,8 @@ CLOSES = ("spherical", "revolute")
 FAMILIES = {
     terms.FAMILY: terms.ABOUT,
     "defaults": "DART's step and its own constraint for every cut joint, the library's parameters",
-    "balls": "DART's step; cut hinges held by balls, and half of a closure error removed in a step",
+    "balls": "DART's step; cut hinges closed by ball constraints, half of a closure error removed in "
+    "each step",
 }
 OPTIONS = {
     "step": "time step, s",

@@ -33,8 +33,8 @@ FINER = 1  # number of further, finer steps, each a third of the previous one: t
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
     terms.FAMILY: terms.ABOUT,
-    DISCRETE: "Drake's discrete plant and SAP solver; cut hinges held by balls, all other cut joints "
-    "by welds of split bodies",
+    DISCRETE: "Drake's discrete plant and SAP solver; cut hinges closed by ball constraints, all other "
+    "cut joints by welds of the two parts of a split body",
 }
 OPTIONS = {
     "step": "time step, s",

@@ -55,7 +55,7 @@ def source(path: Path, options: ImportOptions) -> Source:
 
     without = left_out.checked(options.without)
     model, text = _compiled(mujoco, path, options)
-    if model.nbody < 2:  # the first is the world
+    if model.nbody < 2:  # the first body is the world
         raise SceneError([f"{path}: has no body"])
     reader = _Reader(mujoco, model, text, options, without)
     if not reader.groups.massive:
@@ -76,7 +76,7 @@ def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urd
     """Return the compiled model, and the text of a URDF."""
     try:
         if path.suffix != ".urdf":
-            path.read_bytes()  # raises OSError, which MuJoCo does not
+            path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
             return compiled(mujoco, path, options.hold, options.keyframe), None
         text = urdf.prepared(path.read_text(encoding="utf-8"))
         model = mujoco.MjModel.from_xml_string(text.text)
