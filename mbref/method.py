@@ -29,9 +29,10 @@ if TYPE_CHECKING:
 
 MOST_NAMES = 256  # names whose parsed methods are cached
 SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # default methods for few and for many bodies
-MOST_BODIES = 100  # up to here `taylor`, whose matrix is dense, is the default, because it crosses singular
-# positions.  ``benchmarks/default_method.py``: it costs 6.3 times as much as the sparse method on a chain of
-# four-bars with 81 bodies, and 0.05 times as much on a chain of slider-cranks with 90
+# Up to this number of bodies `taylor` is the default, because it crosses singular positions. Its matrix is
+# dense. By ``benchmarks/default_method.py`` it takes 6.3 times as long as the sparse method on a chain of
+# four-bars with 81 bodies, and 0.05 times as long on a chain of slider-cranks with 90 bodies.
+MOST_BODIES = 100
 SHORT = {
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
@@ -96,7 +97,8 @@ class Method:
         return self.integrator.step is None
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
-        """Return the options of a part: its defaults, overridden by the options in the name."""
+        """Return the options of a formulation, stabilisation or integrator: its defaults, overridden by the
+        method's name."""
         return {**part.options, **self.options.get(part.name, {})}
 
     def settings(self, rank_tolerance: float) -> Settings:

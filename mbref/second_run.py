@@ -116,7 +116,7 @@ def perturbed(scene: Scene) -> Scene:
 
 
 def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits]:
-    """Return the method and the limits of the second run."""
+    """Return method and limits of the more accurate second run, from which the error is estimated."""
     if method.is_series or len(scene.body) <= MOST_BODIES:
         by = Method.parse(f"{SERIES}[order={ORDER}]")
     elif method.integrator.adaptive and method.stabilisation.projects:

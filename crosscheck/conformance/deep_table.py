@@ -38,4 +38,4 @@ def _summary(tally: Tally) -> str:
     ran, drawn = tally.decided(RUN), f"{tally.seeds} random mechanisms"
     if not ran:
         return f"{tally.plan.engine}: ran none of {drawn}, so it is not judged"
-    return f"{tally.plan.engine}: {len(tally.violations)} violations; it ran {ran} of {drawn}"
+    return f"{tally.plan.engine}: {len(tally.violations)} violated checks; the engine ran {ran} of {drawn}"

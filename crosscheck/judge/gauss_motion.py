@@ -167,7 +167,7 @@ def kinetic(scene: Scene, state: State) -> float:
 
 
 def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.ndarray:
-    """Return the rates (l,) of the angles of loads about joints' axes, which the first bodies carry."""
+    """Return the rates (l,) of the joint angles on which loads act; the first body carries each axis."""
     found = []
     for load in turning_loads(scene):
         joint = scene.joint_named(load.joint)

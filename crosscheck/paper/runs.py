@@ -23,7 +23,11 @@ SHORT = np.linspace(0.0, 0.12, 61)  # s; samples every 2 ms over two revolutions
 TURNS = np.linspace(0.0, END, 201)
 SECOND = np.linspace(0.0, 1.0, 6)
 FINE = np.linspace(0.0, END, 2001)  # s; samples every 10 ms, to show the peaks at singular positions
-SIZED_ROWS = ("MPI (SVD)", "ALF", "ALF + CP")  # rows plotted: end time over the size of data errors
+SIZED_ROWS = (
+    "MPI (SVD)",
+    "ALF",
+    "ALF + CP",
+)  # rows of the paper's tables whose end times are plotted over the size of random data errors
 FREE = ("LM2", "MPI (SVD)", "MPI (GS)")  # rows of Table III whose constraints drift until they fail
 LASTING = ("MPI (SVD) + CP", "MPI (GS) + CP")  # the rows of Tables I and II whose runs last 20 s
 

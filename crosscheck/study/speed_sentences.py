@@ -22,7 +22,9 @@ TITLES = {
 LEVEL = ERROR_LEVELS[1]  # largest error of the runs whose speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")
 
-COMPILED = ", compiled"  # suffix of families that call an engine's library without Python
+COMPILED = (
+    ", compiled"  # suffix in the names of settings (families) that call an engine's library without Python
+)
 CLOCK = " Times are CPU seconds of stepping"
 ADAPTERS = ", each engine as crosscheck's Python adapter calls it."
 WITHOUT_PYTHON = (

@@ -47,8 +47,10 @@ def active_entries(
 
 
 def _steady(model: Model) -> Model | None:
-    """The model with loads at their full value, which may be switched off at all states that are read; None
-    where no load depends on time."""
+    """Return the model with all time-dependent loads at their full value; None if no load depends on time.
+
+    Otherwise a load that is zero at all random states would be overlooked.
+    """
     if not any(load.over_time for load in model.scene.load):
         return None
     loads = [
@@ -138,6 +140,6 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
 
 
 def primitives_of(model: Model, rows: np.ndarray) -> np.ndarray:
-    """Return the numbers of the primitives that have one of these rows."""
+    """Return the numbers of the primitive constraints that contain one of the given constraint rows."""
     last = np.searchsorted(model.structure.row, rows, side="right") - 1
     return np.flatnonzero(np.isin(model.structure.row, model.structure.row[last]))

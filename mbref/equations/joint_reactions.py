@@ -48,7 +48,8 @@ class Balance:
 
     @functools.cached_property
     def _blocks(self) -> tuple[Model, np.ndarray]:
-        """Model and Φ_q as blocks (k, m, 12)."""
+        """The model of the scene, and its constraint Jacobian Φ_q as blocks (k samples, m rows, 12 columns of
+        two bodies)."""
         model = self._model or Model(self._scene)
         blocks = model.blocks_along(self._times, self._q)
         model.release()

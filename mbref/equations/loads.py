@@ -29,7 +29,7 @@ from mbref.linear_algebra.vectors import (
 
 @inlined
 def forces(t, equations):
-    """g at the state in ``equations.frames``, into ``equations.system.force``."""
+    """Compute g at the state in ``equations.frames`` into ``equations.system.force``."""
     scene, frames, g = equations.scene, equations.frames, equations.system.force
     mass, inertia, gravity = scene.bodies.mass, scene.bodies.inertia, scene.gravity
     for b in range(mass.shape[0]):

@@ -48,7 +48,8 @@ from mbref.scene import (
 from mbref.scene_joints import ANGLE
 
 Numbers = tuple[float, ...]
-AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)  # the fixed frame, as ``_of_body``
+# parameters of the fixed frame, in the form of ``_of_body``
+AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
 

@@ -1,8 +1,8 @@
 """The primitive constraint equations: Φ, their Jacobian blocks, ν and γ.
 
 Every joint is a list of these (Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988; Haug,
-Computer Aided Kinematics and Dynamics, 1989).  With body-fixed vectors a, b, s and A the rotation
-matrix of a body, the equations are
+Computer Aided Kinematics and Dynamics, 1989).  With body-fixed vectors a, b, s and A the rotation matrix of a
+body, the constraint equations Φ = 0 are
 
     point      r_i + A_i s_i - r_j - A_j s_j = 0                       three rows
     dot-1      (A_i a)·(A_j b) = 0
@@ -89,7 +89,8 @@ def put_translations(row, blocks):
 
 @kernel
 def turned_direction(p, t, equations):
-    """The direction on the first body, turned by its driver where there is one; its rate and second rate."""
+    """Return the direction on the first body, rotated by its driver if there is one, with its first and
+    second rate."""
     primitives = equations.scene.primitives
     x, d = vector(primitives.direction_first, p), primitives.driver[p]
     if d < 0:
@@ -249,7 +250,7 @@ def add_angle(p, equations):
 
 @kernel
 def add_displacement(p, equations):
-    """Add a displacement to its row, by the formulas of ``dot2``."""
+    """Add a displacement to the row of its coupling, by the formulas of the ``dot2`` constraint."""
     primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
     rows, blocks = equations.rows, equations.system.blocks
     i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]

@@ -31,10 +31,10 @@ class Answers(NamedTuple):
 
 
 class StructuralDecisions:
-    """Structural decisions about a scene's parameters on which its reduction depends.
+    """Results of all tests that decide which primitives, rows and columns of a scene a run evaluates.
 
-    The choice of active ``entries`` (m, 12) evaluates the terms at each of ``read``; the choice of statically
-    determined rows asks the remaining questions.
+    The active ``entries`` (m, 12) of the Jacobian are determined at the random states ``read``; the remaining
+    tests find statically determined rows.
     """
 
     def __init__(

@@ -33,8 +33,8 @@ class LoadPlace(NamedTuple):
     """A load without its numbers."""
 
     kind: int
-    first: int  # body
-    second: int  # 0 without
+    first: int  # index of the first body
+    second: int  # index of the second body, 0 without
     function: int  # of time, -1 without
 
 
@@ -71,7 +71,7 @@ class Structure:
     sides: int  # bodies of a row: 2, or 4 if joint coordinates are coupled
     row_bodies: np.ndarray  # (m, sides), padded with the fixed frame
     entry_columns: np.ndarray  # (m, width)
-    row_joint: tuple[str, ...]  # (m,) names
+    row_joint: tuple[str, ...]  # (m,) names of the joints
     load: np.ndarray  # (4, l): kind, first and second body, function of time
     angle: np.ndarray  # (l,) index of the unwrapped angle of a load about a joint's axis, else -1
     anchored: np.ndarray  # (e,) bodies of the joints' anchors
@@ -208,7 +208,8 @@ def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:
 
 
 def _origins(load: LoadPlace, nb: int) -> tuple[int, ...]:
-    """The bodies from whose centres of mass the vectors of a load are: two points, then directions."""
+    """Return the bodies from whose centres of mass the vectors of a load are measured: two points, then
+    directions."""
     first = load.first if load.kind in (FORCE, SPRING, ALONG_AXIS) else nb
     second = load.second if load.kind in (SPRING, ALONG_AXIS) else nb
     return first, second, nb, nb, nb, nb

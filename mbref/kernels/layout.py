@@ -99,7 +99,7 @@ class Equations(NamedTuple):
     rows: Rows
     system: System
     angles: Annotated[Vector, "angles"]  # rad, at the last accepted step, unwrapped
-    piece: Annotated[Indices, "f"]  # selected of each function of time
+    piece: Annotated[Indices, "f"]  # index of the interval in use, for each piecewise function of time
 
 
 class State(NamedTuple):
@@ -124,7 +124,7 @@ class Symbolic(NamedTuple):
 
     row: Annotated[Unsigned, "r"]  # the system's row of each row here, in the order of elimination
     column: Annotated[Unsigned, "c"]  # the system's column of each column here
-    d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D
+    d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D = Φ_q M^(-1/2)
     d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
     s_start: Annotated[Unsigned, "nl + 1"]  # first product in S of each entry of L
@@ -249,7 +249,8 @@ class Loop(NamedTuple):
 
 
 class Kernels(NamedTuple):
-    """The exchangeable kernels of a run."""
+    """The kernels of a run that the stepping loop receives as arguments: formulation, chart and
+    integrator."""
 
     step: Annotated[Kernel, STEP]
     propose: Annotated[Kernel, PROPOSE]
@@ -280,7 +281,7 @@ class Memory(NamedTuple):
 MEMORY, SYSTEM = Named(Memory), Named(System)
 EQUATIONS = Named(Equations)
 
-# signatures of the exchangeable kernels
+# signatures of the kernels that other kernels receive as arguments
 ACCELERATE = INT(SYSTEM)
 ENTER = INT(FLOAT, VECTOR, MEMORY)  # t, y
 RATES = INT(FLOAT, VECTOR, VECTOR, MEMORY)  # t, y, y'

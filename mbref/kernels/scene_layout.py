@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
-POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitives
+POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitive constraints
 MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two of joints
 
 
@@ -96,7 +96,7 @@ class SceneData(NamedTuple):
     primitives: Primitives
     moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
     resting: Annotated[Indices, "resting"]  # rows that only give multipliers
-    row_bodies: Annotated[IndexTable, "m", "sides"]  # the bodies of each row, filled up with the fixed frame
+    row_bodies: Annotated[IndexTable, "m", "sides"]  # bodies of each row, padded with the fixed frame
     functions: Functions
     loads: Loads
 

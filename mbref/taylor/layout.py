@@ -43,7 +43,7 @@ class Solver(NamedTuple):
     work: Annotated[Matrix, "nr", "nz"]
     left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, while pivots are chosen
     row_max: Annotated[Vector, "nr"]  # largest entry of each row, while pivots are chosen
-    # pivots when the partition was chosen: of G, then of the reduced mass matrix
+    # pivots of G and of the reduced mass matrix when the dependent variables were chosen
     first: Annotated[Vector, "nz"]
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots at the start of the step
@@ -123,11 +123,11 @@ class Progress(NamedTuple):
     """Progress of a run: its end, what is recorded, and its largest pivots."""
 
     end: float = 0.0  # s, end of the last step
-    begun: int = 0  # 1 if a series has begun
+    begun: int = 0  # 1 after the first Taylor series of the run has begun
     recorded: int = 0  # singular positions in ``Crossings``
     completed: int = 0  # samples that have accelerations and multipliers
     largest_pivot: float = 0.1  # largest value of the least pivot so far
-    entry_pivot: float = 0.0  # least pivot at the start of the high-accuracy steps
+    entry_pivot: float = 0.0  # least pivot of G at the start of the high-accuracy steps
     leaving: int = 0  # 1 if the motion leaves a singular position that it has crossed
     rests_near: int = 0  # 1 if the motion started at rest near a singular position and is still near
     # distance from singular positions, relative to the distance at which a long crossing may end

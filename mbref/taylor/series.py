@@ -79,7 +79,8 @@ def add_to_later_sums(k, last, memory):
 
 @inlined
 def solve_order(k, last, memory):
-    """Compute order k + 2 of the variables and order k of the multipliers; loads are in the sums."""
+    """Compute order k + 2 of the variables and order k of the multipliers; the right-hand side with the loads
+    is in ``sums``."""
     series, terms, rhs = memory.series, memory.series.terms, memory.solver.rhs
     n, lanes = memory.solver.pivot_columns.shape[0] + memory.solver.pivot_rows.shape[0], terms.shape[1]
     put_sums(k, memory)

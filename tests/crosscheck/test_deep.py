@@ -129,7 +129,7 @@ def test_command_and_its_records(known, capsys, tmp_path):
     counts = record["cards"]["agreement"]
     assert counts["pass"] == 1 and record["first_seed"] == 2, record["cards"]
     assert main(arguments) == 0
-    assert "mbref: 0 violations; it ran 1 of 1 random mechanisms" in capsys.readouterr().out
+    assert "mbref: 0 violated checks; the engine ran 1 of 1 random mechanisms" in capsys.readouterr().out
 
 
 def test_tally_and_seeds_that_decide_nothing(known):

@@ -32,7 +32,7 @@ from mbref.trajectory import Cost
 
 RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight; cancels h² and h⁴
 BEFORE, BEHIND = 2.0, 2.0  # distances of the ends of the window from the failure, in steps
-NODES = 12  # number of states before the window from which the states after it are extrapolated
+NODES = 12  # states before the singular position from which the states after it are extrapolated
 BESIDE = 0.05  # fraction of the node spacing: a node nearer to a sample is moved to it
 APART = 6.0  # distance between two states, in steps, unless the last crossing ends nearer
 

@@ -23,8 +23,8 @@ LEAST_TERMS = 6  # smallest number of terms of a series
 
 
 class Expansion:
-    """The series about a time t: coordinates ``x`` (order + 3, 3, n), angles of loads of joints, and joint
-    coordinates of couplings and armatures."""
+    """The Taylor series about a time t: coordinates ``x`` (order + 3, 3, n), angles of loads of joints, and
+    joint coordinates of couplings and armatures."""
 
     def __init__(
         self,

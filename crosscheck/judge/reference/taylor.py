@@ -123,7 +123,7 @@ class Stepper:
         return 1 + PREFERENCE * rng.random(self.of.count)
 
     def samples(self, times: Times, progress: Progress) -> Iterator[tuple[np.ndarray, ...]]:
-        """X, X', X'' (3, n) at ascending times; raises Ended where the motion cannot be followed."""
+        """Return X, X', X'' (3, n) at increasing times; raises Ended if the motion cannot be followed."""
         self._held = self._choice(self._x, self.t)[0]
         self._conditioning = [self._sharp(self._x, self.t)]
         self._refuse_undetermined()

@@ -1,7 +1,7 @@
 """Equations of motion of a scene on its spanning tree: rates of states, and states that satisfy the joints.
 
-A state holds, in this order, the scalar joint coordinates, the quaternions of the balls, the coordinates of
-joints outside the tree that a driver, a load, a coupling or an armature uses, and the joint rates.
+A state contains, in this order, the scalar joint coordinates, the quaternions of the balls, the coordinates
+of joints outside the tree that a driver, a load, a coupling or an armature uses, and the joint rates.
 """
 
 from __future__ import annotations
@@ -246,7 +246,7 @@ class TreeEquations:
         return int((pivots > RANK).sum())
 
     def _wanted(self, t: np.ndarray) -> np.ndarray:
-        """(3, K, drivers) values of the drivers at times (K,), their rates and second rates."""
+        """Return (3, K, drivers) values of the drivers at times (K,), their rates and second rates."""
         found = [
             np.stack([values(driver, t, self.since, n, self.arithmetic) for n in range(3)])
             for driver in self.scene.driver

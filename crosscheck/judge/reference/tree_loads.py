@@ -100,7 +100,7 @@ class Loads:
         return values(load.over_time, t, since, arithmetic=self.tree.arithmetic)
 
     def _act(self, placed: Placed, wrench: np.ndarray, t: np.ndarray, since: float) -> None:
-        """Adds the loads, each of them a force at a point of a body or a moment."""
+        """Add the loads, each of them a force at a point of a body or a moment."""
         scene = self.tree.scene
         for load in self.moments:
             body = scene.body_index(load.body)

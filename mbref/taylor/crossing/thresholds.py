@@ -42,18 +42,20 @@ PIVOT_CLEAR = 0.09  # pivot / largest pivot: from here regular steps do not stop
 VIOLATION_FLOOR = 1e-15  # scene units: violation by rounding of the rows
 VIOLATION_NEAR = 1e-14  # violation / relative distance: a wider gap is detected by a step near it
 VIOLATION_ACROSS = 1e-13  # scene units: a step across a gap violates the rows by the gap
-VIOLATION_LEFT = 2.0  # violation / violation at the start: dependent rows keep their violation
+VIOLATION_LEFT = 2.0  # violation at the end / start of a step: corrections do not reduce it in dependent rows
 TIME_ROUNDING = 3e-16  # violation / (time × speed): drivers are evaluated at a rounded time
 MIN_PIVOT_RATIO = 0.2  # pivot at the end / start: below it the next step loses accuracy
-MIN_PIVOT_RATIO_ACROSS = 0.05  # pivot at the end / start of a crossing step: otherwise repeat it nearer
+MIN_PIVOT_RATIO_ACROSS = (
+    0.05  # pivot at the end / start of a crossing step: below it the step starts again nearer by
+)
 MAX_SHIFT = 0.05  # correction / pivot at the end: a larger one may change the branch
 MIN_PIVOT = 1e-9  # pivot / largest pivot: rounding 1e-16 / pivot² exceeds every velocity below it
 MIN_PIVOT_ACROSS = 1e-6  # pivot / largest pivot: rounding decides crossings that start nearer
 MIN_PIVOT_FREE = 2.5e-8  # pivot of unit rows: square root of a gap that rounding of lengths may open or close
 MIN_PIVOT_RESOLVED = 1e-7  # pivot of unit rows: rounding 1e-16 / pivot² turns a velocity by 1e-2
-ENTRY_RATIO = 0.5  # pivot / pivot at entry: a motion that moves away is accepted
+ENTRY_RATIO = 0.5  # pivot / pivot before the crossing: a motion that moves away is accepted
 # --- uniqueness -----------------------------------------------------------------------------------------
-MIN_ENERGY = 0.02  # kinetic energy / energy at entry: a slower motion may turn back
+MIN_ENERGY = 0.02  # kinetic energy / its value before the crossing: a slower motion may turn back
 BOUND_MARGIN = 0.5  # fraction of the bound: the rest is for the error of Simpson's rule
 MAX_SHORT_STEPS = 6  # steps: a short crossing that takes more is replaced by a long one
 MIN_CHANGE = 1e-9  # perturbation / velocities: a smaller one is hidden by rounding

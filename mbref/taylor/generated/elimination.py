@@ -88,7 +88,12 @@ class Elimination:
             write.store(left, self._tableau, self._rows[p])
 
     def _split(self) -> None:
-        """Write N and T to memory, by their variables; T number by number."""
+        """Generate code that stores N (row by row) and T (number by number) in memory, in the order of the
+        variables.
+
+        All variables are z = N b + T u with the right-hand sides b of the rows and the independent variables
+        u.
+        """
         write, free = self._write, self._columns[self._rank :]
         for k, column in enumerate(self._columns[: self._rank]):
             place = write.multiplied(column, self._lanes)

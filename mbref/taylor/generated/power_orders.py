@@ -161,7 +161,7 @@ class PowerOrders(Orders):
         return turning
 
     def _turned(self, row: Vectors) -> Vectors:
-        """Return B times a row of terms."""
+        """Return the matrix B (the response to the rate of G) times a row of Taylor coefficients."""
         numbers = [self._write.repeated(row, i) for i in range(self._nz)]
         return [self._combined(numbers, [vectors[b] for vectors in self._turning]) for b in self._vectors]
 

@@ -25,7 +25,7 @@ class JointRow:
     """A joint coordinate that follows another one: q = offset + ratio · q₂, both from the reference."""
 
     name: str
-    joints: tuple[int, int]  # MuJoCo's numbers; the second is -1 if the first follows a constant
+    joints: tuple[int, int]  # MuJoCo's joint numbers; the second is -1 if the first coordinate is constant
     offset: float
     ratio: float
 
