@@ -98,6 +98,8 @@ def _nodes(node: ast.AST) -> Iterator[ast.AST]:
 def _is_left(node: ast.AST) -> bool:
     if isinstance(node, ast.If):
         return ast.unparse(node.test) == "TYPE_CHECKING"
+    if isinstance(node, ast.keyword):
+        return node.arg == "strict"  # of zip: a check of lengths that are equal
     return isinstance(node, ast.JoinedStr)
 
 

@@ -39,6 +39,7 @@ BY_KIND = {
     "imports for types": ("if TYPE_CHECKING:\n    import a", set()),
     "equal arguments": ("x = f(a, a)", set()),
     "arguments in any order": ("x = np.hypot(a, b)", set()),
+    "a check of lengths": ("x = zip(a, a, strict=True)", set()),
     "umlauts before the place": ("x = 'ä', a - b", {"x = 'ä', ((a) + (b))"}),
 }
 

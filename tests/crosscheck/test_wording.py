@@ -1,0 +1,45 @@
+"""Words for numbers and lists, and which runs are timed again / worked out by hand, at the ends of ranges."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.study import wording
+from crosscheck.study.timings import LONG, _is_short
+
+
+def test_lists_of_none_one_and_more():
+    assert [wording.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
+
+
+@pytest.mark.parametrize(
+    ("value", "bound", "said"),
+    [
+        (6.04e-9, 1e-14, "6.1e-9"),
+        (6.0e-9, 6.0e-9, "6.0e-9"),
+        (9.91e-9, 0.0, "10.0e-9"),
+        (5e-15, 3e-14, "less than the truth's own bound, 3e-14"),
+    ],
+)
+def test_errors_are_rounded_up_or_below_the_bound(value, bound, said):
+    assert wording.at_most(value, bound) == said
+
+
+def test_one_and_several():
+    assert [wording.runs(n) for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    for names, words in ((["a"], ("is", "its", "agrees")), (["a", "b"], ("are", "their", "agree"))):
+        assert (wording.is_or_are(names), wording.its_or_their(names), wording.agree(names)) == words
+    assert wording.uncapitalised("Both engines") == "both engines"
+    assert wording.uncapitalised("MuJoCo is") == "MuJoCo is"
+
+
+def test_times_and_multiples_at_the_ends_of_their_units():
+    assert [wording.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
+    assert [wording.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
+    assert (wording.span(2.0, 2.04), wording.span(1.5, 30.0)) == ("2.0 times", "1.5 to 30 times")
+
+
+@pytest.mark.parametrize(("seconds", "again"), [(LONG, True), (1.01 * LONG, False)])
+def test_completed_runs_up_to_half_a_second_are_timed_again(seconds, again):
+    record = {"outcome": "COMPLETED", "cost": {"seconds": seconds}}
+    assert _is_short(record, LONG) is again and not _is_short({**record, "outcome": "TIMED_OUT"}, LONG)
