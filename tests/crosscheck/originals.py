@@ -13,7 +13,7 @@ from mbref import rotations
 
 OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "REFSAFE")
 NO_SOFTNESS = -1e-300  # stiffness and damping of closures: reference accelerations are those of exact joints
-RTOL, RANK = 1e-11, 1e-9
+RTOL, RANK = 1e-13, 1e-9  # of the integrations; of the rank of rows
 LEAST = 1e-4  # m: a shorter way is of a structure whose loops leave no motion
 
 
