@@ -37,12 +37,16 @@ class Support:
     def row(self, name: str, notes: Sequence[str]) -> list[str]:
         """Return the cells of a row: CAN, or the number that the reason of the refusal has in ``notes``."""
         found = self.answers[name]
-        return [CAN if (gap := found[e]) is None else f"– {_number(notes, e, gap)}" for e in self.engines]
+        return [CAN if (gap := found[e]) is None else f"– {_number(notes, gap)}" for e in self.engines]
 
     def notes(self) -> list[str]:
-        """Return one sentence for each different refusal of an engine, in the order of the rows."""
-        gaps = [(e, gap) for found in self.answers.values() for e, gap in found.items() if gap is not None]
-        return list(dict.fromkeys(_note(e, gap) for e, gap in gaps))
+        """Return one sentence for each different refusal, with its engines, in the order of the rows."""
+        refusing: dict[str, list[str]] = {}
+        for found in self.answers.values():
+            for name, gap in found.items():
+                if gap is not None and name not in (names := refusing.setdefault(str(gap), [])):
+                    names.append(name)
+        return [f"{', '.join(names)}: {refusal}" for refusal, names in refusing.items()]
 
 
 def of_features(engines: Sequence[str], ask: Ask | None = None) -> Support:
@@ -93,12 +97,8 @@ def _table(what: str, support: Support) -> Iterator[str]:
         yield from (f"{i}. {note}" for i, note in enumerate(notes, 1))
 
 
-def _note(name: str, gap: Cannot) -> str:
-    return f"{name}: {gap}"
-
-
-def _number(notes: Sequence[str], name: str, gap: Cannot) -> int:
-    return notes.index(_note(name, gap)) + 1
+def _number(notes: Sequence[str], gap: Cannot) -> int:
+    return next(i for i, note in enumerate(notes, 1) if note.split(": ", 1)[1] == str(gap))
 
 
 def refresh(path: str | Path) -> None:

@@ -62,6 +62,15 @@ def test_gaps_and_their_sentences():
     assert len(notes) == len(set(notes)), notes
 
 
+def test_engines_with_one_cause_share_a_note():
+    def ask(name: str, scene: Scene) -> Cannot | None:
+        return None if name == "a" else Cannot(Owner.ADAPTER, "load[0]: no map")
+
+    found = support.of_features(["a", "b", "c"], ask)
+    assert found.notes() == ["b, c: load[0]: no map (missing in the adapter)"], found.notes()
+    assert found.row("loop", found.notes()) == ["✓", "– 1", "– 1"], found.row("loop", found.notes())
+
+
 def test_every_built_in_engine_and_refusal_of_undetermined_motion():
     found = support.of_features(BUILT_IN).answers["motion without masses"]
     assert all(isinstance(gap, Cannot) for gap in found.values()), found
