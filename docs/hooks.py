@@ -18,7 +18,6 @@ from crosscheck.judge.truth import truth_for
 from mbref import find_scene, simulate
 from mbref.drawing.picture import moving, still
 from mbref.drawing.view import View
-from mbref.formulations import FORMULATIONS
 from mbref.scene import JOINT_TYPES, Scene
 
 ROOT = Path(__file__).parents[1]
@@ -66,7 +65,7 @@ OF_SLIDES = {
 
 
 sys.path.insert(0, str(ROOT / "docs"))
-from method_pages import TABLE, pages, table, with_formulations  # noqa: E402
+from method_pages import CHOOSE, pages, with_formulations, with_links  # noqa: E402
 
 
 def on_config(config: Any) -> Any:
@@ -124,8 +123,9 @@ def joint_scene(kind: str) -> Scene:
 
 
 def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
-    """Fill tables of measurements, set formulas, and let links lead to copies of files."""
-    markdown = markdown.replace(TABLE, table(FORMULATIONS.values()))
+    """Fill tables of measurements, set formulas, and let links lead to pages and copies of files."""
+    if page.file.src_uri == CHOOSE:
+        markdown = with_links(markdown)
     markdown = re.sub(r"<!-- measured: (.+?) -->", lambda m: measured(m[1].split()), markdown)
     markdown = markdown.replace("<!-- paper -->", paper())
     up = "../" * page.file.src_uri.count("/")

@@ -1,13 +1,17 @@
-"""Pages and tables of the documentation that are made from the formulations' own texts."""
+"""Pages and tables of the documentation that are made from the formulations' own texts.
+
+``python docs/method_pages.py`` replaces the table of formulations in the guide for choosing.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 from mbref.formulations import FORMULATIONS, Formulation
 
-TABLE = "<!-- formulations -->"  # replaced by the table of formulations
+BEGIN, END = "<!-- formulations -->", "<!-- /formulations -->"  # around the table of formulations
 CHOOSE = "methods.md"  # the pages of formulations follow it in the contents
 
 
@@ -46,15 +50,34 @@ def pages() -> dict[str, str]:
 
 
 def table(formulations: Iterable[Formulation]) -> str:
-    """Return the table of formulations: equations, and what each does with redundancy and singular masses."""
-    rows = ["| formulation | equations | redundant rows | singular mass matrix |", "|---|---|---|---|"]
+    """Return the table of formulations: what each is, does with redundancy and with singular masses."""
+    rows = [
+        "| formulation | what it is | equations | redundant rows | singular mass matrix |",
+        "|---|---|---|---|---|",
+    ]
     for f in formulations:
         redundant = "handled" if f.handles_redundancy else "fails"
         if f.needs_independent_columns:
             redundant = "driven mechanisms only"
         masses = "handled" if f.handles_singular_mass else "fails"
-        rows.append(f"| [`{f.name}`](methods/{f.name}.md) | {f.equations} | {redundant} | {masses} |")
+        rows.append(f"| `{f.name}` | {f.about.title} | {f.equations} | {redundant} | {masses} |")
     return "\n".join(rows)
+
+
+def with_table(text: str) -> str:
+    """Return the text of the guide with the present table of formulations between its two marks."""
+    before, begin, rest = text.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise ValueError(f"no {BEGIN} … {END}")
+    return f"{before}{BEGIN}\n{table(FORMULATIONS.values())}\n{END}{after}"
+
+
+def with_links(text: str) -> str:
+    """Return a text in which a formulation's name at the begin of a row leads to its page of the site."""
+    for name in FORMULATIONS:
+        text = text.replace(f"\n| `{name}` |", f"\n| [`{name}`](methods/{name}.md) |")
+    return text
 
 
 def with_formulations(contents: Any) -> Any:
@@ -70,3 +93,8 @@ def with_formulations(contents: Any) -> Any:
     if isinstance(contents, dict):
         return {title: with_formulations(inside) for title, inside in contents.items()}
     return contents
+
+
+if __name__ == "__main__":
+    guide = Path(__file__).with_name(CHOOSE)
+    guide.write_text(with_table(guide.read_text()))

@@ -63,6 +63,14 @@ def test_a_new_formulation_is_one_file_and_one_line(monkeypatch, capsys):
     assert {"thrown-away": "methods/thrown-away.md"} in contents and contents[-1] == {"End": "end.md"}
 
 
+def test_the_guide_has_the_present_table_of_formulations():
+    text = (DOCS / "methods.md").read_text()
+    assert method_pages.with_table(text) == text, "python docs/method_pages.py renews the table"
+    for name in FORMULATIONS:
+        assert f"| `{name}` |" in text
+        assert f"\n| [`{name}`](methods/{name}.md) |" in method_pages.with_links(text)
+
+
 def test_measured_methods_are_methods():
     texts = [*(page.read_text() for page in PAGES), *MADE.values()]
     found = [m for text in texts for m in re.findall(r"<!-- measured: (.+?) -->", text)]
