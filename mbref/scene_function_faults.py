@@ -58,7 +58,7 @@ def _table_at_start(rows: Sequence[tuple[float, float]]) -> float:
     if not rows:
         return 0.0
     try:
-        return Factor(table=rows).pieces()[0].cubic[0]
+        return Factor(table=tuple(rows)).pieces()[0].cubic[0]
     except ValidationError:
         return 0.0
 

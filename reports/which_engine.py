@@ -220,7 +220,8 @@ def _lines(group: Judged) -> Iterator[str]:
     """Yield each engine's own code or XML of its settings, to be copied."""
     found = group.within(LEVEL, lambda record: bool(own_code(group.scene, record)))
     if found:
-        yield f"\nTo copy, of settings that the engine itself has: fastest within {SAID}, otherwise best.\n"
+        best = f"the fastest run with an error within {SAID}, otherwise the most accurate run"
+        yield f"\nLines to copy, for settings that the engine itself has: {best}.\n"
         yield "```text"
         for engine, record in found.items():
             yield f"{title(engine)}, error {error_text(record)}: {own_code(group.scene, record)}"

@@ -18,7 +18,7 @@ from mbref.scenes import SCENES
 
 CAN = "✓"
 BEGIN, END = "<!-- support -->", "<!-- /support -->"
-KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # engines in the matrix of the document, installed or not
+KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # engines in the support table, installed or not
 Ask = Callable[[str, Scene], Cannot | None]  # function of (engine name, scene) that returns a refusal or None
 
 

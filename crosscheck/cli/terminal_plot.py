@@ -20,7 +20,7 @@ def scatter(records: Sequence[Record], letters: Mapping[tuple[str, str], str]) -
     plotted = [r for r in records if is_completed(r) and math.isfinite(error(r))]
     points = [(*_place(r), letters[engine_and_family(r)]) for r in plotted]
     if not points:
-        return Text("nothing to plot: no completed run has an error")
+        return Text("nothing to plot: the error of no completed run is known")
     (left, right), (low, high) = _range([p[0] for p in points]), _range([p[1] for p in points])
     grid = [[" "] * WIDTH for _ in range(HEIGHT)]
     for x, y, letter in points:

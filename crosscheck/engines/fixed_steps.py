@@ -73,7 +73,7 @@ def simulated(
     """Return the trajectory of the simulation that ``make`` constructs; raises ValueError for an unknown
     family."""
     if setting.family not in engine.families:
-        raise ValueError(f"{engine.name} has no family {setting.family!r}")
+        raise ValueError(f"{engine.name} has no family of settings {setting.family!r}")
     start = time.process_time()
     with np.errstate(all="ignore"):
         run = make()

@@ -127,12 +127,12 @@ def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarra
     return wrench(link.mass * (acceleration - np.array(scene.gravity)), motion.position[k] + arm, moment)
 
 
-def _arm(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> np.ndarray:
+def _arm(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float] | np.ndarray) -> np.ndarray:
     return motion.rotation[link] @ (np.array(point) - tree.links[link].position)
 
 
 def _point(
-    tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]
+    tree: Tree, motion: LinkMotion, link: int, point: Sequence[float] | np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return present position and velocity of a point of a link (or of the ground), given in the world at t =
     0."""

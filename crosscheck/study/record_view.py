@@ -126,7 +126,8 @@ def varied_settings(record: Record, records: Sequence[Record]) -> str:
     settings = [r["settings"] for r in records if engine_and_family(r) == engine_and_family(record)]
     names = [k for k in own if any(s.get(k, own[k]) != own[k] for s in settings)]
     if len(settings) == 1:
-        own = names = {k: v for k, v in record["asked"]["options"].items() if k not in ORIGIN}
+        own = {k: v for k, v in record["asked"]["options"].items() if k not in ORIGIN}
+        names = list(own)
     return ", ".join(f"{k}={own[k]:g}" if isinstance(own[k], float) else f"{k}={own[k]}" for k in names)
 
 

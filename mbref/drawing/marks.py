@@ -191,7 +191,7 @@ def load_mark(stage: Stage, load: Load) -> str:
     joint = stage.scene.joint_named(load.joint)
     at, axis = stage.place(joint.bodies[1], joint.anchor_pair[1]), _unit(joint.directions[0])
     sense = axis * np.copysign(1.0, load.action.amount)
-    signs = {
+    signs: dict[str, Callable[[], str]] = {
         "torsion_spring": _spiral,
         "slide_spring": lambda: _short_zigzag(stage, axis),
         "joint_torque": lambda: _turning(stage, sense, 15.0),

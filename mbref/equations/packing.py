@@ -152,12 +152,12 @@ class Packs:
         if isinstance(load, Moment | Force):
             return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0, function)
         if isinstance(load, Spring):
-            return LoadPlace(SPRING, *map(self.index.__getitem__, load.bodies), function)
+            first, second = map(self.index.__getitem__, load.bodies)
+            return LoadPlace(SPRING, first, second, function)
         if not isinstance(load, JointLoad):
             raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
-        bodies = self.scenes[0].joint_named(load.joint).bodies
-        kind = ABOUT_AXIS if load.coordinate == ANGLE else ALONG_AXIS
-        return LoadPlace(kind, *map(self.index.__getitem__, bodies), function)
+        first, second = map(self.index.__getitem__, self.scenes[0].joint_named(load.joint).bodies)
+        return LoadPlace(ABOUT_AXIS if load.coordinate == ANGLE else ALONG_AXIS, first, second, function)
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """Return an array that is equal for all scenes."""
@@ -235,8 +235,9 @@ class Packs:
         found = _once(pieces_of, functions)
         pieces = self._rows((piece for rows in found for piece in rows), 6)
         first = self._all(np.cumsum([0, *count], dtype=np.int64))
-        waves = (numbers[..., k] for k in range(3))
-        return Functions(first, *waves, numbers[..., 3:], pieces[..., 0], pieces[..., 1], pieces[..., 2:])
+        amplitude, frequency, phase = (numbers[..., k] for k in range(3))
+        begin, part, cubic = pieces[..., 0], pieces[..., 1], pieces[..., 2:]
+        return Functions(first, amplitude, frequency, phase, numbers[..., 3:], begin, part, cubic)
 
     def directions(self, bodies: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """Return world vectors (…, k, 3) at t = 0, each in the principal frame (s, k, 3) of a body with index

@@ -102,8 +102,8 @@ def torsions_of(loads: Loads, forms: Forms, angles: Sequence[tuple[Any, ...]]) -
     constant, form, stiffness, damping, natural, function, slot, row, factor = _stacked(rows, 9, forms.d, 7)
     amount = loads.force[..., places, 0] / of.length**2
     amount = np.concatenate([amount, np.zeros((*amount.shape[:-1], len(angles)))], axis=-1)
-    indices = (number.astype(np.int64) for number in (function, slot, row))
-    return Torsions(constant, form, stiffness, damping, natural, amount, *indices, factor)
+    function, slot, row = (number.astype(np.int64) for number in (function, slot, row))
+    return Torsions(constant, form, stiffness, damping, natural, amount, function, slot, row, factor)
 
 
 def slides_of(loads: Loads, forms: Forms) -> Slides:
@@ -119,8 +119,9 @@ def slides_of(loads: Loads, forms: Forms) -> Slides:
         constant, form = (np.concatenate([axis[c], other[c] - one[c]]) for c in range(2))
         natural = loads.natural[k] / of.length
         rows.append((constant, form, loads.stiffness[k], loads.damping[k], natural, loads.function[k]))
-    *numbers, function = _stacked(rows, 6, forms.d, 4)
-    return Slides(*numbers, loads.force[..., places, 0] / of.length, function.astype(np.int64))
+    constant, form, stiffness, damping, natural, function = _stacked(rows, 6, forms.d, 4)
+    amount = loads.force[..., places, 0] / of.length
+    return Slides(constant, form, stiffness, damping, natural, amount, function.astype(np.int64))
 
 
 def no_springs(d: int) -> Springs:
@@ -130,14 +131,14 @@ def no_springs(d: int) -> Springs:
 
 def no_slides(d: int) -> Slides:
     """Return loads along joints' axes of a scene of d variables that has none."""
-    none = np.zeros(0)
-    return Slides(*_stacked([], 6, d), none, none.astype(np.int64))
+    constant, form, stiffness, damping, natural = _stacked([], 6, d)
+    return Slides(constant, form, stiffness, damping, natural, np.zeros(0), np.zeros(0, dtype=np.int64))
 
 
 def timed_forces(loads: Loads, forms: Forms) -> TimedForces:
     """Return the forces and moments on bodies that functions of time multiply."""
     places = [k for k in np.flatnonzero(loads.function >= 0) if loads.kind[k] in (FORCE, MOMENT)]
-    found, lead, d = [_force_of(k, loads, forms) for k in places], loads.force.shape[:-2], forms.d
+    found, lead, d = [_force_of(int(k), loads, forms) for k in places], loads.force.shape[:-2], forms.d
     constant = np.array([np.broadcast_to(c, (*lead, d)) for c, _ in found]).reshape(len(found), *lead, d)
     linear = np.array([np.broadcast_to(m, (*lead, d, d)) for _, m in found])
     linear = np.moveaxis(linear.reshape(len(found), *lead, d, d), 0, len(lead))

@@ -146,7 +146,7 @@ class _MujocoSimulation:
         elif setting.family in ("tuned", "stiff", *INTEGRATED_HERE):
             self._harden(options.get("beta", 0.0), options.get("hard", HARD))
         else:
-            raise ValueError(f"mujoco has no family {setting.family!r}")
+            raise ValueError(f"mujoco has no family of settings {setting.family!r}")
         turn = options.get("turn", TURN_PER_STEP)
         self.longest = turn / stated_rate(scene) if scene.driver else np.inf
         if setting.family in COMPILED:

@@ -161,10 +161,10 @@ def _left_out(scene: Scene) -> Iterator[str]:
     for i, load in enumerate(scene.load):
         if isinstance(load, CONSTANT):
             yield f"load[{i}] ({load.type} on {load.body}): apply it by mjData.xfrc_applied"
-        elif load.over_time:
-            yield f"load[{i}] ({load.type} of {load.joint}): MJCF has no loads over time"
         elif isinstance(load, JointTorque | JointForce):
-            yield f"load[{i}] ({load.type} of {load.joint}): its motor is controlled in keyframe {KEYFRAME!r}"
+            said = f"its motor is controlled in keyframe {KEYFRAME!r}"
+            said = "MJCF has no loads over time" if load.over_time else said
+            yield f"load[{i}] ({load.type} of {load.joint}): {said}"
     for body in scene.body:
         if body.velocity is not None or body.angular_velocity is not None:
             yield f"initial velocity of {body.name}: set mjData.qvel"

@@ -168,7 +168,7 @@ class _PinocchioSimulation:
             adaptive = Adaptive(self.rhs, settle, setting.options["rtol"], *limits, self.counts)
             self.step = adaptive.advance
         else:
-            raise ValueError(f"pinocchio has no family {family!r}")
+            raise ValueError(f"pinocchio has no family of settings {family!r}")
 
     def _max_step(self) -> float:
         if not self.driven:

@@ -200,7 +200,7 @@ class _Reader:
         )
         if friction:
             self.parts.append(Part("friction", f"dry friction of joint {made.name!r}"))
-        given = {"joint": made.name, "stiffness": stiffness, "damping": damping}
+        given: dict[str, Any] = {"joint": made.name, "stiffness": stiffness, "damping": damping}
         if not (damping or stiffness):
             return
         if made.type == "revolute":

@@ -64,7 +64,7 @@ class Generator(Engine):
 
     def _known(self, setting: Setting) -> None:
         if setting.family not in self.families:
-            raise ValueError(f"{self.name} has no family {setting.family!r}")
+            raise ValueError(f"{self.name} has no family of settings {setting.family!r}")
 
     def _trajectory(
         self,

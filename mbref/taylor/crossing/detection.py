@@ -157,9 +157,10 @@ def vanishes_inside(h, memory):
 
 @kernel
 def stays_level(h, largest, memory):
-    """Return whether the determinant is not small at two times inside a step of h seconds.
+    """Return whether the determinant is large at two times inside a step of h seconds.
 
-    Relative to the larger one at the ends, as logarithms: one that vanishes twice is small at one of them.
+    ``largest`` is the logarithm of the larger determinant at the two ends of the step.  A determinant that
+    vanishes twice inside the step is small at one of the two times.
     """
     first = logarithm_at(h - GOLDEN * h, memory)
     return min(first, logarithm_at(GOLDEN * h, memory)) > largest + LOG_LEVEL

@@ -60,8 +60,11 @@ def keeps_moving(least, first, memory):
 
 @kernel
 def is_bounded(delay, memory):
-    """Return whether ``delay`` = ∫ v₀² / v² dt (s) of a crossing bounds the distance of a perturbed
-    motion."""
+    """Return whether a motion with a slightly changed velocity stays near the motion that crosses.
+
+    ``delay`` = ∫ v₀² / v² dt (s) over the crossing, with the speed v and its value v₀ at the start.  The
+    change of velocity times ``delay`` bounds the distance of the two motions.
+    """
     change = memory.options.velocity_change
     speed = largest_coefficient(memory.series.terms, 1, memory.solver.pivot_columns.shape[0])
     near = STRICTER * min(MAX_GAIN * change, MAX_APART)

@@ -34,7 +34,7 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
             model.dof_damping[_dofs(model, j)] = 0
             continue
         rest = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
-        numbers = {"joint": joint.name, "stiffness": stiffness, "damping": damping}
+        numbers: dict[str, Any] = {"joint": joint.name, "stiffness": stiffness, "damping": damping}
         if coordinate == ANGLE:
             yield TorsionSpring(**numbers, natural_angle=rest)
         else:
