@@ -67,7 +67,7 @@ class TimeFunction(Entry):
     @property
     def interval(self) -> tuple[float, float]:
         """Times (s) between which the function is switched on."""
-        return 0.0, np.inf
+        return -np.inf, np.inf
 
     def pieces(self) -> tuple[Piece, ...]:
         """The pieces on which the function is analytic, from t = 0 on."""

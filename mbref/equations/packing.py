@@ -117,8 +117,7 @@ class Packs:
         coupled: Sequence[tuple[Primitive, ...]],
         driven: Mapping[str, int],
     ) -> Places:
-        """Return everything of a scene except its numbers, from the primitives of each joint and of the first
-        scene's couplings."""
+        """Return the first scene without its numbers, from the primitives of its joints and couplings."""
         scene, joints = self.scenes[0], self.joints[0]
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads, functions = () if self.kinematic else scene.load, functions_of(scene)

@@ -220,5 +220,5 @@ def test_a_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
         SceneError, match=r"driver\[plane0\].joint: 'plane0' is planar; only .* can be driven"
     ):
         scene.with_(driver=(Driver(joint="plane0"),))
-    with pytest.raises(SceneError, match=r"load\[0\].joint: 'plane0' is planar; only .* torsion spring"):
+    with pytest.raises(SceneError, match=r"load\[0\].joint: 'plane0' is planar; only .* torsion_spring"):
         scene.with_(load=(TorsionSpring(joint="plane0", stiffness=1.0),))

@@ -108,7 +108,7 @@ def memory(variables=2, rank=1, kind=HIGH_ACCURACY, **numbers):
             loop=SimpleNamespace(clock=clock),
             equations=SimpleNamespace(
                 system=SimpleNamespace(counts=counts, settings=SimpleNamespace(nearly_dependent=True)),
-                scene=SimpleNamespace(drivers=SimpleNamespace(polynomial=np.zeros((0, 1)))),
+                piece=np.zeros(0),
             ),
             control=control,
             state=SimpleNamespace(velocities=np.array([numbers.get("velocity", 1.0)])),

@@ -90,7 +90,7 @@ def test_power_and_what_changes_the_energy(scene):
             np.einsum("bij,bj->bi", inertia, motion.angular_acceleration[k]),
         ]
         growth = float(np.sum(np.hstack(pushes) * twist))
-        power = float(np.sum(applied(scene, state(motion, k)) * twist))
+        power = float(np.sum(applied(scene, float(motion.times[k]), state(motion, k)) * twist))
         work = float(np.sum(resultants(scene, motion, k) * twist))
         scale = max(1.0, np.abs(np.hstack(pushes) * twist).max())
         assert abs(growth - power) < 1e-6 * scale, f"power {power} W, energy grows by {growth} W: {scene}"
