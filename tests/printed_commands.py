@@ -15,7 +15,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 def commands(page: Path) -> Iterator[list[str]]:
     """Yield the words of each command in a page's shell and console blocks, without comments and pipes."""
-    for kind, block in re.findall(r"^```(sh|console)?\n(.*?)^```$", page.read_text(), re.S | re.M):
+    for kind, block in re.findall(r"^```(.*?)\n(.*?)^```$", page.read_text(), re.S | re.M):
+        if kind not in ("", "sh", "console"):
+            continue
         lines = shown(block) if kind == "console" else block.replace("\\\n", " ").splitlines()
         for line in lines:
             if line and re.match(r"(mbref|crosscheck|python|pytest) ", line):
