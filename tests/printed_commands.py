@@ -14,9 +14,9 @@ PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
 def commands(page: Path) -> Iterator[list[str]]:
-    """Yield the words of each command in a page's shell and console blocks, without comments and pipes."""
+    """Yield the words of each command in a page's shell, console and text blocks, without comments."""
     for kind, block in re.findall(r"^```(.*?)\n(.*?)^```$", page.read_text(), re.S | re.M):
-        if kind not in ("", "sh", "console"):
+        if kind not in ("", "sh", "console", "text"):
             continue
         lines = shown(block) if kind == "console" else block.replace("\\\n", " ").splitlines()
         for line in lines:
