@@ -119,13 +119,14 @@ def test_tree_engines_move_as_the_reference_or_refuse(name, make):
 
 
 @pytest.mark.parametrize("name", ["drake", "dart"])
-def test_a_slipping_coupling_or_a_lost_rotor_is_seen(name, monkeypatch):
-    """The terms of an engine without the rows of couplings, or without armatures, move otherwise."""
+def test_a_coupling_of_another_ratio_or_a_lost_rotor_is_seen(name, monkeypatch):
+    """The terms of an engine with other ratios of couplings, or without armatures, move otherwise."""
     pytest.importorskip(MODULES[name])
     scene = planetary().with_(duration=0.2)
-    for part, nothing in (("_couplings", (0, 2)), ("_rotors", (2, 2))):
+    for part, wrong in (("_couplings", lambda rows: rows * [1.0, 1.1]), ("_rotors", np.zeros_like)):
+        usual = getattr(terms.Simulation, part)
         with monkeypatch.context() as changed:
-            changed.setattr(terms.Simulation, part, lambda self, shape=nothing: np.zeros(shape))
+            changed.setattr(terms.Simulation, part, lambda self, f=usual, g=wrong: g(f(self)))
             run = engine(name).run(scene, np.array([0.0, 0.2]), FINE[name])
         assert measure(scene, run, truth_for(scene))["error"] > 1e-3, part
 

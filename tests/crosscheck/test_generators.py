@@ -105,7 +105,7 @@ def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
         rtols = [setting.options["rtol"] for setting in simulator.settings_of(scene, "taylor")]
         assert rtols == sorted(rtols, reverse=True) and len(rtols) > 3, rtols
     assert all(simulator.serves(scene, family) for family in simulator.families)
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         simulator.run(scene, np.array([0.0]), Setting("best", {"rtol": 1e-6}))
 
 

@@ -200,7 +200,7 @@ def test_projected_driver_and_its_prescribed_motion_agree() -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         simulate(SCENES["four_bar"](), 0.1, "best")
 
 

@@ -231,5 +231,5 @@ def test_a_motion_the_joints_cannot_follow_keeps_the_states_before() -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         engine("ondsel").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"step": 1e-3}))

@@ -206,7 +206,7 @@ def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         simulate(SCENES["four_bar"](), 0.1, "best")
 
 

@@ -156,5 +156,5 @@ def test_the_same_motion_with_and_without_masses() -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         simulate(SCENES["four_bar"](), 0.1, 1e-6, "best")

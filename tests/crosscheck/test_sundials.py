@@ -156,5 +156,5 @@ def test_drivers_that_no_motion_can_follow_end_the_run() -> None:
 
 
 def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         engine("sundials").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"rtol": 1e-6}))

@@ -149,7 +149,7 @@ def test_a_motion_that_an_engine_s_own_joints_are_driven_to(name: str) -> None:
 @pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
 def test_a_family_that_is_unknown_or_does_not_serve(name: str) -> None:
     scene = SCENES["four_bar"]()
-    with pytest.raises(ValueError, match="no family 'best'"):
+    with pytest.raises(ValueError, match="no family of settings 'best'"):
         engine(name).run(scene, np.array([0.0]), Setting("best", {"step": 1e-3}))
     if name == "drake":
         assert not engine(name).serves(scene, "discrete"), "a discrete plant would be driven"
