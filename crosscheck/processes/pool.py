@@ -31,9 +31,10 @@ READY_SECONDS = 600.0  # s for imports and compilation, before the time limit of
 _idle: list[tuple[str, Child]] = []  # idle children with their engines, the latest one at the end
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # keyed by engine
-_asked: set[str] = set()  # engines that have answered a question
 _starting: dict[int, Child] = {}  # children that are being prepared, keyed by thread
-_prepared: set[tuple[str, str]] = set()  # engines and families that a child has prepared
+_prepared: set[tuple[str, str | None]] = (
+    set()
+)  # engine and family that a child has prepared; None: a question
 
 
 def run_isolated(
@@ -175,30 +176,23 @@ def _observed(
 
 
 def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
-    """Return the engine's version after preparing the engine.
-
-    A lock keeps two children from compiling the same code.
-    """
-    arguments = serve.get_ready, (engine_name, [family]), READY_SECONDS
-    with _starts(child):
-        if (engine_name, family) in _prepared:
-            return child.call(*arguments)
-        with _preparing.setdefault(engine_name, Lock()):
-            ready = child.call(*arguments)
-            _prepared.add((engine_name, family))
-        return ready
+    """Return the engine's version after preparing the engine."""
+    with _starts(child), _alone_at_first(engine_name, family):
+        return child.call(serve.get_ready, (engine_name, [family]), READY_SECONDS)
 
 
 @contextmanager
-def _alone_at_first(engine_name: str) -> Iterator[None]:
-    """Hold back other questions to an engine until its first answer: two children would compile it twice."""
-    lock = _preparing.setdefault(engine_name, Lock())
-    if engine_name in _asked:
+def _alone_at_first(engine_name: str, family: str | None = None) -> Iterator[None]:
+    """Let one child at a time prepare an engine's family, or answer without one, until a child has done so.
+
+    Two children would compile the same code.
+    """
+    if (engine_name, family) in _prepared:
         yield
         return
-    with lock:
+    with _preparing.setdefault(engine_name, Lock()):
         yield
-        _asked.add(engine_name)
+        _prepared.add((engine_name, family))
 
 
 @contextmanager

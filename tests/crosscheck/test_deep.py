@@ -52,7 +52,7 @@ def test_every_check_and_the_sound_example_engine(known, tmp_path):
 
 
 def test_records_without_a_check(known, tmp_path, monkeypatch):
-    """A check that records say nothing of is asked anew, and no other."""
+    """Only checks without a record are asked again."""
     known(example())
     path, plan = tmp_path / "records.jsonl", deep.Plan("example", 1)
     monkeypatch.setattr(deep, "KINDS", ((random_scenes.mechanism, ("run", "closure", "smooth")),))

@@ -127,7 +127,7 @@ def test_the_scale_of_accelerations_in_lengths(length):
 
 
 def test_the_centre_of_mass_is_weighted_by_the_masses():
-    """Of 2 kg and 6 kg the second is moved by a hundredth of the 4 m between them: three quarters of it."""
+    """Moving the body of 6 kg by 0.04 m moves the common centre of mass with the body of 2 kg by 0.03 m."""
     bodies = tuple(
         Body(name=name, mass=mass, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, 0.0))
         for name, mass, x in (("a", 2.0, 0.0), ("b", 6.0, 4.0))

@@ -162,9 +162,9 @@ def _left_out(scene: Scene) -> Iterator[str]:
         if isinstance(load, CONSTANT):
             yield f"load[{i}] ({load.type} on {load.body}): apply it by mjData.xfrc_applied"
         elif isinstance(load, JointTorque | JointForce):
-            said = f"its motor is controlled in keyframe {KEYFRAME!r}"
-            said = "MJCF has no loads over time" if load.over_time else said
-            yield f"load[{i}] ({load.type} of {load.joint}): {said}"
+            motor = f"its motor is controlled in keyframe {KEYFRAME!r}"
+            reason = "MJCF has no loads over time" if load.over_time else motor
+            yield f"load[{i}] ({load.type} of {load.joint}): {reason}"
     for body in scene.body:
         if body.velocity is not None or body.angular_velocity is not None:
             yield f"initial velocity of {body.name}: set mjData.qvel"
