@@ -2,7 +2,8 @@
 
 The public names are imported at first access, so that ``import crosscheck`` takes little time.
 ``find_engine`` is the function ``crosscheck.engine.engine`` and ``run_study`` the function
-``crosscheck.study.study``. Here the modules ``engine`` and ``study`` would hide them under their own names.
+``crosscheck.study.study``. Under their own names both functions would be hidden by the modules ``engine`` and
+``study``.
 """
 
 from __future__ import annotations

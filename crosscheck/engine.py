@@ -55,8 +55,8 @@ __all__ = [
 BRANCHES = "branches"
 # family of the most accurate settings of an engine, in engines that have a family of this name
 BEST = "tuned"
-AS_IN_FILE = "as in file"  # the family that runs the file from which a scene was read, at its own settings
-ORIGIN = ("file", "import")  # the options of that family that say where the file is and how it is read
+AS_IN_FILE = "as in file"  # family that runs the file from which a scene was read, at the file's own settings
+ORIGIN = ("file", "import")  # options of "as in file": path of the file, options for reading
 # part of a method (such as "integrators") → name → its options with their defaults
 FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]
 
@@ -84,7 +84,8 @@ class Setting:
 
 
 def best_family(settings: Sequence[Setting]) -> list[Setting]:
-    """Return the settings of the family "tuned", or of the first family if there is none, coarse to fine."""
+    """Return the settings of the family "tuned", or of the first family of settings if the engine has no such
+    family, coarse to fine."""
     families = [setting.family for setting in settings]
     best = BEST if BEST in families or not families else families[0]
     return [setting for setting in settings if setting.family == best]
@@ -114,7 +115,7 @@ class Engine(ABC):
 
     name: str
     package: str  # name of the package to install
-    supports: Supports = Supports()  # all other joints, drivers and loads are refused
+    supports: Supports = Supports()  # features that the engine can simulate; all others are refused
     rounding: float = 2.0**-52  # relative rounding of the engine's arithmetic; 2**-23 in single precision
     families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
     integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
@@ -133,8 +134,8 @@ class Engine(ABC):
     def cannot(self, scene: Scene) -> Cannot | None:
         """Return the refusal of a scene, or None if the engine can run it.
 
-        Joints, drivers and loads that ``supports`` does not declare are refused first. Then ``refuses`` is
-        asked.
+        Joints, drivers and loads that ``supports`` does not declare are refused first. Then the method
+        ``refuses`` decides.
         """
         return self.supports.missing(scene) or self.refuses(scene)
 
@@ -165,8 +166,8 @@ class Engine(ABC):
         return False
 
     def family_parts(self) -> FamilyParts:
-        """Return the parts of which names of families are composed, such as integrators; empty if there are
-        none."""
+        """Return the parts of which names of families are composed, such as integrators; empty if names are
+        not composed of parts."""
         return {}
 
     def own_code(self, scene: Scene, setting: Setting) -> str:

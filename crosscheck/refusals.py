@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from mbref.scene import Scene
 
-TABLE, FACTOR = "table", "factor"  # of a driver, of a load
+TABLE, FACTOR = "table", "factor"  # features of a driver and of a load
 
 
 class Owner(enum.Enum):

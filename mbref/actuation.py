@@ -96,7 +96,7 @@ def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
 
 
 def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
-    """Return length, angle or displacement, rate and force or torque of a load by its place; raises
+    """Return length, angle or displacement, rate and force or torque of the load with the given index; raises
     IndexError."""
     if not 0 <= place < len(scene.load):
         raise IndexError(f"no load {place}; the scene has {len(scene.load)} loads, counted from 0")

@@ -19,7 +19,7 @@ class Parser(argparse.ArgumentParser):
     """A parser whose commands report their own unknown options."""
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Return the options; the command refuses an unknown one and names the option that was probably
+        """Return the options; the command refuses an unknown option and names the option that was probably
         meant."""
         found, unknown = self.parse_known_args(args, namespace)
         if unknown:
@@ -33,7 +33,8 @@ class Parser(argparse.ArgumentParser):
         return found
 
     def error(self, message: str) -> NoReturn:
-        """Print the usage and the message, or all commands if none is named, and exit with 2."""
+        """Print the usage and the message, or all commands if the command line names none, and exit with
+        status 2."""
         if message.endswith("required: COMMAND"):
             self.print_help(sys.stderr)
             self.exit(2)

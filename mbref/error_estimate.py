@@ -49,7 +49,7 @@ class ErrorEstimate:
 
     @staticmethod
     def none(times: np.ndarray, rtol: float | None, reason: str) -> ErrorEstimate:
-        """Return the estimate of a motion for which none could be made."""
+        """Return the error estimate of a motion for which no second run could be made."""
         return ErrorEstimate(times, np.full(len(times), math.nan), rtol, "", reason)
 
     @property
@@ -59,24 +59,27 @@ class ErrorEstimate:
         return float(known.max()) if known.size else None
 
     def exceeds_from(self, level: float) -> float | None:
-        """Return the time, s, of the first sample whose error is above ``level``; None if there is none."""
+        """Return the time, s, of the first sample whose error is above ``level``; None if no sample has such
+        an error."""
         above = np.flatnonzero(self.error > level)
         return float(self.times[above[0]]) if above.size else None
 
     @property
     def exceeds_rtol_from(self) -> float | None:
-        """Time, s, of the first sample whose error is above ``rtol``. None if there is none."""
+        """Time, s, of the first sample whose error is above ``rtol``; None if no sample has such an error."""
         return None if self.rtol is None else self.exceeds_from(self.rtol)
 
     def _warned_from(self) -> float | None:
-        """Time, s, of the first sample whose error the warning reports. None if there is none."""
+        """Time, s, of the first sample whose error the warning reports; None without a warning."""
         return None if self.rtol is None else self.exceeds_from(max(RATIO * self.rtol, LEAST))
 
     @property
     def warning(self) -> str:
-        """Sentence on an error above 1000 times the relative tolerance and 1e-6. Empty if there is none.
+        """Sentence on an error above 1000 times the relative tolerance and above 1e-6. Empty if no error is
+        as large.
 
-        The motion is called sensitive unless a smaller tolerance gives less than 1000 times that tolerance.
+        The sentence calls the motion sensitive, unless a run with a smaller tolerance has an error below 1000
+        times that tolerance.
         """
         begin = self._warned_from()
         if begin is None:
@@ -88,7 +91,7 @@ class ErrorEstimate:
 
     @property
     def sentence(self) -> str:
-        """Sentence on the estimate, or on the reason why there is none."""
+        """Sentence on the error estimate, or on the reason why no estimate was made."""
         if self.largest is None:
             return f"no error estimate: {self.reason}"
         begin = self.exceeds_rtol_from

@@ -173,14 +173,15 @@ class Format(Protocol):
     writes: tuple[str, ...]
 
     def read(self, path: Path, options: ImportOptions) -> Imported:
-        """The scene of a file; raises SceneError, ValueError for an option, OSError."""
+        """Return the scene in a file; raises SceneError for a faulty file, ValueError for a faulty option,
+        OSError."""
 
     def write(self, scene: Scene) -> Exported:
-        """The scene as text."""
+        """Return the scene as the text of a file, with the features that the format lacks."""
 
 
 def read(path: str | Path, options: ImportOptions | None = None) -> Imported:
-    """The scene of a file, by the format of its ending; raises ValueError, SceneError, OSError."""
+    """Return the scene in a file, by the format of its suffix; raises the errors of ``Format.read``."""
     return _found(path, "reads").read(Path(path), options or ImportOptions())
 
 

@@ -49,7 +49,7 @@ class JointMotion:
 
 
 def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
-    """Return the motion in the joint of a name; raises KeyError that lists the joints."""
+    """Return the motion in the joint of that name; raises a KeyError that lists the joints."""
     if name not in {joint.name for joint in scene.joint}:
         raise KeyError(f"no joint {name!r}; joints: {', '.join(joint.name for joint in scene.joint)}")
     joint = scene.joint_named(name)

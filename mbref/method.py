@@ -44,8 +44,8 @@ Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 def default_method(scene: Scene) -> str:
     """Return the name of the default method for a scene.
 
-    It is ``taylor``, which crosses singular positions, and for more than MOST_BODIES bodies the sparse method
-    ``alf-dual+projection/dop853``, which does not cross them.
+    The default is ``taylor``, which crosses singular positions. For more than MOST_BODIES bodies the default
+    is the sparse method ``alf-dual+projection/dop853``, which ends at a singular position.
     """
     return SERIES if len(scene.body) <= MOST_BODIES else SPARSE
 
@@ -56,7 +56,8 @@ class MethodError(Exception):
 
 @dataclass(frozen=True)
 class Method:
-    """Formulation, stabilisation and integrator: a row of the paper's tables, and how it is integrated.
+    """Formulation, stabilisation and integrator of a run: a row of the paper's tables, and the integrator of
+    the run.
 
     Attributes
     ----------
@@ -162,7 +163,7 @@ def _text(name: str, options: Mapping[str, float]) -> str:
 
 
 def _part(text: str, table: Mapping[str, Part], kind: str, options: dict[str, dict[str, float]]) -> Part:
-    """Return the table's entry, and put its bracketed options into ``options``."""
+    """Return the part of a method from its table of parts, and put its bracketed options into ``options``."""
     match = re.fullmatch(r"([\w-]+)(?:\[(.*)\])?", text.strip())
     name = match[1] if match else text
     if name not in table:

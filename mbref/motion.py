@@ -76,7 +76,7 @@ class Motion(Trajectory):
     def energy(self) -> np.ndarray:
         """Kinetic plus potential energy, J, shape (k,).
 
-        It is constant if the scene has no drivers, dampers, forces and moments.
+        The energy is constant if the scene has no drivers, dampers, forces and moments.
         """
         return self.kinetic_energy + self.potential_energy
 
@@ -108,7 +108,7 @@ class Motion(Trajectory):
 
     @property
     def largest_reaction(self) -> np.ndarray | None:
-        """Largest reaction force of a joint at each sample, N, shape (k,). None without masses."""
+        """Largest reaction force of a joint at each sample, N, shape (k,). None if a body has no mass."""
         if self.reactions is None:
             return None
         forces = [np.linalg.norm(wrench[:, :3], axis=1) for wrench in self.reactions.values()]
@@ -116,9 +116,8 @@ class Motion(Trajectory):
 
     @property
     def determined_reactions(self) -> dict[str, np.ndarray]:
-        """Which components of the reactions equilibrium determines, by joint, shape (k, 6).
-
-        True for a component of force (x, y, z) or moment (x, y, z) that does not depend on how redundant
+        """Components of the reactions that equilibrium determines, by joint, shape (k, 6). An entry is true
+        for a component of force (x, y, z) or moment (x, y, z) that does not depend on how redundant
         constraints share the load. In a plane mechanism across z these are force x, force y and moment z.
         """
         return SERVICES.determined_reactions(self.mechanism, self)
@@ -127,7 +126,7 @@ class Motion(Trajectory):
     def error_estimate(self) -> ErrorEstimate:
         """Estimated global error of the motion at its samples, by a second run at a smaller tolerance.
 
-        The second run is made on first access; it takes about twice the time of the motion. Raises ValueError
+        The second run is made on first access and takes about twice the time of the motion. Raises ValueError
         if the motion is of another engine than mbref.
         """
         return SERVICES.error_estimate(self)
@@ -135,7 +134,7 @@ class Motion(Trajectory):
     def with_error_estimate(
         self, seconds: float = math.inf, progress: Callable[[float], None] | None = None
     ) -> Motion:
-        """Return the motion with its error estimate, whose warning, if it has one, is part of ``message``.
+        """Return the motion with its error estimate. The estimate's warning, if any, is part of ``message``.
 
         Parameters
         ----------
@@ -161,7 +160,7 @@ class Motion(Trajectory):
 
     @property
     def known_estimate(self) -> ErrorEstimate | None:
-        """Error estimate if it has been made, otherwise None."""
+        """Error estimate, or None if no estimate has been made."""
         return self.__dict__.get("error_estimate")
 
     def to_record(self) -> dict[str, Any]:

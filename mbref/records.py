@@ -1,8 +1,9 @@
-"""Record files: results as JSON lines, each with a key; records in the file need not be computed again.
+"""Record files: results as JSON lines, each with a key. A result that the file contains is not computed
+again.
 
 A line is strict JSON (NaN becomes null, an infinite number 1e999), written by one call of the operating
-system. So only the last line can be incomplete, after a kill or a power failure; it is removed when the file
-is read.
+system. So a kill or a power failure can leave only the last line incomplete. An incomplete last line is
+removed when the file is read.
 """
 
 from __future__ import annotations
@@ -20,11 +21,12 @@ INFINITE = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the
 
 
 class RecordsError(ValueError):
-    """A file contains something else than records; it is not changed."""
+    """Error: a file contains something else than records. The file is not changed."""
 
 
 def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Return the records of the file by ``key``, the last one of each key; none if there is no file.
+    """Return the records of the file by ``key``, the last record of each key; an empty dictionary if there is
+    no file.
 
     Lines that contain no record are reported by number on stderr and not changed. Raises RecordsError if no
     line contains a record, OSError if the file cannot be read.
@@ -41,7 +43,8 @@ def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
 
 
 def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, int]:
-    """Return the records of the file by ``key``, the size of its complete lines, and its own size (bytes)."""
+    """Return the records of the file by ``key``, the size of its complete lines and the size of the file
+    (bytes)."""
     if path is None or not Path(path).exists():
         return {}, 0, 0
     text = Path(path).read_bytes()
@@ -57,7 +60,7 @@ def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, in
 
 
 def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Read records like ``stored`` from a file that can be appended to; a missing file is made. Raises
+    """Read records like ``stored`` from a file that can be appended to; a missing file is created. Raises
     OSError."""
     if path is not None:
         open(path, "ab").close()
@@ -84,8 +87,8 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
 
 
 def strict_json(value: Any) -> str:
-    """Return the value as JSON that any reader accepts: NaN is null, and an infinite number is one beyond
-    every double."""
+    """Return the value as JSON that any reader accepts: NaN becomes null, an infinite number becomes
+    1e999."""
     text = json.dumps(_finite(value), allow_nan=False)
     for number, mark in INFINITE.items():
         text = text.replace(json.dumps(mark), f"{math.copysign(1, number):.0f}e999")
@@ -101,7 +104,7 @@ def _finite(value: Any) -> Any:
 
 
 def _record(line: bytes) -> dict[str, Any] | None:
-    """Return the record in a line, None if the line contains none."""
+    """Return the record in a line, None if the line contains no record."""
     try:
         found = json.loads(line, parse_constant=_refused)
     except (ValueError, RecursionError):

@@ -1,4 +1,5 @@
-"""Scene: the mechanism as plain, validated, frozen data; reads and writes TOML. No numerics.
+"""Scene: the mechanism as plain, validated, frozen data; reads and writes TOML. The classes here contain no
+numerics.
 
 Units are SI, angles radians; positions, axes and velocities are in the world frame at t = 0
 unless a field says otherwise.  ``"ground"`` names the fixed frame in fields that name a body. Field names are
@@ -111,10 +112,10 @@ Inertia = tuple[float, float, float] | tuple[Vector, Vector, Vector] | None
 class Body(Entry):
     """A rigid body; its frame sits at the centre of mass.
 
-    ``inertia`` is about the centre of mass along the body axes: three principal moments or a
-    symmetric 3x3 (kg m²).  ``mass`` and ``inertia`` are omitted together for a kinematic analysis.
-    ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed such that they
-    agree with the constraints and the given ones.
+    ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
+    (kg m²).  A kinematic analysis needs neither ``mass`` nor ``inertia``; a body has both or none of them.
+    ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed from the
+    constraints and the given velocities.
     """
 
     name: Name

@@ -14,9 +14,9 @@ class Coupling(Entry):
     """q₂ = ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
 
     A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
-    of the second body relative to the first. It is zero at the poses that the scene gives. ``coordinates``
-    names the coordinate of each joint. The default is the coordinate that a driver of the joint would
-    prescribe; for one joint named twice, its angle and its displacement.
+    of the second body relative to the first. Both coordinates are zero at the poses that the scene gives.
+    ``coordinates`` names the coordinate of each joint. The default is the coordinate that a driver of the
+    joint would prescribe; for one joint named twice, its angle and its displacement.
     """
 
     name: Name

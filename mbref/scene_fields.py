@@ -99,7 +99,7 @@ def as_list(value: Any) -> Any:
 
 
 def field_of(entry: Any, key: str) -> Any:
-    """A field of an entry that may still be a raw table, or already a model."""
+    """Return a field of an entry, which may be a raw table or a model."""
     return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)
 
 

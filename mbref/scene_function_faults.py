@@ -1,4 +1,4 @@
-"""Faults of functions of time that fields alone do not show: gaps of tables, units, values at t = 0."""
+"""Faults of functions of time that concern several fields: gaps of tables, units, values at t = 0."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Faults = Iterator[tuple[str, str]]  # path and message
 
 
 def factor_faults(path: str, factor: Any, data: Mapping[str, Any]) -> Faults:
-    """A factor of a load whose amplitude has a unit, or whose table leaves a gap."""
+    """Return the faults of a load's factor: an amplitude with a unit, or a table with a gap."""
     if dimension_of(amplitude := field_of(field_of(factor, "sine"), "amplitude")) is not None:
         yield f"{path}.sine.amplitude", f"multiplies the load, so it has no unit, got {amplitude!r}"
     start, stop = _number(field_of(factor, "start")), _number(field_of(factor, "stop")) or math.inf
@@ -24,7 +24,7 @@ def factor_faults(path: str, factor: Any, data: Mapping[str, Any]) -> Faults:
 
 
 def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float, stop: float) -> Faults:
-    """The fault of a table that does not reach over the times (s) in which its function acts."""
+    """Return the fault of a table that does not cover the times (s) in which its function acts."""
     rows, duration = rows_of(function), field_of(data, "duration")
     if not rows:
         return
@@ -36,7 +36,7 @@ def table_faults(path: str, function: Any, data: Mapping[str, Any], start: float
 
 
 def rows_of(function: Any) -> list[tuple[float, float]]:
-    """The rows of a table; none of a table that is itself faulty."""
+    """Return the rows of a table; no rows if a row is faulty."""
     table = field_of(function, "table")
     given = list(table) if isinstance(table, list | tuple) else []
     rows = [tuple(row) for row in given if isinstance(row, list | tuple) and len(row) == 2]
@@ -45,7 +45,8 @@ def rows_of(function: Any) -> list[tuple[float, float]]:
 
 
 def initial_value(driver: Any) -> float:
-    """value(0) of a driver; 0 where rounding or where its fields are themselves faulty."""
+    """Return value(0) of a driver; 0 if value(0) is a rounding error, or if a field of the driver is
+    faulty."""
     polynomial, sine = field_of(driver, "polynomial"), field_of(driver, "sine")
     first = polynomial[0] if isinstance(polynomial, list | tuple) and polynomial else 0.0
     amplitude, phase = _number(field_of(sine, "amplitude")), _number(field_of(sine, "phase"))
@@ -54,7 +55,7 @@ def initial_value(driver: Any) -> float:
 
 
 def _table_at_start(rows: Sequence[tuple[float, float]]) -> float:
-    """The value of a table at t = 0; 0 where it is itself faulty."""
+    """Return the value of a table at t = 0; 0 if the table is faulty."""
     if not rows:
         return 0.0
     try:
@@ -64,7 +65,8 @@ def _table_at_start(rows: Sequence[tuple[float, float]]) -> float:
 
 
 def _number(value: Any) -> float:
-    """A number of a size that a scene can have, or 0, where a field's own fault is reported."""
+    """Return a number that a scene can contain; 0 for any other value, which is reported as a fault of its
+    field."""
     if dimension := dimension_of(value):
         value = in_si(value, dimension)
     return float(value) if isinstance(value, int | float) and abs(value) <= LARGEST else 0.0

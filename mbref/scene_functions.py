@@ -1,7 +1,8 @@
 """Functions of time as data: polynomial, sine and table, of drivers and of loads; loads can be switched.
 
-A table is joined by a cubic spline: twice continuously differentiable, "not-a-knot" at both ends, so that a
-table of a cubic polynomial is that polynomial (C. de Boor, A Practical Guide to Splines, 1978, chapter IV).
+A table is interpolated by a cubic spline: twice continuously differentiable, "not-a-knot" at both ends. So
+the spline through values of a cubic polynomial equals the polynomial (C. de Boor, A Practical Guide to
+Splines, 1978, chapter IV).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from pydantic import BeforeValidator, Strict, field_validator
 
 from mbref.scene_fields import Angle, Entry, LengthOrAngle, NotNegative, Positive, Real, Reals, as_list
 
-FEWEST_ROWS = 4  # of a table, which determine a cubic polynomial
+FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
 Row = Annotated[tuple[Real, Real], Strict(False)]
 Table = Annotated[tuple[Row, ...], Strict(False), BeforeValidator(as_list)]
@@ -70,7 +71,7 @@ class TimeFunction(Entry):
         return -np.inf, np.inf
 
     def pieces(self) -> tuple[Piece, ...]:
-        """The pieces on which the function is analytic, from t = 0 on."""
+        """Pieces on which the function is analytic, from t = 0 on."""
         start, stop = self.interval
         cuts = {0.0, *(t for t in (start, stop) if 0.0 < t < np.inf)}
         if self.table is not None:
@@ -92,7 +93,8 @@ class TimeFunction(Entry):
         )
 
     def values(self, times: np.ndarray) -> np.ndarray:
-        """Return the values (k,) at times (k,) in s; at a time of switching, of the piece that begins."""
+        """Return the values (k,) at times (k,) in s; at a time of switching, the value of the piece that
+        begins."""
         pieces = self.pieces()
         k = np.searchsorted([piece.begin for piece in pieces[1:]], times, side="right")
         begin, part, cubic = (np.array(column)[k] for column in zip(*pieces, strict=True))
@@ -104,13 +106,13 @@ class TimeFunction(Entry):
 
     @property
     def is_constant(self) -> bool:
-        """Whether the value never changes."""
+        """True if the value never changes."""
         still = self.sine is None or self.sine.amplitude == 0.0
         return still and not any(self.coefficients[1:]) and self.table is None and len(self.pieces()) == 1
 
 
 class Factor(TimeFunction):
-    """A function of time that multiplies a load; 1 where only times of switching are given.
+    """A function of time that multiplies a load; the function is 1 if only times of switching are given.
 
     The load acts from ``start`` (s) until before ``stop`` (s).
     """

@@ -13,7 +13,7 @@ from mbref.scene_fields import Entry, Name, NotNegative, Pair, Point, PointPair,
 
 X, Y, Z = 0, 1, 2
 SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
-RIGHT_ANGLE = 1e-15  # the same of axes that are perpendicular to the rounding of their numbers
+RIGHT_ANGLE = 1e-15  # largest cosine between axes that are perpendicular up to rounding
 Coordinate = Literal["angle", "displacement"]
 ANGLE: Coordinate = "angle"
 DISPLACEMENT: Coordinate = "displacement"
@@ -22,14 +22,15 @@ Condition = Literal["perpendicular axes", "constant distance"]
 
 @dataclass(frozen=True)
 class JointFacts:
-    """The relative motion that a joint type forbids, and what can act on the motion it leaves free.
+    """Relative motion that a joint type forbids, and the drivers and loads that can act on the remaining
+    motion.
 
     ``forbidden_translations`` and ``forbidden_rotations`` are components (0, 1, 2) of the second body's
-    motion relative to the first, in the joint's frame on the first body; its third axis is along the
-    joint's axis.  ``condition`` is one further equation: the axes of both bodies stay perpendicular, or
-    the anchors keep their distance.  ``driven`` is the coordinate a driver prescribes: the angle about or
-    the displacement along the axis, None where the joint cannot be driven.  ``loaded`` are the coordinates
-    along which springs, forces and torques of the joint can act.
+    motion relative to the first, in the joint's frame on the first body; its third axis is along the joint's
+    axis.  ``condition`` is one further equation: the axes of both bodies stay perpendicular, or the anchors
+    keep their distance.  ``driven`` is the coordinate a driver prescribes: the angle about or the
+    displacement along the axis, None for a joint that cannot be driven.  ``loaded`` are the coordinates along
+    which springs, forces and torques of the joint can act.
     """
 
     forbidden_translations: tuple[int, ...] = ()
@@ -40,7 +41,7 @@ class JointFacts:
 
     @property
     def takes_torsion_spring(self) -> bool:
-        """Whether a torsion spring or a torque about the axis can act."""
+        """True if a torsion spring or a torque about the axis can act."""
         return ANGLE in self.loaded
 
     @property
@@ -85,7 +86,8 @@ class JointEntry(Entry):
 
     @property
     def directions(self) -> tuple[Vector, ...]:
-        """Axes of the joint, world at t = 0, of any length: none, one of both bodies, or one of each body."""
+        """Axes of the joint, world at t = 0, of any length: no axis, one axis of both bodies, or one axis of
+        each body."""
         return ()
 
     @property

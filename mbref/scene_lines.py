@@ -17,7 +17,7 @@ Line = tuple[int, str, int, str]  # number from 1, table, index in the table, ke
 
 
 def with_lines(text: str, faults: Sequence[str]) -> list[str]:
-    """Return the faults, each with the line of the file to which its path leads, if there is one."""
+    """Return the faults, each with the line of the file that its path names, if the file has such a line."""
     lines = list(_lines(text))
     names = _names(text, lines)
     return [
@@ -54,7 +54,8 @@ def _lines(text: str) -> Iterator[Line]:
 
 
 def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
-    """Return the index of the first entry of each name (for a driver: its joint's), by table and name."""
+    """Return the index of the first entry of each name, by table and name. A driver has the name of its
+    joint."""
     rows, found = text.splitlines(), dict[tuple[str, str], int]()
     for number, table, place, key in lines:
         if key == ("joint" if table == "driver" else "name") and (name := NAME.match(rows[number - 1])):
@@ -63,8 +64,8 @@ def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
 
 
 def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: str) -> int | None:
-    """Return the line of the field, or of its entry's header if the field is missing; None if it is not
-    found."""
+    """Return the line of the field, or of its entry's header if the field is missing; None if the file has
+    neither line."""
     match = PATH.match(fault)
     if not match:
         return None

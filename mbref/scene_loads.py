@@ -36,7 +36,7 @@ class LoadEntry(Entry):
 
     @property
     def over_time(self) -> Factor | None:
-        """The function of time that multiplies the load; None for a load that does not depend on time."""
+        """Function of time that multiplies the load; None for a load that does not depend on time."""
         return getattr(self, "factor", None)
 
 
@@ -84,7 +84,8 @@ class Spring(LoadEntry):
 class Action(NamedTuple):
     """Force or torque ``amount`` - stiffness (q - natural) - damping q' along a joint coordinate q.
 
-    It acts on the second body, and with the opposite sign on the first; N m, N m/rad, … or N, N/m, ….
+    The load acts on the second body, and with the opposite sign on the first body. Units are N m, N m/rad and
+    N m s/rad for an angle q, and N, N/m and N s/m for a displacement q.
     """
 
     stiffness: float = 0.0
@@ -102,7 +103,7 @@ class JointLoad(LoadEntry):
 
     @property
     def action(self) -> Action:
-        """The numbers of the force or torque."""
+        """Coefficients of the force or torque along the joint coordinate."""
         raise NotImplementedError
 
 

@@ -16,8 +16,8 @@ def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], An
     """Return the fields of a scene with the value at a path changed; tables along the path become
     dictionaries.
 
-    An entry is given by its index or its name (a driver by its joint's). Raises SceneError if the path does
-    not exist.
+    An entry is given by its index or its name, a driver by the name of its joint. Raises SceneError if the
+    path does not exist.
     """
     first, *rest = _steps(fields, path)
     return {**fields, first: _replaced(fields[first], rest, change, path)}
@@ -45,7 +45,8 @@ def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], pa
 
 
 def _fields_of(value: Any) -> Mapping[str, Any]:
-    """Return the fields of a table, which is a dictionary after an earlier change; none for a number."""
+    """Return the fields of an entry; an entry that was changed before is a dictionary, and a number has no
+    fields."""
     if isinstance(value, dict):
         return value
     return {field: getattr(value, field) for field in getattr(type(value), "model_fields", {})}

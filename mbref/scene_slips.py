@@ -29,8 +29,7 @@ def probable_slips(scene: Scene) -> list[str]:
 
 
 def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
-    """Return distances (m) between the joints of each body, ``{"rod": {"A–B": 0.5}}``, also for the
-    ground."""
+    """Return distances (m) between the joints of each body and of the ground: ``{"rod": {"A–B": 0.5}}``."""
     found: dict[str, dict[str, float]] = {}
     for name in [*(body.name for body in scene.body), GROUND]:
         ends = [
@@ -122,7 +121,7 @@ def _axes(scene: Scene) -> Iterator[str]:
 
 
 def _is_in_loop(scene: Scene, name: str) -> bool:
-    """Return whether the bodies of a joint are also connected without it."""
+    """Return whether other joints also connect the bodies of a joint."""
     others = [joint.bodies for joint in scene.joint if joint.name != name]
     reached, last = {scene.joint_named(name).bodies[0]}, 0
     while len(reached) > last:

@@ -18,7 +18,7 @@ NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S*)\s*"
 def in_si(text: str, dimension: Dimension) -> float:
     """Return a number with a unit of length or angle in m or rad.
 
-    Raises ValueError for what is no number with a unit, or has no unit or another one.
+    Raises ValueError for a text that is no number with a unit of the wanted dimension.
     """
     known, match = UNITS[dimension], NUMBER.fullmatch(text)
     if match and match[2] in known:
@@ -45,7 +45,7 @@ def length_or_angle(value: Any) -> Any:
 
 
 def dimension_of(text: Any) -> Dimension | None:
-    """Return the dimension of a text such as "300 mm"; None where it is no number with a known unit."""
+    """Return the dimension of a text such as "300 mm"; None if the text is no number with a known unit."""
     match = NUMBER.fullmatch(text) if isinstance(text, str) else None
     return next((d for d, known in UNITS.items() if match and match[2] in known), None)
 

@@ -45,7 +45,7 @@ NUMBERS = {  # field → content of its list; all other lists contain three numb
     "joints": "two names of joints",
     "coordinates": 'two of "angle" and "displacement"',
 }
-INERTIA_TOLERANCE = 1e-9  # relative; discs and thin rods satisfy the triangle inequality with equality
+INERTIA_TOLERANCE = 1e-9  # relative, of the triangle inequality: equality holds for thin rods
 
 
 class SceneError(Exception):

@@ -76,7 +76,7 @@ def estimate_error(
 
 
 def _none(motion: Motion, seconds: float) -> str:
-    """Return the reason why no second run is made; empty if one is made."""
+    """Return the reason why no second run is made; empty if a second run is made."""
     if not motion.times.size:
         return "the run has no sample"
     if motion.settings.get("kernels") == "interpreted":
@@ -86,9 +86,8 @@ def _none(motion: Motion, seconds: float) -> str:
 
 
 def _second_run(motion: Motion, by: Method, limits: Limits, check: _Check) -> _Made:
-    """Return the run of the perturbed scene; the run of the scene itself if the first one ends earlier.
-
-    Rounding may end the first one at a singular position from which the motion starts.
+    """Return the run of the perturbed scene. If the run of the perturbed scene ends early, return the run of
+    the scene itself: rounding may end the perturbed run at a singular position from which the motion starts.
     """
     scene = motion.mechanism
     found = _run(lambda: perturbed(scene), by, motion.times, limits, check)
@@ -132,7 +131,7 @@ def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits
 
 @dataclass(frozen=True)
 class _Made:
-    """A run of the second kind: its motion, the mechanism's length (m), and the reason of an early end."""
+    """A second run: its motion, the mechanism's length (m), and the reason of an early end."""
 
     motion: Motion | None
     length: float
@@ -150,7 +149,8 @@ class _Made:
     def distances(self, other: Motion) -> np.ndarray:
         """Return the largest distance (k,) of a body from its position in another motion.
 
-        Distances are over the mechanism's length, or angles, rad. They are NaN beyond the end of the run.
+        Distances are relative to the mechanism's length, or angles in rad. Distances after the end of the run
+        are NaN.
         """
         found = np.full(len(other.times), np.nan)
         if self.motion is not None:

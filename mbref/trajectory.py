@@ -1,4 +1,4 @@
-"""Trajectory, Outcome and Cost: the result of every engine and every method."""
+"""Trajectory, Outcome and Cost: the result of a run of any engine or method."""
 
 from __future__ import annotations
 

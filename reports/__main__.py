@@ -20,7 +20,7 @@ from reports.runs import Run, by_scene
 # module → package to install
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}
 PAPER, STABILITY, CLOSED_LOOPS = "paper", "stability", "closed_loops"
-OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # the sections whose runs are their own
+OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # sections with runs of their own
 TITLES: dict[tuple[str, ...], str] = {  # titles of pages of one section
     (PAPER,): "Stabilisation methods for redundant constraints",
     (CLOSED_LOOPS,): "Engines on closed loops, compared with the true motion",

@@ -88,8 +88,8 @@ class Moving:
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell of a heat map: its text, its kind ("kept", "false", "ended" or ""), how deep its colour is, from
-    0 to 1, and the id of the place of the page that it leads to."""
+    """A cell of a heat map: its text, its kind ("kept", "false", "ended" or ""), the depth of its colour,
+    from 0 to 1, and the id of the place of the page to which it links."""
 
     text: str
     kind: str

@@ -153,8 +153,8 @@ def breakable(name: str) -> Markup:
 
 
 def file_name(name: str) -> str:
-    """Return the name of a figure as a file name; a name that is no valid file name, such as ../up, is
-    replaced by a number."""
+    """Return the name of a figure as a file name; a number replaces a name that is no valid file name, such
+    as ../up."""
     plain = re.sub(r"[^\w-]+", "-", name).strip("-")[:80]
     return plain if plain and plain == name else f"{plain}-{zlib.crc32(name.encode()):08x}"
 

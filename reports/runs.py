@@ -56,8 +56,8 @@ class Run:
 
     @property
     def reason(self) -> str:
-        """Return the reason of the run's end in one sentence: the engine's message, otherwise the
-        outcome's."""
+        """Return the reason of the run's end in one sentence: the engine's message, or a sentence on the
+        outcome."""
         return self.record["message"] or self.outcome.sentence
 
     @property
@@ -81,8 +81,7 @@ class Run:
 
     @property
     def said(self) -> str:
-        """Return the error for a table cell: ``< 3e-12`` if it is below the bound on the truth's own
-        error."""
+        """Return the error for a table cell: ``< 3e-12`` if it is below the bound on the truth's error."""
         return error_text(self.record)
 
     @property
@@ -93,17 +92,17 @@ class Run:
     @property
     def is_short_of_tolerance(self) -> bool:
         """Return whether the run reports that it completed although its error exceeds EXCESS times its
-        relative tolerance, if it has one."""
+        relative tolerance, if the setting has a tolerance."""
         rtol = self.record["settings"].get("rtol", math.inf)
         return self.completed and self.error > EXCESS * rtol
 
     def rate(self, count: str) -> float:
-        """Return a cost of the record, such as ``steps``, per second of simulation; NaN if the record has
-        none."""
+        """Return a cost of the record, such as ``steps``, per second of simulation; NaN if the record lacks
+        this cost."""
         return float(self.record["cost"][count]) / self.t_end if self.t_end > 0 else math.nan
 
     def metric(self, name: str) -> float:
-        """Return a metric of the record; NaN if it has none."""
+        """Return a metric of the record; NaN if the record lacks this metric."""
         value = self.record["metrics"].get(name)
         return math.nan if value is None else float(value)
 
@@ -146,7 +145,7 @@ class SceneRuns:
             return None
 
     def exact_part(self, motion: Trajectory) -> Trajectory | None:
-        """Return the true motion at a motion's times, up to the time to which it is known."""
+        """Return the true motion at a motion's times, up to the time to which the truth is known."""
         return exact_motion(motion, self._truth())
 
     def _truth(self) -> Truth | None:

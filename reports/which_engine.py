@@ -52,7 +52,7 @@ joints and loads of each engine.
 
 
 class Kind(NamedTuple):
-    """A kind of mechanism: its heading, how a reader recognises it, and its scenes."""
+    """A kind of mechanism: its heading, a sentence by which a reader recognises the kind, and its scenes."""
 
     title: str
     about: str
@@ -136,7 +136,7 @@ def _named(record: Record | None) -> str:
 
 
 def _bad_defaults(group: Judged) -> str:
-    """Return the engines whose library defaults are wrong or complete no run, with what they do."""
+    """Return the engines whose library defaults are wrong or complete no run, and the failure of each."""
     said = [
         f"{title(name)}: {_end(record)}"
         for name, record in group.defaults().items()
@@ -230,7 +230,7 @@ def _lines(group: Judged) -> Iterator[str]:
 
 
 def _many(group: SceneRuns) -> Iterator[str]:
-    """Yield the cost of one variant among many: its construction counts as well as its steps."""
+    """Yield the cost of one variant among many: construction of the model and steps."""
     yield "## Many variants at once\n"
     yield (
         "If each of many runs has other numbers, the engine's model is built anew for each, so that "

@@ -1,4 +1,4 @@
-"""`crosscheck certify`: write the motion of a scene to many decimal digits as a table."""
+"""`crosscheck certify`: write the motion of a scene as a CSV table, with 20 and more certified digits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""`crosscheck closed-loops`: measure engines on closed loops, and show the matrix of the stored records."""
+"""`crosscheck closed-loops`: measure engines on closed loops, and show the table of engines and
+mechanisms."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
 
 
 def closed_loops(arguments: argparse.Namespace) -> int:
-    """Measure engines and write the page if requested, and print the matrix."""
+    """Measure engines and write the page if requested, and print the table of engines and mechanisms."""
     path = Path(arguments.records)
     if arguments.run:
         _measure(arguments, path)

@@ -68,7 +68,7 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
 
 
 def closed_loops() -> list[Record]:
-    """Return the stored records of the matrix of closed loops."""
+    """Return the stored records of engines on closed loops."""
     return read()
 
 
@@ -79,8 +79,8 @@ def stability_ladders(out: Path, notice: Notice) -> list[Record]:
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
-    """Return the records of the paper's runs, stored in ``out``/paper*: of its tables only, or of all
-    studies."""
+    """Return the records of the paper's runs, stored in ``out``/paper*: runs of the paper's tables only, or
+    of all studies."""
     out.mkdir(parents=True, exist_ok=True)
     path, timed = out / store.FILE, runs.timed()
     cases = runs.cases() | timed | (runs.studies() if is_whole else {})

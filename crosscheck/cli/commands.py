@@ -36,7 +36,7 @@ BAD_INPUT, INTERRUPTED = 2, 130
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run a command line; returns the exit status: 0 done, 1 otherwise, 2 bad input, 130 interrupted
+    """Run a command line and return the exit status: 0 done, 1 not done, 2 faulty input, 130 interrupted
     (`parser.EXIT` defines "done" for each command)."""
     known = parser()
     arguments = known.parse_args(argv)

@@ -32,7 +32,8 @@ class MovingPicture(NamedTuple):
 
 
 def moving_picture() -> MovingPicture:
-    """Return runs of mbref's default method and of MuJoCo's defaults with the smallest step of the sweep."""
+    """Return runs of mbref's default method and of MuJoCo with default settings and the smallest step of the
+    sweep."""
     scene = SCENES[SCENE]()
     truth, times = truth_for(scene), np.linspace(0.0, scene.duration, SAMPLES)
     assert truth is not None

@@ -154,8 +154,7 @@ def digits(text: str) -> int:
 
 
 def length(text: str) -> float:
-    """Parse a positive length such as 1mm or 0.5 in; returns metres, which is also the unit if none is
-    given."""
+    """Parse a positive length such as 1mm or 0.5 in; returns metres. A number without a unit is in metres."""
     try:
         value = in_si(text if text[-1:].isalpha() else f"{text} m", "length")
     except ValueError as error:

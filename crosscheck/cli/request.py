@@ -43,8 +43,8 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
 def find_specimens(names: Sequence[str] | None, reference_time: float, name: str = "") -> list[Specimen]:
     """Return the scenes of the conformance suite with these names, or all of them, each with its truth.
     ``reference_time`` is the CPU time (s) of a reference. Planar loops are added if the engine called
-    ``name`` refuses spatial ones. Every check applies to a ``.toml`` file. Raises RequestError for an unknown
-    name, SceneError for a faulty file."""
+    ``name`` refuses spatial ones. Every check is made on the scene of a ``.toml`` file. Raises RequestError
+    for an unknown name, SceneError for a faulty file."""
     suite = [*specimens(), *planar_specimens()]
     known = {s.scene.name: dataclasses.replace(s, reference_time=reference_time) for s in suite}
     given = {
@@ -122,8 +122,8 @@ def _check_times(times: Sequence[float]) -> None:
 
 
 class Choice(NamedTuple):
-    """Selection of settings: these ``families`` (None: all) or one ``setting``, at the tolerance ``rtol``
-    (None: the sweep over tolerances); ``is_quick`` selects few families."""
+    """Selection of settings: ``families`` of settings (None: all) or one ``setting``, at the tolerance
+    ``rtol`` (None: the sweep over tolerances). ``is_quick`` selects few families."""
 
     families: Sequence[str] | None = None
     setting: Setting | None = None
@@ -194,8 +194,8 @@ def _with_file(scene: Scene, name: str, setting: Setting) -> Setting:
 
 
 def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:
-    """Return a sentence for each option that neither the settings of the family nor the engine knows; none if
-    the engine's sweep does not contain the family."""
+    """Return a sentence for each option that neither the settings of the family nor the engine knows; no
+    sentence if the engine's sweep does not contain the family."""
     sweep = settings(name, scene)
     own = [offered.options for offered in sweep if offered.family == setting.family]
     swept = {option for offered in sweep for option in offered.options}

@@ -16,7 +16,7 @@ from mbref.scenes import SCENES, find_scene
 
 
 class RequestError(Exception):
-    """A request that cannot be carried out; ``faults`` has one line each."""
+    """A request that cannot be carried out; ``faults`` has one line for each fault."""
 
     def __init__(self, *faults: str):
         self.faults = faults

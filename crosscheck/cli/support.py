@@ -40,7 +40,8 @@ class Support:
         return [CAN if (gap := found[e]) is None else f"– {_number(notes, gap)}" for e in self.engines]
 
     def notes(self) -> list[str]:
-        """Return one sentence for each different refusal, with its engines, in the order of the rows."""
+        """Return one sentence for each different refusal with the engines that refuse, in the order of the
+        rows."""
         refusing: dict[str, list[str]] = {}
         for found in self.answers.values():
             for name, gap in found.items():
@@ -102,8 +103,8 @@ def _number(notes: Sequence[str], gap: Cannot) -> int:
 
 
 def refresh(path: str | Path) -> None:
-    """Replace the matrix in a document by the present one; raises ValueError if the document has no
-    markers."""
+    """Replace the matrix in a document by the matrix of the installed code; raises ValueError if the document
+    has no markers."""
     text = Path(path).read_text()
     Path(path).write_text(text.replace(block_of(text), markdown(KNOWN)))
 

@@ -100,7 +100,8 @@ def print_tuning(
     path: str,
 ) -> None:
     """Print the settings that reach a criterion, cheapest first: first settings of the engine's own
-    integrators, then settings that crosscheck integrates. Without any, print the nearest run."""
+    integrators, then settings that crosscheck integrates. If no settings reach the criterion, print the
+    nearest run."""
     if not reached:
         nearest = min(records, key=lambda r: (not is_completed(r), wanted.measure(r), -r["t_end"]))
         console.print(_unreached(wanted, nearest), soft_wrap=True)
@@ -172,7 +173,7 @@ def _counts(group: Judged) -> str:
 
 
 def _print_best(console: Console, group: Judged) -> None:
-    """Print violation, energy error and reaction error of each engine's run of least error."""
+    """Print constraint violation, energy error and reaction error of each engine's most accurate run."""
     header = ("engine, family", "settings", "error", *BEST.values())
     table = _table("every engine's run of least error", header, 2)
     for r in group.best().values():
@@ -206,7 +207,8 @@ def _print_own_code(console: Console, group: Judged) -> None:
 
 
 def own_code(scene: Scene, record: Record) -> str:
-    """Return the line of the engine's own code or XML that makes the settings of a record, if it has one."""
+    """Return the line of the engine's own code or XML that makes the settings of a record; empty if no such
+    line is known."""
     asked = Setting(record["family"], record["asked"]["options"])
     return engine(record["asked"]["engine"]).own_code(scene, asked)
 

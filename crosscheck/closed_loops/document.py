@@ -1,4 +1,4 @@
-"""The matrix of engines and closed-loop mechanisms as a page of the documentation, from stored records."""
+"""The table of engines and closed-loop mechanisms as a page of the documentation, from stored records."""
 
 from __future__ import annotations
 

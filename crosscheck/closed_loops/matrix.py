@@ -1,5 +1,5 @@
-"""The matrix of engines and closed-loop mechanisms, from records: a grade for each engine on each mechanism,
-at its best settings and at its defaults."""
+"""The table of engines (rows) and closed-loop mechanisms (columns), from records: the error of each engine on
+each mechanism, at its best settings and at its defaults."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ PLACES = {column.scene: column.place() for column in DIFFICULTIES}
 class Cell:
     """Results of an engine on a mechanism: the records of its runs, or the record of its refusal.
 
-    Both are missing if nothing was run.
+    A cell without a run has neither runs nor a refusal.
     """
 
     row: str
@@ -44,11 +44,13 @@ class Cell:
     records: Sequence[Record]
 
     def best(self) -> Record | None:
-        """Return the run of least error, otherwise the one that got furthest, or the refusal."""
+        """Return the run of least error; without a completed run the run that got furthest, or the
+        refusal."""
         return min(self.records, key=_order, default=None)
 
     def defaults(self) -> Record | None:
-        """Return the best run by the library's defaults, or the refusal; None if it has no such family."""
+        """Return the best run with the library's default settings, or the refusal; None if the engine has no
+        default settings."""
         own = [r for r in self.records if is_refusal(r) or r["family"] == DEFAULTS]
         return min(own, key=_order, default=None)
 
@@ -59,7 +61,7 @@ class Cell:
 
     @property
     def place(self) -> str:
-        """Id of the cell's records in a page."""
+        """Identifier (HTML anchor) of the cell's records in a page."""
         return f"{self.row} {self.column.scene}".replace("_", "-").replace(" ", "-").replace(",", "")
 
 
@@ -69,7 +71,7 @@ def is_refusal(record: Record) -> bool:
 
 
 def is_run(record: Record | None) -> bool:
-    """Return whether there is a record, and it is of a run."""
+    """Return whether a record exists and is the record of a run."""
     return record is not None and not is_refusal(record)
 
 
@@ -80,7 +82,8 @@ def _order(record: Record) -> tuple[bool, float, float]:
 def matrix(records: Sequence[Record]) -> dict[str, dict[str, Cell]]:
     """Return the cells by row and by heading of the column; rows in the order of the engine table.
 
-    A row is an engine, or its terms in crosscheck's integrator, which closes the loops itself.
+    A row is an engine with its own integrators, or the engine's equations in crosscheck's integrator, which
+    closes the loops.
     """
     found: dict[str, list[Record]] = {}
     for name in engine_names():
@@ -101,14 +104,15 @@ def _of(records: Sequence[Record], column: Difficulty) -> list[Record]:
 
 
 def _unserved(own: Sequence[Record], on_terms: Sequence[Record]) -> list[Record]:
-    """Return refusals of the scenes that an engine can run only by its terms in crosscheck's integrator."""
+    """Return refusals of the scenes that an engine's own integrators cannot run, but its equations in
+    crosscheck's integrator can."""
     served = {record["scene"] for record in own}
     reason = {"outcome": REFUSED, "message": NO_FAMILY, "owner": Owner.ADAPTER.value}
     return [{**record, **reason} for record in on_terms if record["scene"] not in served]
 
 
 def shown(record: Record | None) -> str:
-    """Return a cell's text: sign and error, or how the run ended."""
+    """Return a cell's text: symbol and error, or the outcome of the run."""
     if record is None:
         return NOT_RUN
     if is_refusal(record):
@@ -124,7 +128,7 @@ def _ended(record: Record) -> str:
 
 
 def _size(record: Record) -> str:
-    """Return the error with one digit, or the truth's own bound if that is larger."""
+    """Return the error with one digit, or the bound on the error of the truth if the bound is larger."""
     value, bound = error(record), error_bound(record)
     if value < bound:
         return f"<{bound:.0e}"

@@ -1,4 +1,4 @@
-"""The mechanisms of the matrix: one scene for each difficulty of a closed loop."""
+"""The mechanisms of the page on closed loops: one scene for each difficulty of a closed loop."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ ROOT = FOLDER.parents[2]
 
 
 class Difficulty(NamedTuple):
-    """A column of the matrix: its heading, the sentence that explains it, and its scene.
+    """A column of the table: its heading, the sentence that explains the difficulty, and its scene.
 
     ``scene`` is a built-in name or the stem of a file in FOLDER, ``end`` the end time in s.
     """

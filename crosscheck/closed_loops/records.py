@@ -1,4 +1,4 @@
-"""Records of the matrix of closed loops: runs without their motions, and refusals, in one small file."""
+"""Records of engines on closed loops: runs without their motions, and refusals, in one small file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from mbref.trajectory import Outcome
 
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 21
-TIME_LIMIT = 60.0  # s of CPU time of a run, so that the matrix takes an hour
+TIME_LIMIT = 60.0  # s of CPU time of a run, so that all runs of the table take an hour
 REFUSED = "REFUSED"  # outcome of a record without a run
 KEPT = (
     "key",
@@ -40,7 +40,7 @@ METRICS = ("error", "error_bound", "violation_position")
 
 
 def read(path: Path = FILE) -> list[Record]:
-    """Return the records of a file in their order; none where there is no file."""
+    """Return the records of a file in their order; no records if the file does not exist."""
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
@@ -69,7 +69,7 @@ def cases(
         times = np.linspace(0.0, column.end, SAMPLES)
         found, refused = default_cases(scene, engines, families, times, TIME_LIMIT)
         ended = [case for case in found if key(case) not in slow]
-        wanted += {(case.engine, case.setting.family): case for case in ended}.values()  # the last one stays
+        wanted += {(case.engine, case.setting.family): case for case in ended}.values()  # the finest stays
         unable += refused
     return wanted, unable
 

@@ -57,8 +57,8 @@ def planar_loop(rng: Rng) -> Scene:
 
 
 def rounded_door(rng: Rng) -> Scene:
-    """Return a swinging door on five coaxial hinges whose axes are rounded, with a second door on the
-    first."""
+    """Return a swinging door on five coaxial hinges whose axes are rounded, and a second door that hangs on
+    the first door."""
     axis, out = direction(rng), direction(rng)
     frame = out - axis * (out @ axis)
     door = rod("door", 0 * frame, frame, rng)

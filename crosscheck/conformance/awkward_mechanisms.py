@@ -1,7 +1,7 @@
 """Random mechanisms, each with one numerical difficulty: fast tops, thin links, stiff dampers, drivers with a
 phase, and the loops of `awkward_loops.py`.
 
-Poses satisfy the joints by construction. Velocities follow from the given ones.
+Poses satisfy the joints by construction. Initial velocities follow from a few given velocities.
 """
 
 from __future__ import annotations
@@ -108,8 +108,8 @@ def tumbling_chain(rng: Rng) -> Scene:
 
 # --- sizes and stiffness -----------------------------------------------------------------------------------
 def thin_links(rng: Rng) -> Scene:
-    """Return a spatial loop R-S-S-R whose coupler can spin freely; its inertia about that axis is 1e-7 of the
-    inertia across."""
+    """Return a spatial loop R-S-S-R whose coupler can spin freely; its inertia about its own axis is 1e-7 of
+    its inertia across the axis."""
     points = np.array([(0, 0, 0), (0.1, 0.3, 0.1), (1.5, 0.6, -0.2), (1.6, 0.0, 0.1)])
     points[1:] += 0.05 * rng.normal(size=(3, 3))
     axes = [direction(rng) for _ in points]
@@ -240,7 +240,7 @@ def phased_slide(rng: Rng) -> Scene:
 # --- many bodies -------------------------------------------------------------------------------------------
 def chain_of_twenty(rng: Rng) -> Scene:
     """Return twenty rods on alternating ball joints and hinges that hang nearly straight, with a spring at
-    the last one."""
+    the last rod."""
     steps = np.array([0.0, 0.0, -0.1]) + 0.01 * rng.normal(size=(20, 3))
     points = np.cumsum(np.vstack([np.zeros(3), steps]), axis=0)
     names = ["ground", *(f"b{k}" for k in range(20))]

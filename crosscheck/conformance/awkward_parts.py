@@ -80,8 +80,8 @@ def ring(rng: Rng, name: str, kinds: Sequence[str], axes: Sequence[np.ndarray], 
 
 
 def joint(name: str, kind: str, bodies: tuple[str, str], place: Any, axis: np.ndarray) -> Joint:
-    """Return a joint at a point with the given axis, which is the first of two perpendicular axes if it has
-    two."""
+    """Return a joint at a point with the given axis, which is the first axis of a joint with two
+    perpendicular axes."""
     other = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     axes = (triple(axis), triple(other / np.linalg.norm(other)))
     return JOINT_TYPES[kind].at(

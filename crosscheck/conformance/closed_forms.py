@@ -1,5 +1,5 @@
-"""Scenes whose exact motions are formulas of this module, as a second source in addition to the judge's
-truths."""
+"""Scenes whose exact motions are formulas of this module, as a second source of exact motions besides
+crosscheck's judge."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Checks on many random mechanisms, until each check is decided on the planned number. Records are stored, so
-that a run resumes.
+"""Checks on many random mechanisms, until each check has a verdict on the planned number of mechanisms.
+Records are stored, so that a run resumes.
 
 All checks on a mechanism share its runs: the judged run, its perturbed run, runs at coarser settings, and the
 exact motion.
@@ -32,7 +32,7 @@ ABOUT = (
 MOST = 3
 DECIDED = (PASS, FAIL)
 NOTHING: dict[str, Any] = {"verdicts": ()}
-# checks that need other mechanisms (listed below), or scenes of the suite
+# checks that need other mechanisms, listed here, or scenes of the suite
 ELSEWHERE = ("momentum", "replayed", "dead end", "refined")
 KINDS: tuple[tuple[Callable[[int], Scene], tuple[str, ...]], ...] = (
     (mechanism, (RUN, AGREEMENT, *(check for check in PROPERTIES if check not in ELSEWHERE))),
@@ -161,8 +161,8 @@ def examined(plan: Plan, path: str | None = None, progress: Callable[[str], None
 
 
 def unasked(record: dict[str, Any], wanted: Collection[str]) -> list[str]:
-    """Return the wanted checks, in their present version, on which a seed's record has no verdict; none if
-    its run failed."""
+    """Return the wanted checks, in their present version, on which a seed's record has no verdict; no check
+    if the run of the seed failed."""
     if any(v["property"] == RUN and v["status"] == FAIL for v in record["verdicts"]):
         return []
     asked = {*record.get("asked", ()), *(verdict["card"] for verdict in record["verdicts"])}

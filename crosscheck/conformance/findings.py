@@ -29,10 +29,10 @@ def violates(runner: Runner, check: str) -> Callable[[Scene], bool]:
 
 
 def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> Scene:
-    """Return the smallest scene found that still fails.
+    """Return the smallest scene found on which the check still fails.
 
-    Loads, drivers, joints and bodies are removed, the duration is shortened and numbers are rounded. The
-    scene itself is returned if none of these is possible.
+    Loads, drivers, joints and bodies are removed, the duration is shortened and numbers are rounded. If no
+    reduction still fails, the scene itself is returned.
     """
     left, found = tries, True
     while found and left > 0:

@@ -1,6 +1,7 @@
 """Mechanisms that are hard for the reference solution: stiff, nearly singular, rounded, fast or badly scaled.
 
-Most have no closed form.  Each starts from rest, or the velocity of one body determines all others.
+Most motions have no closed form.  Each mechanism starts from rest, or the velocity of one body determines all
+other velocities.
 """
 
 from __future__ import annotations
@@ -97,7 +98,7 @@ def start_near_singular() -> Scene:
     """Return a four-bar whose coupler and rocker start 1e-3 rad from their dead centre, at a given rate of
     the crank.
 
-    The motion amplifies small differences of that rate.
+    The motion amplifies small differences of the crank's rate.
     """
     crank, coupler, rocker, ground = 0.3, 0.8, 0.6, 1.5
     reach = coupler + rocker - 1e-7

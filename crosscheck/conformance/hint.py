@@ -1,7 +1,8 @@
 """Hints for failing engines: the term of the equations whose change explains an engine's accelerations best.
 
 Accelerations are finite differences of the engine's velocities in the middle of a failing scene. The judge's
-terms are evaluated at the engine's own state there, so that integration errors have no influence.
+mass matrix, forces and constraint rows are evaluated at the engine's own state, so that integration errors
+have no influence.
 """
 
 from __future__ import annotations
@@ -83,7 +84,8 @@ def _looked_at(runner: Runner, failure: Failure, family: str) -> Iterator[tuple[
 
 
 def explanations(bench: Bench) -> Changes:
-    """Return the changes that explain the accelerations of a bench's engine, None where these are right."""
+    """Return the changes that explain the wrong accelerations of a bench's engine; None if the accelerations
+    are right."""
     scene, motion, middle = bench.scene, bench.close, NEIGHBOURS
     own = _differences(scene, bench)
     right = accelerations(scene, terms_at(scene, motion, middle))
@@ -112,6 +114,6 @@ def _differences(scene: Scene, bench: Bench) -> np.ndarray:
 
 
 def _least(scene: Scene) -> float:
-    """Return the acceleration that moves a body by the scene's length within its duration; smaller ones are
-    ignored."""
+    """Return the acceleration that moves a body by the scene's length within its duration; smaller
+    accelerations are ignored."""
     return scene_length(scene) / scene.duration**2

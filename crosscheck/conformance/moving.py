@@ -78,7 +78,7 @@ def dead_end() -> Scene:
     """Return a slider-crank (crank 0.3 m, rod 0.25 m) driven beyond the angle at which the rod is
     perpendicular to the slider's line.
 
-    There the slider's speed grows without bound, and no pose exists beyond it.
+    At that angle the slider's speed grows without bound; the mechanism has no pose beyond the angle.
     """
     crank = Driver(joint="A", polynomial=(0.0, 4.0))
     return slider_crank(0.3, 0.25, 0.2, "dead end").with_(driver=(crank,), duration=0.5)

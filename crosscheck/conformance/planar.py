@@ -27,7 +27,7 @@ from mbref.scene import (
 )
 
 Z, DOWN = (0.0, 0.0, 1.0), (0.0, -9.81, 0.0)
-DURATION = 0.1  # s; within it no loop comes to a singular position
+DURATION = 0.1  # s; in this time no loop comes to a singular position
 Point = tuple[float, float]
 Links = Mapping[str, tuple[Point, Point]]  # name → ends of a rod at t = 0
 

@@ -133,7 +133,7 @@ def rates_closed(bench: Bench) -> Finding:
 
 
 def true_velocities(bench: Bench) -> Finding | Outside:
-    """Velocities and angular velocities (world) agree with the exact ones."""
+    """Velocities and angular velocities (world) agree with the exact velocities."""
     exact, length = bench.exact, scene_length(bench.scene)
     if np.isnan(exact.velocity).any():
         return Outside("the closed form of this scene gives poses only")
@@ -145,7 +145,7 @@ def true_velocities(bench: Bench) -> Finding | Outside:
 
 
 def true_accelerations(bench: Bench) -> Finding | Outside:
-    """Accelerations (world), if the engine gives them, agree with the exact ones, angular ones too."""
+    """Linear and angular accelerations (world), if the engine gives them, agree with the exact motion."""
     if bench.motion.acceleration is None:
         return Outside("the engine gives no accelerations")
     if bench.exact.acceleration is None:
@@ -162,7 +162,7 @@ def true_accelerations(bench: Bench) -> Finding | Outside:
 def energy(bench: Bench) -> Finding | Outside:
     """Energy minus the work of loads is constant, in scenes without dampers and drivers."""
     motion = bench.motion
-    if any(isinstance(load, Moment) for load in bench.scene.load):  # its work is summed over the samples
+    if any(isinstance(load, Moment) for load in bench.scene.load):  # its work is a sum over samples
         motion = bench.run(bench.scene, np.linspace(0.0, bench.scene.duration, DENSE))
     if difference(bench.scene, motion, _at(motion, np.zeros(len(motion.times), dtype=int))) < SAME_MOTION:
         return Outside("nothing moves")
@@ -205,7 +205,7 @@ def _of_reactions(
 def silence(bench: Bench) -> Finding:
     """A run prints nothing and leaves no file in its working directory."""
     seen = bench.finest
-    if seen.printed or seen.files:  # once for a machine, as for a compilation, is forgiven
+    if seen.printed or seen.files:  # allowed if it happens once on a machine
         seen = bench.observed(bench.scene, bench.times, bench.settings[-1])
     said = seen.printed.strip().splitlines()
     remark = "; ".join([*(f"printed {line!r}" for line in said[:1]), *seen.files[:3]])
@@ -260,7 +260,7 @@ def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
 
 
 def _accuracy_of(bench: Bench, scene: Scene, run: Trajectory) -> float:
-    """Return `Bench.own_accuracy` of a changed scene from its two finest settings; 0 if it has only one."""
+    """Return `Bench.own_accuracy` of a changed scene from its two finest settings; 0 for only one setting."""
     if len(bench.settings) < 2:
         return 0.0
     coarser = bench.observed(scene, run.times, bench.settings[-2]).value

@@ -58,7 +58,7 @@ def pytest_report_header(config: pytest.Config) -> list[str]:
 
 
 class Session:
-    """The benches of a test run; each is made at first access."""
+    """The benches of a test run; a bench is made at first access."""
 
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.features import undetermined
@@ -104,7 +104,7 @@ class Session:
         return self.benches[scene]
 
     def verdict(self, scene: str, check: str) -> Verdict:
-        """Return the verdict, or the stored one of an earlier run if that is requested."""
+        """Return the verdict, or the stored verdict of an earlier run if the options request it."""
         from crosscheck.conformance.suite import CANNOT, PASS, REFUSAL, Verdict, verdict_on
 
         key = f"{self.name} {scene} {Verdict(check, scene, PASS).check()}"

@@ -91,8 +91,8 @@ def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
 
 
 def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
-    """Return an engine's own output of the accelerations at t = 0, and of the angular ones times the scene's
-    length (2 nb, 3), m/s², world axes.
+    """Return an engine's own output of the accelerations at t = 0, and of the angular accelerations times the
+    scene's length (2 nb, 3), m/s², world axes.
 
     None if the run fails or contains no accelerations.
     """
@@ -120,7 +120,7 @@ class _Drawing:
         self.joints: list[Joint] = []
 
     def scene(self, name: str) -> Scene | None:
-        """Return the mechanism; None if no loop could be closed or it is singular at its start."""
+        """Return the mechanism; None if no loop could be closed or the mechanism is singular at its start."""
         places = {GROUND: np.zeros(3), **{body.name: np.array(body.position) for body in self.bodies}}
         names = list(places)
         for k in range(1, len(names)):

@@ -1,8 +1,8 @@
 """Random mechanisms for the checks: closed loops with all types of loads and drivers, floating mechanisms,
 rotors.
 
-Some checks need a special kind of mechanism: momentum a floating one, a driver's constant moment a rotor, and
-refusals a mechanism without masses.
+Some checks need a special kind of mechanism: the check of momentum a floating mechanism, the check of a
+driver's constant moment a rotor, and the check of refusals a mechanism without masses.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from crosscheck.judge.constraints import closure_rates, initial_poses, initial_t
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
 
-DURATION = 0.05  # s; within it bodies of half a metre turn by about 0.1 rad
+DURATION = 0.05  # s; in this time bodies of half a metre turn by about 0.1 rad
 # smallest singular value of the normalised constraint rows and driver row; below it the driver hardly moves
 # its joint
 REGULAR = 1e-3
@@ -31,8 +31,8 @@ NUDGE = 0.1  # m or rad: amplitude of a driver's wave
 def mechanism(seed: int) -> Scene:
     """Return a closed-loop mechanism with gravity in a random direction.
 
-    Odd seeds have a torsion spring and a driver if a joint accepts them. Even seeds have neither driver nor
-    damping.
+    Mechanisms of odd seeds have a torsion spring and a driver if a joint accepts them. Mechanisms of even
+    seeds have neither driver nor damping.
     """
     rng = np.random.default_rng([seed, 1])
     scene = random_mechanism(seed)

@@ -37,8 +37,8 @@ FLIP = np.diag([1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation: ``about`` describes it, ``change(scene, motion)`` returns the changed scene or the reason
-    why there is none.
+    """A relation: ``about`` describes it, ``change(scene, motion)`` returns the changed scene, or the reason
+    why the scene cannot be changed.
 
     ``expect(scene, motion)`` returns the expected motion of the changed scene, computed from the motion of
     the first scene.
@@ -113,7 +113,7 @@ class Isometry:
         )
 
     def _load(self, scene: Scene, load: Any, fields: Mapping[str, Mapped]) -> Any:
-        """A load moved as a whole; a mirror turns displacements along the axis of a rotation round."""
+        """Return the load moved as a whole; a mirror reverses displacements along an axis of rotation."""
         if not isinstance(load, JointLoad):
             return mapped(load, fields)
         is_axial = scene.joint_named(load.joint).facts.driven != load.coordinate
@@ -135,8 +135,8 @@ class Isometry:
 def with_pushes(
     to: Trajectory, motion: Trajectory, linear: Mapped, angular: Mapped, force: Mapped, moment: Mapped
 ) -> Trajectory:
-    """Return the motion ``to`` with the mapped accelerations and reactions of another motion; None if these
-    are missing."""
+    """Return the motion ``to`` with the mapped accelerations and reactions of another motion; None if the
+    motion lacks them."""
     return replace(
         to,
         acceleration=None if motion.acceleration is None else linear(motion.acceleration),
@@ -218,7 +218,7 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
 
 
 def _slower(function: Function, amount: float, time: float) -> Function:
-    """A function of time with its values and its times multiplied."""
+    """Return a function of time with its values and its times multiplied by factors."""
     fields = {
         "polynomial": lambda c: tuple(amount * x / time**k for k, x in enumerate(c)),
         "sine": lambda sine: replaced(

@@ -61,8 +61,7 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
 
 
 class _Carry:
-    """Map of points and directions given at t = 0 to their places at a sample, where they move with their
-    bodies."""
+    """Map of body-fixed points and directions from their places at t = 0 to their places at a sample."""
 
     def __init__(self, scene: Scene, motion: Trajectory, sample: int):
         self.scene, self.motion, self.sample = scene, motion, sample
@@ -106,7 +105,7 @@ def _later(driver: Driver, t: float) -> Driver:
 
 
 def _shifted(function: Any, t: float) -> Any:
-    """Return a function of the time since t."""
+    """Return a function of time shifted to begin at time t."""
     if function.interval[1] <= t:
         return Factor(polynomial=(0.0,))
     fields = {
@@ -160,8 +159,8 @@ def _samples(
 
 
 def pinned(scene: Scene) -> list[str]:
-    """Return the names of the joints whose two anchors stay together, so that both bodies feel a reaction at
-    one point."""
+    """Return the names of the joints whose two anchors stay together, so that the reaction acts on both
+    bodies at one point."""
     return [joint.name for joint in scene.joint if len(joint.facts.forbidden_translations) == 3]
 
 

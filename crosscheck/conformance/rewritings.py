@@ -87,7 +87,7 @@ def duplicated(scene: Scene) -> Scene | Outside:
 
 
 def satisfied(scene: Scene) -> Scene | Outside:
-    """Return the scene with an additional cylindrical joint on the axis of a revolute one, which makes rows
+    """Return the scene with an additional cylindrical joint on the axis of a revolute joint, which makes rows
     redundant."""
     hinges = [joint for joint in scene.joint if joint.type == "revolute"]
     if not hinges:
@@ -180,11 +180,12 @@ def _arm(body: Body) -> np.ndarray:
 
 
 def _inertia(body: Body) -> np.ndarray:
-    """Inertia matrix (3, 3) about the centre of a body, along its axes."""
+    """Return the inertia matrix (3, 3) about the centre of a body, along its axes."""
     given = np.array(body.inertia)
     return np.diag(given) if given.ndim == 1 else given
 
 
 def negated(scene: Scene) -> Scene:
-    """Return the scene with every orientation given by the other of its two quaternions."""
+    """Return the scene with every orientation given by its negative quaternion, which describes the
+    orientation equally."""
     return scene.with_(body=tuple(replaced(b, orientation=[-x for x in b.orientation]) for b in scene.body))

@@ -23,8 +23,8 @@ Task = tuple[Scene, Setting]
 
 
 class Runner(Protocol):
-    """Interface of a runner: it asks and runs one engine; raises ChildFailed if the engine crashes when
-    asked."""
+    """Interface of a runner, which asks one engine for its settings and runs it; raises ChildFailed if the
+    engine crashes when asked."""
 
     @property
     def name(self) -> str:
@@ -35,7 +35,8 @@ class Runner(Protocol):
         """Relative rounding error of the numbers that the engine declares."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
-        """Return the version, and the reason of a refusal or the settings, of the engine or of one family."""
+        """Return the version, and the reason of a refusal or the settings, of the engine or of one family of
+        settings."""
 
     def refuses(self, scene: Scene, family: str) -> Cannot | None:
         """Return the reason why the engine cannot run a scene at settings of a family, or None."""

@@ -1,9 +1,9 @@
 """Hypothesis strategies for tests of engines and methods: mechanisms, the paper's parameters, matrices.
 
 ``mechanisms()`` draws closed-loop mechanisms of any graph: a tree of bodies, then joints that close loops.
-Every joint is given in the pose at t = 0, so that poses satisfy it by construction; velocities are projected
-onto the velocities that the joints allow. Numbers are taken from coarse grids, so that reduced examples are
-readable: fewer bodies, fewer loops, joints of the simplest type, bodies at rest.
+Every joint is given in the pose at t = 0, so that poses satisfy the joints by construction; velocities are
+projected onto the velocities that the joints allow. Numbers are taken from coarse grids, so that reduced
+examples are readable: fewer bodies, fewer loops, joints of the simplest type, bodies at rest.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def mechanisms(
 ) -> Scene:
     """Return a mechanism with masses, gravity, loads and consistent velocities.
 
-    ``redundant`` adds a second hinge on the axis of a first one, whose rows are redundant.
+    ``redundant`` adds a second hinge on the axis of a hinge; the rows of the second hinge are redundant.
     """
     bodies = [draw(_bodies(f"b{k}", k)) for k in range(draw(st.integers(1, most_bodies)))]
     names = [GROUND, *(body.name for body in bodies)]
@@ -152,7 +152,8 @@ def _joints(
 
 @st.composite
 def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]) -> list[Joint]:
-    """Return a second joint on the axis of a revolute joint; without one, a new pair of coaxial hinges."""
+    """Return a second joint on the axis of a revolute joint; without a revolute joint, a new pair of coaxial
+    hinges."""
     hinges = [joint for joint in joints if isinstance(joint, Revolute)]
     if not hinges:
         return [joints[-1].model_copy(update={"name": "R"})]  # a duplicate joint is redundant
@@ -164,7 +165,7 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
 
 @st.composite
 def _loads(draw: st.DrawFn, bodies: Sequence[Body]) -> list[Load]:
-    """Return some of a moment, a force and a spring to the ground, all acting on the last body."""
+    """Return up to three loads of the last body: a moment, a force and a spring to the ground."""
     name, place = bodies[-1].name, np.array(bodies[-1].position)
     point = (place + np.array(draw(vectors)) / 4).tolist()
     known: list[Load] = [

@@ -54,7 +54,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Conformance:
-    """Verdicts on an engine: of all checks on all scenes, with the engine's version."""
+    """Verdicts on an engine by all checks on all scenes, with the engine's version."""
 
     engine: str
     version: str
@@ -64,8 +64,8 @@ class Conformance:
 
     @property
     def conforms(self) -> bool:
-        """Return whether no check failed and some passed in a run; an engine that refuses all scenes does not
-        conform."""
+        """Return whether no check failed and some checks passed in a run; an engine that refuses all scenes
+        does not conform."""
         failed = any(verdict.status == FAIL for verdict in self.verdicts)
         return not failed and any(v.status == PASS and v.property != REFUSAL for v in self.verdicts)
 
@@ -95,7 +95,7 @@ def held_against(
     progress: Callable[[str], None] | None = None,
     family: str = "",
 ) -> Conformance:
-    """Return the verdicts on a runner's engine in its best family of settings, or in the given one.
+    """Return the verdicts on a runner's engine in its best family of settings, or in the given family.
 
     Runs in this process take place one after another. ``progress`` receives each finished scene.
     """
@@ -247,7 +247,7 @@ def abouts() -> dict[str, str]:
 
 
 def _count(verdicts: Sequence[Verdict], status: str) -> Text:
-    """Return the number of verdicts with a status in words; empty for none."""
+    """Return the number of verdicts with a status in words; empty if no verdict has the status."""
     number = sum(verdict.status == status for verdict in verdicts)
     return Text(str(number or ""), style=MARKS[status][1])
 

@@ -1,4 +1,4 @@
-"""Bench: an engine and a scene on which it is checked. Its runs are made at first access and shared by all
+"""Bench: an engine and a scene on which it is checked. Runs are made at first access and shared by all
 checks."""
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ STEP = 1e-4  # spacing of neighbouring samples / duration; second differences th
 NEIGHBOURS = 4  # samples on each side of the middle one
 TURN = 1e-3  # rad; largest rotation between neighbouring samples
 SWEPT = 3  # number of settings from which convergence order and accuracy limit are estimated
-# limits of the estimated contraction: adaptive steps and rounding give values beyond them
+# limits of the estimated contraction: adaptive steps and rounding give values outside the limits
 FASTEST, SLOWEST = 0.1, 0.5
-# tolerance of the second integration of Gauss's principle, 100 times the tolerance of the first one
+# tolerance of the second integration of Gauss's principle, 100 times the tolerance of the first integration
 COARSER = 1e-8
 # bound on (error of the finer integration) / (difference of the two integrations); measured: 0.01 to 0.03
 SHARE = 0.1
@@ -171,8 +171,8 @@ class Bench:
 
     @property
     def shared_runs(self) -> list[Trajectory]:
-        """Return completed runs at the finest setting that share a process: one follows a run at the coarsest
-        setting. The second one follows a run of another scene with an equal name."""
+        """Return completed runs at the finest setting that share a process: the first run follows a run at
+        the coarsest setting, the second run follows a run of another scene with an equal name."""
         coarse, fine = (self.scene, self.settings[0]), (self.scene, self.settings[-1])
         runs = self.runner.in_turn([coarse, fine, (weighed(self.scene), self.settings[-1]), fine], self.times)
         return [completed(self.scene, run, len(self.times)) for run in (runs[1], runs[3])]
@@ -198,14 +198,14 @@ class Bench:
 
     @cached_property
     def contraction(self) -> float:
-        """Factor by which the difference of successive settings decreases, from the three finest settings. It
-        measures the order of convergence in steps of the engine's own settings."""
+        """Factor by which the difference of successive settings decreases, from the three finest settings.
+        The factor measures the order of convergence in steps of the engine's own settings."""
         before = self.steps_before
         return self.steps_apart / before if before > 0 else 1.0
 
     @cached_property
     def steps_before(self) -> float:
-        """Difference of the runs at the second and third finest settings; 0 if there are fewer."""
+        """Difference of the runs at the second and third finest settings; 0 for fewer settings."""
         return self._apart(1) if len(self.sweep) == SWEPT else 0.0
 
     @cached_property
@@ -249,8 +249,8 @@ class Bench:
 
     @cached_property
     def own_accuracy(self) -> float:
-        """Largest difference allowed between runs that should agree. It is a multiple of the difference of
-        the two finest settings and of the perturbed runs, at least SAME_MOTION."""
+        """Largest difference allowed between runs that should agree. The result is a multiple of the
+        difference of the two finest settings and of the perturbed runs, at least SAME_MOTION."""
         return max(SAME_MOTION, OWN_ACCURACY * self.steps_apart, PERTURBED * self.perturbed_apart)
 
     @property
@@ -271,8 +271,8 @@ class Bench:
 
 
 def set_up(runner: Runner, specimen: Specimen, family: str = "") -> Bench:
-    """Return a bench with the engine's refusal or settings for the scene, in its best family or the given
-    one. Raises ChildFailed if the engine crashes when asked."""
+    """Return a bench with the engine's refusal or settings for the scene, in its best family of settings or
+    the given family. Raises ChildFailed if the engine crashes when asked."""
     version, cannot, settings = runner.offers(specimen.scene, family)
     return Bench(runner, specimen, version, cannot, settings, family)
 
@@ -290,8 +290,8 @@ def completed(scene: Scene, run: Trajectory, samples: int) -> Trajectory:
 
 
 def difference(scene: Scene, first: Trajectory, second: Trajectory) -> float:
-    """Return the largest position difference over the scene's length, or rotation angle, between two runs. It
-    is infinite if a number is not finite."""
+    """Return the largest position difference over the scene's length, or rotation angle, between two runs.
+    The result is infinite if a number is not finite."""
     worst = float(error_series(scene, first, second).max())
     return worst if np.isfinite(worst) else np.inf
 
@@ -321,8 +321,8 @@ def _of_gauss(scene: Scene, times: np.ndarray) -> Trajectory:
 
 
 def exact_bound(specimen: Specimen, exact: Trajectory) -> float:
-    """Return a bound on the error of `exact_motion`. It is the bound of the formula, truth or reference. For
-    Gauss's principle it follows from two integrations at different tolerances."""
+    """Return a bound on the error of `exact_motion`. The bound is known for a formula, truth or reference.
+    For Gauss's principle the bound follows from two integrations at different tolerances."""
     if exact.engine == GAUSS:
         coarser = gauss_motion(specimen.scene, tuple(exact.times.tolist()), COARSER)
         return SHARE * difference(specimen.scene, exact, coarser)

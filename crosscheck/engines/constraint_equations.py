@@ -156,7 +156,7 @@ class _Group:
 
 class _Direction(_Group):
     def turned(self, t: float) -> Levels:
-        """Return u in body axes (rows, 3, 1), its first and its second time derivative there."""
+        """Return u in body axes (rows, 3, 1), and its first and second time derivative in body axes."""
         if not self.drivers:
             return self.e1, 0 * self.e1, 0 * self.e1
         angle, rate, acceleration = self.prescribed(t)[..., None, None]

@@ -99,10 +99,8 @@ def scouted_rate(engine: Engine, scene: Scene, family: str, **options: Any) -> f
 
 def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 0) -> list[float]:
     """Return steps (s), coarse to fine, in which a body turns by ANGLES at a rate (rad/s), and ``finer``
-    further ones.
-
-    Each further step is a third of the previous one. The engine's own ``default`` is included, and steps that
-    are too many are left out.
+    further steps, each a third of the previous step. The engine's own ``default`` step is included; steps so
+    short that a run takes too many are left out.
     """
     angles = [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))]
     found = [float(f"{angle / rate:.2g}") for angle in angles]

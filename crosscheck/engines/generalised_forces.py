@@ -21,7 +21,7 @@ class Forces:
     forces.
 
     The angle of a torsion spring counts turns: it is the angle nearest to an estimate of the caller.
-    ``turning`` returns its rate.
+    ``turning`` returns the rate of the angle.
     """
 
     def __init__(self, scene: Scene):
@@ -55,7 +55,7 @@ class Forces:
         return self.scene.body_index(name), place[:, None]
 
     def _hinge(self, name: str) -> tuple[tuple[int, ...], list[np.ndarray]]:
-        """Return the bodies of a joint, and the axes (3, 3, columns) of its frame on each."""
+        """Return the bodies of a joint, and the axes (3, 3, columns) of the joint's frame on each body."""
         joint = self.scene.joint_named(name)
         frame = joint_frame(joint.directions[0]).T
         axes = [in_body(self.scene, body, frame).T for body in joint.bodies]

@@ -18,7 +18,7 @@ RANK_TOLERANCE = 1e-9  # relative to the largest singular value
 
 def lacks_mass(scene: Scene) -> Cannot | None:
     """Return the refusal of a scene without masses whose drivers do not determine the whole motion; None for
-    all others."""
+    all other scenes."""
     if scene.has_mass() or not may_move_freely(scene):
         return None
     without = ", ".join(body.name for body in scene.body if body.mass is None)

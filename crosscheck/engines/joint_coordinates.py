@@ -1,9 +1,9 @@
 """Coordinates of a tree for integrators outside engines: one number for a slide or turn, quaternions for all
 other rotations.
 
-Positions q start at zero, with unit quaternions; velocities v are the tree's. Angular velocities of balls and
-the twists (v, ω) of free links are relative to the parent, in the axes of the parent or of the child, as the
-engine defines them.
+Positions q start at zero, with unit quaternions; velocities v are the velocities of the tree. Angular
+velocities of balls and the twists (v, ω) of free links are relative to the parent, in the axes of the parent
+or of the child, as the engine defines them.
 """
 
 from __future__ import annotations

@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-MOST = 64e6  # bytes of a folder; beyond them the oldest files are removed
+MOST = 64e6  # bytes; the oldest files of a larger folder are removed
 
 
 def hashed(*parts: str) -> str:
@@ -30,8 +30,8 @@ def kept(name: str, origin: str, suffix: str) -> Path | None:
 
 
 def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
-    """Store the file that ``make`` writes in the cache, or in a temporary folder if that fails; no reader
-    sees a part of it."""
+    """Store the file that ``make`` writes in the cache, or in a temporary folder if storing fails; no reader
+    sees a part of the file."""
     folder = _folder(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -156,8 +156,8 @@ class Mbref(Engine):
 
 
 def _methods(scene: Scene) -> Sequence[str]:
-    """Return the methods that can run a scene: its default method, then the one with generated code, then all
-    others."""
+    """Return the methods that can run a scene: its default method, then the default method with generated
+    code, then all other methods."""
     from mbref.method import default_method
 
     if _has_singular_mass(scene):

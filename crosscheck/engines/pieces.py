@@ -1,7 +1,7 @@
 """A tree as bodies with joints of one elementary motion each, for engines without joints of several freedoms.
 
-Auxiliary bodies between the joints of a chain have negligible mass, but not zero: engines would warn, or
-divide by it.
+Auxiliary bodies between the joints of a chain have a negligible mass, but not zero mass: engines would warn,
+or divide by zero.
 """
 
 from __future__ import annotations
@@ -70,5 +70,5 @@ def pieces(tree: Tree, negligible: float) -> list[Piece]:
 
 
 def origin(of: list[Piece], piece: int) -> np.ndarray:
-    """Return the origin (3,) of a piece's frame, world at t = 0; of the ground's frame for -1."""
+    """Return the origin (3,) of a piece's frame, world at t = 0; for -1 the origin of the ground's frame."""
     return of[piece].origin if piece >= 0 else O

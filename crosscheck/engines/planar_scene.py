@@ -26,11 +26,12 @@ from mbref.scene import (
 )
 
 PARALLEL = 1e-12  # sine of an angle between axes; smaller angles count as zero
-AT_REST = 1e-12  # velocity out of the plane / velocity within it; smaller ones count as zero
+AT_REST = 1e-12  # velocity out of the plane / velocity in the plane; smaller ratios count as zero
 
 
 def planar_scene(scene: Scene) -> Scene:
-    """Return the scene with the fewest coordinates in its plane; the scene itself if no other has fewer."""
+    """Return the scene with the fewest coordinates in its plane; the scene itself if no other form has fewer
+    coordinates."""
     normals = [joint.directions[0] for joint in scene.joint if isinstance(joint, Revolute)]
     if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
         return scene
@@ -52,7 +53,7 @@ def _starts_within(scene: Scene, normal: np.ndarray) -> bool:
 
 
 def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
-    """Return the joint with the freedom that it has in the plane; None if that is unknown."""
+    """Return the joint reduced to its freedom in the plane; None if this freedom is unknown."""
     axes = [unit(np.array(axis)) for axis in joint.directions]
     across = [bool(np.linalg.norm(np.cross(axis, normal)) < PARALLEL) for axis in axes]
     along = [bool(abs(axis @ normal) < PARALLEL) for axis in axes]

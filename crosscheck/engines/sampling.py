@@ -27,7 +27,7 @@ MAX_STEPS = 10**6  # steps in one sample interval; a run with more steps is stop
 UNKNOWN = np.zeros((0, 3))  # stands for accelerations that an engine does not give
 
 STRETCH = 1.01  # factor by which a step may be extended to end at a sample
-JUMPS = np.linspace(1.0, 4.0, 16)  # multiples of the shortest step that are tried if the shortest one fails
+JUMPS = np.linspace(1.0, 4.0, 16)  # multiples of the shortest step, tried if the shortest step fails
 
 Rhs = Callable[[float, np.ndarray], np.ndarray]
 # function of (t, accepted state) that returns the corrected state
@@ -56,7 +56,7 @@ class Counts:
 class Sample:
     """State of the scene's bodies at one time, as in a Trajectory: (nb, 3), orientations (nb, 4).
 
-    Accelerations are UNKNOWN if the engine gives none.
+    Accelerations are UNKNOWN if the engine does not give them.
     """
 
     position: np.ndarray
@@ -123,7 +123,7 @@ def _finite(sample: Sample) -> bool:
 
 
 def _stacked(samples: list[Sample], name: str, bodies: int, width: int) -> Any:
-    """Return the samples' arrays of a name (k, bodies, width); None if the engine gives none."""
+    """Return the samples' arrays of a name (k, bodies, width); None if the engine does not give them."""
     if samples and getattr(samples[0], name) is UNKNOWN:
         return None
     return np.array([getattr(s, name) for s in samples], dtype=float).reshape(len(samples), bodies, width)
@@ -167,8 +167,8 @@ class Adaptive:
     samples.
 
     Near a singular position the accelerations are dominated by noise, and shorter steps would integrate the
-    noise instead of crossing the position. So ``min_step`` is the shortest step. If it fails, some longer
-    steps are tried, and the one with the least error estimate is accepted.
+    noise instead of crossing the position. So ``min_step`` is the shortest step. If the shortest step fails,
+    some longer steps are tried, and the step with the least error estimate is accepted.
     """
 
     rhs: Rhs
@@ -203,14 +203,14 @@ class Adaptive:
     def _jump(
         self, t: float, y: np.ndarray, f: np.ndarray, t1: float
     ) -> tuple[float, np.ndarray, np.ndarray, float]:
-        """Return the step with the least error estimate among the shortest and some longer ones."""
+        """Return the step with the least error estimate among the shortest step and some longer steps."""
         lengths = {min(factor * self.min_step, t1 - t) for factor in JUMPS}
         attempts = [(h, *self._attempt(t, y, f, h)) for h in sorted(lengths)]
         self.counts.rejected += len(attempts)
         best = min(attempts, key=lambda attempt: attempt[3] if math.isfinite(attempt[3]) else math.inf)
         if not math.isfinite(best[3]):
             if self.settle is not None:
-                self.settle(t + best[0], best[1])  # raises the specific error, if there is one
+                self.settle(t + best[0], best[1])  # raises the specific error, if any
             raise Failed(Outcome.NOT_FINITE, t, f"the motion is not finite after {t:.6g} s")
         return best
 

@@ -1,7 +1,7 @@
 """A scene as a spanning tree with loop closures, for the engines that work in joint coordinates.
 
 Nodes are the bodies and the ground, edges the joints.  A maximum-weight spanning tree by constraint rows
-keeps the stiff joints, and every driven or coupled one; every joint that is cut closes a loop:
+keeps the stiff joints, and every driven or coupled joint; every joint that is cut closes a loop:
 
 - a cut spherical joint is a point that two links share;
 - a cut joint of another type that the engine closes by itself is a closure of that type;
@@ -9,8 +9,8 @@ keeps the stiff joints, and every driven or coupled one; every joint that is cut
   between the body and its ghosts, the ghost hangs from the first body by the joint itself, and a weld
   holds it to its body.  The motion equals the motion of the undivided body.
 
-A distance joint is a *rod* with a spherical joint at either end.  It has the inertia of two point masses
-at its ends, taken out of the two bodies, so the motion is again exactly the scene's; the moment of inertia
+A distance joint is a *rod* with a spherical joint at either end.  The rod has the inertia of two point masses
+at its ends, taken out of the two bodies, so the motion equals the motion of the scene; the moment of inertia
 about its own axis is arbitrary, because a rod that starts without spin never spins.
 """
 
@@ -40,8 +40,8 @@ COORDINATES = {FREE: 6, SLIDE: 1, TURN: 1, BALL_JOINT: 3}
 class Mobility:
     """One elementary motion of a link relative to its parent.
 
-    It is a slide along or a turn about ``axis`` (3,), the free rotation of a ball, or the displacement and
-    rotation of a free link.
+    The motion is a slide along or a turn about ``axis`` (3,), the free rotation of a ball, or the
+    displacement and rotation of a free link.
     """
 
     kind: str
@@ -65,11 +65,11 @@ def mobilities(facts: JointFacts, axes: np.ndarray) -> tuple[Mobility, ...]:
 class Link:
     """A rigid piece of the tree and the joint that carries it.
 
-    Its frame is at ``position`` (world), with world axes at t = 0. ``offset`` is the vector from there to its
-    centre of mass, to which ``inertia`` (3, 3) refers.  ``kind`` is the scene's joint type or ``"free"``,
-    ``mobilities`` are the elementary motions that it leaves free; ``axes`` (n, 3) are unit vectors, from the
-    parent's side to the child's, such that positive coordinates move the joint's second body relative to its
-    first.
+    Its frame is at ``position`` (world), with world axes at t = 0. ``offset`` is the vector from ``position``
+    to the centre of mass, to which ``inertia`` (3, 3) refers.  ``kind`` is the scene's joint type or
+    ``"free"``, ``mobilities`` are the elementary motions that it leaves free; ``axes`` (n, 3) are unit
+    vectors, from the parent's side to the child's, such that positive coordinates move the joint's second
+    body relative to its first.
     """
 
     body: int  # index in scene.body; -1 for the rod of a distance joint
@@ -120,7 +120,7 @@ class Tree:
         return sum(link.freedoms for link in self.links)
 
     def link_of(self, body: int) -> int:
-        """Return the link of a scene's body; the ground's for -1."""
+        """Return the link of a scene's body; for -1 the link of the ground."""
         return self.own[body] if body >= 0 else GROUND_LINK
 
     def coordinate(self, scene: Scene, joint: str, kind: Coordinate | None = None) -> int:

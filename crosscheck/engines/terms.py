@@ -41,7 +41,7 @@ TURN_PER_STEP = 0.25
 PROJECTIONS = 10  # largest number of Newton iterations; two are usual
 CLOSED = 1e-13  # m and rad; residual at which a projection ends
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
-REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
+REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 
 
 class Terms(NamedTuple):
@@ -107,7 +107,7 @@ class Simulation:
         self.integrator = Adaptive(self.rates, self.settled, *limits, self.counts)
 
     def _couplings(self) -> np.ndarray:
-        """(couplings, nv): rows J of q₂ - ratio q₁ = 0."""
+        """Rows J (couplings, nv) of q₂ - ratio q₁ = 0."""
         rows = np.zeros((len(self.scene.coupling), self.at.nv))
         for row, coupling in zip(rows, self.scene.coupling, strict=True):
             for factor, (joint, kind) in zip(
@@ -117,7 +117,7 @@ class Simulation:
         return rows
 
     def _rotors(self) -> np.ndarray:
-        """(nv, nv): armatures, on the diagonal."""
+        """Diagonal matrix (nv, nv) of the armatures."""
         found = np.zeros(self.at.nv)
         for joint in self.scene.joint:
             if joint.reflected_inertia:
@@ -134,8 +134,8 @@ class Simulation:
         self.y = self.integrator.advance(self.y, t0, t1)
 
     def split(self, t: float, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return positions and velocities of a state; driven ones as prescribed at t, quaternions of length
-        1."""
+        """Return positions and velocities of a state; driven coordinates are as prescribed at t, quaternions
+        have length 1."""
         q, v = self.at.normalised(y[: self.at.nq]), y[self.at.nq :]
         if self.driven:
             q, v = q.copy(), v.copy()
@@ -169,8 +169,8 @@ class Simulation:
         return a, multipliers, self._accelerated(terms, motion_now, a), rows
 
     def settled(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Return the state nearest to y, by kinetic energy, that satisfies closures and drivers; raises
-        Failed."""
+        """Return the state nearest to y, measured by kinetic energy, that satisfies closures and drivers;
+        raises Failed."""
         q, v = self.split(t, y)
         if not (self.tree.closures or self.scene.coupling):
             return np.concatenate([q, v])

@@ -26,10 +26,11 @@ ZERO = np.zeros(3)
 
 @dataclass(frozen=True)
 class LinkMotion:
-    """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); the rest (n, 3).
+    """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); all other arrays have the
+    shape (n, 3).
 
-    Accelerations are UNKNOWN if the engine gives none;
-    ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful if a joint has a single angle.
+    Accelerations are UNKNOWN if the engine does not give them; ``coordinates`` and ``rates`` (nv,) are the
+    joint coordinates, meaningful if a joint has a single angle.
     """
 
     rotation: np.ndarray
@@ -51,7 +52,7 @@ def wrench(force: np.ndarray, point: np.ndarray, moment: np.ndarray = ZERO) -> n
 def sample_of(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray] | None) -> Sample:
     """Return the scene's bodies and joints for a motion of the links.
 
-    There are no reactions if ``closing`` is None or the scene has no masses.
+    The sample has no reactions if ``closing`` is None or the scene has no masses.
     """
     own = list(tree.own)
     start = np.array([body.orientation for body in scene.body])

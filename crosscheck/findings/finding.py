@@ -51,12 +51,12 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """``does`` is a sentence on what the engine does. ``right`` is a sentence on what is right, and how that
-    is known.
+    """``does`` is a sentence on what the engine does. ``right`` is a sentence on the right result, and on its
+    source.
 
     The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``. If
-    ``crashes`` is set, it has the error if a signal ends the process of its ``script``.  ``measured`` was the
-    number at ``version`` of ``package``.
+    ``crashes`` is set, the engine has the error if a signal ends the process of ``script``.  ``measured`` was
+    the number at ``version`` of ``package``.
     """
 
     name: str

@@ -64,7 +64,8 @@ def doubles(values: np.ndarray) -> np.ndarray:
 
 
 def largest(values: np.ndarray) -> float:
-    """Return the largest absolute value in an array of any arithmetic, as a double; 0 for an empty array."""
+    """Return the largest absolute value in an array of any arithmetic, as a double; the result is 0 for an
+    empty array."""
     return float(np.abs(doubles(values)).max(initial=0.0))
 
 

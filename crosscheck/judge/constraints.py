@@ -1,8 +1,8 @@
 """Joint equations of a scene, evaluated from poses: residuals at three levels, Jacobian, initial velocities.
 
-The formulas (see joint_residuals.py) are independent of mbref's and use numpy only, so that a trajectory is
-judged without the model that produced it.  Arrays may have any leading shape (…): one pose, or the samples of
-a trajectory.
+The formulas (see joint_residuals.py) do not depend on mbref's formulas and use numpy only, so that a
+trajectory is judged without the model that produced it.  Arrays may have any leading shape (…): one pose, or
+the samples of a trajectory.
 """
 
 from __future__ import annotations
@@ -51,8 +51,9 @@ def closure_rates(
 ) -> Residuals:
     """Return velocity residuals (…, rows), m/s and rad/s, for world velocities (…, nb, 3).
 
-    They are the forbidden components of the relative twist of the joint frames. If the pose satisfies the
-    joints, they are the time derivative of `closure`. Couplings follow the joints, by name.
+    The residuals are the forbidden components of the relative twist of the joint frames. If the pose
+    satisfies the joints, the residuals are the time derivative of `closure`. Couplings follow the joints, by
+    name.
     """
     motion = (*with_ground(position, orientation), grounded(velocity), grounded(angular_velocity))
     found = {
@@ -92,7 +93,7 @@ def coupling_gaps(
     """Return position residuals (k, 1) of couplings by name, q₂ - ratio q₁ in m or rad, for trajectory arrays
     (k, nb, ·).
 
-    They are NaN from the first sample on at which the samples are too far apart to count turns.
+    The residuals are NaN from the first sample on at which the samples are too far apart to count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
     return _coupled(scene, lambda joint: coordinates(joint, *motion))
@@ -129,8 +130,8 @@ def joint_coordinates(
 ) -> dict[str, np.ndarray]:
     """Return angle (rad) and displacement (m) since t = 0 (k, 2) of every joint with a coordinate, by name.
 
-    Arguments are trajectory arrays (k, nb, ·). The angle counts full turns. It is NaN from the first sample
-    on at which the samples are too far apart to count them.
+    Arguments are trajectory arrays (k, nb, ·). The angle counts full turns. The angle is NaN from the first
+    sample on at which the samples are too far apart to count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
     with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
@@ -156,8 +157,8 @@ def joint_rates(
 def jacobian(
     scene: Scene, t: float, position: np.ndarray, orientation: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return (J, b) of the velocity equations J x = b: J (rows, 6 nb), b (rows,), first the joints' rows in
-    their order, then the couplings'.
+    """Return (J, b) of the velocity equations J x = b: J (rows, 6 nb), b (rows,), first the rows of the
+    joints in their order, then the rows of the couplings.
 
     x holds (velocity of the centre of mass, angular velocity), world, body after body; `position` (nb, 3)
     and `orientation` (nb, 4) are one pose.
@@ -178,7 +179,7 @@ def initial_poses(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
 def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return velocities and angular velocities (nb, 3), world, at t = 0 that satisfy joints and drivers.
 
-    They are the nearest to the given velocities in the sense of least squares, with angular velocities
+    The result is nearest to the given velocities in the sense of least squares, with angular velocities
     multiplied by the scene's length. Velocities that are still free have the least mass-weighted norm (unit
     masses if the scene has none).  Raises SceneError naming the joint when given velocities contradict the
     joints by more than 5 % of the velocities' scale, or drivers by more than 0.1 %.
@@ -207,8 +208,8 @@ def scene_length(scene: Scene) -> float:
     """Return the characteristic length (m): the largest distance between two joint anchors or centres of mass
     at t = 0.
 
-    If these coincide, it is the distance that a free body travels or a radius of gyration, whichever is
-    larger, and 1 if both vanish.
+    If all these points coincide, the length is the distance that a free body travels or a radius of gyration,
+    whichever is larger, and 1 if both vanish.
     """
     points = [body.position for body in scene.body]
     for joint in scene.joint:
@@ -218,7 +219,8 @@ def scene_length(scene: Scene) -> float:
 
 
 def _of_one_point(scene: Scene) -> float:
-    """Return the largest distance (m) that a body without joints travels, or its radius of gyration."""
+    """Return the largest distance (m) that a body without joints travels, or its radius of gyration if that
+    is larger."""
     speeds = [np.linalg.norm(body.velocity or 0.0) for body in scene.body]
     way = max(speeds) * scene.duration + np.linalg.norm(scene.gravity) * scene.duration**2 / 2
     if not scene.has_mass():
@@ -250,8 +252,8 @@ def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 
 
 def _refuse(scene: Scene, why: str, residual: np.ndarray, x: np.ndarray, most: float) -> None:
-    """Raise SceneError for the joint with the largest residual if that exceeds the fraction ``most`` of the
-    velocities."""
+    """Raise SceneError for the joint with the largest residual if the residual exceeds the fraction ``most``
+    of the velocities."""
     names = [name for name, rows in length_rows(scene).items() for _ in rows]
     scale = np.abs(x).max(initial=0.0)
     if names and np.abs(residual).max() > most * scale:

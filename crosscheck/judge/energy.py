@@ -38,7 +38,7 @@ def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
 def energy_drift(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return the drift (k,) of energy minus work since t = 0 in J.
 
-    It is None and infinite as in `energy_series`, but a number if all energies are at rounding level.
+    The result is None or infinite as in `energy_series`, but a number if all energies are at rounding level.
     """
     balance = _balance(scene, trajectory)
     return None if balance is None else balance[0]

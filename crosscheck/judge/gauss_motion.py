@@ -1,8 +1,8 @@
 """Motion of any scene by Gauss's principle with the judge's own equations, integrated at 1e-10 by SciPy.
 
-The conformance suite uses it as the exact motion of scenes without a truth. Its error follows from the
-difference of integrations at two tolerances, and from the joint residuals. The rank of the joints' rows is
-the rank at the start, because rows that are redundant there stay redundant.
+The conformance suite uses it as the exact motion of scenes without a truth. The error of this motion follows
+from the difference of integrations at two tolerances, and from the joint residuals. The rank of the joints'
+rows is the rank at the start, because rows that are redundant at the start stay redundant.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
 def _samples(scene: Scene, times: np.ndarray, y: np.ndarray, rtol: float, rank: int) -> np.ndarray:
     """Return states (k, n) at times (k,), integrated from one end of a function's piece to the next.
 
-    Raises RuntimeError where the integration ends before.
+    Raises RuntimeError if the integration ends before the last time.
     """
     t, found = 0.0, [y for _ in times[times == 0.0]]
     while t < times[-1]:
@@ -85,9 +85,9 @@ def accelerations(
     """Return accelerations and angular accelerations (nb, 6), world, at a state.
 
     The state is position (nb, 3), unit orientation (nb, 4), velocity, spin (nb, 3), and angles of the loads
-    about joints' axes. Among all accelerations that joints and drivers allow, the result is the nearest to
-    the unconstrained ones in the mass metric. ``rank`` is the rank of the rows if it is known; functions of
-    time are of the piece that acts from ``since`` (s) on.
+    about joints' axes. Among all accelerations that joints and drivers allow, the result is nearest to the
+    unconstrained accelerations in the mass metric. ``rank`` is the rank of the rows if it is known; functions
+    of time are of the piece that acts from ``since`` (s) on.
     """
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
@@ -158,7 +158,7 @@ def applied(scene: Scene, t: float, state: State, since: float | None = None) ->
 def power(scene: Scene, t: float, state: State) -> float:
     """Return the power (W) of gravity and loads at a state at time t (s)."""
     twist = np.hstack([state[2], state[3]])
-    return float(np.sum(applied(scene, t, state) * twist))  # gyroscopic moments have none
+    return float(np.sum(applied(scene, t, state) * twist))  # gyroscopic moments have no power
 
 
 def kinetic(scene: Scene, state: State) -> float:

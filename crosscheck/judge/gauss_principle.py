@@ -21,7 +21,7 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-# relative residual of the accelerations; a larger one means that the mobility is infinitesimal only
+# relative residual of the accelerations; a larger residual shows that the mobility is infinitesimal only
 CONTINUES = 1e-8
 NO_AXIS = np.zeros(3)  # no shared axis of turning: loads of joints are added here
 
@@ -29,8 +29,8 @@ NO_AXIS = np.zeros(3)  # no shared axis of turning: loads of joints are added he
 def gauss(scene: Scene) -> np.ndarray:
     """Return accelerations at t = 0 in the form of `stacked`.
 
-    Among all accelerations that joints and drivers allow, they minimise ½ aᵀ M a - aᵀ f. The scene must have
-    masses. A moment of inertia may be zero if joints prevent the rotation.
+    Among all accelerations that joints and drivers allow, the result minimises ½ aᵀ M a - aᵀ f. The scene
+    must have masses. A moment of inertia may be zero if joints prevent the rotation.
     """
     mass, force = _unbound(scene)
     # weights of the entries of `stacked`
@@ -109,8 +109,8 @@ def bias(scene: Scene) -> np.ndarray:
 def goes_on(scene: Scene, within: float = CONTINUES) -> bool:
     """Return whether accelerations exist that keep the velocities consistent with the joints.
 
-    Otherwise the mobility is infinitesimal only. ``within`` is the allowed residual relative to the least
-    accelerations that the joints require.
+    If no such accelerations exist, the mobility is infinitesimal only. ``within`` is the allowed residual
+    relative to the least accelerations that the joints require.
     """
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     coasting = bias(scene)
@@ -119,9 +119,8 @@ def goes_on(scene: Scene, within: float = CONTINUES) -> bool:
 
 
 def stacked(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
-    """Return accelerations at a sample, and angular ones times the scene's length (2 nb, 3), m/s², world.
-
-    Raises ValueError if the run has none.
+    """Return accelerations at a sample, and angular accelerations times the scene's length (2 nb, 3), m/s²,
+    world. Raises ValueError if the run has no accelerations.
     """
     if run.acceleration is None or run.angular_acceleration is None:
         raise ValueError(f"{run.engine} reports no accelerations")

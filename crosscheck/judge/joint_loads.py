@@ -1,4 +1,5 @@
-"""Loads along joint coordinates by the judge: a coordinate's row times spring, damper and applied force."""
+"""Loads along joint coordinates, by the judge: the row of a coordinate in the Jacobian, times the sum of
+spring, damper and applied force."""
 
 from __future__ import annotations
 
@@ -31,8 +32,8 @@ def joint_wrenches(
 ) -> np.ndarray:
     """Return forces and moments (nb, 6), world, of the loads along joint coordinates.
 
-    At a pose and twist (nb, ·), with the ``angles`` of ``turning_loads``; functions of time are of the piece
-    that acts from ``since`` (s) on, by default of the one at t.
+    Arguments are a pose and twist (nb, ·) and the ``angles`` of ``turning_loads``. Functions of time are of
+    the piece that acts from ``since`` (s) on, by default of the piece at t.
     """
     found = np.zeros(6 * len(scene.body))
     rates, turned = np.hstack(twist).ravel(), iter(angles)

@@ -3,7 +3,7 @@ engine.
 
 The multipliers of redundant rows are determined up to the left null space of the Jacobian.  At a joint this
 gives a subspace of wrenches. Components orthogonal to the subspace are unique and must agree between engines,
-components in it need not agree.  The resultant of all joints on a body is always unique.
+components in the subspace need not agree.  The resultant of all joints on a body is always unique.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from mbref.scene import GROUND, Joint, Scene
 from mbref.scene_joints import Coordinate
 from mbref.trajectory import Trajectory
 
-LEAST = 1e-3  # m/s²; forces that would accelerate the masses by less count as zero
+LEAST = 1e-3  # m/s²; forces that cause smaller accelerations of the masses count as zero
 POSES = 64  # poses whose undetermined wrenches are kept
 SAMPLES = 11  # number of compared samples, spread over the trajectory
 
@@ -37,7 +37,7 @@ class Reaction:
     """Reactions of one joint in two runs.
 
     ``shared`` is the number of dimensions of the wrench that redundancy leaves undetermined. ``unique`` and
-    ``chosen`` are the largest differences orthogonal to these dimensions and in them, relative to the largest
+    ``chosen`` are the largest differences orthogonal to and in these dimensions, relative to the largest
     reaction of the first run. Moments are divided by the scene's length.
     """
 
@@ -61,8 +61,8 @@ def shared_wrenches(
     k = 0 if the reaction is unique. A wrench is a force and a moment over the scene's length, in world axes,
     on the second body at its anchor.
 
-    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s). It must satisfy the joints so
-    accurately that singular values below ``rank`` times the largest count as zero.
+    ``position`` (nb, 3) and ``orientation`` (nb, 4) are one pose at time t (s). The pose must satisfy the
+    joints so accurately that singular values below ``rank`` times the largest singular value count as zero.
     """
     pose = np.ascontiguousarray(position, dtype=float), np.ascontiguousarray(orientation, dtype=float)
     return dict(_shared(scene, float(t), pose[0].tobytes(), pose[1].tobytes(), rank))
@@ -122,7 +122,7 @@ def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
     """Compare the reactions of a reference and of a run at some samples; both have equal sample times.
 
     Differences are relative to the reference's largest reaction, so that implausible reactions give large
-    numbers. Raises ValueError when one has no reactions or their times differ.
+    numbers. Raises ValueError if a trajectory has no reactions or the times differ.
     """
     samples = min(len(first.times), len(second.times))
     if first.reactions is None or second.reactions is None:

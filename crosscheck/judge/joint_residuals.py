@@ -139,7 +139,7 @@ def velocity_rows(
 def relative_twist(
     frames: list[np.ndarray], offset: np.ndarray, dv: np.ndarray, w: list[np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return velocity and angular velocity (…, 3) of the second frame, seen from the first one."""
+    """Return velocity and angular velocity (…, 3) of the second frame, seen from the first frame."""
     return resolve(frames[0], dv - cross(w[0], offset)), resolve(frames[0], w[1] - w[0])
 
 

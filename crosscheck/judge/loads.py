@@ -22,8 +22,8 @@ class Motion:
     """Poses and velocities in the world: position, velocity, angular_velocity (k, nb, 3), rotation matrices
     (k, nb, 3, 3), and turn (k, nb).
 
-    ``turn`` is the angle of each body since t = 0 about the common axis of the family of motions, NaN without
-    such an angle.
+    ``turn`` is the angle of each body since t = 0 about the axis that all motions of the mechanism have in
+    common, NaN without such an axis.
     """
 
     position: np.ndarray
@@ -38,9 +38,9 @@ def wrenches(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return force and moment about the centre of mass (k, nb, 3), world, on every body, gravity included.
 
-    ``axis`` (3,) is the unit vector of the rotation axis of ``motion.turn``; without one, loads along joint
-    coordinates are left out (``joint_loads``).  Functions of time are at ``t`` (s), of the piece that acts
-    from ``since`` (s) on.
+    ``axis`` (3,) is the unit vector of the rotation axis of ``motion.turn``; without this axis, loads along
+    joint coordinates are left out (``joint_loads``).  Functions of time are at ``t`` (s), of the piece that
+    acts from ``since`` (s) on.
     """
     mass = np.array([body.mass for body in scene.body])
     force = motion.position * 0 + mass[:, None] * np.array(scene.gravity)
@@ -52,7 +52,7 @@ def wrenches(
 
 
 def at_time(load: Any, t: float, since: float | None = None) -> Any:
-    """The constant force or moment that a load has at a time (s)."""
+    """Return the constant force or moment that a load has at a time (s)."""
     if load.over_time is None:
         return load
     factor, field = value(load.over_time, t, since=since), "force" if isinstance(load, Force) else "moment"

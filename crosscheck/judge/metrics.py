@@ -1,4 +1,4 @@
-"""Metrics: each is one number of a run, computed from its scene, its trajectory and the exact motion.
+"""Metrics: a metric is one number of a run, computed from the scene, the trajectory and the exact motion.
 
 Errors are measured at the samples that the run reached and at which the truth is known, so that a failed run
 is judged up to its end.
@@ -41,10 +41,9 @@ _with_reactions: dict[Scene, Trajectory] = {}
 
 @dataclass(frozen=True)
 class Metric:
-    """A metric; ``function(scene, trajectory, exact)`` returns its value, or None if it is not defined.
-
-    ``exact`` is the truth's trajectory at the same times or at the first of them, or None.  Numbers are never
-    NaN; a trajectory that is not finite has infinite errors.
+    """A metric; ``function(scene, trajectory, exact)`` returns its value, or None if the metric is not
+    defined. ``exact`` is the truth's trajectory at the run's times or the first of these times, or None.
+    Numbers are never NaN; a trajectory that is not finite has infinite errors.
     """
 
     function: Callable[[Scene, Trajectory, Trajectory | None], float | None]
@@ -87,9 +86,8 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
 
 
 def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | None:
-    """Return the truth at a trajectory's times, or at the first of them if it is known no further.
-
-    None without a truth, or if it is known at the start only.
+    """Return the truth at a trajectory's times; if the truth ends early, at the first of these times. None
+    without a truth, or if the truth is known at the start only.
     """
     try:
         return None if truth is None else truth.poses(trajectory.times)
@@ -119,7 +117,7 @@ def position_error_series(scene: Scene, trajectory: Trajectory, exact: Trajector
 
 
 def rotation_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
-    """Return the largest geodesic angle (k,) between a body's orientation and its true one, rad."""
+    """Return the largest geodesic angle (k,) between a body's orientation and its true orientation, rad."""
     return rotations.angle_between(trajectory.orientation, exact.orientation).max(axis=-1)
 
 
@@ -132,7 +130,7 @@ def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.
 
 @overload
 def violation_series(scene: Scene, trajectory: Trajectory, level: Literal[0, 1] = 0) -> np.ndarray:
-    """Return the residuals at position or velocity level, which always exist."""
+    """Return the residuals at position or velocity level, which every trajectory has."""
 
 
 @overload
@@ -191,7 +189,7 @@ def _correct_digits(scene: Scene, trajectory: Trajectory, exact: Trajectory | No
 
 def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     """Return the largest error of a velocity, or of an angular velocity times the scene's length, relative to
-    the largest true one."""
+    the largest true velocity."""
     if exact is None or not len(trajectory.times):
         return None
     trajectory, length = _known(trajectory, exact), constraints.scene_length(scene)
@@ -212,9 +210,8 @@ def _largest(series: np.ndarray | None) -> float | None:
 
 def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | None) -> float | None:
     """Return the largest difference of the unique part of the reactions from the reactions of the exact
-    motion,
-    relative to the largest of them, at some samples; None without reactions, masses or a truth, and for more
-    than MANY bodies."""
+    motion, relative to the largest reaction, at some samples; None without reactions, masses or a truth, and
+    for more than MANY bodies."""
     given = exact is not None and trajectory.reactions is not None and len(trajectory.times)
     if not given or exact is None or not (scene.joint and scene.has_mass()) or len(scene.body) > MANY:
         return None
@@ -227,7 +224,7 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
 
 def _exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     """Return the exact motion with its reactions; all runs of a comparison are measured against equal
-    motions, so that the last one of each scene is kept."""
+    motions, so that the latest exact motion of each scene is kept."""
     last = _with_reactions.get(scene)
     if last is None or not all(np.array_equal(getattr(last, k), getattr(exact, k)) for k in STATES):
         last = with_exact_reactions(scene, exact)
@@ -270,7 +267,7 @@ def order_of_convergence(steps: Sequence[float], errors: Sequence[float]) -> flo
     """Return the slope of log error over log step in the longest range of at least three neighbouring steps
     that is nearly straight.
 
-    None if there is none, for example at the rounding level.
+    None if no such range exists, for example at the rounding level.
     """
     table = np.array([(s, e) for s, e in zip(steps, errors, strict=True) if 0 < e < math.inf]).reshape(-1, 2)
     x, y = np.log10(table[np.argsort(table[:, 0])]).T
@@ -288,7 +285,7 @@ def cost_at_error(costs: Sequence[float], errors: Sequence[float], level: float)
     """Return the cost of reaching an error by log-log interpolation between the best runs (no other run is
     both cheaper and more accurate).
 
-    It is the cheapest run's cost if that reaches the level, None if no run does.
+    The result is the cheapest run's cost if this run reaches the level, None if no run does.
     """
     best: list[tuple[float, float]] = []
     for cost, error in sorted(zip(costs, errors, strict=True)):

@@ -2,8 +2,8 @@
 
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
 masses, inertias, axes and loads are the same.  Differences are relative to the largest value, or to a
-fraction of what gravity, loads, drivers and velocities of the scene can cause if that is larger:
-accelerations that balance to zero are rounding.
+fraction of the accelerations that gravity, loads, drivers and velocities of the scene can cause, whichever is
+larger: accelerations that balance to zero are rounding.
 """
 
 from __future__ import annotations
@@ -59,9 +59,10 @@ def gate_times(scene: Scene) -> np.ndarray:
 
 
 def gate(scene: Scene, trajectories: Sequence[Trajectory]) -> Difference | None:
-    """Return the first difference between the first trajectory and another one, or None if all agree.
+    """Return the first difference between the first trajectory and another one, or None if all trajectories
+    agree.
 
-    Trajectories are runs at `gate_times`; put the truth's first when there is one.
+    Trajectories are runs at `gate_times`; put the truth's trajectory first if the scene has a truth.
     """
     return next(iter(differences(scene, trajectories).values()), None)
 
@@ -126,7 +127,7 @@ def acceleration_scale(scene: Scene) -> float:
 
 
 def _most(scene: Scene, load: Load) -> float:
-    """Return the largest size of the function of time that multiplies a load; 1 without."""
+    """Return the largest size of the function of time that multiplies a load; 1 without such a function."""
     times = np.linspace(0.0, scene.duration, DRIVEN_SAMPLES)
     return 1.0 if load.over_time is None else float(np.abs(value(load.over_time, times)).max())
 
@@ -152,7 +153,7 @@ def _initial_speed(scene: Scene) -> float:
 
 
 def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
-    """Return the chosen samples without those near a pose at which the rank of the joints' rows drops."""
+    """Return the chosen samples, except samples near a pose at which the rank of the joints' rows drops."""
     if not scene.joint:
         return list(chosen)
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))

@@ -21,9 +21,9 @@ from mbref.trajectory import Trajectory
 def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
     """Return the drift (k,) since t = 0 of the momentum minus the impulse of gravity and loads, over Σ m |v|.
 
-    The drift of the angular momentum, over that times the scene's length plus Σ |J ω|, is returned if it is
-    larger. None if a joint or a spring is fixed to the ground, if a force or moment changes with time,
-    without masses, or if nothing moves.
+    The drift of the angular momentum, over Σ m |v| times the scene's length plus Σ |J ω|, is returned if it
+    is larger than the drift of the momentum. None if a joint or a spring is fixed to the ground, if a force
+    or moment changes with time, without masses, or if nothing moves.
     """
     if not scene.has_mass() or any(GROUND in item.bodies for item in _links(scene)):
         return None

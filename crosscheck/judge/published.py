@@ -31,7 +31,7 @@ OURS = 1e-6  # accepted error, in the unit of the measure, if none is published
 class Published:
     """One benchmark problem.
 
-    It has the scene's name, printed values by name at ``time`` (s), and the function that computes these
+    Fields are the scene's name, printed values by name at ``time`` (s), and the function that computes these
     values from a motion sampled at ``times``. ``measure`` computes the error, ``words`` describes it,
     ``acceptance`` is the accepted error, and ``source`` the publication.
     """
@@ -106,7 +106,8 @@ STARTS = {
 
 
 def _top_of_first_upright(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
-    """Return the position of the top, which is twice as far from the pivot as the centre of mass."""
+    """Return the position of an upright's upper end, which is twice as far from the pivot as the centre of
+    mass."""
     (x, y, _), (vx, vy, _) = 2 * doubles(motion.position[-1, 0]), 2 * doubles(motion.velocity[-1, 0])
     return {"x": x, "y": y, "x'": vx, "y'": vy}
 
@@ -123,7 +124,7 @@ def _nothing(scene: Scene, motion: Motion | Trajectory) -> dict[str, float]:
 
 
 def _first_top(motion: Trajectory) -> np.ndarray:
-    """Return position and velocity (k, 4) in the plane of the top of the first upright."""
+    """Return position and velocity (k, 4), in the plane, of the upper end of the first upright."""
     return np.asarray(2 * np.hstack([motion.position[:, 0, :2], motion.velocity[:, 0, :2]]))
 
 

@@ -1,7 +1,7 @@
 """Measures of the error of published problems: energy, the place of a body, invariants of a linkage.
 
 A measure is a function of the scene, a trajectory and the exact motion at equal times, or at the first of
-them. It returns None if it is not defined, for example without the exact motion that it needs.
+these times. A measure returns None if it is not defined, for example without an exact motion.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ def energy(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float 
 
 
 def relative_to_each(observe: Callable[[Trajectory], np.ndarray]) -> Measure:
-    """Return the largest relative error of observed numbers (k, n); near zero it is relative to NEAR_ZERO."""
+    """Return the largest relative error of observed numbers (k, n); near zero the error is relative to
+    NEAR_ZERO."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         if exact is None:

@@ -14,17 +14,18 @@ Part = tuple[float, str]
 
 
 def pushes_apart(scene: Scene, expected: Trajectory, found: Trajectory, rank: float = RANK) -> Part:
-    """Return the larger of the relative differences of accelerations and of reactions, and its name.
-
-    Each is relative to the largest expected value. Both runs have equal sample times. Quantities that one of
-    the runs does not give are not compared. ``rank`` is the argument of `shared_wrenches`.
+    """Return the larger of the relative differences of accelerations and of reactions, and the name of the
+    quantity. A difference is relative to the largest expected value. Both runs have equal sample times.
+    Quantities that one of the runs does not give are not compared. ``rank`` is the argument of
+    `shared_wrenches`.
     """
     accelerations = accelerations_apart(scene, expected, found), "accelerations"
     return max(accelerations, _reactions(scene, expected, found, rank))
 
 
 def accelerations_apart(scene: Scene, expected: Trajectory, found: Trajectory) -> float:
-    """Return the difference of accelerations, relative to the largest expected one; 0 if a run gives none.
+    """Return the difference of accelerations, relative to the largest expected acceleration; 0 if a run gives
+    no accelerations.
 
     Angular accelerations are multiplied by the scene's length. The scale is at least the scene's length over
     its duration squared.

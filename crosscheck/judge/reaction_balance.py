@@ -1,4 +1,5 @@
-"""Joint reactions of the exact motion and of a run: they cause the accelerations, and do no work."""
+"""Joint reactions of the exact motion and of a run: tests that reactions cause the accelerations, and do no
+work."""
 
 from __future__ import annotations
 
@@ -30,7 +31,7 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     """Return the exact motion with the reactions that cause it (least squares of the joints' rows). Their
     unique components are exact, and undetermined components have the least norm in the rows' own units.
 
-    Raises ValueError when the motion has no accelerations.
+    Raises ValueError if the motion has no accelerations.
     """
     found = {joint.name: np.zeros((len(exact.times), 6)) for joint in scene.joint}
     wanted = demanded(scene, exact)
@@ -94,7 +95,7 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
     """Return forces and moments about the centres of mass (k, nb, 6), world, that the joints must exert for
     the motion.
 
-    Raises ValueError when the motion has no accelerations.
+    Raises ValueError if the motion has no accelerations.
     """
     if exact.acceleration is None or exact.angular_acceleration is None:
         raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")

@@ -2,8 +2,8 @@
 error.
 
 Three runs x(h) = x₀ + c hᵖ give order, limit and the finest run's distance from the limit without any truth.
-The limit's own error against a truth is the bias. It remains at any step, such as the error of a soft
-constraint.
+The error of the limit against a truth is the bias: an error that remains at any step, such as the error of a
+soft constraint.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Limit:
 
 
 def limit(scene: Scene, steps: Sequence[float], runs: Sequence[Trajectory]) -> Limit | None:
-    """Return the limit of completed runs with equal samples; the three with the smallest steps are used.
+    """Return the limit of completed runs with equal samples; the three runs with the smallest steps are used.
 
     None for fewer than three runs, and if their differences do not decrease as a power of the step between
     LEAST_ORDER and HIGHEST_ORDER. The runs are then outside the asymptotic range.

@@ -29,7 +29,7 @@ class Terms(NamedTuple):
     """The terms of a scene's equations at a state: M a = Σ f + Jᵀ λ, J a = γ.
 
     Mass matrix (6 nb, 6 nb), forces (6 nb,) by name, rows (m, 6 nb) with the joint of each, and the parts of
-    γ (m,) of velocities and of drivers.
+    γ (m,) that velocities and drivers cause.
     """
 
     mass: np.ndarray
@@ -41,7 +41,7 @@ class Terms(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """Terms with one of them changed: the part of an engine that computes this term, and the change."""
+    """Terms of which one is changed: the part of an engine that computes this term, and the change."""
 
     part: str
     change: str
@@ -69,8 +69,8 @@ def terms_at(scene: Scene, motion: Trajectory, sample: int) -> Terms:
 
 
 def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
-    """Return the accelerations (6 nb,) that the terms give, by Gauss's principle; angular ones times the
-    scene's length."""
+    """Return the accelerations (6 nb,) that the terms give, by Gauss's principle; angular accelerations times
+    the scene's length."""
     weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     force = np.sum(list(terms.forces.values()), axis=0)
     gamma = terms.of_velocities + terms.of_drivers
@@ -78,7 +78,8 @@ def accelerations(scene: Scene, terms: Terms) -> np.ndarray:
 
 
 def variants(scene: Scene, motion: Trajectory, sample: int) -> Iterator[Variant]:
-    """Yield the terms at a sample with one of them left out, of opposite sign or wrong, by dependence."""
+    """Yield variants of the terms at a sample: one term is left out, has the opposite sign or is wrong. Terms
+    on which others depend come first."""
     terms = terms_at(scene, motion, sample)
     yield from _other_masses(scene, motion.orientation[sample], terms)
     for name, force in terms.forces.items():

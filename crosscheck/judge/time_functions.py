@@ -1,7 +1,8 @@
 """Functions of time by the judge: values and series in any arithmetic, and the times at which pieces end.
 
 A table is joined by its cubic spline, found from the second derivatives at its rows: tridiagonal equations,
-whose ends are eliminated because the third derivative is continuous at the second and last but one row.
+whose ends are eliminated because the third derivative is continuous at the second and at the last but one
+row.
 """
 
 from __future__ import annotations
@@ -14,11 +15,12 @@ import numpy as np
 from crosscheck.judge.arithmetic import DOUBLE, Arithmetic
 from mbref.scene import Scene, TimeFunction
 
-NEAR = 1e-12  # relative distance of times that are one time of switching, rounded
+NEAR = 1e-12  # relative distance below which two times count as one time of switching
 
 
 class Piece(NamedTuple):
-    """Whether polynomial and sine act, and the cubic (4,) of a table in t - knot; from a time on."""
+    """A piece of a function from a time (s) on: whether polynomial and sine act, and the cubic (4,) of a
+    table in t - knot."""
 
     acts: bool
     knot: Any
@@ -37,7 +39,8 @@ def functions_of(scene: Scene) -> list[TimeFunction]:
 
 
 def next_end(scene: Scene, since: float) -> float:
-    """Return the first time (s) after another at which a piece of a function ends; infinite without one."""
+    """Return the first time (s) after another at which a piece of a function ends; infinite without such a
+    time."""
     later = [t for f in functions_of(scene) for t in ends(f) if t > since * (1 + NEAR)]
     return min(later, default=np.inf)
 
@@ -47,7 +50,7 @@ def value(
 ) -> np.ndarray:
     """Return the value of a function, or a time derivative of it, at times t (…), s.
 
-    The piece is the one that acts from ``since`` (s) on, by default the one at each time.
+    The piece is the one that acts from ``since`` (s) on, by default the piece at each time.
     """
     t = np.asarray(t, dtype=float)
     if since is not None or not ends(function):

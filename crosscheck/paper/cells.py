@@ -38,8 +38,8 @@ class Match(enum.Enum):
 
 
 def match(cell: Cell, outcome: Outcome, t_end: float) -> Match:
-    """Return SAME for equal outcome and end time, OTHER_TIME for an equal footnote at another time, otherwise
-    DIFFERENT."""
+    """Return SAME for equal outcome and end time, OTHER_TIME for an equal footnote at another time, DIFFERENT
+    for another outcome."""
     if cell.end is None:
         return Match.SAME if outcome is Outcome.COMPLETED else Match.DIFFERENT
     if outcome.letter != cell.letter:

@@ -1,7 +1,7 @@
 """The singular positions of the four-bar with equal links (rhombus): rank along the motion, the second branch
 (fold), and the convergence of ALF.
 
-Everything follows from the judge's joint equations and the exact motion, in plain numpy.
+All numbers follow from the judge's joint equations and the exact motion, in plain numpy.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def crossing_distance(theta0: float, time: float) -> float:
 
 def alf_iterations(distance: float, error: float) -> int:
     """Return the number of ALF's iterations at θ₂ = distance (rad), at the settings of the tables; MOST if
-    more are needed.
+    more iterations are needed.
 
     Without masses M = I, and (I + α DᵀD) q̈ ← q̈ + α Dᵀ γ from q̈ = 0 (Eqs. 17 to 20), where D is the
     constraint Jacobian with rows of unit length and Φ = Φ' = 0.  γ is off by ``error`` of its size in the

@@ -73,13 +73,13 @@ def _short(values: Any) -> Any:
 
 def index(path: str | Path, chosen: Cases) -> None:
     """Write the keys of the cases by label next to their records, so that a page can be rendered from these
-    alone."""
+    files alone."""
     known = {json.dumps(label, ensure_ascii=False): key(case) for label, case in chosen.items()}
     Path(path).with_name(INDEX).write_text(json.dumps(known, indent=0, ensure_ascii=False) + "\n")
 
 
 def indexed(folder: Path) -> Records:
-    """Return the records of a folder by label; raises FileNotFoundError if it has none."""
+    """Return the records of a folder by label; raises FileNotFoundError if the folder has no records."""
     known = looked_at(folder / FILE)
     keys = json.loads((folder / INDEX).read_text())
     return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}

@@ -30,7 +30,7 @@ ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUM
 INTERVAL = 0.2  # s, between two readings of a child's CPU time
 LOADED = 10.0  # largest wall time of a call on a busy machine / its limit of CPU time
 ORPHAN_SECONDS = 10.0  # s after which a child ends itself if its parent has died
-ENDING_SECONDS = 10.0  # s that a child without connection has to end by itself
+ENDING_SECONDS = 10.0  # s in which a child without connection must end by itself
 TAIL = 4000  # last bytes of the output, searched for the last printed line
 PRINTED = 200  # characters of the last printed line that a message quotes
 

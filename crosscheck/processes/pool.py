@@ -34,7 +34,7 @@ _preparing: dict[str, Lock] = {}  # keyed by engine
 _starting: dict[int, Child] = {}  # children that are being prepared, keyed by thread
 _prepared: set[tuple[str, str | None]] = (
     set()
-)  # engine and family that a child has prepared; None: a question
+)  # engine and family of settings that a child has prepared; None for a question
 
 
 def run_isolated(
@@ -79,8 +79,8 @@ def observe(
     """Run like `run_isolated` in a process of its own, and return also what was printed and the files that
     the run left.
 
-    Both are empty if the run gave no result, since its message then quotes the printed text. The process is
-    new, or a copy of one that has only prepared the engine.
+    Both texts are empty if the run gave no result, since its message then quotes the printed text. The
+    process is new, or a copy of a process that has only prepared the engine.
     """
     _check(engine_name)
     if COPIES:
@@ -112,7 +112,7 @@ def capabilities(
 
 def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], time_limit: float) -> Any:
     """Return ``question(engine_name, *about)``, called in a child that has served the engine before, or in a
-    new one.
+    new child.
 
     Raises ChildFailed if that fails, LookupError for an unknown engine.
     """
@@ -126,9 +126,9 @@ def time_interleaved(
 ) -> list[list[float]]:
     """Return CPU seconds of stepping for speed comparisons: for every job a list of ``repeats`` times.
 
-    The jobs (engine name, setting) take turns in one child process after a warm-up round, so that
-    all see the same machine.  A run that does not complete has NaN.  ``time_limit`` (s) is for all.
-    Raises ChildFailed when there is no result, LookupError for an unknown engine.
+    The jobs (engine name, setting) take turns in one child process after a warm-up round, so that all jobs
+    see the same machine. A run that does not complete has NaN. ``time_limit`` (s) is for all jobs together.
+    Raises ChildFailed if the child gives no result, LookupError for an unknown engine.
     """
     for engine_name, _ in jobs:
         _check(engine_name)
@@ -183,7 +183,8 @@ def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
 
 @contextmanager
 def _alone_at_first(engine_name: str, family: str | None = None) -> Iterator[None]:
-    """Let one child at a time prepare an engine's family, or answer without one, until a child has done so.
+    """Let one child at a time prepare an engine's family of settings, or answer questions about an engine,
+    until a child is ready.
 
     Two children would compile the same code.
     """

@@ -1,9 +1,9 @@
 """The program of a child process: it makes calls, each in a directory of its own, until its parent closes the
 connection.
 
-``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  It is sent
-(directory, seconds after which it ends itself in case the parent has died, function, arguments, whether a
-copy of it is to call the function) and answers (True, value) or (False, sentence).
+``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  The parent sends
+(directory, seconds after which the child ends itself if the parent has died, function, arguments, whether a
+copy of the child calls the function). The child answers (True, value) or (False, sentence).
 """
 
 from __future__ import annotations
@@ -58,8 +58,8 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
 
 
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:
-    """Return the engine's version, the reason why it cannot run the scene or None, and its settings if it
-    can."""
+    """Return the engine's version, the reason why it cannot run the scene or None, and its settings if the
+    engine can run the scene."""
     simulator = engine(engine_name)
     version, cannot = simulator.version(), simulator.cannot(scene)
     return version, cannot, [] if cannot else list(simulator.settings(scene))
@@ -97,7 +97,7 @@ def _unserved(family: str) -> Cannot:
 def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int) -> list[list[float]]:
     """Return ``cost.seconds`` for every repeat of every job, round-robin after a warm-up round.
 
-    A run that did not complete has NaN, since the time of a part is not the time of the whole.
+    A run that did not complete has NaN, since its time is not the time of a complete run.
     """
     simulators = [(engine(name), setting) for name, setting in jobs]
 

@@ -15,7 +15,8 @@ from crosscheck.recorded.explanations import Columns, Difference, with_signs
 from mbref.scene import Scene, SceneError, TorsionSpring
 
 ITERATIONS = 5
-# fraction of the difference left after a linear fit: above it the change is not fitted further
+# fraction of the difference that remains after a linear fit; a change with a larger remainder is not fitted
+# further
 PROMISING = 0.7
 RTOL = 1e-9
 KNOWN_GRAVITY = {9.80665: "9.80665", 9.81: "9.81", 9.8: "9.8", 10.0: "10"}
@@ -23,8 +24,8 @@ KNOWN_GRAVITY = {9.80665: "9.80665", 9.81: "9.81", 9.8: "9.8", 10.0: "10"}
 
 @dataclass(frozen=True)
 class Change:
-    """A scene with one changed number: ``of(value)`` returns it, ``small`` is a first value, 0 means no
-    change."""
+    """A change of one number of a scene: ``of(value)`` returns the changed scene, ``small`` is a first value,
+    the value 0 changes nothing."""
 
     of: Callable[[float], Scene]
     small: float

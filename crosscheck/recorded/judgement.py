@@ -1,5 +1,5 @@
-"""Comparison of a recorded motion with the exact one: the error of each column, its begin, and likely
-causes."""
+"""Comparison of a recorded motion with the exact motion: the error of each column, the time at which it
+begins, and likely causes."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Judgement:
 def judge_motion(
     scene: Scene, motion: str | Path | Mapping[str, np.ndarray] | Recording, seconds: float = SECONDS
 ) -> Judgement:
-    """Return the errors of a recorded motion and what would explain them.
+    """Return the errors of a recorded motion and their possible explanations.
 
     Parameters
     ----------
@@ -96,8 +96,8 @@ def judge_motion(
 
 
 def _with_dense(times: np.ndarray) -> np.ndarray:
-    """Return times (k,) and further ones from 0 to their end, none nearer to a given one than a tenth of a
-    step."""
+    """Return times (k,) and further times from 0 to their end. A further time has at least a tenth of a step
+    to a given time."""
     dense = np.linspace(0.0, times[-1], DENSE + 1)
     after = np.minimum(np.searchsorted(times, dense), len(times) - 1)
     nearest = np.minimum(np.abs(times[after] - dense), np.abs(times[np.maximum(after - 1, 0)] - dense))

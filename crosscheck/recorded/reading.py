@@ -90,7 +90,8 @@ def _split(line: str, separator: str | None) -> list[str]:
 def _chosen(
     scene: Scene, headers: list[str], columns: Mapping[str, str], path: Path
 ) -> tuple[dict[str, int], dict[str, str]]:
-    """Return for each column of the scene the number of the table's column, and its unit if one is given."""
+    """Return for each column of the scene the number of the table's column, and its unit if a unit is
+    given."""
     known, chosen, units = ["time", *names(scene)], {}, {}
     for k, header in enumerate(headers):
         name, unit = _recognised(header, known)
@@ -112,8 +113,8 @@ def _chosen(
 
 
 def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
-    """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if it is no
-    column."""
+    """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if the header
+    names no column of the scene."""
     match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/]*)\s*[\])]?)?\s*", header)
     text, unit = (match[1], match[2] or "") if match else (header, "")
     if text.lower() in ("t", "time"):

@@ -15,25 +15,25 @@ STEP = "step"  # name of the option for fixed steps, s; all other options that v
 MOST_COARSER = 8  # largest number of tried settings that are coarser than a family's own
 LOOSEST = 0.5  # largest tolerance that is tried
 DIGITS = 3  # significant digits of the tried options
-# fraction of the next finer setting's work: a coarser setting that needs more gains nothing
+# fraction of the next finer setting's work; a coarser setting with more work gains nothing
 STILL_CHEAPER = 0.97
 
 
 def between(coarse: Setting, fine: Setting) -> Setting | None:
     """Return the setting half way between two settings of a family.
 
-    None if they are too near to each other or differ in no number.
+    None if both settings are too near to each other or differ in no number.
     """
     found = _changed(coarse, fine, lambda a, b: math.sqrt(a * b))
     return None if found in (coarse, fine) else found
 
 
 def coarser(coarsest: Setting, next_finer: Setting, longest: float) -> Setting | None:
-    """Return the setting that is coarser than the coarsest one by the ratio between the coarsest and the next
-    finer.
+    """Return the setting that is coarser than the coarsest one by the ratio between the coarsest setting and
+    the next finer setting.
 
-    None if no step or tolerance grows from the finer to the coarser, or if the result exceeds the ``longest``
-    step (s) or the LOOSEST tolerance.
+    None if no step or tolerance grows from the finer to the coarser setting, or if the result exceeds the
+    ``longest`` step (s) or the LOOSEST tolerance.
     """
     found = _changed(coarsest, next_finer, lambda a, b: a * a / b)
     if found is None or found == coarsest:
@@ -45,9 +45,8 @@ def coarser(coarsest: Setting, next_finer: Setting, longest: float) -> Setting |
 
 
 def work(record: Record) -> float:
-    """Return the work of a run: its right-hand sides, otherwise its steps, otherwise its CPU seconds.
-
-    The first two do not depend on the machine.
+    """Return the work of a run: its right-hand sides, or its steps, or its CPU seconds, whichever the run
+    reports first. Right-hand sides and steps do not depend on the machine.
     """
     cost = record["cost"]
     return float(cost.get("rhs") or cost.get("steps") or cost["seconds"])

@@ -18,7 +18,8 @@ Call = tuple[Future[Record], Callable[[Case], Trajectory], Case]
 
 
 class Chains(ThreadPoolExecutor):
-    """Executor with one thread for each core; a thread runs the cases of one engine as long as there are any.
+    """Executor with one thread for each core; a thread runs the cases of one engine as long as cases are
+    left.
 
     One child process serves an engine, and the next run of a family begins after the end of the previous one.
     A further thread calls ``measure``, which makes the record and may wait for a truth while runs continue.

@@ -57,7 +57,7 @@ class Wanted(NamedTuple):
     for records.
 
     Further fields choose few settings (`study.ladder`), the timing of short runs only, and whether the user
-    named families. Named families are not replaced by others if they cannot run a scene.
+    named families. Named families that cannot run a scene are not replaced by other families.
     """
 
     times: Sequence[np.ndarray]
@@ -125,7 +125,7 @@ def _measured(
 def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> list[Family]:
     """Return cases of further families for engines without a right run on a scene.
 
-    Only then it is known whether the engine completes no run or is inaccurate.
+    After these runs it is known whether the engine completes no run or is inaccurate.
     """
     found: list[Family] = []
     by_pair: dict[tuple[str, str], list[Family]] = {}
@@ -162,7 +162,7 @@ def _all(groups: Sequence[Family], gates: Sequence[Case], path: Path | None) -> 
 def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Path | None) -> Made:
     """Extend each family to the coarsest setting that reaches the first error level.
 
-    Without it a family whose sweep begins too fine would seem too expensive.
+    Without coarser settings a family whose sweep begins too fine would seem too expensive.
     """
     for _ in range(MOST_COARSER):
         added = [beyond(group, records) for group in groups]
@@ -176,7 +176,8 @@ def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Pa
 def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Record]:
     """Return records by key.
 
-    The first engine starts first, since a new one compiles, and then the last ones, which take longest.
+    The first engine starts first, because mbref may have to compile. Then the last engines follow, because
+    their runs take longest.
     """
     if not cases:
         return {}

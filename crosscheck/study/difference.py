@@ -32,8 +32,8 @@ Identity = tuple[str, str, str, str, str]  # scene, engine, family, options, sam
 
 
 class Change(NamedTuple):
-    """A run that is in both sets or in one (the missing record is None), and sentences on changes; no
-    sentence means no change."""
+    """A run of both sets or of one set (the missing record is None), and sentences on changes; no sentence
+    means no change."""
 
     identity: Identity
     old: Record | None
@@ -102,7 +102,7 @@ def _paired(old: Record | None, new: Record | None) -> Sequence[tuple[Record | N
 
 
 def _is_other_mechanism(old: Record | None, new: Record | None) -> bool:
-    """Return whether both records name their mechanisms, and these differ."""
+    """Return whether both records name their mechanisms, and the mechanisms differ."""
     if old is None or new is None:
         return False
     return len({old.get("mechanism"), new.get("mechanism")} - {None}) > 1

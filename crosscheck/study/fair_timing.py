@@ -35,10 +35,8 @@ def _called_from_python(found: Sequence[Setting]) -> Sequence[Setting]:
 
 def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
     """Return a sentence on the first quantity in which the records of `identity_cases` differ; None if all
-    agree.
-
-    They are compared with the truth, or with the first record if there is no truth. Runs that did not
-    complete are ignored.
+    records agree. Records are compared with the truth; without a truth, with the first record. Runs that did
+    not complete are ignored.
     """
     return next(iter(model_differences(scene, records, reference_time).values()), None)
 
@@ -85,9 +83,9 @@ def timed(
     """Return the records with ``cost.seconds`` replaced by the minimum over interleaved runs; ``timing`` has
     their median and number.
 
-    The completed runs of a scene take turns in one process, so that all see the same machine.  If the timing
-    process of a scene fails, its records keep the seconds of their isolated runs, and a ``notice`` reports
-    it.
+    The completed runs of a scene take turns in one process, so that all runs see the same machine.  If the
+    timing process of a scene fails, its records keep the seconds of their isolated runs, and a ``notice``
+    reports it.
     """
     done = list(records)
     for scene in {case.scene.name: case.scene for case in cases}.values():

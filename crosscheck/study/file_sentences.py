@@ -14,13 +14,13 @@ from crosscheck.study.tuning import closure_gap
 from crosscheck.study.verdict import Grade, Judged, grade
 
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
-SHUT = 1e-12  # fraction of the scene's length: smaller gaps are rounding of joints that a tree keeps
+SHUT = 1e-12  # fraction of the scene's length; smaller gaps are rounding errors
 OFF = "Contacts, limits, dry friction and motors are off, as in the scene."
 
 
 def as_in_file(groups: Sequence[Judged]) -> str:
-    """Return how wrong each file is at its own settings, with the gap of its closures in millimetres; empty
-    where no file ran."""
+    """Return sentences on the error of each file at its own settings, with the gap of its closures in
+    millimetres; empty if no file ran."""
     found = [(group, r) for group in groups for r in group.records if r["family"] == AS_IN_FILE]
     return " ".join([*(_one(group, r) for group, r in found), *[OFF] * bool(found)])
 

@@ -231,8 +231,8 @@ def made_by() -> dict[str, Any]:
 
 
 def _asked(case: Case) -> dict[str, Any]:
-    """Return the request: engine, options, end time, and the number of equally spaced samples, otherwise all
-    sample times."""
+    """Return the request: engine, options, end time, and the number of equally spaced samples, or, for other
+    times, all sample times."""
     end, times = case.scene.duration, np.asarray(case.times, dtype=float)
     even = len(times) > 1 and np.array_equal(times, np.linspace(0.0, end, len(times)))
     when = {"samples": len(times)} if even else {"times": times.tolist()}
@@ -302,7 +302,7 @@ def _worth_repeating(record: Record, time_limit: float) -> bool:
 
 @functools.cache
 def _version(engine_name: str) -> str:
-    """Return the engine's version; empty if it gives none, which each run then reports as its outcome."""
+    """Return the engine's version; empty if the engine gives none; the runs then fail."""
     try:
         return str(engine(engine_name).version())
     except Exception:

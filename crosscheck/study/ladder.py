@@ -1,8 +1,8 @@
 """Selection of the settings of a family that run.
 
-At quick depth these are the coarsest, the middle one and the finest affordable one. Affordable means that the
-two others predict a short run. At any depth coarser settings are added as long as they reach the first error
-level.
+At quick depth the coarsest, the middle and the finest affordable setting run. A setting is affordable if the
+runs of the coarsest and the middle setting predict a short run. At any depth coarser settings are added as
+long as they reach the first error level.
 """
 
 from __future__ import annotations
@@ -35,17 +35,16 @@ def first(family: Family) -> list[Case]:
 
 def finest(family: Family, records: Mapping[str, Record]) -> list[Case]:
     """Return a list with the finest affordable setting beyond the middle one, by the records of ``first``;
-    empty if there is none."""
+    empty if no such setting exists."""
     costs = [_cost(records[key(case)]) for case in (family[0], family[_middle(family)])]
     beyond = range(len(family) - 1, _middle(family), -1)
     return [family[i] for i in beyond if _expected(family, costs, i) <= AFFORDABLE][:1]
 
 
 def beyond(family: Family, records: Mapping[str, Record]) -> list[Case]:
-    """Return a list with the setting next coarser than the coarsest one that ran.
-
-    It is empty if the coarsest run failed, misses the first of ERROR_LEVELS or costs no less than the next
-    finer one, or if no coarser setting exists.
+    """Return a list with the setting next coarser than the coarsest setting that ran. The list is empty if
+    the coarsest run failed, misses the first of ERROR_LEVELS or costs no less than the next finer run, or if
+    no coarser setting exists.
     """
     run = [case for case in family if key(case) in records][:2]
     if len(run) < 2 or family[0] != run[0]:

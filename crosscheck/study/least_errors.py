@@ -48,7 +48,8 @@ class LeastError:
         return _reaches(self.best)
 
     def share(self) -> str:
-        """Return the number of families whose error is at most FLOOR, of how many families."""
+        """Return the number of families of settings whose error is at most FLOOR, and the number of all
+        families."""
         return f"{sum(map(_reaches, self.families.values()))} of {len(self.families)}"
 
     def row(self) -> tuple[str, ...]:

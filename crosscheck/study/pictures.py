@@ -67,7 +67,7 @@ def _pictured(case: Case) -> Record:
 
 
 def shortened(bodies: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, list[list[float]]]]:
-    """Return the bodies' poses rounded to DIGITS digits of the largest number of each kind."""
+    """Return the bodies' poses, rounded to DIGITS digits relative to the largest position and orientation."""
     largest = {key: max(np.abs(body[key]).max(initial=0.0) for body in bodies.values()) for key in POSES}
     return {name: {key: _rounded(body[key], largest[key]) for key in POSES} for name, body in bodies.items()}
 

@@ -50,8 +50,8 @@ def is_completed(record: Record) -> bool:
 
 
 def of_scenes(records: Sequence[Record], scenes: Sequence[Scene]) -> list[Record]:
-    """Return the records of these scenes, without records of a scene's earlier version.
-    Records that name no mechanism count as of the scene they name."""
+    """Return the records of these scenes, without records of a scene's earlier version. A record that names
+    no mechanism counts as a record of the present scene."""
     known = {scene.name: mechanism(scene) for scene in scenes}
     return [r for r in records if r["scene"] in known and r.get("mechanism") in (None, known[r["scene"]])]
 
@@ -79,19 +79,19 @@ def error(record: Record) -> float:
 
 
 def error_bound(record: Record) -> float:
-    """Return the bound on the truth's own error; 0 without one."""
+    """Return the bound on the truth's error; 0 without a bound."""
     return record["metrics"].get("error_bound") or 0.0
 
 
 def drawn(record: Record, seconds: float) -> tuple[float, float]:
-    """Return error and time (s) of a record for logarithmic axes; the error is at least the truth's own
-    bound."""
+    """Return error and time (s) of a record for logarithmic axes; the error is at least the bound on the
+    truth's error."""
     return max(error(record), error_bound(record), SMALLEST), max(seconds, UNTIMED)
 
 
 def error_text(record: Record) -> str:
-    """Return the error as text: ``< 3e-12`` if it is below the truth's own bound, – without an error and for
-    a run that ended at its start."""
+    """Return the error as text: ``< 3e-12`` if it is below the bound on the truth's error, – without an error
+    and for a run that ended at its start."""
     value, bound = error(record), error_bound(record)
     if not math.isfinite(value) or never_moved(record):
         return "–"
@@ -99,7 +99,8 @@ def error_text(record: Record) -> str:
 
 
 def is_judged(record: Record) -> bool:
-    """Return whether the error of a record covers all times that the run reached; True if it reached none."""
+    """Return whether the error of a record covers all times that the run reached; also True for a run that
+    reached no time."""
     metrics = record["metrics"]
     if never_moved(record) or not record["times"]:
         return True

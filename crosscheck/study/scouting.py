@@ -1,4 +1,5 @@
-"""Settings of the engines for scenes. An engine may run a scene to find them, so each pair is asked once."""
+"""Settings of the engines for scenes. An engine may run a scene to find its settings, so each pair of engine
+and scene is asked once."""
 
 from __future__ import annotations
 
@@ -49,8 +50,8 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:
-    """Settings that ``scout`` found out, else those that the engine gives in this process; settings that run
-    the scene's file come first, also where the engine refuses the scene."""
+    """Return the settings that ``scout`` found, or ask the engine in this process. Settings that run the
+    scene's own file come first, also if the engine refuses the scene."""
     if (engine_name, scene) not in _found:
         _found[engine_name, scene] = _offered(engine_name, scene)
     found, own = _found[engine_name, scene], of_file(engine_name, scene)
@@ -58,8 +59,8 @@ def offer(engine_name: str, scene: Scene) -> Offer:
 
 
 def settings(engine_name: str, scene: Scene) -> tuple[Setting, ...]:
-    """Return an engine's settings for a scene, coarse to fine in each family; none if it cannot run the
-    scene."""
+    """Return an engine's settings for a scene, coarse to fine in each family; no settings if the engine
+    cannot run the scene."""
     found = offer(engine_name, scene)
     return () if isinstance(found, Cannot) else found
 

@@ -85,7 +85,8 @@ def headline(groups: Sequence[Judged]) -> str:
 
 
 def not_judged(groups: Sequence[Judged]) -> str:
-    """Return a clause on the engines whose mechanism differs from a scene; empty if there are none."""
+    """Return a clause on the engines whose mechanism differs from a scene; empty if all engines simulate the
+    scene."""
     found = list(dict.fromkeys(name for group in groups for name in group.differences))
     if not found:
         return ""
@@ -181,14 +182,14 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
 
 def _of_those_that_end(groups: Sequence[Judged], scene: str, name: str) -> str:
     """Return a clause on the time limit if it ended settings that might be better than the best completed
-    one."""
+    setting."""
     records = next(g.records for g in groups if g.scene.name == scene)
     limits = {r["time_limit"] for r in records if r["engine"] == name and r["outcome"] == TIMED_OUT}
     return f" of the settings that end within {max(limits):g} s" if limits else ""
 
 
 def _where(groups: Sequence[Judged], bad: Grade) -> dict[str, list[Judged]]:
-    """Return for each grade the scenes on which an engine's defaults have it."""
+    """Return for each grade the scenes on which an engine's defaults have the grade."""
     found: dict[str, list[Judged]] = {}
     for group in groups:
         for name, record in group.defaults().items():

@@ -44,8 +44,8 @@ def engines_of(groups: Sequence[Judged]) -> list[str]:
 
 
 def fast(groups: Sequence[Judged]) -> str:
-    """Return sentences on the stepping times that reach LEVEL, as multiples of the fastest, and on
-    integrators of crosscheck."""
+    """Return sentences on the stepping times that reach LEVEL, as multiples of the fastest time, and on runs
+    that crosscheck integrates."""
     found = {group.scene.name: group.costs(LEVEL) for group in groups}
     costs = {name: cost for name, cost in found.items() if cost}
     if not any(group.is_judged for group in groups):
@@ -111,8 +111,8 @@ def _fast_on_one(costs: Mapping[str, float], aided: Collection[str]) -> str:
 
 
 def _whose(name: str, aided: Collection[str]) -> str:
-    """Return the engine as the subject of a sentence, with the note that crosscheck integrates its runs if it
-    does."""
+    """Return the engine as the subject of a sentence, with a note if crosscheck integrates the engine's
+    runs."""
     return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
 
 

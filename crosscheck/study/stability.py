@@ -1,5 +1,5 @@
 """Stability ladders: a difficulty of a mechanism, such as a mass ratio, grows rung by rung. Each method and
-engine runs on each rung.
+engine runs on each rung of a ladder.
 
 The exact motion of every rung is known in closed form.  Methods of mbref run at one tolerance, engines at a
 fine setting of the family that suits singular positions best.

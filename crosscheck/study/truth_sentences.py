@@ -31,8 +31,8 @@ def truth(groups: Sequence[Judged]) -> str:
 
 
 def unknown(scene: Scene, known: Mapping[str, Any]) -> str:
-    """Return from which time on the true motion of a scene is unknown, with the reason; empty if it is known
-    to the end."""
+    """Return the time from which on the true motion of a scene is unknown, with the reason; empty if the
+    motion is known to its end."""
     if not known["kind"]:
         return f"There is no reference for {scene.name}: {known['reason']}."
     return f"The motion of {scene.name} is known{_until(scene, known)}." if known["reason"] else ""
@@ -52,8 +52,8 @@ def _reference(group: Judged) -> str:
 
 
 def _until(scene: Scene, known: Mapping[str, Any]) -> str:
-    """Return the time up to which a truth is known, with the reason for its end; empty if it is known to the
-    end."""
+    """Return the time up to which a truth is known, with the reason for its end; empty if the truth is known
+    to the end of the motion."""
     if not known["reason"]:
         return ""
     end = f"{known['until']:.4g} s of {scene.duration:.4g} s"
@@ -61,8 +61,8 @@ def _until(scene: Scene, known: Mapping[str, Any]) -> str:
 
 
 def up_to(groups: Sequence[Judged]) -> str:
-    """Return the beginning of a sentence on the time up to which the motions are known; empty if all are
-    known to their ends."""
+    """Return the beginning of a sentence on the time up to which the motions are known; empty if all motions
+    are known to their ends."""
     ends = [group.truth["until"] for group in groups if group.truth["reason"]]
     return f"Up to t = {min(ends):.4g} s" if ends else ""
 

@@ -25,8 +25,8 @@ Run = Callable[[Sequence[Case]], list[Record]]
 
 
 class Criterion(NamedTuple):
-    """A criterion for runs: a number of the record must not exceed a level. It has a name for sentences and a
-    text for values."""
+    """A criterion for runs: a number of the record must not exceed a level. The criterion has a name for
+    sentences and a text for values."""
 
     name: str
     level: float
@@ -109,7 +109,7 @@ Pair = tuple[Case, Record]
 
 
 class _Search:
-    """Search for the cheapest setting in one family, whose coarsest setting has run."""
+    """Search for the cheapest setting in one family, in which the coarsest setting has run."""
 
     def __init__(
         self,
@@ -133,11 +133,13 @@ class _Search:
         return _seconds(first) if is_completed(first) else math.inf
 
     def cheapest(self) -> list[Pair]:
-        """Return a list with the run of least work that reaches the error; empty without one."""
+        """Return a list with the run of least work that reaches the error; empty if no run reaches the
+        error."""
         return sorted((p for p in self.made if self._reaches(p[1])), key=lambda pair: work(pair[1]))[:1]
 
     def least(self) -> float:
-        """Return the CPU seconds of the cheapest run that reaches the error; infinite without one."""
+        """Return the CPU seconds of the cheapest run that reaches the error; infinite if no run reaches the
+        error."""
         return min((_seconds(record) for _, record in self.cheapest()), default=math.inf)
 
     def carry_out(self, limit: float) -> None:
@@ -148,10 +150,8 @@ class _Search:
             self._bisect(*bracket)
 
     def _coarsened(self, reached: Pair) -> tuple[Pair, Pair] | None:
-        """Return the finest run that misses the error and the coarsest that reaches it, found among coarser
-        settings.
-
-        None if every coarser setting that saves work still reaches the error.
+        """Return the finest run that misses the error and the coarsest run that reaches the error, found
+        among coarser settings. None if every coarser setting that saves work still reaches the error.
         """
         finer = self._settings[1].setting if len(self._settings) > 1 else self._settings[0].setting
         longest = self._settings[0].scene.duration
@@ -168,10 +168,8 @@ class _Search:
         return None
 
     def _refined(self, missed: Pair, limit: float) -> tuple[Pair, Pair] | None:
-        """Return the last run that misses the error and the first that reaches it, found among finer
-        settings.
-
-        None if no setting reaches it or the search ends at its limit.
+        """Return the last run that misses the error and the first run that reaches the error, found among
+        finer settings. None if no setting reaches the error or the search ends at its limit.
         """
         for case in self._settings[1:]:
             if missed[1]["outcome"] == "TIMED_OUT" or _seconds(missed[1]) >= limit:

@@ -73,7 +73,7 @@ class Judged:
 
     @property
     def is_judged(self) -> bool:
-        """Whether a run by an engine that is judged has an error, or none completes a known motion."""
+        """True if a run of a judged engine has an error, or if no engine completes a known motion."""
         runs = self.comparable
         if any(record["metrics"].get("error") is not None for record in runs):
             return True
@@ -98,7 +98,7 @@ class Judged:
 
     def costs(self, level: float) -> dict[str, float]:
         """Return for each engine the CPU seconds in which its best family reaches an error; engines that miss
-        it are left out."""
+        the error are left out."""
         return {name: cost for name, (cost, _) in self.fastest(level).items()}
 
     def fastest(self, level: float, without: Callable[[Record], bool] | None = None) -> dict[str, Fastest]:

@@ -15,10 +15,10 @@ SMOOTH = 1  # number of the smooth branch, which is taken unless the user choose
 
 
 def chosen(smooth: Motion, number: int | None) -> int:
-    """Return the number, from 1, of the chosen singular position, otherwise of the first one with several
-    branches.
+    """Return the number, from 1, of the chosen singular position; without a choice, of the first position
+    with several branches.
 
-    Raises MethodError if the method does not detect singular positions, ValueError if there is none.
+    Raises MethodError if the method does not detect singular positions, ValueError if the motion passes none.
     """
     if smooth.crossings is None:
         raise MethodError(
@@ -63,7 +63,7 @@ def sentence(motion: Motion, number: int) -> str:
 
 
 def _quiet(time: float) -> None:
-    """Ignore the progress, for the short runs after the long one."""
+    """Ignore the progress: runs along branches are short."""
 
 
 def _title(branch: int, motion: Motion) -> str:

@@ -37,7 +37,8 @@ exit status: 0 done, 1 a run ended early, 2 bad input, 130 interrupted"""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line; returns the exit status: 0 completed, 1 ended otherwise, 2 bad input."""
+    """Run a command line and return the exit status: 0 if the run completed, 1 if the run ended early, 2 for
+    faulty input."""
     options = parser().parse_args(arguments)
     try:
         return int(options.action(options))
@@ -103,7 +104,8 @@ def parser() -> argparse.ArgumentParser:
 
 
 class _Version(argparse.Action):
-    """Command-line action that prints the versions and exits; versions are looked up only then."""
+    """Command-line action that prints the versions and exits. Versions are looked up only when they are
+    printed."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
         print(_versions())

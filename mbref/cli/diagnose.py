@@ -71,7 +71,7 @@ def _diagnose(options: argparse.Namespace) -> int:
 
 
 def _along(scene: Scene) -> AlongMotion | str:
-    """Return the diagnosis along the motion, or the reason why there is none."""
+    """Return the diagnosis along the motion, or the reason why the motion cannot be diagnosed."""
     from mbref.design.along_motion import along_motion
 
     try:
@@ -115,7 +115,7 @@ def _scene_lines(scene: Scene) -> list[str]:
 
 
 def _unit_lines(path: str) -> list[str]:
-    """Return lines with the numbers of a scene's file that have a unit, in SI."""
+    """Return a line for each number with a unit in the scene's file, with its value in SI units."""
     if not path.endswith(".toml"):
         return []
     found = list(echoed(tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))))
@@ -198,8 +198,8 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
 
 
 def _driver_lines(scene: Scene) -> list[str]:
-    """Return a line if there are more drivers than degrees of freedom, so that rows are redundant for any
-    joints."""
+    """Return a line if the scene has more drivers than degrees of freedom: constraint rows are then redundant
+    whatever the joints are."""
     freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
     sentence = (
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"

@@ -98,7 +98,7 @@ def _show_spread(
 
 
 def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
-    """Return for every outcome except COMPLETED the number of runs and the cause of the first one."""
+    """Return for every outcome except COMPLETED the number of runs and the cause of the first run's end."""
     ends: dict[str, list[int]] = {}
     for place, run in sorted(runs.items()):
         if run.outcome.name != "COMPLETED":

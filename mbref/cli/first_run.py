@@ -1,8 +1,8 @@
 """The first run on a machine: interpreted kernels compute its result while the kernels are being compiled.
 
 Compiling the kernels of a method takes half a minute, interpreting a short run a few seconds, with the same
-arithmetic.  So two processes work at once: one runs the interpreted kernels, the other compiles. If the
-compilation ends first, the run is made with compiled kernels.
+arithmetic.  So two processes work at once: the first process runs the interpreted kernels, the second process
+compiles. If the compilation ends first, the run is made with compiled kernels.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def simulator(method: str) -> Iterator[Simulate]:
     """Return ``simulate``, or, if the method's kernels are not compiled, a function that runs and compiles at
     once.
 
-    At the end it waits for the compilation. Raises MethodError for an unknown method.
+    When the ``with`` block ends, the caller waits for the compilation. Raises MethodError for an unknown
+    method.
     """
     if INTERPRETED in os.environ or (os.cpu_count() or 1) < 2 or are_compiled(Method.parse(method)):
         yield simulate
@@ -69,7 +70,7 @@ def _raced(
     limits: Limits,
     progress: Callable[[float], None],
 ) -> Motion:
-    """Return the motion by interpreted kernels, or by compiled ones if these are ready first."""
+    """Return the motion by interpreted kernels, or by compiled kernels if the compilation ends first."""
     answers, answer = SPAWN.Pipe(duplex=False)
     interpreting = SPAWN.Process(target=_interpret, args=(answer, scene, method, times, limits))
     with _environment(INTERPRETED, "1"):
@@ -83,7 +84,7 @@ def _raced(
             if isinstance(said, Motion):
                 return said
             progress(said)
-    except EOFError:  # the interpreting process has crashed
+    except EOFError:  # the process with interpreted kernels has crashed
         compiling.join()
     finally:
         interpreting.kill()

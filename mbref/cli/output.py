@@ -29,7 +29,7 @@ QUANTITIES = {  # column of a body in a table → field of a trajectory
 }
 
 
-SMALL = ("violation", "error_estimate")  # columns whose numbers may be of the size of rounding errors
+SMALL = ("violation", "error_estimate")  # columns in which numbers of the size of rounding errors are printed
 
 
 def console() -> Console:

@@ -100,7 +100,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _estimated(motion: Motion, wanted: str) -> Motion:
-    """Return the motion, with its error estimate if one is wanted."""
+    """Return the motion, with its error estimate if the options request an estimate."""
     if wanted == "no":
         return motion
     with progress_bar("estimating the error", motion.t_end) as progress:
@@ -108,7 +108,8 @@ def _estimated(motion: Motion, wanted: str) -> Motion:
 
 
 def _branches(words: list[str]) -> dict[int, int]:
-    """Return the branch for each crossing; raises ValueError for a word that is no such pair."""
+    """Return the branch for each crossing; raises ValueError for a word that is not of the form
+    ``CROSSING=BRANCH``."""
     try:
         pairs = [word.split("=") for word in words]
         return {int(crossing): int(branch) for crossing, branch in pairs}
@@ -117,7 +118,7 @@ def _branches(words: list[str]) -> dict[int, int]:
 
 
 def _writer(out: str | None) -> Any:
-    """Return the writer for a file of that name; ValueError for an unknown file suffix."""
+    """Return the writer for a file of that name; raises ValueError for an unknown file suffix."""
     writers = {".csv": Motion.to_csv, ".json": lambda motion, path, *_: motion.save(path)}
     if out is not None and Path(out).suffix not in writers:
         raise ValueError(f"--out: must end in {' or '.join(writers)}, got {out!r}")

@@ -63,7 +63,8 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def _found(options: argparse.Namespace) -> list[Equilibrium]:
-    """Return the equilibria; raises ValueError if none is found, or none has the requested number."""
+    """Return the equilibria; raises ValueError if no equilibrium is found, or if the requested number is
+    larger than theirs."""
     from mbref.design.equilibrium import equilibria
 
     if options.starts < 1:

@@ -32,13 +32,13 @@ MOST_STEPS = 20_000  # steps of the diagnosis; of a longer motion only the first
 class AlongMotion:
     """Ranks and singular values of Φ_q, rows of unit length, at the poses of a motion from t = 0.
 
-    ``rank`` is the rank at most poses, ``redundant`` the rows beyond it.  ``by_rounding`` singular values are
-    small at every pose but not zero: rows that are redundant up to rounding in the scene's numbers.
-    ``crossings`` are the singular positions that the motion passes; ``shaky`` says whether second order
-    takes away freedoms of first order at every pose: they are none (A. Müller, Mech. Mach. Theory 2016).
-    ``nearest`` is the least of the smallest singular values, over the largest one at the pose, at time
-    ``nearest_time`` (s): 0 in a singular position.  ``stopped`` says why the motion ended before the scene's
-    duration, empty where it did not.
+    ``rank`` is the rank at most poses, ``redundant`` the number of rows minus the rank.  ``by_rounding``
+    singular values are small at every pose but not zero: rows that are redundant up to rounding in the
+    scene's numbers. ``crossings`` are the singular positions that the motion passes; ``shaky`` is true if at
+    every pose the equations of second order forbid velocities that the equations of first order allow (A.
+    Müller, Mech. Mach. Theory 2016). ``nearest`` is the least ratio of the smallest to the largest singular
+    value of a pose, at time ``nearest_time`` (s): 0 in a singular position. ``stopped`` is the reason why the
+    motion ended before the scene's duration; empty for a complete motion.
     """
 
     end: float
@@ -54,7 +54,7 @@ class AlongMotion:
 
 
 def along_motion(scene: Scene) -> AlongMotion:
-    """Over the scene's duration by the default method.
+    """Diagnose the motion of the default method over the scene's duration.
 
     Raises SceneError if the scene cannot be simulated, or has more than 300 rows.
     """

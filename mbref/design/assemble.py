@@ -24,7 +24,8 @@ MOST_ITERATIONS = 50
 
 @dataclass(frozen=True)
 class Assembled:
-    """The closed scene; the displacement of every joint (m) and body (m, rad); lengths before and after."""
+    """Scene with closed loops; displacement of every joint (m) and body (m, rad); lengths of links before and
+    after."""
 
     scene: Scene
     joints: dict[str, float]

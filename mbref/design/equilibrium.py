@@ -73,13 +73,14 @@ class Equilibrium:
 
     @property
     def damping_ratios(self) -> np.ndarray:
-        """Damping ratios -Re s / |s| of the same eigenvalues."""
+        """Damping ratios -Re s / |s| of the eigenvalues s with positive imaginary part."""
         found = self.eigenvalues[self.oscillating]
         return np.asarray(-found.real / np.abs(found) + 0.0)
 
     @property
     def oscillating(self) -> np.ndarray:
-        """Numbers of the eigenvalues with positive imaginary part, slowest first."""
+        """Numbers (indices from 0) of the eigenvalues with positive imaginary part, slowest vibration
+        first."""
         size = float(np.abs(self.eigenvalues).max(initial=0.0))
         return np.flatnonzero(self.eigenvalues.imag > STILL * size)
 
@@ -179,8 +180,8 @@ def _refuse(scene: Scene) -> None:
 
 
 def _scale(poses: list[Tangent]) -> float:
-    """Return the scale of accelerations, m/s²: the largest at some poses, or for a displacement by the
-    mechanism's length."""
+    """Return the scale of accelerations, m/s²: the largest acceleration at some poses, or the acceleration
+    for a displacement by the mechanism's length."""
     by_place = float(np.linalg.norm(poses[0].slope())) * poses[0].model.length
     return max(by_place, *(float(np.linalg.norm(each.accelerations(*_rest(each)))) for each in poses))
 

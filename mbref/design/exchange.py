@@ -14,7 +14,7 @@ from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
 
-WEAKER = {  # joint type → types that allow at least its motion, those with most rows first
+WEAKER = {  # joint type → types that allow at least its motion, beginning with most rows
     "revolute": ("cylindrical", "universal", "spherical", "inline"),
     "translational": ("cylindrical", "planar", "inline"),
     "cylindrical": ("inline",),
@@ -26,7 +26,7 @@ MOST_EXCHANGES = 4  # largest number of joints in a set; a search of larger sets
 MOST_TRIALS = 5_000  # number of exchanges tried in the search for smallest sets, about 1 s
 PART = 1e-6  # weight of a row in a dependence above which its joint takes part
 
-REMOVED = "removed"  # stands for a joint type
+REMOVED = "removed"  # stands for a joint type where a joint is removed
 Exchange = dict[str, str]  # joint → its new type, or REMOVED
 
 
@@ -34,9 +34,9 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     """Return sets of joints whose exchange or removal ends all redundancy, with the same freedoms.
 
     If at most four joints suffice, the smallest sets are returned: at most ``most`` without and ``most`` with
-    removed joints. Otherwise one set is found joint by joint. The result is empty if nothing is redundant or
-    no set is found. The rank is computed at a general pose, without drivers. A joint with a driver or a
-    torsion spring is exchanged only for a type that can have it, and is not removed.
+    removed joints. If more joints are needed, one set is found joint by joint. The result is empty if nothing
+    is redundant or no set is found. The rank is computed at a general pose, without drivers. A joint with a
+    driver or a torsion spring is exchanged only for a type that can have it, and is not removed.
     """
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
@@ -59,11 +59,12 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
 
 
 class Weaker(NamedTuple):
-    """A weaker joint type in the place of a joint: its rows, and how they depend on the rows of the joint."""
+    """A weaker joint type at the place of a joint: its rows, and their coefficients in the rows of the
+    joint."""
 
     rows: np.ndarray  # (k, n), of unit length
-    kept: np.ndarray  # (k, d): its rows as combinations of the d rows of the joint
-    lost: np.ndarray  # (d - k, d): orthonormal basis of the combinations that it lacks
+    kept: np.ndarray  # (k, d): rows of the weaker type as combinations of the d rows of the joint
+    lost: np.ndarray  # (d - k, d): orthonormal basis of the row combinations that the weaker type lacks
 
 
 Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining rows
@@ -72,8 +73,8 @@ Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining row
 class Combinations:
     """A basis of the vanishing linear combinations of the rows of Φ_q (its left null vectors), by joint.
 
-    After an exchange those combinations remain that do not contain the lost rows. The rank is unchanged if
-    each lost row removes one combination.
+    After an exchange the combinations without the lost rows remain. The rank is unchanged if each lost row
+    removes one combination.
     """
 
     def __init__(self, parts: Mapping[str, np.ndarray], number: int):
@@ -92,7 +93,7 @@ class Combinations:
         return bool(np.linalg.norm(self.parts[joint], axis=1).max() > PART)
 
     def with_exchange(self, name: str, weaker: Weaker) -> Combinations | None:
-        """Return the combinations that remain after an exchange; None if it lowers the rank."""
+        """Return the combinations that remain after an exchange; None if the exchange lowers the rank."""
         _, values, vt = np.linalg.svd(weaker.lost @ self.parts[name])
         if len(weaker.lost) > self.number or np.sum(values > PART) < len(weaker.lost):
             return None
@@ -137,10 +138,8 @@ def _of_size(redundant: Combinations, choices: Choices, size: int) -> Iterator[E
 
 
 def _joint_by_joint(redundant: Combinations, choices: Choices) -> Exchange | None:
-    """Return exchanges that end the redundancy, made joint by joint, each with the most lost rows; None if
-    none is found.
-
-    A joint is removed if no other exchange remains.
+    """Return exchanges that end the redundancy, found joint by joint: each exchange loses as many rows as
+    possible. A joint is removed if no weaker type is left. Return None if no set is found.
     """
     chosen: Exchange = {}
     offers = [(name, kind) for name, kinds in choices.items() for kind in kinds]
@@ -171,7 +170,7 @@ def _rank(rows: Iterable[np.ndarray]) -> int:
 
 
 def _bearing(scene: Scene, name: str) -> list[str]:
-    """The types that can bear the driver and the loads of the joint of that name."""
+    """Return the joint types that can have the driver and the loads of the joint of that name."""
     driven = scene.joint_named(name).facts.driven if name in {d.joint for d in scene.driver} else None
     acting = {load.coordinate for load in scene.load if isinstance(load, JointLoad) and load.joint == name}
     facts = {kind: joint.facts for kind, joint in JOINT_TYPES.items()}
@@ -199,8 +198,8 @@ def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: 
 
 
 def _weaker(rows: np.ndarray, own: np.ndarray) -> Weaker:
-    """Return rows (k, n) as combinations of a joint's own rows (d, n), and the combinations that they
-    lack."""
+    """Return the coefficients of rows (k, n) in a joint's own rows (d, n), and the combinations that the rows
+    (k, n) lack."""
     kept = rows @ np.linalg.pinv(own)
     _, _, vt = np.linalg.svd(kept.reshape(-1, len(own)))
     return Weaker(rows, kept, vt[len(rows) :])
@@ -208,7 +207,7 @@ def _weaker(rows: np.ndarray, own: np.ndarray) -> Weaker:
 
 def _as(joint: Joint, kind: str) -> Joint:
     """Return the joint as another type at the same place; a universal joint gets the old axis as its first
-    one."""
+    axis."""
     axis = np.array(joint.directions[0] if joint.directions else (0.0, 0.0, 1.0))
     across = np.cross(axis, np.eye(3)[np.argmin(abs(axis))])
     anchor = joint.anchor_pair[1]

@@ -1,8 +1,9 @@
 """Equations of motion about a pose at rest, in coordinates along the constraints' tangent.
 
 With x = (δr, δπ') the displacements of the bodies from a pose q0, S = diag(1 m, 1/L rad) and an orthonormal
-basis Z of the null space of Φ_q S, a pose has the coordinates y: q(y) is q0 ⊕ S Z y put onto the constraints.
-About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ S⁻¹ q''.
+basis Z of the null space of Φ_q S, a pose has the coordinates y: q(y) is the pose q0 ⊕ S Z y, projected onto
+the constraints. About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ S⁻¹
+q''.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class Tangent:
         return int(self.basis.shape[1])
 
     def pose(self, y: np.ndarray) -> np.ndarray:
-        """Return q(y) (7 nb,). Raises OffConstraints."""
+        """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
         moved = displaced(self.q, self.units * (self.basis @ y))
         found, _ = solve_positions(self.model, 0.0, moved)
         phi = self.model.terms(0.0, found, np.zeros(self.model.n)).phi
@@ -55,13 +56,13 @@ class Tangent:
         return np.asarray(self.basis.T @ (accelerations(self.model, q, v) / self.units))
 
     def slope(self) -> np.ndarray:
-        """Return A (f, f) by differences of second order, for Newton's method."""
+        """Return A = ∂y''/∂y (f, f) by differences of second order, for Newton's method."""
         zero, moves = np.zeros(self.freedoms), SHORT * self.step * np.eye(self.freedoms)
         pairs = [(self.accelerations(move, zero), self.accelerations(-move, zero)) for move in moves]
         return np.array([after - before for after, before in pairs]).T / (2 * SHORT * self.step)
 
     def linear_part(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return A and B (f, f)."""
+        """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8."""
         zero, directions = np.zeros(self.freedoms), np.eye(self.freedoms)
         by_place = [self._derivative(lambda y: self.accelerations(y, zero), d) for d in directions]
         by_rate = [self._derivative(lambda y: self.accelerations(zero, y), d) for d in directions]
@@ -76,7 +77,8 @@ class Tangent:
 
 
 def accelerations(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return q'' (n,) at t = 0: of all that the rows allow, the one of Gauss's principle."""
+    """Return q'' (n,) at t = 0: the accelerations of Gauss's principle among all that the constraint rows
+    allow."""
     terms = model.terms(0.0, q, v)
     free = _null_space(terms.jacobian)
     bound = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=RANK)[0] if model.m else np.zeros(model.n)

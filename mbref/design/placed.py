@@ -1,4 +1,4 @@
-"""A scene written again for other poses of its bodies."""
+"""A scene rewritten for other poses of its bodies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     """Return the model's scene with its bodies at coordinates q (7 nb,); joints and points of loads move with
     the bodies.
 
-    A joint's anchor is its anchor on the second body, its axis the one on the first body.
+    A joint's anchor is read from the second body, its axis from the first body.
     """
     scene, zeros = model.scene, np.zeros((1, model.nb, 6))
     motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)

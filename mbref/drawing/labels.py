@@ -41,7 +41,7 @@ class Label(NamedTuple):
 
 
 def names(stage: Stage) -> Iterator[str]:
-    """Yield the names of joints and bodies; each stays near the joint or body while that moves."""
+    """Yield the names of joints and bodies. A name stays near its moving joint or body."""
     size, taken = np.array([stage.page.width, stage.page.height]), list(_parts(stage))
     for label in (*_of_joints(stage), *_of_bodies(stage)):
         cost = sum((weight * _overlap(label, *box) for weight, *box in taken), _outside(label, size))

@@ -67,8 +67,8 @@ def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
 
 
 def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
-    """Return the pixels (1, 2, 2) of the line along which a joint to the ground slides, a little longer than
-    its travel."""
+    """Return the pixels (1, 2, 2) of the line along which a joint to the ground slides. The line is a little
+    longer than the travel."""
     axis, point = _unit(joint.directions[0]), np.array(joint.anchor_pair[side])
     moving = attached(stage.scene, stage.motion, joint.bodies[1 - side], [joint.anchor_pair[1 - side]])[:, 0]
     travel, over = (moving - point) @ axis, 42 / stage.page.scale
@@ -173,7 +173,7 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
 
 
 def load_mark(stage: Stage, load: Load) -> str:
-    """The sign of a load: an arrow, a turn, a zigzag, or a spiral at its joint."""
+    """Symbol of a load: a straight arrow, a curved arrow, a zigzag, or a spiral at its joint."""
     if load.type == "force":
         return svg.follow(
             stage.place(load.body, load.point),

@@ -39,7 +39,8 @@ class Look(NamedTuple):
 
 
 class Layer(NamedTuple):
-    """Bodies of a motion in a style, and what else is drawn with them, such as ``signs`` and ``names``."""
+    """Bodies of a motion in a style, and functions such as ``signs`` and ``names`` that yield further
+    symbols."""
 
     motion: Trajectory
     look: Look = Look()
@@ -47,7 +48,7 @@ class Layer(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """Layers on top of each other, below the lines of a title, and paths (n, 3) in space, m, drawn in
+    """Layers drawn on top of each other below the lines of a title, and paths (n, 3) in space, m, drawn in
     grey."""
 
     layers: Sequence[Layer]
@@ -288,7 +289,7 @@ def _axes(page: Page, grid: _Grid) -> Iterator[str]:
 
 
 def _scale(grid: _Grid) -> Iterator[str]:
-    """Yield a bar of a round length."""
+    """Yield a scale bar, labelled with its round length in m."""
     scale = grid.page.scale
     length = round_length(110 / scale)
     left, y = grid.width - 40 - length * scale, grid.bottom + FOOT - 20
@@ -298,7 +299,7 @@ def _scale(grid: _Grid) -> Iterator[str]:
 
 
 def _pace(grid: _Grid, timeline: Timeline | None) -> Iterator[str]:
-    """Yield the text on how fast an animation runs."""
+    """Yield the text on the speed of an animation relative to real time."""
     if timeline:
         words = f"{timeline.times[-1] - timeline.times[0]:.4g} s in {timeline.seconds:.3g} s"
         yield svg.text(grid.width / 2, grid.bottom + FOOT - 16, words, _words(grid))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def png(svg: str, zoom: int = 2) -> bytes:
-    """Return the picture at twice its size; a moving one at its first frame.
+    """Return the picture as PNG at twice its size; of an animation, the first frame.
 
     Raises ValueError without resvg.
     """

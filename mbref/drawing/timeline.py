@@ -38,7 +38,8 @@ class Timeline:
         return (times - self.times[0]) / ((self.times[-1] - self.times[0]) or 1.0)
 
     def animate(self, attribute: str, values: Sequence[str], tag: str = "animate", more: str = "") -> str:
-        """Return the SMIL element that gives an attribute its value (k,) at each sample; none if constant."""
+        """Return the SMIL element that gives an attribute its value (k,) at each sample; an empty text for a
+        constant value."""
         if len(set(values)) == 1:
             return ""
         once = f'attributeName="{attribute}"{more} dur="{self.seconds:g}s" values="{";".join(values)}"'

@@ -56,7 +56,8 @@ def view_of(points: np.ndarray, axes: Sequence[Sequence[float]]) -> View:
 
 @dataclass(frozen=True)
 class Page:
-    """From metres to pixels: scale (px/m), and the place of the upper left corner of what is shown."""
+    """Map from metres to pixels: scale (px/m), and the coordinates (m) of the upper left corner of the shown
+    area."""
 
     view: View
     scale: float
@@ -84,12 +85,13 @@ class Page:
         return (flat - self.corner) * np.array([1.0, -1.0]) * self.scale + self.margin
 
     def directions(self, vectors: np.ndarray) -> np.ndarray:
-        """World directions (…, 3) on the page (…, 2), y downwards, at the length they are seen with."""
+        """World directions (…, 3) projected onto the page (…, 2), with y downwards."""
         seen: np.ndarray = vectors @ self.view.axes[:2].T * np.array([1.0, -1.0])
         return seen
 
 
 def round_length(longest: float) -> float:
-    """Return the largest of 1, 2 or 5 times a power of ten that is not longer."""
+    """Return the largest length of the form 1, 2 or 5 times a power of ten that is not longer than the given
+    length."""
     power = 10.0 ** math.floor(math.log10(longest))
     return float(f"{max(k for k in (1, 2, 5) if k * power <= longest * (1 + 1e-9)) * power:.6g}")

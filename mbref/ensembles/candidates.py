@@ -54,8 +54,8 @@ class Candidates(NamedTuple):
 
 
 def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
-    """Return the scenes. Those may join the batch whose structure equals the run's and whose start is
-    regular, too."""
+    """Return the candidates for a batch of a lead run. A scene may join the batch if its structure equals the
+    structure of the run and its start is regular."""
     packs, decisions = Packs(scenes), _reduction(run).decisions
     evaluations = Evaluations(run.model, packs)
     starts, q, v = _starts(run, packs, evaluations)
@@ -70,7 +70,7 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
 
 
 def _reduction(run: Run) -> Reduction:
-    """Return the reduction of a run that may lead a batch, which always has one."""
+    """Return the reduction (independent rows and active columns) of a run that may lead a batch."""
     assert run.reduction is not None
     return run.reduction
 

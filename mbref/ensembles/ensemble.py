@@ -1,8 +1,8 @@
-"""Ensembles: many scenes simulated by one method in several processes; results are yielded as they come, and
-can be stored and resumed.
+"""Ensembles: many scenes simulated by one method in several processes. Each result is yielded when its run
+ends, and can be stored; a stored ensemble can be resumed.
 
-A process receives several runs at a time, because scenes of equal structure are prepared together
-(``batch``).
+A process receives several runs in one call, because scenes of equal structure are prepared in one batch
+(``batch.py``).
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ from mbref.scene import SceneError
 
 
 class Evaluations:
-    """Terms of the equations of s scenes whose structure equals a model's; afterwards the model has its own
-    numbers again."""
+    """Terms of the equations of s scenes whose structure equals the structure of a model. After an evaluation
+    the model contains the numbers of its own scene again."""
 
     def __init__(self, model: Model, packs: Packs):
         self._model, self._packs = model, packs

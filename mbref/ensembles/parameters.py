@@ -25,7 +25,7 @@ class Parameters:
         self._saved = saved
 
     def write(self, place: int) -> None:
-        """Write the numbers of the scene at a place."""
+        """Write the numbers of the scene with the given index."""
         if self._saved is not None:
             self._saved.restore()
         for target, of_all, where in self._values:
@@ -33,8 +33,8 @@ class Parameters:
 
 
 def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[tuple[Any, ...]]:
-    """Return the arrays of memory of the equations in which the scenes differ from it, each with the values
-    of all scenes; no kernel changes these arrays."""
+    """Return the arrays of an equation's memory in which the scenes differ from the lead scene, each with the
+    values of all scenes. No kernel changes these arrays."""
     system = equations.system
     masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
     pairs = [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]

@@ -1,7 +1,7 @@
 """Processes that each make one call after another; a killed process fails its own call only.
 
 A ProcessPoolExecutor would fail all submitted calls. A call and its result go through a pipe without threads,
-which would take longer than a short run.
+because threads would take longer than a short run.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ class Processes(Executor):
 
 
 class Worker:
-    """One process. It ends on request, or when its parent has ended."""
+    """Process that makes one call after another. The process ends on request, or when its parent has
+    ended."""
 
     def __init__(self) -> None:
         context = get_context("spawn")
@@ -73,14 +74,14 @@ class Worker:
         return found
 
     def end(self, wait: bool = True) -> None:
-        """Request that the process ends after its call."""
+        """Request that the process ends after its present call."""
         self._pipe.close()
         if wait:
             self._process.join()
 
 
 def _answer(pipe: Connection) -> None:
-    """Make the calls that come through a pipe, until its other end is closed; the parent handles
+    """Make the calls that arrive through a pipe, until the parent closes the pipe. The parent handles
     interrupts."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with contextlib.suppress(EOFError, OSError):

@@ -49,7 +49,8 @@ class Ended:
 def simulate_all(
     scenes: Sequence[Scene], method: Method | str, times: np.ndarray, limits: Limits
 ) -> list[Motion]:
-    """Return the motions of the scenes, as ``simulate`` does for single scenes; raises its errors."""
+    """Return the motions of the scenes. Each motion equals the result of ``simulate`` for the scene. Raises
+    the errors of ``simulate``."""
     ended = run_all(scenes, method, times, limits)
     if ended.error:
         raise ended.error
@@ -80,7 +81,7 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 
 def _can_lead(method: Method, limits: Limits) -> bool:
-    """Return whether runs of a method may lead batches: this needs projection or Taylor series."""
+    """Return whether runs of a method may lead batches: only runs with projection or Taylor series may."""
     held = limits.rank_tolerance <= DROPS and not limits.branches
     return method.stabilisation.projects and held
 

@@ -2,9 +2,9 @@
 
 Data of the Bari/CWI test set of initial value problems (W. Schiehlen, ed., Multibody Systems Handbook, 1990;
 Hairer and Wanner, Solving Ordinary Differential Equations II, VI.9).  A motor turns K1 with a constant
-moment; no gravity.  Link K1 turns about O, K3 about B, K5 and K7 about A; K2, K3, K4 and K6 meet at E.
-The centres of mass of K3, K5 and K7 are known by their distances from the pivots; on which side they are
-does not matter to the motion.  All joints are revolute, so that three loops have nine redundant rows.
+moment; no gravity.  Link K1 turns about O, K3 about B, K5 and K7 about A; K2, K3, K4 and K6 meet at E. The
+centres of mass of K3, K5 and K7 are known by their distances from the pivots; the side of a centre of mass
+does not affect the motion.  All joints are revolute, so that three loops have nine redundant rows.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STIFFNESS, NATURAL_LENGTH, MOTOR = 4530.0, 0.07785, 0.033  # N/m, m, N m
 BETA, THETA, GAMMA = -0.0617138900142764496358948458001, 0.0, 0.455279819163070380255912382449
 PHI, DELTA = 0.222668390165885884674473185609, 0.487364979543842550225598953530
 OMEGA, EPSILON = -0.222668390165885884674473185609, 1.23054744454982119249735015568
-ANGLES = (BETA, BETA + THETA, GAMMA, PHI + DELTA, DELTA, OMEGA + EPSILON, EPSILON)  # of the links at t = 0
+ANGLES = (BETA, BETA + THETA, GAMMA, PHI + DELTA, DELTA, OMEGA + EPSILON, EPSILON)  # rad, at t = 0
 Z = (0.0, 0.0, 1.0)
 
 
@@ -78,6 +78,6 @@ def andrews_squeezer() -> Scene:
 
 
 def _on(start: tuple[float, float], angle: float, along: float, across: float = 0.0) -> tuple[float, float]:
-    """Return a point of a link that is rotated by an angle, relative to its start."""
+    """Return a point of a link that is rotated by an angle, relative to the link's first end."""
     c, s = math.cos(angle), math.sin(angle)
     return start[0] + along * c - across * s, start[1] + along * s + across * c

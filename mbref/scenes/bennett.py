@@ -2,7 +2,7 @@
 
 G. T. Bennett, Engineering 76, 1903.  Opposite links have the same length and twist, sin α / a = sin β / b,
 and the hinges' angles obey tan(θ₁/2) tan(θ₂/2) = sin((β + α)/2) / sin((β - α)/2).  Three rows are redundant.
-Sizes and inertias are ours: links of 1 kg per metre, 0.3 m and 0.5 m, gravity along -z.
+Sizes and inertias are chosen here: links of 1 kg per metre, 0.3 m and 0.5 m, gravity along -z.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """IFToMM A04, Bricard's mechanism: five rods of 1 m and 1 kg along the edges of a cube, six hinges.
 
-Kutzbach's count gives no freedom; there is one, and no row can be named as the redundant one (González et
-al., Multibody System Dynamics 16, 2006).  Released from rest, gravity along -y.  Sources differ in the
-rods' inertia: a cuboid of 1 m x 0.1 m x 0.1 m, or thin, m/12 across and 0 about the rod.
+Kutzbach's count gives no degree of freedom; the mechanism has one. No single row can be named as the
+redundant row (González et al., Multibody System Dynamics 16, 2006).  Released from rest, gravity along -y.
+Sources differ in the rods' inertia: a cuboid of 1 m x 0.1 m x 0.1 m, or thin, m/12 across and 0 about the
+rod.
 """
 
 from __future__ import annotations

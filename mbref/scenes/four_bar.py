@@ -1,10 +1,10 @@
 """The paper's four-bar linkage (Figure 3): a rhombus of 0.5 m links in three dimensions.
 
-Revolutes about z at A and D; universals at B and C with z on crank and rocker and, on the coupler,
-its transverse in-plane axis (the longitudinal one would leave the coupler free to spin).
-With ``ground = "body"``: 24 coordinates, 25 rows with the driver, rank 24, one redundant row.  Rank 23 at
-θ₂ = nπ: at θ₂ = 0 the fold branch does not meet a turning crank, at θ₂ = π it does, a bifurcation.
-The paper drives the crank at θ₂ = θ₀ - 124.8 t; its inertias, which it leaves open, are ours.
+Revolutes about z at A and D; universals at B and C with z on crank and rocker and, on the coupler, its
+transverse in-plane axis (the longitudinal one would leave the coupler free to spin). With ``ground =
+"body"``: 24 coordinates, 25 rows with the driver, rank 24, one redundant row.  Rank 23 at θ₂ = nπ: at θ₂ = 0
+the folded branch does not meet the branch of a turning crank; at θ₂ = π both meet in a bifurcation. The paper
+drives the crank at θ₂ = θ₀ - 124.8 t. The paper gives no inertias; they are chosen here.
 """
 
 from __future__ import annotations

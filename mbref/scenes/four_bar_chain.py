@@ -1,12 +1,12 @@
 """N four-bars in a row, a benchmark of scaling: N + 1 uprights on the ground, N bars across their tops.
 
-Links of 1 m and 1 kg; uprights from (i, 0) to (i, 1), bars from (i, 1) to (i + 1, 1), gravity along -y.
-Every upright starts vertical and turns at -1 rad/s; the bars stay level, so the motion is a pendulum's:
-θ'' = W sin θ with θ from the vertical, W = (g/L) ((N + 1)/2 + N) / ((N + 1)/3 + N).
-Joints as in the four-bar: 12 N + 6 coordinates, 13 N + 5 rows, N of them redundant, one degree of freedom;
-singular at θ = ±π/2, with all links on one line, where the rank drops by N.
-N = 2 is the double four-bar of the IFToMM library, N = 40 problem A02 of González et al., Multibody System
-Dynamics 16, 2006; the moment about a link's own axis, about which none turns, is ours.
+Links of 1 m and 1 kg; uprights from (i, 0) to (i, 1), bars from (i, 1) to (i + 1, 1), gravity along -y. Every
+upright starts vertical and turns at -1 rad/s; the bars stay level, so the motion is a pendulum's: θ'' = W sin
+θ with θ from the vertical, W = (g/L) ((N + 1)/2 + N) / ((N + 1)/3 + N). Joints as in the four-bar: 12 N + 6
+coordinates, 13 N + 5 rows, N of them redundant, one degree of freedom; singular at θ = ±π/2, with all links
+on one line, where the rank drops by N. N = 2 is the double four-bar of the IFToMM library, N = 40 problem A02
+of González et al., Multibody System Dynamics 16, 2006; the moment of inertia about a link's own axis is
+chosen here; no link turns about this axis.
 """
 
 from __future__ import annotations

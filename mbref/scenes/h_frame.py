@@ -1,8 +1,8 @@
 """A frame on two hinges of one axis with a mass fixed off its centre: reactions that are not unique.
 
-Two bodies, two revolutes, one fixed joint: minus four degrees of freedom by the count, one in truth, five
-redundant rows.  A commercial program that drops one of the hinges' rows reports one-sided reactions.  Sizes
-and inertias are ours.
+Two bodies, two revolutes, one fixed joint: minus four degrees of freedom by Kutzbach's count, one degree of
+freedom in fact, five redundant rows.  A commercial program that drops one of the hinges' rows reports
+one-sided reactions.  Sizes and inertias are chosen here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The parts the paper's mechanisms share: thin rods, sliders and poses in a plane."""
+"""Parts that the paper's mechanisms have in common: thin rods, sliders and poses in a plane."""
 
 from __future__ import annotations
 

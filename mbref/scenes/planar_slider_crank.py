@@ -1,10 +1,10 @@
 """The paper's planar slider-crank (Figure 10): crank a, rod b in the xy-plane, slider on the x axis.
 
-Revolutes about z at A and B, a spherical joint at C, a translational joint along x at D.  With
-``ground = "body"``: 24 coordinates, 24 rows, rank 23, one redundant row, one degree of freedom.
-With a = b singular at θ = ±π/2, where the slider passes the crank's centre; never singular otherwise.
-Driven by 100 N m on the crank, from rest at θ = 0; inertias and start, which the paper leaves open,
-are ours.
+Revolutes about z at A and B, a spherical joint at C, a translational joint along x at D.  With ``ground =
+"body"``: 24 coordinates, 24 rows, rank 23, one redundant row, one degree of freedom. With a = b the mechanism
+is singular at θ = ±π/2, where the slider passes the crank's centre; with a ≠ b it is never singular. Driven
+by 100 N m on the crank, from rest at θ = 0; the paper gives neither inertias nor the start; they are chosen
+here.
 """
 
 from __future__ import annotations

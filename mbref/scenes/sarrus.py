@@ -1,7 +1,8 @@
 """Sarrus's linkage: two folding pairs of bars in perpendicular planes guide a platform along a line.
 
-P. F. Sarrus, Comptes rendus 36, 1853.  Six hinges, five bodies, one degree of freedom where the count
-says none.  Sizes and inertias are ours: bars of 0.5 m and 0.5 kg, a platform of 1 kg, gravity along -z.
+P. F. Sarrus, Comptes rendus 36, 1853.  Six hinges, five bodies, one degree of freedom, although Kutzbach's
+count gives none. Sizes and inertias are chosen here: bars of 0.5 m and 0.5 kg, a platform of 1 kg, gravity
+along -z.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import math
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes.links import Point, midpoint, rod_inertia
 
-HALF, LENGTH, MASS, SLOPE = 0.2, 0.5, 0.5, math.radians(60)  # m, m, kg, rad of the bars at first
+HALF, LENGTH, MASS, SLOPE = 0.2, 0.5, 0.5, math.radians(60)  # m, m, kg, rad; SLOPE at t = 0
 PLATFORM, MOMENT = 1.0, 0.01  # kg, kg m²
 
 

@@ -1,9 +1,9 @@
 """N slider-cranks on one crankshaft, the in-line engine as a benchmark of scaling.
 
 The planar slider-crank (crank 0.304 m, rod 0.4048 m) side by side along z, 0.1 m apart; each crank is fixed
-to its neighbour a third of a turn ahead and has its own bearing.  Under gravity along -y, from θ = 0.3 at
-30 rad/s.  18 N coordinates, 24 N - 6 rows, 6 N - 5 of them redundant, one degree of freedom, never singular:
-five of every further bearing, and one of every slider-crank.
+to its neighbour a third of a turn ahead and has its own bearing.  Under gravity along -y, from θ = 0.3 at 30
+rad/s.  18 N coordinates, 24 N - 6 rows, 6 N - 5 of them redundant, one degree of freedom, never singular.
+Every further bearing has five redundant rows, every slider-crank has one.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Comparison of a run with the motion that the default method follows.
 
-Without projection only the accelerations keep a run on its branch. At a singular position these are
-ill-determined. A pseudo-inverse whose rank drops there lets the run continue along another branch, without
-violating constraints or energy balance. Near a singular position coordinate partitioning can also change the
-branch, if its dependent coordinates jump. A projected run may change branch where it came near a singular
-position, or where a coarse rank tolerance drops independent rows. Such runs count as completed only if they
-agree with the motion of the default method.
+Without projection only the accelerations keep a run on its branch. At a singular position the accelerations
+are ill-determined. A pseudo-inverse whose rank drops at the singular position lets the run continue along
+another branch, without violating constraints or energy balance. Near a singular position coordinate
+partitioning can also change the branch, if its dependent coordinates jump. A projected run may change branch
+where it came near a singular position, or where a coarse rank tolerance drops independent rows. Such runs
+count as completed only if they agree with the motion of the default method.
 """
 
 from __future__ import annotations

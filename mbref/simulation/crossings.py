@@ -1,4 +1,4 @@
-"""Crossings: the singular positions that a run passed. Their branches are computed at first access."""
+"""Crossings: the singular positions that a run passed. Branches are computed at first access."""
 
 from __future__ import annotations
 

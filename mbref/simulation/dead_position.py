@@ -2,8 +2,8 @@
 
 Near a dead position the velocities, over the rates of the drivers, grow with the inverse root of the
 remaining time: Φ_q v = ν has no solution there. If branches of a motion cross, Φ_q also loses rank, but ν is
-in its range, and the velocities are bounded. A state that violates the constraints has large velocities
-there, too, but then `taylor` can follow the motion further.
+in the range of Φ_q, and the velocities are bounded. Near a dead position a state that violates the
+constraints has large velocities, too; but then `taylor` can follow the motion further.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ NEAR_SINGULAR = (
     "position, or at a pose with a singular value above {:g}"
 )
 REDUNDANT = "rows with a singular value of {:.1e} at the start count as redundant"
-ROUNDING = 1e-13  # smaller singular values are not reported
+ROUNDING = 1e-13  # relative; smaller singular values are not reported
 NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 
@@ -134,8 +134,8 @@ def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
 
 
 def _singular_position(run: Run, status: int) -> Met | None:
-    """Return the singular position at which a run by a method that does not cross it ended; None if it ended
-    elsewhere."""
+    """Return the singular position at which a run by a method that does not cross it ended; None if the run
+    ended at a regular position."""
     meets = status == SINGULAR_AHEAD
     if run.method.is_series or not (meets or (status in FAILED and is_near(run))) or is_at_dead_position(run):
         return None
@@ -153,7 +153,7 @@ def _met(run: Run, met: Met) -> str:
 def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:
     """Return the singular positions that were passed, or the one at which the run ended.
 
-    None for a method that does not look for them.
+    None for a method that does not detect singular positions.
     """
     if met is not None:
         return Crossings(run.model, [Passed(met.time, met.coordinates, met.velocities, NONE_TAKEN)])
@@ -177,7 +177,8 @@ def _message(run: Run, status: int) -> str:
 
 
 def _left_from_rest(run: Run) -> str:
-    """The choice of a branch at a start at rest; empty where there is one, or no force acts along any."""
+    """Return a sentence on the branch chosen at a start at rest; empty if only one branch exists, or if no
+    force acts along a branch."""
     if not begins_at_rest(run) or leaving_acceleration(run) is None:
         return ""
     return LEAVES_REST.format(len(tangents(run.model, run.start.q)))

@@ -28,7 +28,8 @@ BY_STATUS = {
 
 
 def remedy(run: Run, status: int) -> str:
-    """Return a clause that names a method or change that avoids the failure; empty if none is known."""
+    """Return a clause that names a method or a change that avoids the failure; empty if no remedy is
+    known."""
     if status == SINGULAR:
         return _of_singular_matrix(run)
     if status == NOT_CONVERGED:
@@ -39,7 +40,7 @@ def remedy(run: Run, status: int) -> str:
 
 
 def _follows(run: Run) -> str:
-    """Return the advice to use `taylor`; empty if it does not complete the motion."""
+    """Return the advice to use `taylor`; empty if `taylor` does not complete the motion."""
     if trial_of(run) is None:
         return "" if run.method.is_series else FOLLOWS
     return _completes(run)
@@ -61,8 +62,8 @@ def _of_singular_matrix(run: Run) -> str:
 
 
 def _completes(run: Run) -> str:
-    """Return the fact that `taylor` completes the motion; empty if it does not, or if there is no trial
-    run."""
+    """Return a clause that `taylor` completes the motion; empty if `taylor` does not, or if no trial run was
+    made."""
     trial = trial_of(run)
     return COMPLETES if trial is not None and trial.completed else ""
 

@@ -77,8 +77,8 @@ def _cause(family: str, failed: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _drawn(verified: Sequence[Verified]) -> Table:
-    """Return the table of checks and engines on random mechanisms: on how many a check passes, of how many it
-    was decided on."""
+    """Return the table of checks and engines on random mechanisms: the number of mechanisms on which a check
+    passes, and the number on which it has a verdict."""
     names = {name: check for found in verified for name, check in found["cards"].items()}
     rows = [
         (check["card"], check["about"], *(_share(found["cards"].get(name, {})) for found in verified))

@@ -89,7 +89,7 @@ def _asked(record: Record) -> tuple[int, int]:
 
 
 def _title(record: Record) -> str:
-    """Return the name of a branch, with the end of its run if that ended early."""
+    """Return the name of a branch, with the end of its run if the run ended early."""
     branch = _asked(record)[1]
     name = f"Branch {branch}{', smooth' * (branch == SMOOTH)}"
     if record["outcome"] == Outcome.COMPLETED.label:
@@ -99,7 +99,7 @@ def _title(record: Record) -> str:
 
 def _open_reactions(run: Run) -> Iterator[str]:
     """Return a sentence on the samples at which equilibrium determines fewer components of the reactions than
-    at others."""
+    at other samples."""
     marks = {joint: np.array(row) for joint, row in (run.record.get("open_reactions") or {}).items()}
     if not marks:
         return

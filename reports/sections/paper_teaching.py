@@ -59,7 +59,7 @@ def violation(run: Run) -> np.ndarray:
 def exponent(run: Run) -> float:
     """Return the exponent p of a violation that grows as t^p; NaN if it is at rounding level.
 
-    It is a least-squares fit of the logarithms after a tenth of the time.
+    The exponent is a least-squares fit of the logarithms after a tenth of the time.
     """
     t, values = np.array(run.record["times"]), violation(run)
     late = t >= TEACHING[-1] / 10

@@ -1,5 +1,5 @@
-"""Section: joint reactions of the engines compared with the exact ones where these are unique, and how
-redundant joints share loads."""
+"""Section: joint reactions of the engines compared with the exact reactions where these are unique, and the
+shares of redundant joints in the loads."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ HEADER = (
     "Wrong or failed",
 )
 
-Costs = Mapping[Curve, Sequence[float]]  # seconds for each error of LEVELS; NaN if it is not reached
+Costs = Mapping[Curve, Sequence[float]]  # seconds for each error of LEVELS; NaN if no run reaches the error
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -55,8 +55,8 @@ def _scene(group: SceneRuns) -> list[Block]:
 
 
 def _gate(group: SceneRuns) -> list[Block]:
-    """Return a sentence on the comparison of the engines' mechanisms at the start; empty if it was not
-    made."""
+    """Return a sentence on the comparison of the engines' mechanisms at the start; empty if the mechanisms
+    were not compared."""
     if not group.gate:
         return []
     if reason := group.difference():
@@ -68,7 +68,8 @@ def _gate(group: SceneRuns) -> list[Block]:
 
 
 def _cost(runs: Sequence[Run], level: float) -> float:
-    """Return the seconds at which the curve of the completed runs reaches an error; NaN if it does not."""
+    """Return the seconds at which the curve of the completed runs reaches an error; NaN if the curve does not
+    reach the error."""
     usable = [run for run in runs if run.completed and math.isfinite(run.error)]
     cost = cost_at_error([run.seconds for run in usable], [run.error for run in usable], level)
     return math.nan if cost is None else cost

@@ -96,7 +96,8 @@ def _scene(group: SceneRuns) -> tuple[str, str]:
 
 
 def _row(group: SceneRuns) -> dict[str, list[Verdict]]:
-    """Return for each engine the best family, and the library's defaults if these are another family."""
+    """Return for each engine the best family, and the library's defaults if the defaults are another family
+    of settings."""
     best = group.best()
     found: dict[str, list[Verdict]] = {}
     for engine in dict.fromkeys(engine for engine, _ in best):

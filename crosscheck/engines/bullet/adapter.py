@@ -1,8 +1,8 @@
 """Bullet, through PyBullet: multibodies in joint coordinates, with loops closed by impulses that an iterative
 solver finds.
 
-Its step is semi-implicit and of first order. A driver is a motor with a prescribed velocity: its mean over a
-step, so that positions are met at the end of the step.
+Its step is semi-implicit and of first order. A driver is a motor with a prescribed velocity: the mean
+velocity over a step, so that the prescribed position is reached at the end of the step.
 """
 
 from __future__ import annotations

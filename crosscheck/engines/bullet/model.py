@@ -1,5 +1,5 @@
-"""A scene's spanning tree as multibodies of PyBullet: one for every link that is joined to the ground or
-floats.
+"""A scene's spanning tree as multibodies of PyBullet: one multibody for every link that is joined to the
+ground or floats.
 
 A link's frame has its origin at the joint's anchor and world-aligned axes at t = 0; states are of the frame
 of its centre of mass and principal axes.  Links are listed depth first, since PyBullet renumbers links in any

@@ -1,7 +1,7 @@
 """CasADi: generated C code for a mechanism's equations in joint coordinates, integrated by a compiled DOP853.
 
-CasADi eliminates common subexpressions. A C compiler optimises its code together with the integrator for this
-machine. The step control equals the one in ``crosscheck.engines.compiled.dop853``.
+CasADi eliminates common subexpressions. A C compiler optimises this code together with the integrator for
+this machine. The step control equals the step control of ``crosscheck.engines.compiled.dop853``.
 """
 
 from __future__ import annotations

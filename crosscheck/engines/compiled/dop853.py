@@ -3,8 +3,8 @@
 The 8(5,3) pair of Dormand and Prince (Hairer, Nørsett & Wanner, Solving Ordinary Differential Equations I,
 2nd edition, 1993, section II.5) with the step control that needed the fewest evaluations on mechanisms. The
 error is the largest over the components. The next step is the last one times 0.8 error^(-1/8), limited to 0.2
-… 100. The factor is smaller if errors grew since the previous step (K. Gustafsson, ACM Trans. Math. Software
-20, 1994).
+… 100. The factor is smaller if the error grew since the previous step (K. Gustafsson, ACM Trans. Math.
+Software 20, 1994).
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def attempt(system, h, memory):
 
 @njit(cache=True)
 def is_settled(system, t, memory):
-    """Correct the new state by the function ``system.settle``; returns whether that was possible."""
+    """Correct the new state by the function ``system.settle``; returns whether the correction succeeded."""
     new, spare = memory.new, memory.errors[0]
     status = rates_of(system.settle, system.context, t, new.ctypes.data, spare.ctypes.data)
     return status == 0 and is_finite(new)
@@ -144,7 +144,7 @@ def growth(ratio):
 
 @njit(cache=True)
 def trend(h, ratio, clock):
-    """Return the factor, at most 1, by which growing errors shorten the step after one of length h."""
+    """Return the factor, at most 1, by which growing errors shorten the step after a step of length h."""
     length, before = clock[2], clock[3]
     clock[2], clock[3] = h, ratio
     if not min(ratio, before) > 0.0:
@@ -165,7 +165,7 @@ def first_step(system, end, memory):
 
 @njit(cache=True)
 def step_within(left, h):
-    """Return the next step towards a sample: all that is left, its half, or h."""
+    """Return the next step towards a sample: the whole remaining time, half of the remaining time, or h."""
     if h * (1.0 + STRETCH) >= left:
         return left
     return min(h, 0.5 * left)
@@ -173,7 +173,8 @@ def step_within(left, h):
 
 @njit(cache=True)
 def jump(system, left, memory):
-    """Try the shortest and some longer steps and return the length with the least error; 0 if all fail."""
+    """Try the shortest and some longer steps and return the length with the least error; 0 if all attempted
+    steps fail."""
     best, least = 0.0, math.inf
     for k in range(JUMPS):
         h = min(system.shortest * (1.0 + (LONGEST_JUMP - 1.0) * k / (JUMPS - 1)), left)

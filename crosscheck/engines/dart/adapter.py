@@ -58,8 +58,8 @@ class Dart(Engine):
         return lacks_mass(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Tolerances, and steps by the angle turned in one; tolerances alone where DART's own steps do not
-        serve."""
+        """Return settings by tolerance, and by the angle that a body turns in one step; only settings by
+        tolerance if DART's own steps cannot run the scene."""
         if _is_geared(scene):
             return terms.sweep(stated_rate(scene))
         rate = scouted_rate(self, scene, "defaults", erp=DEFAULT_ERP)
@@ -74,11 +74,13 @@ class Dart(Engine):
         ]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether a family serves a scene: DART's own steps have no couplings and armatures here."""
+        """Return whether a family can run a scene: this adapter gives DART's own steps neither couplings nor
+        armatures."""
         return family in FAMILIES and (family == terms.FAMILY or not _is_geared(scene))
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate; raises ValueError for a family it does not have, or one that does not serve the scene."""
+        """Simulate a scene; raises ValueError for an unknown family, or a family that cannot run the
+        scene."""
         if setting.family in FAMILIES and not self.serves(scene, setting.family):
             raise ValueError("DART's own steps have no couplings and armatures here; family 'terms' has them")
         if setting.family == "balls" and (planar := planar_scene(scene)) is not scene:

@@ -1,9 +1,9 @@
 """Drake: joint coordinates, with loops closed by constraints of the discrete plant, which Drake's SAP solver
 satisfies.
 
-Drake's step is of first order. Its solver ends the process if a ball constraint connects a body to the world
-(1.51.1, 1.58.0), so loops are cut between moving links. A continuous plant has no constraints. Its terms are
-integrated by crosscheck.
+Drake's step is of first order. The solver of the discrete plant ends the process if a ball constraint
+connects a body to the world (1.51.1, 1.58.0), so loops are cut between moving links. A continuous plant has
+no constraints. crosscheck integrates the equations of the continuous plant.
 """
 
 from __future__ import annotations
@@ -76,7 +76,8 @@ class Drake(Engine):
         return family == terms.FAMILY or (family == DISCRETE and not scene.driver)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate a scene; raises ValueError for an unknown family or one that cannot run the scene."""
+        """Simulate a scene; raises ValueError for an unknown family, or a family that cannot run the
+        scene."""
         if setting.family == DISCRETE and scene.driver:
             raise ValueError("Drake's discrete plant prescribes no motion of a joint")
         if setting.family == DISCRETE and (planar := planar_scene(scene)) is not scene:

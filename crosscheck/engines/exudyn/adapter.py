@@ -185,8 +185,8 @@ def _trapezoidal(exu: Any, settings: Any, singular: bool) -> Any:
 
 
 def _alpha(exu: Any, settings: Any, singular: bool) -> Any:
-    """Configure the generalised-α solver with looser Newton tolerances, without which it fails at singular
-    positions."""
+    """Configure the generalised-α solver with looser Newton tolerances; with the default tolerances the
+    solver fails at singular positions."""
     settings.timeIntegration.newton.relativeTolerance = 1e-6
     settings.timeIntegration.newton.absoluteTolerance = 1e-8
     settings.timeIntegration.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
@@ -219,7 +219,8 @@ def _fully_driven(scene: Scene) -> bool:
 
 
 def _accelerates(driver: Driver) -> bool:
-    """Return whether a driver's rate changes; Exudyn's initial accelerations ignore that."""
+    """Return whether a driver's rate changes; Exudyn's initial accelerations ignore a driver's
+    acceleration."""
     return any(driver.polynomial[2:]) or bool(driver.sine and driver.sine.amplitude)
 
 

@@ -47,7 +47,7 @@ class Ending(NamedTuple):
 class Motion:
     """Node coordinates (3, k, nb, 7) at times (k,): values, rates, second rates; and how the run ended.
 
-    ``forces`` (k, ·) are the outputs of the joints' sensors, None where there are none.
+    ``forces`` (k, ·) are the outputs of the joints' sensors, None if the system has no such sensors.
     """
 
     times: np.ndarray

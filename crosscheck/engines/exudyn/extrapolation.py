@@ -1,7 +1,7 @@
 """Richardson's extrapolation of Exudyn's runs to h = 0, restarted after singular positions.
 
-The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end
-at regular positions; a step that ends near a singular one fails. If a run fails, all runs stop before a
+The trapezoidal rule with index-2 constraints has an error that is even in the step h, as long as steps end at
+regular positions; a step that ends near a singular position fails. If a run fails, all runs stop before a
 window around the failure. The states are extrapolated across the window, and the runs restart after it. All
 numbers of steps are even: the multipliers have an error that changes its sign from step to step. The
 functions take the exudyn module and do not import it.
@@ -34,11 +34,12 @@ RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight
 BEFORE, BEHIND = 2.0, 2.0  # distances of the ends of the window from the failure, in steps
 NODES = 12  # states before the singular position from which the states after it are extrapolated
 BESIDE = 0.05  # fraction of the node spacing: a node nearer to a sample is moved to it
-APART = 6.0  # distance between two states, in steps, unless the last crossing ends nearer
+APART = 6.0  # distance between two states, in steps, unless the window of the last crossing ends nearer
 
 
 def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configure: Configure) -> Motion:
-    """Runs with h, h/2, h/4, h at most ``step`` (s), extrapolated to h = 0 at ``times`` (k,).
+    """Return the motion at ``times`` (k,), extrapolated to h = 0 from runs with steps h, h/2 and h/4; h is at
+    most ``step`` (s).
 
     Positions, Euler parameters (normalised when they are read), their rates and the joint sensors' outputs
     are extrapolated.
@@ -47,7 +48,8 @@ def extrapolate(exu: Any, scene: Scene, times: np.ndarray, step: float, configur
 
 
 class _ExtrapolatedRuns:
-    """Three runs, finest first since it is the first to fail; all start from the extrapolated ``state``."""
+    """Three runs, finest first since it is the first to fail; all runs start from the extrapolated
+    ``state``."""
 
     def __init__(self, exu: Any, scene: Scene, step: float, configure: Configure):
         self.scene, self.step, self.configure = scene, step, configure
@@ -56,7 +58,7 @@ class _ExtrapolatedRuns:
         self.pieces: list[Samples] = []
 
     def through(self, times: np.ndarray) -> Motion:
-        """Return the motion at ``times``, or as far as the runs got."""
+        """Return the motion at ``times``, or at the times that the runs reached."""
         ending = None
         while times.size and (ending := self.advance(times, times)[1]):
             if (nodes := self.approach(times, ending)) is None:
@@ -68,7 +70,8 @@ class _ExtrapolatedRuns:
     def approach(self, times: np.ndarray, ending: Ending) -> Samples | None:
         """Take the samples up to the window around the first failure; returns the nodes before it.
 
-        The result is None without room for the nodes: then the failure is not due to a singular position.
+        The result is None if the samples before the window are too few for the nodes: then the failure is not
+        due to a singular position.
         """
         while True:
             start = ending.t - BEFORE * self.step
@@ -107,13 +110,13 @@ class _ExtrapolatedRuns:
         self.arrive(landed)
 
     def arrive(self, samples: Samples) -> None:
-        """Make the last of the samples the present state."""
+        """Make the last sample the present state of all runs."""
         times, values, _ = samples
-        data = self.solvers[-1].state().data  # the data variables only count turns
+        data = self.solvers[-1].state().data  # the data variables count turns only
         self.state = State(float(times[-1]), values[0, -1].ravel(), values[1, -1].ravel(), data)
 
     def motion(self, ending: Ending | None) -> Motion:
-        """Return the samples so far, with the outcome of the run that ended early."""
+        """Return all samples, with the outcome of the run that ended early."""
         costs = [solver.cost() for solver in self.solvers]
         cost = Cost(*(sum(getattr(c, item.name) for c in costs) for item in fields(Cost)))
         times, coordinates, forces = (

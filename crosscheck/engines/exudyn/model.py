@@ -249,7 +249,7 @@ class _Parts:
 
 
 def _vector_over_time(load: Any) -> dict[str, Any]:
-    """The user function of a force or moment over time; none of a constant one."""
+    """Return the user function of a force or moment over time; None for a constant force or moment."""
     if load.factor is None:
         return {}
     vector = np.array(load.force if load.type == "force" else load.moment)

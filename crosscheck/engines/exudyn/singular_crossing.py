@@ -20,7 +20,7 @@ UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])  # Euler parameters of an unrotated nod
 def extrapolated_states(scene: Scene, nodes: Samples, times: np.ndarray) -> Samples:
     """Return samples at ``times`` (k,) after the nodes, extrapolated by one polynomial through all nodes.
 
-    Coordinates and rates are then moved to the nearest ones that satisfy the judge's joint equations.
+    Coordinates and rates are then moved to the nearest values that satisfy the judge's joint equations.
     """
     known, values, forces = nodes
     unit = np.ptp(known)
@@ -70,7 +70,7 @@ def _least(scene: Scene, orientation: np.ndarray, rows: np.ndarray, wanted: np.n
     """Return the change (nb, 6) of the bodies' twists of least kinetic energy for which the rows have the
     wanted values.
 
-    With this metric the noise of a light body does not move a heavy one.
+    With kinetic energy as metric, rounding errors of a light body do not move a heavy body.
     """
     root = np.zeros((len(scene.body), 6, 6))  # square root of M⁻¹, one block for each body
     masses = np.array([body.mass for body in scene.body], dtype=float)

@@ -1,8 +1,8 @@
 """Exudyn's static solver as kinematic analysis: poses of a fully driven mechanism, one after another.
 
-Masses and forces have no influence. Velocities come from Exudyn's own constraint Jacobian. Its rank shows
-whether a pose is singular: there the solver may change to another branch without a message. The functions
-take the exudyn module and do not import it.
+Masses and forces have no influence. Velocities come from Exudyn's own constraint Jacobian. The rank of the
+Jacobian shows whether a pose is singular. At a singular pose the solver may change to another branch without
+a message. The functions take the exudyn module and do not import it.
 """
 
 from __future__ import annotations

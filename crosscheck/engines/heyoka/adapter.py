@@ -1,8 +1,8 @@
 """heyoka: Taylor series of a mechanism's equations in joint coordinates, compiled by heyoka.
 
-The order is the one that heyoka chooses for a tolerance; samples are its dense output.  Closure errors are
-neither fed back nor projected. A compiled integrator is stored in the user's cache folder by scene,
-tolerance, heyoka's version and machine.
+heyoka chooses the order for a tolerance; samples are its dense output.  Closure errors are neither fed back
+nor projected. A compiled integrator is stored in the user's cache folder by scene, tolerance, heyoka's
+version and machine.
 """
 
 from __future__ import annotations

@@ -79,7 +79,7 @@ class MuJoCo(Engine):
         return family == "tuned" or super().serves(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
-        """Return the MJCF of a setting, and Python for what MJCF does not have."""
+        """Return the MJCF of a setting, and Python statements for options that MJCF does not have."""
         return original.own_code(setting) if setting.family in original.FAMILIES else own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
@@ -183,7 +183,7 @@ class _MujocoSimulation:
             mujoco.set_mju_user_warning(None)
 
     def integrated(self, times: np.ndarray, start: float, labels: dict[str, Any]) -> Trajectory:
-        """Return the run of a compiled family; its construction began at ``start`` (s of process time)."""
+        """Return the run of a compiled family; its construction began at ``start`` (s of CPU time)."""
         family, options = self.setting.family, self.setting.options
         run = compiled_run.compiled_run(self.scene, self.compiled, self.data, family, options, self.longest)
         built = time.process_time() - start

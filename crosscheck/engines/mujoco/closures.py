@@ -100,7 +100,8 @@ def largest(rows, left, count, n):
 
 @register_jitable
 def least(rows, wanted, change, count, n):
-    """Compute the least change with rows · change = wanted; rows that depend on others count once.
+    """Compute the change of least norm with rows · change = wanted; rows that depend on other rows count
+    once.
 
     Rows are made orthonormal one by one, the largest remaining row first.
     """
@@ -239,7 +240,7 @@ def meet(c, tolerance):
 
 @register_jitable
 def meet_rates(c, qvel):
-    """Change the data's velocities to the nearest ones that the closures allow."""
+    """Change the data's velocities to the nearest velocities that the closures allow."""
     rows, wanted, root, change = parts(c)
     count = carray(small_integers(c[COUNT]), (1,))[0]
     jacobian = carray(reals(carray(integers(c[JACOBIAN]), (1,))[0]), (count, c[NV]))

@@ -1,7 +1,8 @@
 """Addresses and numbers of a MuJoCo model that C functions in compiled code read.
 
-A state consists of qpos and qvel. A driven coordinate has its prescribed value and rate. Its armature is so
-large that a generalised force causes the prescribed acceleration to rounding accuracy.
+A state consists of qpos and qvel. A driven coordinate has its prescribed value and rate. The armature of a
+driven coordinate is so large that a generalised force causes the prescribed acceleration to rounding
+accuracy.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """MuJoCo's families of settings, and the sweep over their accuracies for a scene.
 
-The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass, its
-default ten times that.  The family ``stiff`` loses an order of convergence, but has smaller closure errors
-after singular positions, which amplify them.
+The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass; MuJoCo's
+default closures are ten times as soft.  The family of settings ``stiff`` loses an order of convergence. But
+its closure errors are smaller after singular positions, which amplify closure errors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
-HARD = 1e-7  # factor on the regulariser; its error and its rounding are below 1e-9, at 1e-8 rounding grows
+HARD = 1e-7  # factor on the regulariser: relative errors below 1e-9; rounding grows at 1e-8
 RK4 = "mjINT_RK4"
 STOCK = {
     "stock": RK4,
@@ -107,7 +107,7 @@ def _adaptive(scene: Scene, rate: float) -> Iterator[Setting]:
     for family, factor in ADAPTIVE.items():
         yield from _by_rtol(family, RTOLS, least, factor, stiff)
     if depends_on_pieces(scene):
-        return  # the code of the compiled families has polynomial and sine of drivers only
+        return  # the compiled families evaluate polynomials and sines of drivers only
     yield from _by_rtol(FORWARD_COMPILED, COMPILED_RTOLS, least, hard, slow)
     yield from _by_rtol(PROJECTED_COMPILED, COMPILED_RTOLS, least, hard, None)
     if scene.driver and not may_move_freely(scene):
@@ -135,14 +135,15 @@ def _stock(scene: Scene) -> list[str]:
 
 
 def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Return steps (s) that turn by the angles (rad) at a rate (rad/s); steps that are too many are left
-    out."""
+    """Return steps (s) in which a body at a rate (rad/s) turns by the angles (rad); steps so short that a run
+    takes too many are left out."""
     steps = [_rounded(angle / rate) for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
 
 def own_code(setting: Setting) -> str:
-    """Return the MJCF of a setting that MuJoCo integrates itself, and Python for what MJCF does not have."""
+    """Return the MJCF of a setting that MuJoCo integrates, and Python statements for options that MJCF does
+    not have."""
     family, options = setting.family, setting.options
     if family in INTEGRATED_HERE:
         return ""

@@ -69,7 +69,7 @@ class Compiled:
     rates: np.ndarray  # joint velocities at t = 0
 
     def apply(self, data: Any, since: float) -> None:
-        """Set the forces on bodies and along joint coordinates to those at the time of the data.
+        """Set the forces on bodies and along joint coordinates to their values at the time of the data.
 
         Functions of time are of the piece that acts from ``since`` (s) on.
         """
@@ -224,7 +224,7 @@ class _Builder:
         """Add spring, damper and force along a joint coordinate."""
         joint, action = self.joint[self.tree.coordinate(self.scene, load.joint, load.coordinate)], load.action
         before, added = joint.stiffness[0], action.stiffness
-        if added > 0:  # two springs act as one; its natural value is their mean, weighted by stiffness
+        if added > 0:  # two springs act as one; natural value: mean weighted by stiffness
             moment = before * joint.springref + added * action.natural
             joint.stiffness[0], joint.springref = before + added, moment / (before + added)
         joint.damping[0] += action.damping

@@ -1,7 +1,7 @@
 """The model of an MJCF file itself, at its own settings, at smaller time steps and with stiffer closures.
 
 Contacts, limits, dry friction and motors are off, as in the scene that was read from the file.  The run keeps
-the file's time step: a sample between two steps is reached by one shorter step from the last of them.
+the file's time step: a sample between two steps is reached by one shorter step from the last step.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ ON_GRID = 1e-9  # fraction of a step: a sample so near a step is at the step
 
 
 def originals(path: Path, options: ImportOptions, read: Source) -> tuple[OriginalRun, ...]:
-    """Return the runs of an MJCF file that was read; none where ``--close`` closed further loops."""
+    """Return the runs of an MJCF file that was read; no runs if ``--close`` closed further loops."""
     if path.suffix != ".xml" or options.close:
         return ()
     where: dict[str, Any] = {"file": str(path.resolve())}
@@ -90,7 +90,8 @@ def _keyword(kind: Any) -> str:
 
 
 def _change(mujoco: Any, model: Any, options: Mapping[str, Any]) -> None:
-    """Give a model the settings among some options; ValueError names one that MuJoCo does not have."""
+    """Give a model the settings among some options; a ValueError names an option that MuJoCo does not
+    have."""
     model.opt.timestep = float(options.get("step", model.opt.timestep))
     model.opt.iterations = int(options.get("iterations", model.opt.iterations))
     for name, kinds in (("integrator", mujoco.mjtIntegrator), ("solver", mujoco.mjtSolver)):
@@ -106,7 +107,7 @@ def _change(mujoco: Any, model: Any, options: Mapping[str, Any]) -> None:
 
 
 def own_code(setting: Setting) -> str:
-    """Return the MJCF that makes a setting of these families; empty for the file's own."""
+    """Return the MJCF that makes a setting of these families; empty for the file's own settings."""
     if setting.family not in (FINER, STIFFER, STIFFER_RK4):
         return ""
     step = setting.options["step"]
@@ -121,7 +122,7 @@ def own_code(setting: Setting) -> str:
 def run(scene: Scene, times: np.ndarray, setting: Setting, version: str) -> Trajectory:
     """Simulate the model of the setting's file; ``scene`` names the bodies.
 
-    Raises SceneError where the file does not give this scene's bodies, ValueError without a file.
+    Raises SceneError if the file has other bodies than the scene, ValueError without a file.
     """
     import mujoco
 

@@ -16,7 +16,7 @@ from mbref.trajectory import Outcome
 ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
 CLOSED = 1e-13  # m and rad; residual at which Newton's method ends
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
-REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
+REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 
 # function that returns the driven constraint rows of the present data
 Rows = Callable[[], Sequence[tuple[int, Driver]]]
@@ -31,8 +31,8 @@ def projected(
     load: Callable[[float, np.ndarray], None],
     y: np.ndarray,
 ) -> np.ndarray:
-    """Return the state (nq + nv,) nearest to ``y``, by kinetic energy, whose positions and velocities satisfy
-    the equality constraints at time t (s).
+    """Return the state (nq + nv,) nearest to ``y``, measured by kinetic energy, whose positions and
+    velocities satisfy the equality constraints at time t (s).
 
     ``load`` puts a state into the data. Raises Failed.
     """

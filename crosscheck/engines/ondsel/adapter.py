@@ -1,11 +1,11 @@
 """OndselSolver: kinematics and inverse dynamics of driven scenes, in the coordinates and joints of the paper.
 
 Positions, velocities, accelerations and reactions follow from the drivers pose by pose, by Newton's method;
-redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose
-to pose; it decides which of several assemblies is found, not how accurate it is.  Equally spaced samples
-are one analysis; where the spacing changes, a new one starts from the pose reached.  With a cylindrical
-or planar joint between moving bodies OndselSolver's accelerations do not satisfy the joint's own equations,
-by 1e-3 and 0.3 of their size; they and the reactions are then left out.
+redundant constraints are removed by the solver.  The one option ``step`` (s) is the largest step from pose to
+pose; the step decides which of several assemblies is found, not how accurate the assembly is.  Equally spaced
+samples are computed in one analysis; where the spacing changes, a new analysis starts from the last pose.
+With a cylindrical or planar joint between moving bodies OndselSolver's accelerations do not satisfy the
+joint's own equations, by 1e-3 and 0.3 of their size; accelerations and reactions are then left out.
 """
 
 from __future__ import annotations
@@ -170,10 +170,11 @@ class _Reader:
         return rotations.rotate(self.back, self._raw(labels))
 
     def _reactions(self, position: np.ndarray, orientation: np.ndarray) -> dict[str, np.ndarray]:
-        """Return force and moment (6,) on each joint's second body at the anchor on it, the driver's
-        included.
+        """Return force and moment (6,) on each joint's second body at the anchor on that body; the driver's
+        force is included.
 
-        The result is empty without masses, or with loads, which the solver does not receive.
+        The result is empty for a scene without masses, and for a scene with loads, which the solver does not
+        receive.
         """
         if self.scene.load or not self.scene.has_mass():
             return {}

@@ -156,8 +156,8 @@ class Assembly:
 
 
 def is_reversed(joint: Joint) -> bool:
-    """Return whether the solver receives the joint's second body as its first one, because that is the
-    ground."""
+    """Return whether the solver receives the joint's second body as its first one, because the second body is
+    the ground."""
     return joint.type in ACCURATE_ON_GROUND and joint.bodies[1] == GROUND
 
 
@@ -185,8 +185,8 @@ def _frames(joint: Joint) -> list[np.ndarray]:
 
 
 def _expression(driver: Driver, t0: float, turned: float, sign: float) -> str:
-    """Return the driver's value times ``sign``, minus the angle ``turned`` (rad), in OndselSolver's
-    syntax."""
+    """Return the driver's value times ``sign``, minus the angle ``turned`` (rad), as an expression in
+    OndselSolver's syntax."""
     t = f"(time + {t0!r})"
     terms = ["*".join([f"({sign * c!r})"] + [t] * n) for n, c in enumerate(driver.polynomial)]
     if s := driver.sine:

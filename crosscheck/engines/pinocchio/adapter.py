@@ -51,7 +51,7 @@ FORCES = (
 )  # solver parameters for forces of redundant closures, whose rounding errors grow as 1/mu
 PROJECTIONS = 10  # largest number of Newton iterations; two are usual
 CLOSED = 1e-13  # m and rad; residual at which a projection ends
-REDUNDANT = 1e-7  # singular value / largest one; smaller ones belong to redundant rows
+REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 NOTHING = 1e-12  # smaller entries of closure rows, relative to the scene's length, are rounding
 CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
 # rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
@@ -93,7 +93,7 @@ class Pinocchio(Engine):
         return family == "tuned" or super().serves(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
-        """Return the settings of constraintDynamics; empty where DOP853 integrates."""
+        """Return the settings of constraintDynamics; empty if crosscheck's DOP853 integrates."""
         return own_code(setting)
 
     def prepare(self, families: Sequence[str]) -> None:
@@ -191,7 +191,8 @@ class _PinocchioSimulation:
     def without_python(
         self, times: np.ndarray, setting: Setting, start: float, labels: dict[str, Any]
     ) -> Trajectory:
-        """Return the run of a compiled family; its construction began at ``start`` (s of process time)."""
+        """Return the run of a compiled family; the construction of the run began at ``start`` (s of process
+        time)."""
         solver = compiled_run.Solver(*WITHOUT_PYTHON, setting.options.get("beta", 0.0), self.least)
         run = compiled_run.CompiledRun(self.mechanism, self.loads, solver)
         built, is_projected = time.process_time() - start, setting.family == TUNED_COMPILED
@@ -230,8 +231,8 @@ class _PinocchioSimulation:
         return y if self.flat and not self.driven else np.concatenate(self.split(t, y))
 
     def projected(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Return the nearest state, by kinetic energy, whose positions and velocities satisfy the closures.
-        With this metric the rounding of a light body does not move a heavy one."""
+        """Return the nearest state, measured by kinetic energy, whose positions and velocities satisfy the
+        closures. With kinetic energy as metric, rounding errors of a light body do not move a heavy body."""
         q, v = self.split(t, y)
         if not len(self.closures):
             return np.concatenate((q, v))

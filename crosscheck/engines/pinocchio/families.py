@@ -13,7 +13,7 @@ BAUMGARTE = 0.1  # decay rate of the closure errors in 1/step, a double root
 RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step, for each setting
-# rad turned per step, for the stabilised family only: without stabilisation closure errors dominate
+# rad turned per step, for the stabilised family only; in the others closure errors dominate
 FINEST = 0.0007
 MAX_FIXED_STEPS = 250_000
 FIXED = ("defaults", "proximal", "baumgarte")
@@ -68,8 +68,8 @@ def _compiled(least: float) -> list[Setting]:
 
 
 def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Return steps (s) that turn by the angles (rad) at a rate (rad/s); steps that are too many are left
-    out."""
+    """Return steps (s) in which a body at a rate (rad/s) turns by the angles (rad); steps so short that a run
+    takes too many are left out."""
     steps = [float(f"{angle / rate:.2g}") for angle in angles]
     return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
 

@@ -150,8 +150,8 @@ class _PointForce:
 class Loads:
     """Generalised forces of a scene's loads, and of its driven coordinates with large armatures.
 
-    Constant loads (a moment on a body that turns about one direction) are evaluated once. All others are
-    converted to joint torques by Pinocchio's static torque for a model without gravity.
+    Constant loads (a moment on a body that turns about one direction) are evaluated once. All other loads are
+    converted to joint torques by Pinocchio's function for static torques, on a model without gravity.
     """
 
     def __init__(self, mechanism: Mechanism):

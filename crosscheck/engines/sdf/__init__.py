@@ -1,1 +1,1 @@
-"""SDF files as scenes, read without an engine: their joints may close loops themselves."""
+"""SDF files as scenes, read without an engine. Joints of an SDF file may close loops."""

@@ -1,4 +1,5 @@
-"""World poses of the named frames of an SDF model: links, joints and frames, each relative to another one."""
+"""World poses of the named frames of an SDF model: links, joints and frames, each given relative to another
+frame."""
 
 from __future__ import annotations
 
@@ -16,13 +17,13 @@ WORLD = "world"
 
 
 class Pose(NamedTuple):
-    """Position (3,) and rotation matrix (3, 3) of a frame in another one."""
+    """Position (3,) and rotation matrix (3, 3) of a frame in another frame."""
 
     position: np.ndarray
     turn: np.ndarray
 
     def then(self, inner: Pose) -> Pose:
-        """Return the pose of a frame that is given in this one."""
+        """Return the pose of a frame whose pose is given in this frame."""
         return Pose(self.position + self.turn @ inner.position, self.turn @ inner.turn)
 
 
@@ -30,7 +31,8 @@ ORIGIN = Pose(np.zeros(3), np.eye(3))
 
 
 def numbers(element: ET.Element | None, where: str, count: int) -> np.ndarray:
-    """Return the numbers of an element, zeros without text; SceneError for another number of them."""
+    """Return the numbers of an element, zeros if it has no text; raises SceneError if the element has more or
+    fewer numbers."""
     text = (element.text or "") if element is not None else ""
     try:
         found = np.array([float(word) for word in text.split()])
@@ -91,7 +93,8 @@ class Frames:
                 self._elements[str(element.get("name"))] = element
 
     def world(self, name: str, within: tuple[str, ...] = ()) -> Pose:
-        """Return the world pose of a frame; SceneError for an unknown one and for frames in a circle."""
+        """Return the world pose of a frame; raises SceneError for an unknown frame and for frames that refer
+        to each other in a circle."""
         if name in self._known:
             return self._known[name]
         if name not in self._elements:

@@ -1,4 +1,4 @@
-"""The scene of an SDF file: links as bodies at their poses, joints at their frames, loops as they are."""
+"""The scene of an SDF file: links become bodies, joints keep their frames, and loops stay closed."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ from mbref.scene import (
     Universal,
 )
 
-GRAVITY = (0.0, 0.0, -9.8)  # m/s², of a file that gives none: the default of the format
-SQUARE = 1e-6  # cosine between the axes of a universal joint: a larger one is no rounding
+GRAVITY = (0.0, 0.0, -9.8)  # m/s², the format's default for a file without gravity
+SQUARE = 1e-6  # cosine between the axes of a universal joint; a larger cosine is no rounding
 TYPES: dict[str, Any] = {
     "fixed": Fixed,
     "revolute": Revolute,
@@ -48,7 +48,8 @@ UNUSED = {"plugin": "plugins", "actor": "actors", "light": "lights", "gripper": 
 
 
 def read(path: Path, options: ImportOptions) -> Imported:
-    """The scene of a .sdf file; raises SceneError, ValueError for an option, OSError."""
+    """Return the scene in a .sdf file; raises SceneError for a faulty file, ValueError for a faulty option,
+    OSError."""
     without = checked(options.without)
     if options.keyframe or options.pose or options.close:
         raise SceneError(
@@ -75,7 +76,8 @@ def read(path: Path, options: ImportOptions) -> Imported:
 
 
 def _unused(root: ET.Element) -> Iterator[str]:
-    """Sentences on parts that a scene does not have and that do not change a motion without contacts."""
+    """Return sentences on parts that a scene cannot contain and that do not change a motion without
+    contacts."""
     counts = {name: len(list(root.iter(tag))) for tag, name in UNUSED.items()}
     counts["limits of joints"] = sum(limit.find("lower") is not None for limit in root.iter("limit"))
     counts["shapes that could touch others"] = len(list(root.iter("collision")))
@@ -96,7 +98,7 @@ class _Reader:
 
     def scene(self, name: str, gravity: Any, hold: Any) -> Scene:
         """Return the scene of all models, with some bodies fixed to the ground; raises SceneError for an
-        unknown one."""
+        unknown body."""
         known = {body.name: body for body in self.bodies}
         if unknown := [body for body in hold if body not in known]:
             raise SceneError([f"--hold {unknown[0]}: no such link that moves; known: {', '.join(known)}"])
@@ -256,7 +258,8 @@ def _is_true(element: ET.Element | None) -> bool:
 
 
 def _inertia(element: ET.Element | None, link: str) -> np.ndarray:
-    """Return the inertia matrix (3, 3) of an element, with ones in the diagonal where it gives none."""
+    """Return the inertia matrix (3, 3) of an element, with ones in the diagonal if the element gives no
+    inertia."""
     if element is None:
         return np.eye(3)
 
@@ -276,13 +279,13 @@ def _plain(inertia: np.ndarray) -> Any:
 
 
 class SdfFiles:
-    """Files of Gazebo and others: read only."""
+    """SDF files of Gazebo and other programs, which are read and not written."""
 
     reads = (".sdf",)
     writes = ()
 
     def read(self, path: Path, options: ImportOptions) -> Imported:
-        """The scene of a .sdf file; raises SceneError, ValueError, OSError."""
+        """Return the scene in a .sdf file; raises SceneError, ValueError, OSError."""
         return read(path, options)
 
     def write(self, scene: Scene) -> Any:

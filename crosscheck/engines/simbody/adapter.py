@@ -2,8 +2,8 @@
 accepted step.
 
 Redundant closures are allowed (multipliers of least norm). The families are Simbody's error-controlled
-integrators. Their only option is ``accuracy``, the tolerance of one step. OpenSim reports no numbers of
-steps, so these are missing in the cost.
+integrators. The only option of a family is ``accuracy``, the tolerance of one step. OpenSim reports no
+numbers of steps, so the cost lacks the numbers of steps.
 """
 
 from __future__ import annotations

@@ -4,10 +4,10 @@ With Euler parameters p, body-fixed ω', and the twist V = (v, ω'), the residua
 
     q' = T(q) (V + Φ_qᵀ μ),   M V' = f + Φ_qᵀ λ,   Φ(q, t) = 0,   Φ_q V = ν,
 
-the index-2 form of Gear, Gupta and Leimkuhler; λ and μ are derivatives of two further states, which makes
-it of index 1 (Gear).  Rows that are redundant at the start are left out; a QR decomposition with pivoting
-selects the others. If another selection becomes much better conditioned, the run restarts with it. The run
-ends if a row that was left out is violated later.
+the index-2 form of Gear, Gupta and Leimkuhler; λ and μ are derivatives of two further states, which reduces
+the index of the equations to 1 (Gear).  Rows that are redundant at the start are left out; a QR decomposition
+with pivoting selects the independent rows. If another selection becomes much better conditioned, the run
+restarts with it. The run ends if a row that was left out is violated later.
 
 The residual is computed by numpy, which takes most of the time.  The one option is ``rtol``.
 """

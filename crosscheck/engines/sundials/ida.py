@@ -19,7 +19,8 @@ from mbref.trajectory import Outcome
 
 INCREMENT = 1e-7  # increment of difference quotients / scale of the component
 WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this fraction of the best choice's
-# fraction of the length, or rad: a row that was left out and is violated by more was not redundant
+# fraction of the length, or rad: a row that was left out and is violated by a larger residual was not
+# redundant
 LOST = 1e-2
 LOOSE = 1e2  # tolerance of ∫μ / its scale; large, because ∫μ is not used and would limit the steps
 LEAST_STEP = 1e-12  # shortest step / duration
@@ -55,7 +56,7 @@ class Run:
         return np.concatenate([r.ravel(), p.ravel(), twist.ravel(), np.zeros(self.equations.springs)])
 
     def _choose(self, t: float) -> bool:
-        """Choose better rows than the present ones; returns whether the choice changed.
+        """Choose better rows than the present rows; returns whether the choice changed.
 
         The number of rows is the rank at the start, because redundant rows seem independent if the pose does
         not satisfy the joints exactly.
@@ -109,7 +110,7 @@ class Run:
         self.evaluated = 0
 
     def _scale(self, multipliers: np.ndarray) -> np.ndarray:
-        """Return the sizes (size,) of the components: absolute tolerances are ``rtol`` times these."""
+        """Return the sizes (size,) of the components: absolute tolerances are ``rtol`` times the sizes."""
         e, rate = self.equations, stated_rate(self.scene)
         force = max(np.abs(multipliers).max(initial=0.0), np.abs(e.forces.mass).max() * rate**2 * self.length)
         twist = np.repeat([self.length * rate, rate], 3)

@@ -140,7 +140,7 @@ class TreeEquations:
         return sum((np.array(load.moment, dtype=float) for load in own), np.zeros(3))
 
     def _rank(self) -> int:
-        """Return the rank of the closures at the start."""
+        """Return the rank of the closures' Jacobian at the start."""
         _, jacobian, _ = self._closures(self.frames(np.zeros(self.n), np.zeros(self.n), NUMBERS))
         return int(np.linalg.matrix_rank(jacobian.astype(float), rtol=RANK_TOLERANCE))
 
@@ -161,8 +161,8 @@ class TreeEquations:
         return motion, self._closing(frames, forces)
 
     def _solved(self, frames: Sequence[Frame]) -> tuple[np.ndarray, np.ndarray]:
-        """Return q̈ (n,) and the forces (closures, 3) of the closures, by least squares if these are
-        singular."""
+        """Return q̈ (n,) and the forces (closures, 3) of the closures, by least squares if the equations of
+        the closures are singular."""
         mass, force = (part.astype(float) for part in self._inertia(frames))
         _, jacobian, bias = (part.astype(float) for part in self._closures(frames))
         free, along = np.linalg.solve(mass, force), np.linalg.solve(mass, jacobian.T)

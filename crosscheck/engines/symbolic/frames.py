@@ -32,10 +32,11 @@ class Turned:
 
 @dataclass
 class Frame:
-    """A moving link: its point that was at ``reference`` is at ``origin``, and it is rotated by ``rotation``.
+    """A moving link: the point of the link that was at ``reference`` at t = 0 is at ``origin``, and the link
+    is rotated by ``rotation``.
 
-    ``columns`` lists the coordinates that move it: index, whether it is a turn, axis, and a point of the
-    axis. The accelerations hold for q̈ = 0.
+    ``columns`` lists the coordinates that move the link: index, whether the coordinate is a turn, axis, and a
+    point of the axis. The accelerations hold for q̈ = 0.
     """
 
     reference: np.ndarray

@@ -102,7 +102,8 @@ class Generator(Engine):
 
 
 def _sample(scene: Scene, y: np.ndarray) -> Sample:
-    """Return poses, velocities and accelerations; with reactions if the joints are the scene's own."""
+    """Return poses, velocities and accelerations; reactions are included if no joint of the scene was
+    replaced."""
     equations = equations_of(scene)
     motion, closing = equations.link_motion(y)
     own, tree = list(equations.tree.own), equations.tree

@@ -2,8 +2,8 @@
 
 The bound is SAFETY times the largest difference so far, and never less than LEAST.  In test scenes with
 truths of forty digits, let d be the difference of the two formulations: the error of A was at most 1.5 d, of
-B at most 2.5 d. A second run of A alone can be nearer to the first by chance, which a factor of ten allows
-for.
+B at most 2.5 d. A second run of A can by chance be nearer to the first run than to the true motion; SAFETY
+allows a factor of ten for that.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ DIGEST = hashlib.sha256().digest_size
 
 
 def load(scene: Scene) -> dict[str, np.ndarray]:
-    """Return the stored arrays of a scene; empty if there is no complete file."""
+    """Return the stored arrays of a scene; empty if no complete file exists."""
     try:
         content = _path(scene).read_bytes()
     except OSError:
@@ -49,7 +49,7 @@ def load(scene: Scene) -> dict[str, np.ndarray]:
 
 
 def save(scene: Scene, arrays: dict[str, np.ndarray]) -> None:
-    """Store the arrays of a scene; a reader sees the old file or the new one, never a part."""
+    """Store the arrays of a scene; a reader sees the old file or the new file, never a part."""
     body, path = io.BytesIO(), _path(scene)
     # without this annotation an array named ``allow_pickle`` would be taken as an option of savez
     named: dict[str, Any] = {**arrays}

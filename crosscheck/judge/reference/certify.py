@@ -27,7 +27,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
-# digits of a step's tolerance beyond the requested ones; the larger number if the smaller one does not
+# digits of a step's tolerance beyond the requested digits; the larger number if the smaller number does not
 # suffice
 SPARE = (6, 12)
 POSES = 101  # number of poses along a motion at which the rank is checked
@@ -54,7 +54,7 @@ def unshown(_: str) -> AbstractContextManager[Progress]:
 
 
 class NotCertified(ArithmeticError):
-    """The formulations do not agree to the requested digits, or one of them ends early."""
+    """The formulations do not agree to the requested digits, or a formulation ends early."""
 
 
 def certified(

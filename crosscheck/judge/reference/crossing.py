@@ -2,8 +2,9 @@
 
 On a smooth branch that crosses a singular position transversally, the least singular value of the constraint
 Jacobian is |s(t)| with s smooth and s(t*) = 0.  The accelerations stay smooth, but the equations for them
-lose digits near t*; there they are taken from a polynomial through the other points.  If the iteration then
-does not converge, the previous panel is extended across the singular position (tree.py, panels.py).
+lose digits near t*; near t* the accelerations are taken from a polynomial through the other points.  If the
+iteration does not converge with these accelerations, the previous panel is extended across the singular
+position (tree.py, panels.py).
 """
 
 from __future__ import annotations
@@ -43,13 +44,13 @@ def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
 
 
 def _inside(near: np.ndarray) -> bool:
-    """Return whether there are points to be bridged, not too many, with other points on both sides."""
+    """Return whether some points are to be bridged, not too many, with other points on both sides."""
     return bool(near.any() and near.sum() <= MOST * len(near) and not near[0] and not near[-1])
 
 
 def singular_ahead(nodes: np.ndarray, distance: np.ndarray) -> float | None:
-    """Return the place in (1, 3) at which the distance (K,) from singularity becomes zero if it continues as
-    at the panel's end."""
+    """Return the place in (1, 3) at which the distance (K,) from singularity becomes zero if the distance
+    continues as at the panel's end."""
     x, d = nodes[-WINDOW // 2 :], distance[-WINDOW // 2 :]
     slope, _ = np.polyfit(x, d, 1)
     ahead = 1 - d[-1] / slope if slope < 0 else np.inf
@@ -63,8 +64,8 @@ def _fit(x: np.ndarray, d: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def bridged(nodes: np.ndarray, rates: np.ndarray, distance: np.ndarray) -> np.ndarray:
-    """Return rates (K, n) in which those near the singular position come from the polynomial through the
-    others."""
+    """Return rates (K, n); near the singular position the rates come from the polynomial through the rates of
+    the other points."""
     near = near_singular(distance)
     if not _inside(near):
         return rates

@@ -56,7 +56,7 @@ class Expansion:
 
     @property
     def angles(self) -> list[np.ndarray]:
-        """The series of the angles of loads about joints' axes."""
+        """Series of the angles of loads about joints' axes."""
         return [load.value for load in self._loads.turned]
 
     @property
@@ -100,8 +100,9 @@ class Expansion:
 class Series:
     """Series of the coordinates about a time, and the sizes of its terms, which determine the possible steps.
 
-    The size of a term is the larger of it and the next one, so that a series with even orders only is not cut
-    too early. The series ends with its smallest term, because later terms contain growing rounding noise.
+    The size of a term is its norm or the norm of the next term, whichever is larger, so that a series with
+    even orders only is not cut too early. The series ends with its smallest term, because later terms contain
+    growing rounding noise.
     """
 
     def __init__(self, x: np.ndarray):
@@ -111,7 +112,7 @@ class Series:
         self._logs -= self._logs[0]
 
     def reach(self, tolerance: float) -> float:
-        """Return the longest step (s) whose smallest term is not above the tolerance."""
+        """Return the longest step (s) for which the smallest term is not above the tolerance."""
         with np.errstate(over="ignore"):
             each = np.exp((np.log(tolerance) - self._logs[1:]) / self._orders[1:])
         return float(np.minimum(each[:-1], each[1:])[LEAST_TERMS - 1 :].max())

@@ -111,9 +111,9 @@ class Drives:
 
 def independent(rows: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return numbers of independent rows among unit rows (m, n), in increasing order, and the pivots (min(m,
-    n),) relative to the first.
+    n),) relative to the first pivot.
 
-    Weights (m,) near one decide between rows that are equally good.
+    Weights (m,) near one decide between rows with equal pivots.
     """
     if not len(rows):
         return np.zeros(0, dtype=int), np.zeros(0)
@@ -123,11 +123,11 @@ def independent(rows: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def function_series(function: TimeFunction, t: Any, terms: int, arithmetic: Arithmetic) -> np.ndarray:
-    """Taylor coefficients (terms,) about t of the piece of a function that acts from t on."""
+    """Return Taylor coefficients (terms,) about t of the piece of a function that acts from t on."""
     piece, series = piece_of(function, float(t), arithmetic), arithmetic.zeros(terms)
     for coefficients, d in ((piece.cubic, t - piece.knot), (arithmetic.array(function.coefficients), t)):
         c = list(coefficients) if piece.acts else []
-        for i in range(len(c)):  # Horner's scheme, again and again: the polynomial of d + s
+        for i in range(len(c)):  # repeated Horner's scheme: coefficients of the polynomial in s at d + s
             for j in range(len(c) - 2, i - 1, -1):
                 c[j] = c[j] + d * c[j + 1]
         series[: len(c)] = series[: len(c)] + c[:terms]

@@ -26,16 +26,16 @@ WEAKER = {
 }
 """Types whose rows are among those of a type, with the same anchor and axis; the fewest rows first."""
 REMOVED = "removed"
-# smallest singular value without the removed rows / with them; a smaller ratio forbids the removal
+# smallest singular value without / with the removed rows; a smaller ratio forbids the removal
 KEPT = 0.02
 Pose = tuple[float, np.ndarray, np.ndarray]
 """Time, positions (nb, 3) and orientations (nb, 4)."""
 
 
 def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
-    """Return the scene with redundant joints removed or replaced by weaker ones, the last joints first. The
+    """Return the scene with redundant joints removed or replaced by weaker joints, the last joints first. The
     rank at t = 0 and at poses along the motion is unchanged.  Joints whose coordinate is used are unchanged;
-    if redundant rows remain among them, the scene is unchanged."""
+    if such joints have redundant rows, the scene is unchanged."""
     poses = [(0.0, *initial_poses(scene)), *along]
     rank = _rank(scene)
     least = [_singular_value(scene, rank, pose) for pose in poses]
@@ -62,7 +62,7 @@ def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
 
 
 def replaced(scene: Scene, by: Scene) -> dict[str, str]:
-    """Return the joints of a scene that another scene lacks or replaces by weaker ones, by name: their new
+    """Return the joints of a scene that another scene lacks or replaces by weaker joints, by name: their new
     type or REMOVED."""
     types = {joint.name: joint.type for joint in by.joint}
     kept = {joint.name: types.get(joint.name, REMOVED) for joint in scene.joint}
@@ -70,10 +70,10 @@ def replaced(scene: Scene, by: Scene) -> dict[str, str]:
 
 
 def _weaker(joint: Joint) -> Iterator[tuple[Joint, ...]]:
-    """Return the possible replacements of a joint: none, then weaker joints.
+    """Return the possible replacements of a joint: no joint, then weaker joints.
 
-    For a revolute joint the last ones are universal joints, which also turn about one of two directions
-    normal to its axis.
+    For a revolute joint the last replacements are universal joints, which also turn about one of two
+    directions normal to the hinge's axis.
     """
     yield ()
     axis = next(iter(joint.directions), None)
@@ -101,7 +101,7 @@ def _rank(scene: Scene) -> int:
 
 
 def _singular_value(scene: Scene, number: int, pose: Pose) -> float:
-    """Return one of the rows' singular values; number 1 is the largest, and number 0 gives infinity."""
+    """Return a singular value of the rows by its number: number 1 is the largest, number 0 gives infinity."""
     return float(_singular_values(scene, pose)[number - 1]) if number else np.inf
 
 

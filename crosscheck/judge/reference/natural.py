@@ -2,8 +2,8 @@
 
 The coordinates of a body are the columns of X_b = [r A]: centre of mass and body axes in the world, twelve
 numbers (J. García de Jalón and E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994).  A
-point or direction fixed in a body is linear in them, X e, so that rigidity and all joints are rows
-(X u) · (X w) = c, drivers put a time into c or turn u, and the mass matrix is constant.
+point or direction fixed in a body is a linear function X e of the coordinates, so that rigidity and all
+joints are rows (X u) · (X w) = c, drivers put a time into c or turn u, and the mass matrix is constant.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class NaturalCoordinates:
 
     The last columns of X (3, n) are the ground's [0 1]. Lengths are in the unit ``length`` (m), a power of
     two near the scene's size. So all coordinates are about one, and the scaling changes no digit.  Products 0
-    … m - 1 are the rows' products; further ones are the second products of driven angles.
+    … m - 1 are the rows' products; further products are the second products of driven angles.
     """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
@@ -68,7 +68,7 @@ class NaturalCoordinates:
         self.c = arithmetic.array([row.c for row in rows])
         self.mass = self._mass()
         self.joints = JointCoordinates(self)
-        self.count = len(self.c) + len(self.joints.couplings)  # number of rows, the last ones of couplings
+        self.count = len(self.c) + len(self.joints.couplings)  # rows of couplings are last
 
     def take_right_angles(self) -> None:
         """Let axes of universal joints that are perpendicular to rounding enclose a right angle; with many
@@ -212,8 +212,8 @@ class NaturalCoordinates:
     def _driven(
         self, kind: str, driver: Driver, e: Sequence[np.ndarray], f: Sequence[np.ndarray], apart: np.ndarray
     ) -> Row:
-        """Return the row of an angle ψ: the first axis on the second body is perpendicular to cos ψ e₂ -
-        sin ψ e₁."""
+        """Return the row of a driven angle ψ: the first axis on the second body is perpendicular to cos ψ e₂
+        - sin ψ e₁."""
         if kind == "translational":
             return Row(e[2], apart, 0.0, driver)
         return Row(e[1], f[0], 0.0, driver, -1 * e[0])
@@ -222,7 +222,8 @@ class NaturalCoordinates:
         """Return M (4 nb, 4 nb) such that ½ Σ Ẋ M Ẋᵀ is the kinetic energy: mass and ½ tr(J) 1 - J of each
         body.
 
-        Bodies without mass have unit ones, which have no influence if the drivers determine the motion.
+        Bodies without mass have unit masses and inertias, which have no influence if the drivers determine
+        the motion.
         """
         mass = self.arithmetic.zeros(4 * self.nb, 4 * self.nb)
         for b, body in enumerate(self.scene.body):

@@ -1,9 +1,9 @@
 """Joint coordinates in natural coordinates as Taylor series; the rows of couplings and armatures.
 
 An angle follows from θ' = C S' - S C' with C = e₁ · f₁ and S = e₂ · f₁ of the cross axes e of the first body
-and f of the second, a displacement is a · d.  Order j of both is linear in X_j, with the gradient at the time
-of expansion, so that a coupling is a row with a multiplier. An armature I is a row, too: its multiplier is μ
-= I q'', with the diagonal entry -1 / I.
+and f of the second, a displacement is a · d.  Order j of the angle and of the displacement is linear in X_j,
+with the gradient at the time of expansion, so that a coupling is a row with a multiplier. An armature I is a
+row, too. Its multiplier is μ = I q''; its entry on the diagonal is -1 / I.
 """
 
 from __future__ import annotations
@@ -154,7 +154,8 @@ Form = AngleForm | SlideForm
 class Gear:
     """The row Σ weight × coordinate, with coordinates given by number.
 
-    For a coupling it is 0. For an armature its second derivative is the multiplier over the ``inertia``.
+    For a coupling the sum is 0. For an armature the second derivative of the sum is the multiplier over the
+    ``inertia``.
     """
 
     terms: tuple[tuple[int, Any], ...]
@@ -196,7 +197,7 @@ class JointCoordinates:
         return Gear(((i, self._of.arithmetic.number(1.0)),), inertia)
 
     def _number(self, joint: Joint, coordinate: str) -> int:
-        """Return the number of a coordinate, which is appended if it is new."""
+        """Return the number of a coordinate; a new coordinate is appended."""
         key = joint.name, coordinate
         if key not in self._numbers:
             self._numbers[key] = len(self.forms)

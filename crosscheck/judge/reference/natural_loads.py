@@ -19,7 +19,8 @@ from mbref.scene_joints import ANGLE
 
 
 class Loads:
-    """Gravity and the loads of a scene; ``turned`` are loads about joints' axes, ``slid`` along them."""
+    """Gravity and the loads of a scene; ``turned`` are loads about joints' axes, ``slid`` are loads along
+    joints' axes."""
 
     def __init__(self, of: NaturalCoordinates):
         self.constant = of.arithmetic.zeros(3, 4 * of.nb + 4)
@@ -57,11 +58,12 @@ class Loads:
             (self.turned if load.coordinate == ANGLE else self.slid).append(JointForm(of, load))
 
     def series(self, t: Any, angles: Sequence[Any], terms: int) -> LoadSeries:
-        """The loads as series of so many terms about t, from the angles of ``turned`` there."""
+        """Return the loads as series about t with the given number of terms, from the angles of ``turned`` at
+        t."""
         return LoadSeries(self, t, angles, terms)
 
     def factor(self, factor: Factor | None, t: Any, terms: int) -> np.ndarray:
-        """Taylor coefficients (terms,) about t of a factor, 1 without."""
+        """Return Taylor coefficients (terms,) about t of a load's factor; 1 for a load without factor."""
         if factor is not None:
             return function_series(factor, t, terms, self.arithmetic)
         found = self.arithmetic.zeros(terms)
@@ -165,7 +167,8 @@ class JointForm:
 
 
 class JointSeries:
-    """Its force or torque along the coordinate, an angle of which unwraps; ``applied`` (terms,)."""
+    """Series of a load's force or torque along a joint coordinate; an angle counts full turns, ``applied``
+    has (terms,)."""
 
     def __init__(self, form: JointForm, start: Any, applied: np.ndarray):
         self._form, self._applied, self._moment = form, applied, 0 * applied
@@ -173,15 +176,16 @@ class JointSeries:
 
     @property
     def value(self) -> np.ndarray:
-        """The coordinate (terms,)."""
+        """Series of the coordinate (terms,)."""
         return self._moved.value
 
     def grow(self, k: int, x: np.ndarray) -> None:
-        """Order k of the coordinate."""
+        """Compute order k of the coordinate."""
         self._moved.grow(k, x)
 
     def order(self, k: int) -> np.ndarray:
-        """Order k (3, n) of the force: (amount - stiffness (q - rest) - damping q') times the gradient."""
+        """Return order k (3, n) of the force: (amount - stiffness (q - rest) - damping q') times the
+        gradient."""
         form = self._form
         elastic = self.value[k] - form.rest if k == 0 else self.value[k]
         resistance = form.stiffness * elastic + form.damping * (k + 1) * self.value[k + 1]

@@ -19,11 +19,11 @@ from crosscheck.judge.deadline import ask
 from crosscheck.judge.reference.crossing import bridged, singular_ahead, singular_time
 
 SWEEPS = 60  # Picard iterations before a panel is shortened
-MANY = 35  # iterations; after more of them the next panel is not longer
+MANY = 35  # iterations; after more iterations the next panel is not longer
 SETTLED = 2000.0  # rounding units; limit of the last change and of the last coefficients of the series
 BRIDGED = 1e4  # factor on the tolerance across a singular position
 TELLING = 1e-3  # change of an iterate below which its series determines the length of a panel
-ROUGHLY = 1.2  # safety factor on the length that the series of an iterate gives
+ROUGHLY = 1.2  # safety factor on a panel length estimated from the series of an iterate
 SPARE = 0.9  # panel length / longest length that the series resolves
 # factors on the length of the next panel: largest, after a failed panel, smallest
 LONGEST, SHORTER, SHORTEST = 1.6, 0.6, 0.5
@@ -53,17 +53,17 @@ class Equations(Protocol):
         singularity."""
 
     def nearer(self, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Return states that violate the constraints less; near singular positions, rates of other states
-        lose digits."""
+        """Return states that violate the constraints less; near singular positions, the rates of states that
+        violate the constraints lose digits."""
 
 
 @dataclass(frozen=True)
 class Panel:
     """An interval of time: start, length, states (nodes, n) and rates of the columns after the light ones.
 
-    Further fields are: whether the iteration has converged, a factor on the length for the next panel or
-    another attempt, and the places in [-1, 1] of a crossed singular position and (from -1 on) of a predicted
-    one.
+    Further fields are: whether the iteration has converged; a factor on the length for the next panel or
+    another attempt; the place in [-1, 1] of a crossed singular position; the place (from -1 on) of a
+    predicted singular position.
     """
 
     start: Any
@@ -132,7 +132,7 @@ class Panels:
     def _integrated(
         self, equations: Equations, y: np.ndarray, rates: np.ndarray, length: Any
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return states (nodes, n) from the first one on, for given rates of the columns after the light
+        """Return states (nodes, n) from the first state on, for given rates of the columns after the light
         ones, and the columns' sizes (n,)."""
         light, half, better = equations.light, length / 2, y.copy()
         better[:, light:] = y[0, light:] + half * self.times(self.integral, rates)
@@ -167,7 +167,7 @@ class Panels:
     def _noise(self, series: np.ndarray) -> float:
         """Return the noise of an iterate that ill-conditioned equations cause.
 
-        It is 0 if the series decreases to its end, or to the tolerance.
+        The noise is 0 if the series decreases to its end, or to the tolerance.
         """
         few = len(series) // 8
         before, last = series[-2 * few : -few].max(), series[-few:].max()
@@ -175,10 +175,10 @@ class Panels:
         return NOISE * float(last) if noisy else 0.0
 
     def _fits(self, series: np.ndarray, change: float, tolerance: float) -> float:
-        """Return the factor by which a panel could be longer with its points.
-
-        The series falls geometrically: if an iterate needs k coefficients down to the size of its change,
-        the solution needs k log(tolerance) / log(change); if they do not reach so far, the last one is used.
+        """Return the factor by which a panel with an equal number of points could be longer. The coefficients
+        decrease geometrically: if an iterate needs k coefficients down to the size of its change, the
+        solution needs k log(tolerance) / log(change); if the iterate has fewer coefficients, the last
+        coefficient is used.
         """
         level = max(change, tolerance)
         above = np.flatnonzero(series > level)

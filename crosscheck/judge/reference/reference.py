@@ -1,10 +1,11 @@
 """The reference motion of any scene: two formulations, their agreement, and the bound that follows from it.
 
-Formulation A computes the motion twice, by series of different orders and with other independent rows if some
-are redundant. Formulation B computes it once. If redundant rows contradict each other, because the scene's
-numbers are rounded, joints are displaced by that amount in the second run. If B ends before A, as at a
-singular position, the difference of the two runs of A gives the bound. If A runs out of time before B, as
-with stiff dampers, B is run twice, and the difference of the two runs of B gives the bound from there on.
+Formulation A computes the motion twice, by series of different orders and, if rows are redundant, with
+different independent rows. Formulation B computes it once. If redundant rows contradict each other, because
+the scene's numbers are rounded, joints are displaced by the amount of the contradiction in the second run. If
+B ends before A, as at a singular position, the difference of the two runs of A gives the bound. If A runs out
+of time before B, as with stiff dampers, B is run twice, and the difference of the two runs of B gives the
+bound from there on.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ class Reference:
     error.
 
     The bound is a distance over the scene's length, or an angle (rad). ``both`` (k,) is True where A and B
-    agree, and False where two runs of one of them agree. ``seconds`` is the CPU time.
+    agree, and False where two runs of one formulation agree. ``seconds`` is the CPU time.
     """
 
     times: np.ndarray
@@ -75,8 +76,9 @@ class NoReference:
 def reference(scene: Scene, times: Times, seconds: float = SECONDS) -> Reference | NoReference:
     """Return the reference motion at times (k,) ≥ 0, from the cache if it contains them.
 
-    It takes at most about ``seconds`` of CPU time of the calling thread. If several threads request a scene,
-    the first one computes it.  Raises SceneError where the scene's velocities contradict its joints.
+    The computation takes at most about ``seconds`` of CPU time of the calling thread. If several threads
+    request a scene, the first one computes it.  Raises SceneError if the scene's velocities contradict its
+    joints.
     """
     wanted = np.unique(np.asarray(times, dtype=float))
     with _computing.setdefault(cache.canonical(scene), Lock()):
@@ -144,7 +146,8 @@ def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) 
 def judged(
     scene: Scene, times: np.ndarray, one: Motion, second_run: Motion, other: Motion
 ) -> tuple[Reference, str]:
-    """Return samples of a motion with the bound from its second run and formulation B, while it is useful."""
+    """Return samples of a motion with the bound from its second run and from formulation B, up to the time at
+    which the bound becomes too large to be useful."""
     apart = np.zeros(max(len(second_run.times), len(other.times)))
     for second in (second_run, other):
         k = len(second.times)
@@ -177,7 +180,8 @@ class _Kept:
     seconds: float
 
     def answers(self, times: np.ndarray, seconds: float) -> bool:
-        """Return whether another run within these CPU seconds would not give more at the times (k,)."""
+        """Return whether the known part answers a request for times (k,): a further run within these CPU
+        seconds would give no more."""
         missing = times[~np.isin(times, self.samples.times)]
         return not len(missing) or (
             missing.min() > self.until() and self.seconds >= seconds and bool(self.reason)

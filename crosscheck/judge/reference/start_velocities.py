@@ -1,11 +1,11 @@
 """Initial velocities by the documented rule, to the last digit of any arithmetic.
 
-Among the velocities that satisfy the rows, the rule selects those nearest to the given ones. If degrees of
-freedom are left, it selects the velocities of least kinetic energy. Each solution is corrected by
-pseudo-inverses in double precision until its residuals, computed in the arithmetic itself, are at rounding
+Among the velocities that satisfy the rows, the rule selects the velocities nearest to the given velocities.
+If degrees of freedom are left, it selects the velocities of least kinetic energy. Each solution is corrected
+by pseudo-inverses in double precision until its residuals, computed in the arithmetic itself, are at rounding
 level (Å. Björck, Numerical Methods for Least Squares Problems, 1996, section 2.9). In double precision alone
-the start would differ from the rule's by 1e-16, and near singular positions by 1e-13, in all formulations
-alike.
+the start would differ from the start of the rule by 1e-16, and near singular positions by 1e-13, in all
+formulations alike.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Panels of stiff motions: the collocation equations solved by Newton's method instead of Picard's iteration.
 
 Picard's iteration needs panels of a few times the shortest decay time, however smooth the motion is. Newton's
-method needs the derivatives of the rates. They are computed in double precision, while residuals use the
-arithmetic itself, so that each correction gains digits. The rates at the start of a panel are no unknowns:
-they follow from the polynomial through the other rates, so that fast decays are damped for any panel length
-(E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, section IV.3: the stability
-function vanishes at infinity).
+method needs the derivatives of the rates. These derivatives are computed in double precision, while residuals
+use the arithmetic itself, so that each correction gains digits. The rates at the start of a panel are no
+unknowns: they follow from the polynomial through the other rates, so that fast decays are damped for any
+panel length (E. Hairer and G. Wanner, Solving Ordinary Differential Equations II, 1996, section IV.3: the
+stability function vanishes at infinity).
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class StiffPanels:
         return Panel(start, length, guess, rates, False, SHORTER)
 
     def _judged(self, panel: Panel, size: np.ndarray, distance: np.ndarray) -> Panel:
-        """Return a converged panel, or a failed one if its points do not resolve the motion or it crosses a
+        """Return a converged panel, or a failed panel if its points do not resolve the motion or it crosses a
         singular position."""
         fits = self._fits(panel.states, size)
         crossing = singular_time(doubles(self.panels.nodes), distance)
@@ -99,7 +99,7 @@ class StiffPanels:
         return Panel(panel.start, panel.length, panel.states, panel.rates, True, min(SPARE * fits, LONGEST))
 
     def _fits(self, y: np.ndarray, size: np.ndarray) -> float:
-        """Return the factor by which a panel could be longer with its points."""
+        """Return the factor by which a panel with an equal number of points could be longer."""
         level = RESOLVED * self.panels.tolerance
         series = (np.abs(doubles(self.panels.times(self.panels.series, y))) / size).max(axis=1)
         needed = np.flatnonzero(series > level).max(initial=0) + 1

@@ -1,8 +1,8 @@
 """The motion of a scene by formulation A: Taylor series of high order, step after step.
 
 Steps are as long as the series' smallest term allows (À. Jorba and M. Zou, Experimental Mathematics 14,
-2005); after each the coordinates are projected onto the rows.  Near a singular position rounding noise
-dominates the series, so one step crosses the position, along the branch that the series continues.
+2005); after each step the coordinates are projected onto the constraint rows.  Near a singular position
+rounding dominates the series, so one step crosses the position along the branch that the series continues.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ ORDER = 28
 NEW_ROW = 1e-4  # a row that was dependent at the start counts as independent from this pivot on
 # smallest singular value / value of the best selection: below it rows are selected again
 ILL_CONDITIONED = 0.25
-# new rows are accepted if their smallest singular value / value of the best selection is above this,
+# least (smallest singular value of new rows / value of the best selection) at which new rows are accepted,
 WELL_CONDITIONED = 0.5
-BETTER = 1e3  # or if their smallest singular value is larger than the old rows' by this factor
+BETTER = 1e3  # or if their smallest singular value exceeds the old rows' value by this factor
 NEAR = 0.4  # smallest singular value / usual value, below which a singular position is near
 PREFERENCE = 0.2  # largest relative change of a row's weight
 USUAL = 50  # number of steps whose median of the smallest singular value is the usual value
@@ -46,7 +46,7 @@ SHORTER = 0.8  # factor on a step that ends too near to a singular position
 LEAST_STEP = 1e-6  # s; shortest step near the time limit
 SHORTEST = 1e-9  # step / time reached: a shorter step ends the run
 STEPS_END = "its steps end: its series cannot be continued over a singular position there"
-WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia: smaller ones count as zero
+WITHOUT_INERTIA = 1e-13  # fraction of the largest inertia; smaller inertias count as zero
 
 
 class Ended(ArithmeticError):
@@ -67,7 +67,7 @@ def natural_motion(
 ) -> Motion:
     """Return the motion at increasing times (k,) ≥ 0 in natural coordinates (see Motion), by Taylor series of
     an order. ``tolerance`` is the relative tolerance of a step (default: the arithmetic's rounding unit).
-    Another ``seed`` selects other rows if some are redundant, and displaces joints by up to ``displaced``,
+    Another ``seed`` selects other rows if rows are redundant, and displaces joints by up to ``displaced``,
     relative to the largest coordinate. ``seconds`` limits the CPU time of the thread; ``progress`` receives
     the time of every step."""
     began, reason, samples = time.thread_time(), "", []
@@ -174,7 +174,7 @@ class Stepper:
         return max(1.0, largest(self._x))
 
     def _choice(self, x: np.ndarray, t: Any) -> tuple[HeldRows, int]:
-        """Return independent rows at the coordinates x, and the number of well-conditioned ones."""
+        """Return independent rows at the coordinates x, and the number of well-conditioned rows."""
         rows, pivots = independent(self._every.unit_gradient(x, t), self._weights)
         return HeldRows(self.of, rows), int((pivots > NEW_ROW).sum())
 
@@ -184,15 +184,15 @@ class Stepper:
         return float(np.linalg.svd(self._held.unit_gradient(x, t), compute_uv=False)[-1])
 
     def _choose_again(self) -> None:
-        """Select other rows if the present ones are ill-conditioned and the position is not singular.
-        Ill-conditioned rows amplify the contradictions of redundant rows."""
+        """Select other rows if the present rows are ill-conditioned and the position is not singular.
+        Ill-conditioned rows amplify contradictions."""
         now, best = self._conditioning[-1], max(self._conditioning)
         if now <= ILL_CONDITIONED * best:
             self._hold_others(self._x, self.t, min(WELL_CONDITIONED * best, BETTER * now))
 
     def _hold_others(self, x: np.ndarray, t: Any, least: float) -> bool:
-        """Select the rows that are independent at coordinates x if they are better conditioned than ``least``
-        there and than the present rows here. Returns whether the selection changed."""
+        """Select the rows that are independent at coordinates x if their conditioning exceeds ``least`` and
+        the conditioning of the present rows. Returns whether the selection changed."""
         before, now = self._held, self._conditioning[-1]
         self._held = self._choice(x, t)[0]
         here, there = self._sharp(self._x, self.t), self._sharp(x, t)
@@ -254,8 +254,8 @@ class Stepper:
             raise Ended("a pivot of its equations is zero to the digits of the arithmetic")
 
     def _step(self, most: float, left: float) -> tuple[Expansion, float]:
-        """A series and the length (s) of its step, at most ``most``, and no more than is ``left`` (s) of a
-        piece of a function of time; it does not end much nearer to a singular position."""
+        """Return a series and the length (s) of its step: at most ``most``, and at most the time ``left`` (s)
+        in a piece of a function of time. The step does not end much nearer to a singular position."""
         expansion = self._expansion(self._order)
         series = Series(expansion.x)
         h = series.reach(self._tolerance)
@@ -276,7 +276,7 @@ class Stepper:
     def _shortened(self, x: np.ndarray, series: Series, h: float, ahead: float) -> float:
         """Return the length (s) of a step that does not end much nearer to a singular position; ``ahead`` is
         the conditioning at the end of a step of length h. Raises Ended if no length is short enough. The
-        conditioning at the start is computed again, because the correction of the coordinates changed it."""
+        conditioning at the start is computed again, because the coordinates were corrected."""
         if ahead >= NEAR * self._conditioning[-1]:
             return h
         least, now = SHORTEST * max(1e-3, float(self.t)), self._sharp(self._x, self.t)
@@ -289,7 +289,7 @@ class Stepper:
 
     def _others_serve(self, series: np.ndarray, middle: float) -> bool:
         """Return whether only the selected rows are dependent at a distance (s) ahead, but other rows are
-        not. Then the position is not singular, and the other rows are selected."""
+        not. In this case the position is not singular, and the other rows are selected."""
         d = self.of.arithmetic.number(middle)
         if not self._hold_others(value(series, d), self.t + d, self._conditioning[-1]):
             return False
@@ -302,7 +302,8 @@ class Stepper:
         return self._sharp(value(x[: series.terms(h)], d), self.t + d)
 
     def _may_step_across(self, lost: float) -> bool:
-        """Return whether a step across loses no more than rounding of the data, or than a second attempt."""
+        """Return whether a step across a singular position loses no more than rounding, or than a second
+        attempt."""
         before, self._lost = self._lost, lost
         ill_conditioned = max(self._conditioning[-USUAL:]) / self._conditioning[-1]
         data = 0.0 if self.of.arithmetic.digits else DATA * ill_conditioned**2

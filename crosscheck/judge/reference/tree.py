@@ -28,7 +28,7 @@ NODES_PER_DIGIT = 2.1
 FIRST = 0.1  # length of the first panel / duration
 LEAST = 1e-10  # shortest panel / duration
 SLOW = 20  # Picard iterations; a panel that needs more may be stiff
-NEAR_END = 0.7  # fraction of a panel; a singular position later than this is too near to its end
+NEAR_END = 0.7  # fraction of a panel; a singular position after this fraction is too near to the panel's end
 BEYOND = (
     0.35  # half lengths: largest distance of a singular position from the end of a panel that steps across it
 )
@@ -50,7 +50,7 @@ def tree_motion(
 ) -> Motion:
     """Return the motion of a scene at increasing times (k,) ≥ 0 in an arithmetic; see Motion.
 
-    Another ``seed`` selects other rows if some are redundant, and displaces the joints that close loops by up
+    Another ``seed`` selects other rows if rows are redundant, and displaces the joints that close loops by up
     to ``displaced``, relative to the scene's length. The motion ends early, with the reason, after
     ``seconds`` of CPU time, if loops open, or if no panel is short enough. ``progress`` receives the time of
     every panel.  Raises SceneError if start velocities violate the joints.
@@ -76,11 +76,11 @@ class _Run:
         self.state = self.arithmetic.zeros(0)
         self.samples: list[tuple[np.ndarray, np.ndarray]] = []
         self.crossings: list[float] = []
-        self.foreseen = 0.0  # time of the next singular position, or of the last one
+        self.foreseen = 0.0  # time of the next singular position; after it, of the last singular position
         self.unsettled, self.lost = (
             0,
             np.inf,
-        )  # failed panels across the next position; digits lost by a step across it
+        )  # failed panels across the next position; error of a step across it
         self.taken = self.steps = 0
         self.stiff, self.is_stiff = StiffPanels(self.panels), False
 
@@ -111,12 +111,13 @@ class _Run:
         return ""
 
     def _before_end(self, length: Any) -> Any:
-        """A length with which no panel passes the end of a piece of a function of time."""
+        """Return a length with which no panel passes the end of a piece of a function of time."""
         left = next_end(self.equations.scene, float(self.t))
         return length if self.t + length <= left else self.arithmetic.number(left) - self.t
 
     def _tried(self, last: Panel | None, length: Any) -> Panel:
-        """Solve a panel of the given length; after several failures, one across a singular position."""
+        """Solve a panel of the given length; after several failures, solve a panel across a singular
+        position."""
         panel = self._panel(length, self._guess(last, length))
         step_across = None if panel.settled else self._step_across(panel.time(panel.foreseen))
         return step_across or panel
@@ -144,7 +145,8 @@ class _Run:
     def _before_singular(self, length: Any) -> Any:
         """Return a length with which no panel ends near a singular position.
 
-        One panel ends half a length before the position, and the next one has it in the middle.
+        A panel ends half a length before the singular position, and the next panel has the position in its
+        middle.
         """
         gap = self.foreseen - float(self.t)
         near = NEAR_END * float(length) < gap < (1 + NEAR_END) * float(length)

@@ -1,9 +1,9 @@
 """The equations that close the loops of a spanning tree, as wrenches: values, rates, drifts, Jacobian.
 
-With d from a point of the first body to one of the second, and directions a of the first and b of the second,
-they are a · d = 0, d · d / 2 = constant and a · b = constant.  The rate of each is linear in the two bodies'
-twists; its coefficients form a wrench on each body, and wrenches times the columns of the tree's Jacobian are
-the Jacobian of the closures.
+With d from a point of the first body to a point of the second body, and directions a of the first and b of
+the second body, the equations are a · d = 0, d · d / 2 = constant and a · b = constant.  The rate of an
+equation is linear in the twists of the two bodies; its coefficients form a wrench on each body, and wrenches
+times the columns of the tree's Jacobian are the Jacobian of the closures.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Rows:
     jacobian: np.ndarray
 
     def joined(self, other: Rows) -> Rows:
-        """Return these rows followed by others."""
+        """Return these rows followed by other rows."""
         pairs = ((self.value, other.value), (self.drift, other.drift), (self.jacobian, other.jacobian))
         return Rows(*(np.concatenate(pair, axis=1) for pair in pairs))
 

@@ -28,7 +28,7 @@ COORDINATES = (ANGLE, DISPLACEMENT)
 WORSE = 0.5  # conditioning / best conditioning, below which other rows are selected
 CORRECTIONS = 8  # largest number of Newton iterations that close the loops
 PREFERENCE = 0.2  # largest relative change of a row's weight
-OPEN = 1e-9  # residual, relative to the scene's length, above which rows that were taken as redundant are not
+OPEN = 1e-9  # residual, relative to the scene's length, above which dropped rows are independent
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Instant:
 class TreeEquations:
     """Equations for the rates of states; ``kept`` are the independent rows of closures and drivers.
 
-    ``way`` is a seed that selects other rows if some are redundant, and the displacement of loop-closing
+    ``way`` is a seed that selects other rows if rows are redundant, and the displacement of loop-closing
     joints, relative to the scene's length.
     """
 
@@ -239,7 +239,7 @@ class TreeEquations:
     def _rank(self, rows: np.ndarray) -> int:
         """Return the number of independent rows (m, nv)."""
         size = np.linalg.norm(rows, axis=1, keepdims=True)
-        # the motion of a unit joint rate is at most this
+        # largest motion of a body for a unit joint rate
         largest = max(size.max(initial=0.0), min(1.0, self.length**2))
         rows = rows / np.where(size > RANK * largest, size, largest)  # rows of rounding size stay small
         pivots = np.abs(np.diag(qr(rows.T, mode="r", pivoting=True)[0]))

@@ -48,7 +48,7 @@ class Link:
         return list(among.get(kind, ()))
 
     def turns(self, numbers: Arithmetic) -> list[np.ndarray]:
-        """Return the axes of rotation, the first fixed to the parent; a second one is fixed to the body."""
+        """Return the axes of rotation: the first axis is fixed to the parent, a second axis to the body."""
         kind = self.joint.type if self.joint else "free"
         if kind == "universal":
             return list(unit(numbers.array(self.joint.axes))[:: self.sign])
@@ -65,8 +65,8 @@ class Placed:
     """Bodies at K times, the ground last.
 
     Fields are ``position`` (K, nb + 1, 3) of the centres of mass, quaternions and matrices of the ``turn``
-    since t = 0, and twists ``velocity`` and ``spin``. ``drift`` and ``spin_drift`` are the parts of their
-    rates without joint accelerations. ``columns`` (K, nb + 1, nv, 6) are the twists for unit joint rates.
+    since t = 0, and twists ``velocity`` and ``spin``. ``drift`` and ``spin_drift`` are the rates of both
+    without joint accelerations. ``columns`` (K, nb + 1, nv, 6) are the twists for unit joint rates.
     """
 
     position: np.ndarray
@@ -83,7 +83,7 @@ class Tree:
     """A spanning tree with its joint coordinates.
 
     ``scalars`` are displacements and angles, then follows one unit quaternion for each of the ``balls``.
-    Joint rates have an equal order, with three for a ball.
+    Joint rates have this order, too, with three rates for a ball.
     """
 
     def __init__(self, scene: Scene, arithmetic: Arithmetic):
@@ -119,7 +119,7 @@ class Tree:
         self.slides = np.array(slides, dtype=int).reshape(len(self.links), len(rates))[:, : self.scalars]
 
     def _list_arms(self) -> None:
-        """Store the vectors at t = 0 from a parent's centre to the joint, and from there to the body's
+        """Store the vectors at t = 0 from a parent's centre to the joint, and from the joint to the body's
         centre."""
         nb = len(self.scene.body)
         self.body = np.array([link.body for link in self.links])
@@ -129,7 +129,7 @@ class Tree:
         ]
         anchor = self.arithmetic.array(anchors)
         self.inner, self.outer = anchor - self.start[self.parent], self.start[self.body] - anchor
-        # entry is 1 if the link carries the body, directly or through others
+        # entry is 1 if the link carries the body, directly or through other links
         self.carried = np.zeros((nb + 1, len(self.links)), dtype=int)
         for n, link in enumerate(self.links):
             self.carried[link.body] = self.carried[link.parent]
@@ -176,7 +176,7 @@ class Tree:
 
 
 def used_coordinates(scene: Scene) -> set[tuple[str, str]]:
-    """Kind and joint of the coordinates that drivers, loads of joints, couplings and armatures use."""
+    """Return kind and joint of the coordinates that drivers, loads of joints, couplings and armatures use."""
     acting = [driver.joint for driver in scene.driver]
     acting += [joint.name for joint in scene.joint if joint.reflected_inertia]
     found = {(str(scene.joint_named(name).facts.driven), name) for name in acting}

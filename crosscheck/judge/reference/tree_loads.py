@@ -23,7 +23,7 @@ class Loads:
     """Masses, inertias, armatures, gravity and loads as arrays; ``measured`` has the rows of joint
     coordinates by kind and joint.
 
-    If masses are missing, there are no loads, and missing masses and inertias are 1: drivers determine the
+    In a scene without masses, loads are left out, and masses and inertias are 1: drivers determine the
     motion, so these values have no influence.
     """
 
@@ -94,13 +94,13 @@ class Loads:
         return found + np.swapaxes(rows, 1, 2) @ (self.armature[:, None] * rows)
 
     def _factor(self, load: Any, t: np.ndarray, since: float) -> np.ndarray:
-        """(K,) the function of time that multiplies a load, at times t (K,)."""
+        """Return the function of time (K,) that multiplies a load, at times t (K,)."""
         if load.over_time is None:
             return 0 * t + 1
         return values(load.over_time, t, since, arithmetic=self.tree.arithmetic)
 
     def _act(self, placed: Placed, wrench: np.ndarray, t: np.ndarray, since: float) -> None:
-        """Add the loads, each of them a force at a point of a body or a moment."""
+        """Add the loads: forces at points of bodies, and moments."""
         scene = self.tree.scene
         for load in self.moments:
             body = scene.body_index(load.body)

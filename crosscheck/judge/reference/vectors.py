@@ -11,7 +11,7 @@ COLUMN = np.array([[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]])
 SIGN = np.array([[1, -1, -1, -1], [1, 1, -1, 1], [1, 1, 1, -1], [1, -1, 1, 1]])
 """Entries of the matrix L(p) with p q = L(p) q for quaternions."""
 REGULAR = 1e-15  # regularisation on the diagonal of the scaled matrix
-# least diagonal entry of a mass matrix / largest; smaller ones are scaled as if they had this size
+# least diagonal entry of a mass matrix / largest; smaller entries are scaled as if they had this size
 LIGHT = 1e-12
 REFINEMENTS = 40
 
@@ -63,8 +63,9 @@ def saddle_solve(
 
     M (K, n, n) is positive semidefinite, G (K, m, n), force (K, n), right (K, m).  The inverse is computed in
     double precision, the residuals in the data's arithmetic (iterative refinement; Wilkinson, Rounding Errors
-    in Algebraic Processes, 1963).  The distance is the inverse's Frobenius norm to the power -1/2, which
-    follows the least singular value of G; infinite without coordinates.
+    in Algebraic Processes, 1963).  The distance is the inverse's Frobenius norm to the power -1/2, which is
+    proportional to the least singular value of G near singularity. The distance is infinite without
+    coordinates.
     """
     n = mass.shape[-1]
     scale, inverse = _scaled_inverse(doubles(mass), doubles(rows))

@@ -1,7 +1,8 @@
-"""Truths: the exact motion of scenes of known families, recognised from their data, and references of others.
+"""Truths: exact motions. Families of mechanisms with closed forms are recognised from their data; other
+scenes have references.
 
 A truth is a closed form, a high-precision solution of an equation reduced to the true degrees of freedom, or
-the reference that two formulations agree on; it shares no code with the model it judges.
+the reference that two formulations agree on; it shares no code with the engines that it judges.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ class Truth(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the family of closed forms, or of the reference."""
+        """Name of the family of closed forms, or "reference"."""
 
     @property
     def accuracy(self) -> float:
@@ -81,10 +82,11 @@ def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
 
 @functools.lru_cache(maxsize=64)
 def closed_form(scene: Scene) -> Truth | None:
-    """Return the truth of a scene of a known family, or None. It is cached with the part of the motion that
-    is already solved.
+    """Return the truth of a scene of a known family, or None. The truth is cached with the part of the motion
+    that is already solved.
 
-    No family has couplings, armatures, tables, loads over time or, except torsion springs, loads of joints.
+    No known family has couplings, armatures, tables, loads over time or, except torsion springs, loads of
+    joints.
     """
     varies = any(load.over_time for load in scene.load) or any(ends(driver) for driver in scene.driver)
     pushed = any(isinstance(load, JointLoad) and not isinstance(load, TorsionSpring) for load in scene.load)

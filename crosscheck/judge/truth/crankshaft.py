@@ -1,4 +1,5 @@
-"""Slider-cranks side by side whose cranks are fixed to each other: each moves along its own path."""
+"""Slider-cranks side by side whose cranks are fixed to each other: each slider-crank moves along its own
+path."""
 
 from __future__ import annotations
 
@@ -12,7 +13,7 @@ from mbref.scene import GROUND, Fixed, Scene
 
 
 def crankshaft(scene: Scene) -> Path | None:
-    """Return the path of a scene that may belong to this family, or None."""
+    """Return the path of a scene that may be such a crankshaft, or None."""
     groups = _without_shaft(scene)
     if len(groups) < 2:
         return None

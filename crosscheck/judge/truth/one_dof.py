@@ -1,9 +1,10 @@
 """Motion of a mechanism with one degree of freedom: the poses along its path, and the path coordinate as a
 function of time.
 
-A family gives the path — every body's pose as a function of one coordinate q, with first and second
-derivatives — and the rest is common: either a driver prescribes q(t), or q follows from the reduced
-equation of motion I(q) q'' + ½ I'(q) q'² = Q, whose terms are sums over the bodies.
+A family of mechanisms gives the path: every body's pose as a function of one coordinate q, with first and
+second derivatives. All families have the motion along the path in common: either a driver prescribes q(t), or
+q follows from the reduced equation of motion I(q) q'' + ½ I'(q) q'² = Q, whose terms are sums over the
+bodies.
 """
 
 from __future__ import annotations
@@ -51,7 +52,7 @@ class Pose:
     dspin: np.ndarray
 
 
-# sign with which a driver changes q; None: the driver does not belong to the family
+# sign with which a driver changes q; None for a driver of another kind
 DrivenSign = Callable[[Driver], float | None]
 
 
@@ -60,7 +61,7 @@ class Path:
     """A possible path of a scene: poses at q (q = 0 at t = 0), the rotation axis of the turns, and the sign
     with which a driver of a joint changes q.
 
-    The sign is None if the driver does not belong to the family.
+    The sign is None for a driver that does not move the mechanism along the path.
     """
 
     family: str
@@ -130,7 +131,7 @@ class Reduced:
         try:
             turns, rest = self._turns(np.asarray(times, dtype=REAL))
             q, s, _ = self._solution.where(2, rest).T
-        except NoSolution as found:  # the error has σ instead of the time
+        except NoSolution as found:  # the error contains σ instead of the time
             end = float(self._solution.reach(lambda _: True)[2])
             raise NoSolution.ending(found.reason, end) from None
         root = self._terms(q, s)[0]
@@ -184,7 +185,7 @@ class Reduced:
 
 
 def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
-    """Return the truth along a path, or None if the scene does not move along it and only along it."""
+    """Return the truth along a path, or None if the scene can move in another way."""
     if path is None or not _fits(scene, path):
         return None
     if scene.driver:
@@ -198,7 +199,7 @@ def one_dof(scene: Scene, path: Path | None) -> OneDof | None:
 
 
 def initial_rate(scene: Scene, path: Path) -> float | None:
-    """Return q' at t = 0 from the scene's velocities; None if these are not along the path."""
+    """Return q' at t = 0 from the scene's velocities; None if the velocities are not along the path."""
     velocity, spin = constraints.initial_twists(scene)
     pose = path.poses(np.zeros(1, dtype=REAL))
     length = constraints.scene_length(scene)

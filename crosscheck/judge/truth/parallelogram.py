@@ -19,7 +19,7 @@ from mbref.scene import GROUND, Cylindrical, Distance, Driver, Revolute, Scene
 
 
 def parallelogram(scene: Scene) -> Path | None:
-    """Return the path of a scene that may belong to this family, or None."""
+    """Return the path of a scene that may be such a parallelogram, or None."""
     pivots = pivots_of(scene)
     if not pivots:
         return None

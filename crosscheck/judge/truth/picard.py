@@ -1,8 +1,8 @@
 """Ordinary differential equations to rounding error: Chebyshev–Picard iteration in extended precision.
 
 On a panel of time the derivative is sampled at all Chebyshev points at once, interpolated, integrated
-exactly, and the iteration repeated until it stands still; a panel whose Chebyshev series has not died
-away is shortened.  There is no step-size tolerance: the answer is as exact as the arithmetic allows.
+exactly, and the iteration is repeated until it converges; a panel whose Chebyshev series does not decrease to
+rounding is shortened.  No tolerance limits the steps: the solution is as exact as the arithmetic allows.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ ROOT_STEPS = 20  # Newton iterations for the time at which a component has a giv
 UP, DOWN = np.longdouble(1.2), np.longdouble(0.7)  # factors on the length of the next panel
 REAL = np.longdouble  # 64-bit mantissa on x86; double elsewhere, with the accuracy of double
 SETTLED = 64 * float(np.finfo(REAL).eps)  # relative limit of the last change and of the last coefficients
-SECONDS = 20.0  # CPU seconds for all panels of a solution; it is known up to the end of the last one
+SECONDS = 20.0  # CPU seconds for all panels of a solution, which is known up to the last panel
 SMALLEST = 1e-12  # panel length / time reached below which the solution counts as singular
 
 Derivative = Callable[[np.ndarray], np.ndarray]
@@ -64,7 +64,8 @@ class Solution:
         self._asked, self._spent = Lock(), 0.0
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
-        """Return states (k, m) at times (k,) ≥ 0; raises NoSolution if the solution ends before."""
+        """Return states (k, m) at times (k,) ≥ 0; raises NoSolution if the solution ends before the last
+        time."""
         times = np.asarray(times, dtype=REAL)
         edges, values = self._panels(lambda: self._edges[-1] < times.max(initial=0))
         panel = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(values) - 1)

@@ -53,7 +53,7 @@ class Lengths:
 
 
 def planar_slider_crank(scene: Scene) -> Path | None:
-    """Return the path of a scene that may belong to this family, or None."""
+    """Return the path of a scene that may be a planar slider-crank, or None."""
     parts = parts_of(scene, Revolute)
     if parts is None:
         return None

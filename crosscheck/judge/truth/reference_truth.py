@@ -1,4 +1,4 @@
-"""The truth of a scene of no known family: its reference, computed at the first request for poses."""
+"""The truth of a scene without a closed form: its reference, computed at the first request for poses."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class ReferenceTruth:
     def accuracy(self) -> float:
         """Largest bound on the error of the poses returned so far, or of the scene's whole duration.
 
-        Raises NoSolution if there is no reference.
+        Raises NoSolution if the scene has no reference.
         """
         if self._accuracy is None:
             self.poses(np.linspace(0.0, self._scene.duration, SAMPLES))
@@ -35,7 +35,7 @@ class ReferenceTruth:
 
     def poses(self, times: np.ndarray) -> Trajectory:
         """Return the trajectory at times (k,) ≥ 0; raises NoSolution, with reason and time, if the reference
-        ends before."""
+        ends before the last time."""
         times = np.asarray(times, dtype=float)
         with self._asked:
             found = reference(self._scene, times.tolist(), self._seconds)

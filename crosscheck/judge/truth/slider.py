@@ -11,7 +11,7 @@ from mbref.scene import GROUND, Scene, Translational
 
 
 def slider(scene: Scene) -> Path | None:
-    """Return the path of a scene that may belong to this family, or None."""
+    """Return the path of a scene that may be a single slider, or None."""
     if len(scene.body) != 1 or len(scene.joint) != 1 or not isinstance(scene.joint[0], Translational):
         return None
     joint = scene.joint[0]

@@ -19,7 +19,7 @@ from mbref.scene import Scene, Universal
 
 
 def spatial_slider_crank(scene: Scene) -> Path | None:
-    """Return the path of a scene that may belong to this family, or None."""
+    """Return the path of a scene that may be a spatial slider-crank, or None."""
     parts = parts_of(scene, Universal)
     if parts is None:
         return None

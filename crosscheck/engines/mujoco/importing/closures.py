@@ -114,7 +114,7 @@ def _ends(mujoco: Any, model: Any, e: int) -> tuple[Frame, Frame]:
     if model.eq_type[e] == mujoco.mjtEq.mjEQ_CONNECT:
         return Frame(first, data[0:3].copy(), np.eye(3)), Frame(second, data[3:6].copy(), np.eye(3))
     relative = rotations.to_matrix(data[6:10] / np.linalg.norm(data[6:10]))
-    # pose of the second body's frame in the first one, at the second body's anchor
+    # pose of the second body's frame in the first body's frame, at the second body's anchor
     anchor = data[0:3].copy()
     return Frame(first, data[3:6] + 0.0, relative), Frame(second, anchor, np.eye(3))
 

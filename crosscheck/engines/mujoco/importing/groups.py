@@ -11,7 +11,7 @@ from mbref import rotations
 from mbref.scene import GROUND, Body
 
 WORLD = 0  # MuJoCo's number of the world, and of the group that is fixed to it
-PLAIN = 1e-15  # product of inertia / largest moment; smaller ones are rounding
+PLAIN = 1e-15  # product of inertia / largest moment; smaller products are rounding
 
 
 @dataclass(frozen=True)
@@ -59,8 +59,8 @@ class Groups:
         return self.names[int(self.of[body])]
 
     def main(self, group: int) -> int:
-        """Return the body that gives a group its name: the first one if it has mass, otherwise the
-        heaviest."""
+        """Return the body that gives a group its name: the first body if it has mass, otherwise the heaviest
+        body."""
         masses = self.model.body_mass
         heaviest = max(self.members[group], key=lambda b: float(masses[b]))
         return group if masses[group] > 0 else int(heaviest)
@@ -80,7 +80,8 @@ class Groups:
         return Placed(centre, data.xquat[self.main(group)].copy(), jacobian)
 
     def body(self, data: Any, group: int, twist: np.ndarray | None) -> Body:
-        """Return a group as a body of a scene, with the velocities of a twist (6,) if one is given."""
+        """Return a group as a body of a scene, with the velocities of a twist (6,) if the caller gives a
+        twist."""
         at = self.placed(data, group)
         turn = rotations.to_matrix(at.orientation)
         inertia = turn.T @ self._inertia(data, group, at.position) @ turn

@@ -12,8 +12,8 @@ from mbref.scene import SceneError
 def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any:
     """Return the model of an MJCF file in which some bodies have no joint to the world.
 
-    They stay at the pose of the keyframe, or of the reference. Raises SceneError for a body without joints to
-    the world, ValueError if MuJoCo cannot read the file.
+    These bodies stay at the pose of the keyframe, or of the reference. Raises SceneError for a body without
+    joints to the world, ValueError if MuJoCo cannot read the file.
     """
     if not hold:
         return mujoco.MjModel.from_xml_path(str(path))
@@ -39,7 +39,8 @@ def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any
 
 
 def _placed(mujoco: Any, model: Any, keyframe: str) -> Any:
-    """Return the data of a model at a keyframe, or at the reference where the model has none of that name."""
+    """Return the data of a model at a keyframe, or at the reference if the model has no keyframe of that
+    name."""
     data = mujoco.MjData(model)
     key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe or "\0")
     if key >= 0:

@@ -1,5 +1,5 @@
-"""Parts of a model that a scene cannot describe: those that change the motion, by kind, and those that do
-not."""
+"""Parts of a model that a scene cannot describe: parts that change the motion, by kind, and parts without
+influence on the motion."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Part:
 
 
 def checked(without: Collection[str]) -> frozenset[str]:
-    """Return the kinds of parts to be left out; raises ValueError for an unknown one."""
+    """Return the kinds of parts to be left out; raises ValueError for an unknown kind."""
     for kind in without:
         if kind not in (*KINDS, EVERYTHING):
             raise ValueError(f"--without: {kind!r} is none of {', '.join((*KINDS, EVERYTHING))}")

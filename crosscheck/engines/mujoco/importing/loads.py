@@ -1,4 +1,5 @@
-"""Springs and dampers of joints and tendons as loads of a scene, and those that no load can describe."""
+"""Springs and dampers of joints and tendons as loads of a scene, and the springs and dampers that no load can
+describe."""
 
 from __future__ import annotations
 
@@ -20,7 +21,7 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
     """Return a spring for every hinge and slide with stiffness or damping; all other springs are parts to
     be left out.
 
-    ``joint_of`` maps a MuJoCo joint to the scene's joint if that consists of it alone.
+    ``joint_of`` maps a MuJoCo joint to the scene's joint that consists of this MuJoCo joint alone.
     """
     for j in range(model.njnt):
         stiffness, damping = _springs(mujoco, model, j)

@@ -17,12 +17,13 @@ CLOSED = 1e-12  # smaller gaps, relative to the model's extent or in rad, count 
 ROUNDED = 1e-9  # limit like CLOSED near singular positions, where Newton's method is less accurate
 ITERATIONS = 200
 LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in one iteration
-RANK = 1e-9  # singular value / largest one; smaller ones belong to redundant rows
+RANK = 1e-9  # singular value / largest singular value; smaller values belong to redundant rows
 
 
 @dataclass(frozen=True)
 class JointRow:
-    """A joint coordinate that follows another one: q = offset + ratio · q₂, both from the reference."""
+    """A joint coordinate q that follows another coordinate q₂: q = offset + ratio · q₂, both measured from
+    the reference."""
 
     name: str
     joints: tuple[int, int]  # MuJoCo's joint numbers; the second is -1 if the first coordinate is constant

@@ -1,7 +1,8 @@
 """MJCF and URDF as scenes: bodies, joints, closures, springs and gravity of the compiled model.
 
-Bodies that are fixed to each other are one body of the scene.  Its frame has the origin at the centre of mass
-and the axes of the file's body.  A scene is returned only if its matrices agree with the model's.
+Bodies that are fixed to each other are one body of the scene.  The frame of the scene's body has its origin
+at the centre of mass and the axes of the file's body.  A scene is returned only if its matrices agree with
+the model's.
 """
 
 from __future__ import annotations
@@ -204,7 +205,7 @@ class _Reader:
                 model.eq_active0[e] = 0
 
     def _reads_row(self, e: int) -> bool:
-        """Return whether an equality of joints locks one, or is linear and not to be left out."""
+        """Return whether an equality of joints locks a joint, or is linear and not to be left out."""
         is_linear = not np.any(self.model.eq_data[e, 2:5])
         return self.model.eq_obj2id[e] < 0 or (is_linear and "couplings" not in self.without)
 
@@ -248,7 +249,7 @@ class _Reader:
         self._couple()
 
     def _with_armature(self, chain: Chain, joints: list[Joint]) -> list[Joint]:
-        """Return the joints of a chain; if it is a single hinge or slide, with its armature."""
+        """Return the joints of a chain; the joint of a single hinge or slide has its armature."""
         driven = joints[0].facts.driven if len(joints) == 1 else None
         wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
         kinds = [wanted.get(kind) for kind in chain.kinds]
@@ -270,7 +271,8 @@ class _Reader:
                 self.notes.append(f"fixed to {self.groups.name_of(main)!r} and part of it: {names}")
 
     def _couple(self) -> None:
-        """Make a coupling of a coordinate that follows another, and a constant driver of a locked one.
+        """Add a coupling for a coordinate that follows another coordinate, and a constant driver for a locked
+        coordinate.
 
         Raises SceneError if a scene has no such coordinate.
         """

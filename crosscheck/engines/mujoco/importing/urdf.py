@@ -27,7 +27,7 @@ PARTS = (
     "mimic",
     "mujoco",
 )
-LEAST = 1e-12  # kg and kg m²; MuJoCo refuses moving bodies with less
+LEAST = 1e-12  # kg and kg m²; MuJoCo refuses moving bodies with smaller values
 BodyOf = Callable[[str], int]
 
 
