@@ -74,12 +74,16 @@ def _picture(path: Path) -> int:
 def _render(folder: Path, names: Sequence[str]) -> int:
     """Render the records of a folder again; nothing runs."""
     from reports import sections, stored
-    from reports.sections import paper
+    from reports.sections import closed_loops, paper, stability
 
+    blocks: list[Block] = []
     try:
-        blocks = (
-            [] if names == [PAPER] else sections.blocks(stored.groups(folder), names, stored.verified(folder))
-        )
+        if set(names) - set(OWN):
+            blocks += sections.blocks(stored.groups(folder), names, stored.verified(folder))
+        if STABILITY in names:
+            blocks += stability.render(collection.stored_ladders(folder))
+        if CLOSED_LOOPS in names:
+            blocks += closed_loops.render(collection.closed_loops())
         if PAPER in names:
             blocks += paper.render(*collection.stored_paper(folder))
     except (FileNotFoundError, SceneError) as error:

@@ -22,6 +22,7 @@ from mbref.records import looked_at
 from mbref.scene import Scene
 
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
+LADDERS = "stability.jsonl"
 REPEATS = 3  # timed runs of each setting; the settings take turns
 Notice = Callable[[str], None]  # takes one sentence for the user
 
@@ -75,7 +76,17 @@ def closed_loops() -> list[Record]:
 def stability_ladders(out: Path, notice: Notice) -> list[Record]:
     """Return the records of the stability ladders, which are stored in ``out``/stability.jsonl."""
     out.mkdir(parents=True, exist_ok=True)
-    return stability.run(out / "stability.jsonl", find_engines(None, notice))
+    return stability.run(out / LADDERS, find_engines(None, notice))
+
+
+def stored_ladders(out: Path) -> list[Record]:
+    """Return the records of the stability ladders that a folder stores, without any run.
+
+    Raises FileNotFoundError if the folder has none.
+    """
+    if not (out / LADDERS).exists():
+        raise FileNotFoundError(f"{out}: has no {LADDERS} of a report")
+    return list(looked_at(out / LADDERS).values())
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:

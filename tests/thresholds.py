@@ -1,0 +1,181 @@
+"""Table of the thresholds of mbref outside ``mbref.taylor.crossing``, from the constants and their comments.
+
+``python -m tests.thresholds docs/internals/thresholds.md`` writes the page.  A check of a threshold stands in
+``tests/mbref/interpreted_limits.py`` under the name of its module, and fails when the threshold moves.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[1]
+CHECKS = tuple(ROOT / "tests" / "mbref" / f"limits_of_{kind}.py" for kind in ("equations", "runs", "scenes"))
+LEFT_OUT = (
+    "cli/",
+    "drawing/",
+    "scenes/",
+    "taylor/crossing/thresholds.py",
+)  # layouts, data, a table of its own
+NUMBERS = {
+    "MOST_BYTES",
+    "LINE",
+    "WORDS",
+    "CHANGED",
+    "SINGULAR_AHEAD",
+    "NONE_TAKEN",
+    "SMOOTH",
+    "C",
+    "POINTERS",
+    "COUNTS",
+    "CENTRAL",
+    "GOLDEN",
+    "NEGATIVE",
+    "FACTOR_FAILED",
+    "UNIT",
+    "INFINITE",
+    "FINEST",
+}
+# names and modules of numbers that change time, memory or the size of an output only
+COSTS = {
+    "MOST_KEPT",
+    "MOST_NAMES",
+    "MOST_PATTERNS",
+    "MOST_SHAPES",
+    "MOST_CHECKED",
+    "MOST_KEYS",
+    "MOST_OF_A_KEY",
+    "MOST_STRUCTURES",
+    "MOST_OF_ONE",
+    "MOST",
+    "MOST_ROWS",
+    "LARGE",
+    "MOST_AT_ONCE",
+    "SECONDS",
+    "LEAST_FREE",
+    "MOST_VECTORS",
+    "CHAINS",
+    "AT_ONCE",
+    "KEPT",
+    "STEPS_PER_CALL",
+    "SAMPLES",
+    "FRAMES",
+    "AMPLITUDE",
+    "MOST_EXCHANGES",
+    "MOST_TRIALS",
+    "MOST_STEPS",
+    "MOST_TERMS",
+    "MOST_FACTORS",
+    "MOST_KINEMATIC",
+    "AIM",
+    "POSES",
+    "INSTANTS",
+    "STARTS",
+    "STRIDE",
+    "SHARES",
+}
+HEAD = """# Thresholds
+
+Numbers on which decisions of mbref depend, besides the thresholds at singular positions, which stand in
+`mbref/taylor/crossing/thresholds.py`. `python -m tests.thresholds docs/internals/thresholds.md` writes this
+page from the constants and their comments. {count}
+
+| check | meaning |
+|---|---|
+| yes | a decision is checked on both sides; the check fails if the number moves by a tenth, a count by one |
+| cost | the number changes time, memory or the size of an output only |
+| no | no check of its own |
+
+`tests/mbref/test_thresholds.py` runs the checks.
+
+"""
+
+
+class Threshold(NamedTuple):
+    """A numeric constant: its module below mbref, name, value as written, and the comment on it."""
+
+    module: str
+    name: str
+    value: str
+    comment: str
+
+
+def thresholds() -> list[Threshold]:
+    """Return all numeric constants of mbref that have a comment."""
+    paths = sorted((ROOT / "mbref").rglob("*.py"))
+    names = [path.relative_to(ROOT / "mbref").as_posix() for path in paths]
+    chosen = [(name, path) for name, path in zip(names, paths, strict=True) if not name.startswith(LEFT_OUT)]
+    return [found for name, path in chosen for found in constants(name, path.read_text())]
+
+
+def constants(name: str, text: str) -> Iterator[Threshold]:
+    """Yield the numeric constants with a comment of a file, by its name below mbref and its text."""
+    lines, module = text.splitlines(), name.removesuffix(".py").replace("/", ".")
+    for node in ast.parse(text).body:
+        if not isinstance(node, ast.Assign) or not (comment := _comment(lines, node)):
+            continue
+        (target,) = node.targets
+        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+            pairs = list(zip(target.elts, node.value.elts, strict=True))
+        else:
+            pairs = [(target, node.value)]
+        for each, value in pairs:
+            if isinstance(each, ast.Name) and _is_number(value):
+                yield Threshold(module, each.id, ast.unparse(value), comment)
+
+
+def _comment(lines: list[str], node: ast.Assign) -> str:
+    """Return the comment behind an assignment, or the lines of comment before it."""
+    if found := re.search(r"  # (.+)$", lines[(node.end_lineno or node.lineno) - 1]):
+        return found[1]
+    before, k = list[str](), node.lineno - 2
+    while k >= 0 and lines[k].startswith("# "):
+        before.insert(0, lines[k].removeprefix("# "))
+        k -= 1
+    return " ".join(before)
+
+
+def _is_number(node: ast.expr) -> bool:
+    """Return whether an expression is a number, an expression of numbers, or several of them."""
+    if isinstance(node, ast.Constant):
+        return isinstance(node.value, int | float) and not isinstance(node.value, bool)
+    if isinstance(node, ast.UnaryOp):
+        return _is_number(node.operand)
+    if isinstance(node, ast.BinOp):
+        return all(isinstance(part, ast.Name) or _is_number(part) for part in (node.left, node.right))
+    if isinstance(node, ast.Tuple):
+        return all(map(_is_number, node.elts))
+    return isinstance(node, ast.Dict) and all(map(_is_number, node.values))
+
+
+def checked() -> set[tuple[str, str]]:
+    """Return module and name of each threshold with a check."""
+    texts = [path.read_text() for path in CHECKS]
+    return {pair for text in texts for pair in re.findall(r'^@check\("(\S+) (\w+)"\)', text, re.M)}
+
+
+def page() -> str:
+    """Return the page: a table for each folder of mbref."""
+    have, rows, marks = checked(), dict[str, list[str]](), list[str]()
+    for each in thresholds():
+        if each.name in NUMBERS:
+            continue
+        mark = "yes" if each[:2] in have else "cost" if each.name in COSTS else "no"
+        marks.append(mark)
+        folder, _, file = each.module.rpartition(".")
+        cells = f"`{file}`", f"`{each.name}`", f"`{each.value}`", each.comment.replace("|", "\\|"), mark
+        rows.setdefault(folder or "scenes and methods", []).append(f"| {' | '.join(cells)} |")
+    count = (
+        f"Of {len(marks)} numbers {marks.count('yes')} have a check, {marks.count('cost')} change cost only."
+    )
+    head = "| file | name | value | quantity and reason | check |\n|---|---|---|---|---|\n"
+    parts = [f"## {folder}\n\n{head}" + "\n".join(lines) + "\n" for folder, lines in rows.items()]
+    return HEAD.format(count=count) + "\n".join(parts)
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(page())
