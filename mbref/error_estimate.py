@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from mbref import rotations
+
 RATIO, LEAST = 1e3, 1e-6  # error / relative tolerance, and error: a warning is given if both are exceeded
 
 
@@ -122,6 +124,19 @@ class ErrorEstimate:
             **{key: record[key] for key in ("rtol", "second_run", "reason")},
             tighter=None if tighter is None else (float(tighter[0]), float(tighter[1])),
         )
+
+
+def distances(
+    pose: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray], length: float
+) -> np.ndarray:
+    """Return the largest distance (k,) of a body between two motions, over a length (m), or angle, rad.
+
+    A pose is positions (k, nb, 3) and quaternions (k, nb, 4).
+    """
+    places = np.linalg.norm(other[0] - pose[0], axis=-1) / length
+    turns = rotations.angle_between(other[1], pose[1])
+    found: np.ndarray = np.maximum(places, turns).max(axis=-1, initial=0.0)
+    return found
 
 
 def _short(number: float | None) -> str:

@@ -14,8 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref import rotations
-from mbref.error_estimate import ErrorEstimate
+from mbref.error_estimate import ErrorEstimate, distances
 from mbref.method import MOST_BODIES, SERIES, Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
@@ -155,9 +154,8 @@ class _Made:
         found = np.full(len(other.times), np.nan)
         if self.motion is not None:
             k = min(self.count, len(other.times))
-            places = np.linalg.norm(other.position[:k] - self.motion.position[:k], axis=-1) / self.length
-            turns = rotations.angle_between(other.orientation[:k], self.motion.orientation[:k])
-            found[:k] = np.maximum(places, turns).max(axis=-1, initial=0.0)
+            own, theirs = ((m.position[:k], m.orientation[:k]) for m in (self.motion, other))
+            found[:k] = distances(own, theirs, self.length)
         return found
 
 

@@ -17,10 +17,9 @@ from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Crossing, Outcome
 
-SAMPLES = 61
+SAMPLES = 61  # poses of a motion at which ranks are computed
 ROUNDING = (
-    # relative singular values below this at every pose are attributed to rounding of the scene's numbers
-    1e-5
+    1e-5  # singular value of unit rows: below it at every pose, rounding of the scene's numbers explains it
 )
 MOST_ROWS = 300  # constraint rows; for more, singular values at every pose take too long
 SAME = 1e-9  # relative difference below which two poses count as equal

@@ -19,7 +19,7 @@ from mbref.scene import GROUND, Scene, SceneError
 Point = tuple[float, float, float]
 SHARES = 20  # parts into which a large change is divided, so that the loops stay on their branch
 CLOSED = 1e-10  # gap / mechanism's length; smaller gaps count as closed
-MOST_ITERATIONS = 50
+MOST_ITERATIONS = 50  # largest number of Gauss–Newton steps for the points of a link
 
 
 @dataclass(frozen=True)

@@ -25,13 +25,13 @@ from mbref.trajectory import Trajectory
 STARTS = 24  # number of poses from which an equilibrium is searched
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism
 LONGEST = 0.3  # largest step towards an equilibrium / length of the mechanism
-MOST_STEPS = 60
+MOST_STEPS = 60  # largest number of Newton steps from a start
 BALANCED = 1e-11  # largest acceleration at an equilibrium / scale of accelerations
 SAME = 1e-6  # distance / length of the mechanism, or rad, below which two poses count as equal
 STILL = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
 # acceleration × duration² / length of the mechanism below which a mechanism counts as free of forces
 NOTHING = 1e-9
-SEED = 1
+SEED = 1  # of the random directions in which starts lie
 # displayed vibration: largest displacement / length of the mechanism, and number of samples
 AMPLITUDE, FRAMES = 0.1, 49
 

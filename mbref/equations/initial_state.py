@@ -23,7 +23,7 @@ LARGE = 40  # rows; for more, dense singular values take longer than sparse fact
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
-MOST_ITERATIONS = 30
+MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
 # weight of open velocities relative to given ones, and number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
 # residual of Φ_q v = ν / largest velocity; it is larger if the velocities belong to another branch

@@ -21,7 +21,7 @@ from mbref.kernels.layout import OK, PROPOSE, STEP
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.vectors import copy
 
-HIGHEST = 12
+HIGHEST = 12  # largest order of the method
 AIM = 0.5  # error / tolerance for which step lengths are chosen
 
 

@@ -33,12 +33,15 @@ from mbref.linear_algebra.vectors import copy
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-TINY, NEVER = 1e-300, 1e300
+TINY, NEVER = 1e-300, 1e300  # divisors stay above the first number; the second one stands for no change yet
 # least number of iterations of ``solve_to_tolerance``; enough away from singular positions, so that it is
 # fixed there
 LEAST = 2
 ALPHA = 1e10  # penalty for systems that are solved once; singular values below 1e-5 are ignored
-ITERATIONS, ROUNDING = 20, 1e-15
+ITERATIONS, ROUNDING = (
+    20,
+    1e-15,
+)  # most iterations of a system that is solved once; relative change that ends them
 DEPENDENT = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 

@@ -14,7 +14,7 @@ import time
 
 import numpy as np
 
-from mbref import rotations
+from mbref.error_estimate import distances
 from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import Method, default_method
 from mbref.simulation.start_run import start_run
@@ -22,7 +22,7 @@ from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
 from mbref.stepping.run import Run
 
-MOST_STEPS = 100_000
+MOST_STEPS = 100_000  # steps of the run by the default method
 TOLERANCE = 1e-10  # relative tolerance of the run by the default method
 # allowed distance (lengths of the mechanism or rad): a multiple of the run's tolerance, and a least value
 OFF = (1e3, 1e-6)
@@ -75,8 +75,7 @@ def _allowed(run: Run) -> float:
 
 def _distances(run: Run, other: Run, samples: int) -> np.ndarray:
     """Return the largest distance (k,) of a body at each of the first samples: over the length, or rad."""
-    mine, theirs = (r.memory.loop.samples.coordinates[:samples] for r in (run, other))
-    mine, theirs = (q.reshape(samples, run.model.nb, 7) for q in (mine, theirs))
-    places = np.linalg.norm(mine[..., :3] - theirs[..., :3], axis=-1) / run.model.length
-    turns = rotations.angle_between(mine[..., 3:], theirs[..., 3:])
-    return np.maximum(places, turns).max(axis=-1, initial=0.0)
+    mine, theirs = (
+        r.memory.loop.samples.coordinates[:samples].reshape(samples, run.model.nb, 7) for r in (run, other)
+    )
+    return distances((mine[..., :3], mine[..., 3:]), (theirs[..., :3], theirs[..., 3:]), run.model.length)

@@ -25,8 +25,8 @@ from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.projection import ROUNDING
 
-MOST_ITERATIONS = 20
-SINGULAR_PIVOT = 1e-13
+MOST_ITERATIONS = 20  # largest number of Newton steps for the dependent coordinates
+SINGULAR_PIVOT = 1e-13  # pivot of Φ_u (1, or 1/m) below which Φ_u is singular to rounding
 
 
 class Options(NamedTuple):

@@ -31,7 +31,7 @@ INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # squared pivot above which a row count
 DEPENDENT = 3e-3  # pivot below which a row clearly depends on others
 CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
-MOST_ITERATIONS = 10
+MOST_ITERATIONS = 10  # largest number of Newton steps of a correction
 ROUNDING = 1e3  # violation / tolerance below which iterations may fail to reduce it further
 # violation, and its reduction by a step, below which the factor is used again
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2

@@ -1,4 +1,4 @@
-"""Entry points of a run by Taylor series: its start, and the steps that it takes in one call."""
+"""Kernels that Python calls in a run by Taylor series: the start of a series, and many steps in one call."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise_equations, solution
 
 MAX_VIOLATION = 1e-6  # violation below which one correction leaves rounding
-MAX_CORRECTIONS = 8
+MAX_CORRECTIONS = 8  # largest number of corrections of a state
 
 
 @kernel

@@ -43,10 +43,8 @@ from mbref.taylor.stepping import (
 PREDICTOR_TOLERANCE = 3e-7  # tolerance of the last terms, away from singular positions
 ACCURATE_TOLERANCE = 1e-13  # tolerance of high-accuracy steps
 MIN_PREDICTOR_RATIO = 0.25  # predictor step / crossing step: a shorter one is not taken
-PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = (
-    16,
-    12,
-)  # of the series unless another order is requested; the least one that crosses
+# order of the series unless another one is requested; least order that crosses
+PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = 16, 12
 
 
 @entry(INT(SERIES))

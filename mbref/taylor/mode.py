@@ -1,4 +1,5 @@
-"""Modes of a run in series: which kind of step comes next, its tolerance and the order of its series."""
+"""Kinds of steps of a Taylor method (regular, high-accuracy, predictor), with tolerance and order of the
+series."""
 
 from __future__ import annotations
 

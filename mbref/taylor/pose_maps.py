@@ -1,4 +1,4 @@
-"""The variables of natural coordinates read from a state of all bodies."""
+"""Linear maps from the poses of all bodies to the variables of natural coordinates, and their evaluation."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from mbref.taylor.crossing.long_crossing import (
     put_state_along,
 )
 from mbref.taylor.driven import follow_drivers
-from mbref.taylor.outputs import complete_samples
+from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import CALLED
 from mbref.taylor.stepping import begin_series, take_step
 

@@ -1,4 +1,5 @@
-"""Samples between the ends of a step: states from the series, saved until the steps of a call have ended."""
+"""States of all bodies from a series, at samples and at ends of steps; samples are saved until the steps of a
+call have ended."""
 
 from __future__ import annotations
 
@@ -117,7 +118,7 @@ def put_terms(series, memory):
 @kernel
 def keep_sample(h, memory):
     """Save the variables at the next sample, at a distance h (s) into the step, until samples are completed
-    (``mbref.taylor.outputs``)."""
+    (``mbref.taylor.sample_completion``)."""
     clock, waiting = memory.run.loop.clock, memory.waiting
     evaluate_series(h, memory)
     put_angles(h, memory)

@@ -12,9 +12,9 @@ from mbref.kernels.named_memory import allocate
 from mbref.stepping.run import Run
 from mbref.taylor.crossing.detection import contains_singular_position
 from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
-from mbref.taylor.outputs import complete_sample
 from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
+from mbref.taylor.sample_completion import complete_sample
 from mbref.taylor.series import expand_series, expand_with_multipliers
 from mbref.taylor.simd import padded_size
 from mbref.taylor.solver import respond_in_loops

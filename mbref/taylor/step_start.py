@@ -1,4 +1,4 @@
-"""The start of a step: the series that the step evaluates, and the return to the start after a failed
+"""The start of a step: the saved series that the step evaluates, and the return to it after a failed
 attempt."""
 
 from __future__ import annotations

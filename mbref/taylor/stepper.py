@@ -1,5 +1,5 @@
-"""The steps of a run by Taylor series: memory made from the scene's natural coordinates, and the loop of
-steps."""
+"""A run by Taylor series in Python: its memory and options, and the loop over calls of the kernels that take
+steps, cross singular positions and complete samples."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from mbref.taylor.driven import (
 from mbref.taylor.geometry import geometry_of
 from mbref.taylor.layout import Options, TaylorMemory
 from mbref.taylor.mode import REGULAR
-from mbref.taylor.outputs import complete_samples
+from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
@@ -50,7 +50,7 @@ SHARE = 0.05  # tolerance of the last terms / (rtol + atol), far from singular p
 ROUNDING = 1e-16  # relative rounding of a singular value
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
-LEAST_ORDER, MOST_ORDER = 4, 30
+LEAST_ORDER, MOST_ORDER = 4, 30  # order of a series; rounding dominates higher terms
 # order of least cost: at a tolerance of 1, and increase for each digit
 CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}
 

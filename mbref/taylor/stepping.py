@@ -1,4 +1,4 @@
-"""The steps of a Taylor method: as long as the last terms allow, each judged at its end.
+"""One step of a Taylor method: as long as the last terms of the series allow, and judged at its end.
 
 Steps follow À.  Jorba and M.  Zou (Experimental Mathematics 14, 2005).  At the end of a step the rows are
 violated by the error of the series, which is corrected, and the accelerations of the equations differ from

@@ -15,7 +15,7 @@ from mbref.scene import GROUND, Body, Driver, Revolute, Scene, SceneError, Unive
 from mbref.simulation import comparison, outcome, start_run, trial
 from mbref.stepping.limits import Limits
 from mbref.stepping.ranks import Ranks
-from mbref.taylor import driven, mode, outputs, stepper
+from mbref.taylor import driven, mode, sample_completion, stepper
 from tests.mbref.interpreted_thresholds import flips, memory
 from tests.mbref.threshold_checks import check, near
 
@@ -457,12 +457,12 @@ def _(_):
     return near(state.mode.tolerance, 1e-4)
 
 
-@check("taylor.outputs SAMPLE_CORRECTIONS")
+@check("taylor.sample_completion SAMPLE_CORRECTIONS")
 def _(_):
     """A sample of a predictor step is corrected so often."""
     made = []
     state = memory()
     state.options.follows_drivers = True
     state.kernels = SimpleNamespace(expand=lambda *_: made.append(1) or 0)
-    outputs.expand_at_sample(state)
+    sample_completion.expand_at_sample(state)
     return len(made) == 2

@@ -1,4 +1,4 @@
-"""Outputs of a series: accelerations and multipliers at the samples that its steps have saved.
+"""Completion of samples: accelerations and multipliers at the states that the steps of a series have saved.
 
 A series of second order about the sample gives the accelerations.  Near a singular position rounding divided
 by the distance would dominate that series, so the second derivative of the high-accuracy step is used.
