@@ -26,6 +26,7 @@ MOST_IDLE = 8  # idle children: about one for every engine
 # on other systems a forked process may lack threads of the system's libraries
 COPIES = sys.platform == "linux"
 NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
+EVERY_ENGINE = "*"  # name of the child in which the runs of all engines take turns
 READY_SECONDS = 600.0  # s for imports and compilation, before the time limit of a run applies
 
 _idle: list[tuple[str, Child]] = []  # idle children with their engines, the latest one at the end
@@ -127,12 +128,13 @@ def time_interleaved(
     """Return CPU seconds of stepping for speed comparisons: for every job a list of ``repeats`` times.
 
     The jobs (engine name, setting) take turns in one child process after a warm-up round, so that all jobs
-    see the same machine. A run that does not complete has NaN. ``time_limit`` (s) is for all jobs together.
-    Raises ChildFailed if the child gives no result, LookupError for an unknown engine.
+    see the same machine. The same child times the next scene. A run that does not complete has NaN.
+    ``time_limit`` (s) is for all jobs together. Raises ChildFailed if the child gives no result, LookupError
+    for an unknown engine.
     """
     for engine_name, _ in jobs:
         _check(engine_name)
-    with closing(Child()) as child:
+    with _in_use(EVERY_ENGINE) as child:
         return child.call(serve.run_interleaved, (scene, times, list(jobs), repeats), time_limit).value
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.processes.child import ChildFailed
@@ -38,15 +38,20 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
     """Ask each engine for its settings for each scene, in one child process for each core; ``advance``
     receives each finished pair.
 
+    An engine is asked for further scenes after its first answer, before which it may compile for a minute.
     An engine that crashes or hangs on a scene counts as refusing it, with the reason.
     """
-    pairs = [(name, scene) for scene in scenes for name in engines if (name, scene) not in _found]
+    left = {name: [scene for scene in scenes if (name, scene) not in _found] for name in engines}
+    first = [(name, theirs.pop(0)) for name, theirs in left.items() if theirs]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
-        asked = {threads.submit(_asked, pair): pair for pair in pairs}
-        for future in as_completed(asked):
-            name, scene = pair = asked[future]
-            _found[pair] = future.result()
-            advance(f"{name} {scene.name}")
+        asked = {threads.submit(_asked, pair): pair for pair in first}
+        while asked:
+            for future in wait(asked, return_when=FIRST_COMPLETED).done:
+                name, scene = pair = asked.pop(future)
+                _found[pair] = future.result()
+                advance(f"{name} {scene.name}")
+                more = [(name, other) for other in left.pop(name, ())]
+                asked |= {threads.submit(_asked, pair): pair for pair in more}
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:

@@ -324,6 +324,10 @@ def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
     assert order == ("a", "b") * 3, order
     assert len(set(processes)) == 1, f"one process for all, got {set(processes)}"
     assert int(processes[0]) != os.getpid()
+    time_interleaved(still(str(log)), TIMES, jobs, repeats=1, time_limit=60.0)
+    assert log.read_text().splitlines()[-1].split()[1] == processes[0], (
+        "the process times the next scene, too"
+    )
 
 
 def test_interleaved_crash_is_an_error():
