@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
@@ -40,15 +41,24 @@ WHEN = (
     "some fail there, and a run that ends on another branch has the outcome LEFT_MOTION."
 )
 
+SERIES = "taylor"
 Runs = Mapping[Curve, Mapping[float, Record]]  # by engine and family, by difficulty
 
 
 def render(records: Sequence[Record]) -> list[Block]:
-    """Return advice, counts of false successes, and a heat map for each ladder."""
+    """Return two sentences of result, advice, counts of false successes, and a heat map for each ladder."""
     found = _runs(records)
     shown = [ladder for ladder in ladders() if ladder.name in found]
     maps = [_map(ladder, found[ladder.name]) for ladder in shown]
-    return [Heading("Stability", 2), Text(WHEN), Text(HOW), _counts(shown, found), *maps]
+    counts = _counts(shown, found)
+    return [
+        Heading("Stability", 2),
+        *(Text(sentence) for sentence in _results(counts)),
+        Text(WHEN),
+        Text(HOW),
+        _table(counts),
+        *maps,
+    ]
 
 
 def _runs(records: Iterable[Record]) -> dict[str, Runs]:
@@ -69,16 +79,45 @@ def is_false(record: Record) -> bool:
     return is_completed(record) and not error(record) <= allowed
 
 
-def _counts(shown: Sequence[Ladder], found: Mapping[str, Runs]) -> Table:
-    """Return the numbers of right runs, of reported failures and of false successes of every method over all
-    ladders."""
-    curves = dict.fromkeys(curve for runs in found.values() for curve in runs)
-    rows = []
-    for curve in curves:
+class Count(NamedTuple):
+    """Runs of a method over all ladders: completed and right, ended early, and completed but wrong."""
+
+    right: int
+    ended: int
+    false: int
+
+
+def _counts(shown: Sequence[Ladder], found: Mapping[str, Runs]) -> dict[Curve, Count]:
+    """Return the counts of every engine and method."""
+    counts: dict[Curve, Count] = {}
+    for curve in dict.fromkeys(curve for runs in found.values() for curve in runs):
         records = [r for ladder in shown for r in found[ladder.name].get(curve, {}).values()]
         false = sum(map(is_false, records))
         right = sum(map(is_completed, records)) - false
-        rows.append((*curve, str(right), str(len(records) - right - false), str(false)))
+        counts[curve] = Count(right, len(records) - right - false, false)
+    return counts
+
+
+def _results(counts: Mapping[Curve, Count]) -> list[str]:
+    """Return a sentence on `taylor`, and one on the other methods and engines."""
+    first = counts.get((MBREF, SERIES))
+    others = {curve: count for curve, count in counts.items() if curve != (MBREF, SERIES)}
+    if first is None or not others:
+        return []
+    best = max(others, key=lambda curve: others[curve].right)
+    worst = max(others, key=lambda curve: others[curve].false)
+    rungs = sum(others[best])
+    return [
+        f"Of {sum(first)} runs by taylor {first.right} are right, {first.ended} ended early, and "
+        f"{first.false} completed with a wrong motion.",
+        f"Of the others, {_name(best)} is right most often ({others[best].right} of {rungs} runs), and "
+        f"{_name(worst)} completes wrong motions most often ({others[worst].false} of {sum(others[worst])}).",
+    ]
+
+
+def _table(counts: Mapping[Curve, Count]) -> Table:
+    """Return the counts as a table."""
+    rows = [(*curve, *map(str, count)) for curve, count in counts.items()]
     caption = (
         "Runs of all ladders: completed and right, ended early, and completed but wrong (false successes)."
     )

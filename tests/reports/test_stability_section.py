@@ -7,7 +7,9 @@ import pytest
 from crosscheck.engine import engine_names
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
-from reports.blocks import HeatMap, Table
+from mbref.records import append
+from reports import __main__ as program
+from reports.blocks import HeatMap, Table, Text
 from reports.render import html, markdown
 from reports.sections import stability as section
 
@@ -57,6 +59,20 @@ def test_counts_tell_right_ended_and_false():
         ("mbref", "taylor", "1", "1", "2"),
         ("mujoco", "projected", "1", "0", "1"),
     ]
+    first, second, *_ = [b.text for b in section.render(records) if isinstance(b, Text)]
+    assert first == "Of 4 runs by taylor 1 are right, 1 ended early, and 2 completed with a wrong motion."
+    assert second == (
+        "Of the others, mujoco projected is right most often (1 of 2 runs), and mujoco projected completes "
+        "wrong motions most often (1 of 2)."
+    )
+
+
+def test_stored_ladders_are_rendered_without_a_run(tmp_path, capsys):
+    assert program.main(["--section", "stability", "--render", str(tmp_path)]) == 2
+    assert "stability.jsonl" in capsys.readouterr().err
+    append(tmp_path / "stability.jsonl", {"key": "1", **record("gap", 1e-1, 1e-9)})
+    assert program.main(["--section", "stability", "--render", str(tmp_path)]) == 0
+    assert "| taylor | 9 |" in (tmp_path / "report.md").read_text()
 
 
 @pytest.mark.parametrize(
