@@ -9,14 +9,13 @@ import os
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
 from importlib import import_module, metadata
-from typing import Any
 
 import numpy as np
 
 from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
 from crosscheck.refusals import Cannot, Owner, Supports
+from crosscheck.setting import FamilyParts, Setting, best_family
 from mbref import rotations
 from mbref.scene import GROUND, Scene
 from mbref.scene_fields import meant
@@ -51,51 +50,11 @@ __all__ = [
     "rotations",
 ]
 
-# name of the option that chooses the branch at a singular position, in engines that have such an option
-BRANCHES = "branches"
-# family of the most accurate settings of an engine, in engines that have a family of this name
-BEST = "tuned"
-AS_IN_FILE = "as in file"  # family that runs the file from which a scene was read, at the file's own settings
-ORIGIN = ("file", "import")  # options of "as in file": path of the file, options for reading
-# part of a method (such as "integrators") → name → its options with their defaults
-FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]
-
-
-@dataclass(frozen=True)
-class Setting:
-    """One way of running an engine.
-
-    Attributes
-    ----------
-    family : str
-        Group of settings that differ in accuracy only. ``"defaults"`` is the library's own choice,
-        ``"tuned"`` the most accurate one that its documentation allows.
-    options : mapping of str to Any
-        Numbers of the engine. Family and options reproduce the run.
-    """
-
-    family: str
-    options: Mapping[str, Any] = field(default_factory=dict)
-
-    def __str__(self) -> str:
-        return self.family + "".join(
-            f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}" for k, v in self.options.items()
-        )
-
-
-def best_family(settings: Sequence[Setting]) -> list[Setting]:
-    """Return the settings of the family "tuned", or of the first family of settings if the engine has no such
-    family, coarse to fine."""
-    families = [setting.family for setting in settings]
-    best = BEST if BEST in families or not families else families[0]
-    return [setting for setting in settings if setting.family == best]
-
 
 class Engine(ABC):
-    """Interface of an engine adapter: it simulates a Scene and returns a Trajectory. Its constructor takes no
-    arguments.
+    """Interface of an engine adapter, which simulates a Scene and returns a Trajectory.
 
-    An adapter imports the engine's package inside its methods, so that constructing it imports nothing.
+    The constructor takes no arguments. Only methods import the engine's package.
 
     Attributes
     ----------
@@ -105,24 +64,26 @@ class Engine(ABC):
         Joint types, drivers and loads that the adapter maps. Everything else is refused.
     rounding : float
         Relative rounding of the engine's numbers: 2**-52, or 2**-23 in single precision.
-    families : mapping of str to str
-        Families of settings and their descriptions, for `crosscheck list settings`.
+    families, options : mapping of str to str
+        Families of settings, and options of a setting with units, each with a description.
     integrated_here : collection of str
         Families whose integrator or extrapolation belongs to crosscheck.
-    options : mapping of str to str
-        Options of a setting and their descriptions, with units.
     """
 
     name: str
-    package: str  # name of the package to install
-    supports: Supports = Supports()  # features that the engine can simulate; all others are refused
-    rounding: float = 2.0**-52  # relative rounding of the engine's arithmetic; 2**-23 in single precision
-    families: Mapping[str, str] = {}  # family of settings → its description, for `crosscheck list settings`
-    integrated_here: Collection[str] = ()  # families whose integrator, or extrapolation, is crosscheck's
-    options: Mapping[str, str] = {}  # option of a setting → its description, with the unit
+    package: str
+    supports: Supports = Supports()
+    rounding: float = 2.0**-52
+    families: Mapping[str, str] = {}
+    integrated_here: Collection[str] = ()
+    options: Mapping[str, str] = {}
 
     def version(self) -> str:
         """Return the version of the engine; by default the version of ``package``.
+
+        Returns
+        -------
+        str
 
         Raises
         ------
@@ -132,51 +93,136 @@ class Engine(ABC):
         return metadata.version(self.package)
 
     def cannot(self, scene: Scene) -> Cannot | None:
-        """Return the refusal of a scene, or None if the engine can run it.
+        """Return the refusal of a scene: first by ``supports``, then by ``refuses``.
 
-        Joints, drivers and loads that ``supports`` does not declare are refused first. Then the method
-        ``refuses`` decides.
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        Cannot or None
+            None if the engine can run the scene.
         """
         return self.supports.missing(scene) or self.refuses(scene)
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Return a refusal beyond the declared joints, drivers and loads, or None."""
+        """Return a refusal beyond the declared joints, drivers and loads.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        Cannot or None
+            None if the engine can run the scene.
+        """
         return None
 
     @abstractmethod
     def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Return the settings of all families for a scene, coarse to fine in each family."""
+        """Return the settings of all families for a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        sequence of Setting
+            Coarse to fine in each family.
+        """
 
     def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
-        """Return the settings of one family, coarse to fine; an empty list if the family cannot run the
-        scene."""
+        """Return the settings of one family for a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+        family : str
+
+        Returns
+        -------
+        sequence of Setting
+            Coarse to fine; empty if the family cannot run the scene.
+        """
         return [setting for setting in self.settings(scene) if setting.family == family]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether a family has settings for a scene."""
+        """Return whether a family has settings for a scene.
+
+        Parameters
+        ----------
+        scene : Scene
+        family : str
+
+        Returns
+        -------
+        bool
+        """
         return bool(self.settings_of(scene, family))
 
     def best_settings(self, scene: Scene) -> Sequence[Setting]:
-        """Return the settings of the family "tuned", or of the first family."""
+        """Return the settings of the family "tuned", or of the first family.
+
+        Parameters
+        ----------
+        scene : Scene
+
+        Returns
+        -------
+        sequence of Setting
+            Coarse to fine.
+        """
         return best_family(self.settings(scene))
 
     def has_family(self, family: str) -> bool:
-        """Return whether `run` accepts a family. An engine may accept families that `settings` does not
-        list."""
+        """Return whether `run` accepts a family, which `settings` need not list.
+
+        Parameters
+        ----------
+        family : str
+
+        Returns
+        -------
+        bool
+        """
         return False
 
     def family_parts(self) -> FamilyParts:
-        """Return the parts of which names of families are composed, such as integrators; empty if names are
-        not composed of parts."""
+        """Return the parts of which names of families are composed, such as integrators.
+
+        Returns
+        -------
+        mapping
+            Kind of part → name → options with their defaults. Empty if names are not composed of parts.
+        """
         return {}
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
-        """Return the line of the engine's own code or XML that makes a setting; empty if no such line is
-        known."""
+        """Return the line of the engine's own code or XML that makes a setting.
+
+        Parameters
+        ----------
+        scene : Scene
+        setting : Setting
+            Family and options.
+
+        Returns
+        -------
+        str
+            Empty if no such line is known.
+        """
         return ""
 
     def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
-        """Import and compile what the families need, before the first run in a process."""
+        """Import and compile what the families need, before the first run in a process.
+
+        Parameters
+        ----------
+        families : sequence of str
+        """
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
@@ -201,29 +247,32 @@ class Engine(ABC):
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # these run by default if their packages are installed
-# these run only if they are named, since they compile code for each scene first
-GENERATORS = ("casadi", "heyoka")
-# these run only if they are named, since their packages are large
-LARGE = ("drake", "dart", "bullet", "mjx", "warp")
+GENERATORS = ("casadi", "heyoka")  # these run only if they are named: they compile code for each scene
+LARGE = ("drake", "dart", "bullet", "mjx", "warp")  # these run only if they are named: large packages
 ON_REQUEST = (*GENERATORS, *LARGE)
 ALL = "all"  # this name selects every installed engine
 ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of crosscheck's engines and of the engines that installed packages register."""
-    return (
-        *BUILT_IN,
-        *OPTIONAL,
-        *ON_REQUEST,
-        *(point.name for point in metadata.entry_points(group=ENTRY_POINTS)),
-    )
+    """Return the names of crosscheck's engines and of the engines that installed packages register.
+
+    Returns
+    -------
+    tuple of str
+    """
+    registered = (point.name for point in metadata.entry_points(group=ENTRY_POINTS))
+    return (*BUILT_IN, *OPTIONAL, *ON_REQUEST, *registered)
 
 
 def default_engines() -> tuple[str, ...]:
     """Return the names of the engines that run if the user names none.
 
     Engines that run on request only, and optional engines that are not installed, are left out.
+
+    Returns
+    -------
+    tuple of str
     """
     asked = (name for name in engine_names() if name not in ON_REQUEST)
     return tuple(name for name in asked if name not in OPTIONAL or installed(name))
@@ -252,10 +301,14 @@ def engine(name: str) -> Engine:
         The name of an engine, or ``module:attribute`` of a module that can be imported or is in the working
         directory.
 
+    Returns
+    -------
+    Engine
+
     Raises
     ------
     LookupError
-        If there is no such engine; the message lists the known ones.
+        If there is no such engine; the message lists the known engines.
     """
     if name in BUILT_IN + OPTIONAL + ON_REQUEST:
         return _as_engine(name, import_module(f"crosscheck.engines.{name}").ENGINE)

@@ -13,8 +13,11 @@ TABLE, FACTOR = "table", "factor"  # features of a driver and of a load
 
 
 class Owner(enum.Enum):
-    """The owner of a gap: the adapter, the engine or the engine's model would have to change to run a
-    scene."""
+    """Owner of a missing feature: the part that must change before the scene can run.
+
+    ``ADAPTER`` is crosscheck's adapter of the engine, ``ENGINE`` the engine, and ``MODEL`` the engine's model
+    of mechanisms, which excludes the feature.
+    """
 
     ADAPTER = "missing in the adapter"
     ENGINE = "missing in the engine"
@@ -65,7 +68,18 @@ class Supports:
     over_time: Collection[str] = ()
 
     def missing(self, scene: Scene) -> Cannot | None:
-        """Return the refusal of the first joint, coupling, driver or load that is not declared, or None."""
+        """Return the refusal of the first joint, coupling, driver or load that is not declared.
+
+        Parameters
+        ----------
+        scene : Scene
+            The mechanism.
+
+        Returns
+        -------
+        Cannot or None
+            None if every feature of the scene is declared.
+        """
         missing = next(self._missing(scene), "")
         return Cannot(Owner.ADAPTER, f"{missing}, which the adapter does not map") if missing else None
 

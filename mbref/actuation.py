@@ -129,6 +129,14 @@ def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadM
     return LoadMotion(place, length, rate, force, power=-force * rate)
 
 
+def largest_force(trajectory: Trajectory) -> np.ndarray | None:
+    """Return the largest reaction force of a joint at each sample (k,), N; None without reactions."""
+    if trajectory.reactions is None:
+        return None
+    forces = [np.linalg.norm(wrench[:, :3], axis=1) for wrench in trajectory.reactions.values()]
+    return np.asarray(np.max(forces, axis=0, initial=0.0)) if forces else np.zeros(len(trajectory.times))
+
+
 def _world_axis(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
     """Return the axis (k, 3) of a joint, which its first body carries, as a unit vector."""
     joint = scene.joint_named(name)

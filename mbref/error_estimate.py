@@ -51,7 +51,22 @@ class ErrorEstimate:
 
     @staticmethod
     def none(times: np.ndarray, rtol: float | None, reason: str) -> ErrorEstimate:
-        """Return the error estimate of a motion for which no second run could be made."""
+        """Return the error estimate of a motion for which no second run could be made.
+
+        Parameters
+        ----------
+        times : ndarray, shape (k,)
+            Sample times of the motion, s.
+        rtol : float or None
+            Relative tolerance of the motion.
+        reason : str
+            The reason, as a clause.
+
+        Returns
+        -------
+        ErrorEstimate
+            With NaN as error of every sample.
+        """
         return ErrorEstimate(times, np.full(len(times), math.nan), rtol, "", reason)
 
     @property
@@ -61,8 +76,18 @@ class ErrorEstimate:
         return float(known.max()) if known.size else None
 
     def exceeds_from(self, level: float) -> float | None:
-        """Return the time, s, of the first sample whose error is above ``level``; None if no sample has such
-        an error."""
+        """Return the time of the first sample whose error is above a level.
+
+        Parameters
+        ----------
+        level : float
+            Relative error, or angle in rad.
+
+        Returns
+        -------
+        float or None
+            Time, s; None if no sample has such an error.
+        """
         above = np.flatnonzero(self.error > level)
         return float(self.times[above[0]]) if above.size else None
 
@@ -102,7 +127,13 @@ class ErrorEstimate:
         return f"estimated error: at most {self.largest:.1e}{above}{ends}"
 
     def to_record(self) -> dict[str, Any]:
-        """Return numbers, lists and text, for JSON."""
+        """Return numbers, lists and text, for JSON.
+
+        Returns
+        -------
+        dict
+            The attributes by name, with ``largest``, ``exceeds_rtol_from`` (s) and ``sentence``.
+        """
         return {
             "largest": self.largest,
             "exceeds_rtol_from": self.exceeds_rtol_from,
@@ -116,7 +147,19 @@ class ErrorEstimate:
 
     @staticmethod
     def from_record(times: np.ndarray, record: Mapping[str, Any]) -> ErrorEstimate:
-        """Return the estimate that ``to_record`` wrote."""
+        """Return the estimate that ``to_record`` wrote.
+
+        Parameters
+        ----------
+        times : ndarray, shape (k,)
+            Sample times of the motion, s, which the record does not contain.
+        record : mapping
+            Result of ``to_record``.
+
+        Returns
+        -------
+        ErrorEstimate
+        """
         tighter = record["tighter"]
         return ErrorEstimate(
             times,

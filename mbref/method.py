@@ -51,7 +51,7 @@ def default_method(scene: Scene) -> str:
 
 
 class MethodError(Exception):
-    """An unknown method, or an option that a part of the method does not have."""
+    """Error: a method is unknown, or a part of the method does not have an option."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Method:
 
     @property
     def crosses(self) -> Literal["no", "by regularisation", "by series"]:
-        """Strategy for crossing singular positions, or None if the method does not cross them."""
+        """Strategy for crossing singular positions: ``"by series"``, ``"by regularisation"`` or ``"no"``."""
         if self.integrator.crosses != "no":
             return self.integrator.crosses
         return "no" if self.stabilisation.watches_rank else self.formulation.crosses
@@ -98,12 +98,33 @@ class Method:
         return self.integrator.step is None
 
     def options_of(self, part: Formulation | Stabilisation | Integrator) -> dict[str, float]:
-        """Return the options of a formulation, stabilisation or integrator: its defaults, overridden by the
-        method's name."""
+        """Return the options of one part of the method: its defaults, overridden by the method's name.
+
+        Parameters
+        ----------
+        part : Formulation, Stabilisation or Integrator
+            A part of this method.
+
+        Returns
+        -------
+        dict of str to float
+            Options by name; ``mbref list methods`` prints their units.
+        """
         return {**part.options, **self.options.get(part.name, {})}
 
     def settings(self, rank_tolerance: float) -> Settings:
-        """Return the numbers that all kernels share; the feedback gains of both parts are added."""
+        """Return the numbers that all kernels share; the feedback gains of both parts are added.
+
+        Parameters
+        ----------
+        rank_tolerance : float
+            Singular value or pivot, relative to the largest one, below which it counts as zero.
+
+        Returns
+        -------
+        Settings
+            Velocity gain (1/s), position gain (1/s²) and rank tolerance.
+        """
         gains = np.zeros(2)
         for part in (self.formulation, self.stabilisation):
             if part.feedback is not None:
@@ -112,7 +133,18 @@ class Method:
         return Settings(velocity_gain, position_gain, rank_tolerance)
 
     def packed_options(self, part: Formulation | Stabilisation) -> Packed | None:
-        """Return the numbers that only this part's kernels need."""
+        """Return the numbers that only this part's kernels need.
+
+        Parameters
+        ----------
+        part : Formulation or Stabilisation
+            A part of this method.
+
+        Returns
+        -------
+        Packed or None
+            The options as a record of numbers; None for a part without options.
+        """
         return packed(record(part.numbers(**self.options_of(part)))) if part.options else None
 
     @staticmethod
@@ -125,6 +157,10 @@ class Method:
         name : str
             ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT. The
             stabilisation defaults to ``none``, the integrator to ``dop853``.
+
+        Returns
+        -------
+        Method
 
         Raises
         ------

@@ -35,3 +35,10 @@ def _value(value: Any) -> str:
     if isinstance(value, list):
         return "[" + ", ".join(map(_value, value)) + "]"
     return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+
+
+def as_lists(value: Any) -> Any:
+    """Return tuples as lists, as writers of TOML and JSON need them."""
+    if isinstance(value, Mapping):
+        return {k: as_lists(v) for k, v in value.items()}
+    return [as_lists(v) for v in value] if isinstance(value, tuple | list) else value

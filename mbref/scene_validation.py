@@ -49,7 +49,7 @@ INERTIA_TOLERANCE = 1e-9  # relative, of the triangle inequality: equality holds
 
 
 class SceneError(Exception):
-    """A scene that cannot be used; ``faults`` has one ``path: message`` for each fault."""
+    """Error: a scene cannot be used; ``faults`` has one ``path: message`` for each fault."""
 
     def __init__(self, faults: Sequence[str]):
         self.faults = list(faults)

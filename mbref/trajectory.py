@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
+
+from mbref.crossing import Crossing
 
 
 class Outcome(enum.Enum):
@@ -69,73 +70,6 @@ class Cost:
     rhs: int = 0
     factorisations: int = 0
     newton: int = 0
-
-
-@dataclass(frozen=True)
-class Crossing:
-    """A singular position that a run crossed, and the branches of motion that meet there.
-
-    Attributes
-    ----------
-    time : float
-        Time of the singular position, s.
-    position : ndarray, shape (nb, 3)
-        Centres of mass of the bodies, world frame, m.
-    orientation : ndarray, shape (nb, 4)
-        Unit quaternions (w, x, y, z), body to world.
-    velocity, angular_velocity : ndarray, shape (b, nb, 3)
-        Velocities on each of the b branches, world frame, m/s and rad/s. The smooth branch is the first one.
-    taken : int
-        The branch that the run followed, counted from 1.
-    sentence : str
-        How many branches there are, or the reason why they are not known.
-    """
-
-    time: float
-    position: np.ndarray
-    orientation: np.ndarray
-    velocity: np.ndarray
-    angular_velocity: np.ndarray
-    taken: int
-    sentence: str
-
-    def instants(self, end: float, count: int) -> np.ndarray:
-        """Return times at which the branches are seen to separate.
-
-        From a quarter turn of the fastest body before the crossing to slightly less than half a turn after
-        it, where the next crossing often is. If no body turns, the times cover the whole run.
-
-        Parameters
-        ----------
-        end : float
-            End of the run, s.
-        count : int
-            Number of times.
-
-        Returns
-        -------
-        ndarray, shape (count,)
-            Times, s.
-        """
-        rate = float(np.linalg.norm(self.angular_velocity, axis=-1).max(initial=0.0))
-        if not rate:
-            return np.linspace(0.0, end, count)
-        turn = 2 * math.pi / rate
-        return np.linspace(max(0.0, self.time - 0.25 * turn), min(end, self.time + 0.45 * turn), count)
-
-    def to_record(self) -> dict[str, Any]:
-        """Return the crossing as numbers, lists and text, for JSON."""
-        arrays = ("position", "orientation", "velocity", "angular_velocity")
-        return {
-            "time": self.time, "taken": self.taken, "sentence": self.sentence,
-            **{key: getattr(self, key).tolist() for key in arrays},
-        }  # fmt: skip
-
-    @staticmethod
-    def from_record(record: Mapping[str, Any]) -> Crossing:
-        """Return the crossing that ``to_record`` wrote."""
-        arrays = {key: np.array(v, dtype=float) for key, v in record.items() if isinstance(v, list)}
-        return Crossing(**{**record, **arrays})
 
 
 @dataclass(frozen=True)
@@ -257,7 +191,26 @@ class Trajectory:
         *, scene: str, engine: str, version: str, method: str, settings: Mapping[str, Any],
         bodies: tuple[str, ...], outcome: Outcome, message: str,
     ) -> Trajectory:  # fmt: skip
-        """Return a trajectory without states, for a run that crashed, hung or did not begin."""
+        """Return a trajectory without states, for a run that crashed, hung or did not begin.
+
+        Parameters
+        ----------
+        scene, engine, version, method : str
+            Names of the scene, the engine, its version, and the method or family of settings.
+        settings : mapping
+            Numbers of the method or engine.
+        bodies : tuple of str
+            Names of the scene's bodies.
+        outcome : Outcome
+            How the run ended.
+        message : str
+            One sentence on the end of the run.
+
+        Returns
+        -------
+        Trajectory
+            With k = 0 samples.
+        """
         nb = len(bodies)
         return Trajectory(
             scene, engine, version, method, settings, np.zeros(0), bodies, np.zeros((0, nb, 3)),
@@ -266,7 +219,13 @@ class Trajectory:
         )  # fmt: skip
 
     def to_record(self) -> dict[str, Any]:
-        """Return the record that ``run --json`` prints. crosscheck adds its ``metrics``."""
+        """Return the record that ``run --json`` prints. crosscheck adds its ``metrics``.
+
+        Returns
+        -------
+        dict
+            Numbers in the units of the attributes, lists and text, for JSON; states by body.
+        """
         per_body = [key for key in PER_BODY if getattr(self, key) is not None]
         return {
             "engine": self.engine,
@@ -290,7 +249,20 @@ class Trajectory:
 
     @staticmethod
     def from_record(scene: str, record: Mapping[str, Any]) -> Trajectory:
-        """Return the trajectory of a record that ``to_record`` wrote."""
+        """Return the trajectory of a record that ``to_record`` wrote.
+
+        Parameters
+        ----------
+        scene : str
+            Name of the scene, which the record does not contain.
+        record : mapping
+            Result of ``to_record``.
+
+        Returns
+        -------
+        Trajectory
+            The trajectory, with arrays as attributes.
+        """
         names = tuple(record["bodies"])
         k, crossings, marks = len(record["times"]), record.get("crossings"), record.get("open_reactions")
 

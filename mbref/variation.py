@@ -36,7 +36,16 @@ class Variation:
 
     @staticmethod
     def parse(text: str) -> Variation:
-        """Parse ``PATH=LOW:HIGH`` or ``PATH=MEAN+-DEVIATION``.
+        """Return the variation that a text describes.
+
+        Parameters
+        ----------
+        text : str
+            ``PATH=LOW:HIGH`` or ``PATH=MEAN+-DEVIATION``, in SI units.
+
+        Returns
+        -------
+        Variation
 
         Raises
         ------
@@ -55,7 +64,18 @@ class Variation:
         return Variation(path.strip(), low, high, normal)
 
     def draw(self, random: np.random.Generator) -> float:
-        """Return one random value."""
+        """Return one random value.
+
+        Parameters
+        ----------
+        random : numpy.random.Generator
+            Source of random numbers.
+
+        Returns
+        -------
+        float
+            The value, SI units.
+        """
         return float(
             random.normal(self.low, self.high) if self.normal else random.uniform(self.low, self.high)
         )
@@ -76,6 +96,11 @@ def variants(scene: Scene, variations: Sequence[Variation], count: int, seed: in
         Number of copies.
     seed : int
         Seed of the random numbers.
+
+    Yields
+    ------
+    Scene
+        Variants 0 to ``count`` - 1, in order.
 
     Raises
     ------

@@ -27,7 +27,8 @@ from crosscheck.cli.running import (
     print_json,
     studied,
 )
-from crosscheck.study.grid import Record, key, made_by
+from crosscheck.study.grid import Record, key
+from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
 from mbref.scene import SceneError
 from mbref.trajectory import Outcome

@@ -53,7 +53,7 @@ class Comparison:
 
     @cached_property
     def verdict(self) -> Verdict:
-        """Return the sentences of the verdict: headline, right, fast, breaks and truth."""
+        """Sentences of the verdict: headline, right, fast, breaks and truth."""
         return verdict([self.judged], self._unlike)
 
     @property
@@ -63,12 +63,12 @@ class Comparison:
 
     @property
     def records(self) -> Sequence[Record]:
-        """Return the records of all runs."""
+        """Records of all runs."""
         return self.judged.records
 
     @property
     def rows(self) -> list[Row]:
-        """Return one dictionary for each run: completed runs first, in the order of increasing error.
+        """One dictionary for each run: completed runs first, in the order of increasing error.
 
         Keys: engine, family, settings, verdict, outcome, end time (s), error and the other metrics, CPU
         seconds of stepping, and steps.
@@ -76,13 +76,25 @@ class Comparison:
         return [_row(r) for r in sorted(self.records, key=lambda r: (not is_completed(r), error(r)))]
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return ``rows`` as a pandas DataFrame."""
+        """Return ``rows`` as a pandas DataFrame.
+
+        Returns
+        -------
+        pandas.DataFrame
+            One row for each run.
+        """
         import pandas
 
         return pandas.DataFrame(self.rows)
 
     def document(self) -> dict[str, Any]:
-        """Return the document of `crosscheck compare --json`."""
+        """Return the document of `crosscheck compare --json`.
+
+        Returns
+        -------
+        dict
+            Scene, records, verdict, truth, and differences between the engines' mechanisms.
+        """
         truth = {name: self.judged.truth[name] for name in TRUTH}
         return {
             "scene": self.judged.scene.name,
@@ -96,6 +108,11 @@ class Comparison:
     def save(self, path: str | Path) -> None:
         """Write ``document`` as JSON.
 
+        Parameters
+        ----------
+        path : str or path
+            The file, which ends in ``.json``.
+
         Raises
         ------
         ValueError
@@ -106,7 +123,13 @@ class Comparison:
         Path(path).write_text(json.dumps(self.document(), allow_nan=False) + "\n")
 
     def print(self, console: Console) -> None:
-        """Print the verdict, tables and a plot."""
+        """Print the verdict, tables and a plot.
+
+        Parameters
+        ----------
+        console : rich.console.Console
+            The console on which they are printed.
+        """
         tables.print_comparison(console, self.judged, self.verdict, self.path, with_ratio=not self._unlike)
 
     def __str__(self) -> str:
@@ -138,7 +161,7 @@ def compare(
     scene : Scene, str or path
         A Scene, the name of a built-in one, or a .toml file.
     engines : str or sequence of str, optional
-        Names of engines. Default: all that are installed.
+        Names of engines. Default: mbref, MuJoCo, Pinocchio, Exudyn and installed optional engines.
     families : str or sequence of str, optional
         Families of settings. Default: a few; all if ``depth`` is ``"whole"``.
     depth : {"quick", "whole"}
@@ -155,6 +178,11 @@ def compare(
         Folder in which records are kept. They are not made again.
     notice : callable, optional
         Receives sentences about engines that are left out.
+
+    Returns
+    -------
+    Comparison
+        Verdict, rows and records.
 
     Raises
     ------

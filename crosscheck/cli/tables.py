@@ -12,7 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
-from crosscheck.engine import ORIGIN, Engine, Setting, engine
+from crosscheck.engine import Engine, Setting, engine
+from crosscheck.setting import ORIGIN
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (

@@ -12,7 +12,8 @@ import numpy as np
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import engine
-from crosscheck.study.grid import Case, Record, Unable, default_cases, key, made_by, study
+from crosscheck.study.grid import Case, Record, Unable, default_cases, key, study
+from crosscheck.study.origin import made_by
 from mbref.trajectory import Outcome
 
 FILE = Path(__file__).parent / "records.jsonl"

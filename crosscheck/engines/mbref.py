@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from crosscheck.engine import BRANCHES, Cannot, Engine, FamilyParts, Owner, Setting, Supports
+from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
+from crosscheck.setting import BRANCHES, FamilyParts
 from mbref.scene import LOAD_TYPES, Scene
 from mbref.trajectory import Trajectory
 

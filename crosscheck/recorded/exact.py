@@ -63,8 +63,13 @@ def reference_table(
     Returns
     -------
     dict of str to ndarray, shape (k,)
-        SI units. ``bound`` is on the error: a distance over the scene's length, or an angle (rad). The
-        columns end where the reference ends.
+        SI units, world frame. ``bound`` is on the error: a distance over the scene's length, or an angle
+        (rad). The columns end where the reference ends.
+
+    Raises
+    ------
+    SceneError
+        If the scene's velocities contradict its joints.
     """
     found = exact(scene, times, seconds)
     return {"time": found.motion.times, "bound": found.bound, **values(scene, found.motion)}

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-from crosscheck.engine import ORIGIN
+from crosscheck.setting import ORIGIN
 from crosscheck.study.grid import TIME_LIMIT, Record
 
 

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from crosscheck.engine import Setting, best_family
+from crosscheck.engine import Setting
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
+from crosscheck.setting import best_family
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.least_errors import least_errors
 from crosscheck.study.record_view import is_completed

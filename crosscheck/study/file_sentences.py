@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from crosscheck.engine import AS_IN_FILE
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.free_fall import falls_freely
+from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, is_completed
 from crosscheck.study.tuning import closure_gap

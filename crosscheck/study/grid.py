@@ -8,18 +8,13 @@ import functools
 import hashlib
 import json
 import os
-import platform
-import subprocess
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
-from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-import mbref
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
 from crosscheck.judge.deadline import given_up
@@ -30,6 +25,7 @@ from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import end_idle, run_isolated
 from crosscheck.processes.serve import run_once
+from crosscheck.study.origin import made_by
 from crosscheck.study.scouting import offer
 from mbref.records import append, stored
 from mbref.scene import Scene
@@ -39,7 +35,6 @@ SCHEMA = 1
 SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
 MEASURED = 2.0  # limit of the CPU time for the metrics, as a multiple of the time limit of the case
-PACKAGES = ("numpy", "scipy", "numba")
 
 Record = dict[str, Any]
 # function of (number of finished cases, number of cases, newest record)
@@ -102,6 +97,11 @@ def default_cases(
         Sample times, s. Default: SAMPLES equidistant ones over the scene's duration.
     time_limit : float
         CPU time (s) of a run.
+
+    Returns
+    -------
+    tuple of (list of Case, list of Unable)
+        The runs, and the refusals.
     """
     times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
     cases, unable = [], []
@@ -129,17 +129,20 @@ def study(
     cases : sequence of Case
         The runs.
     executor : concurrent.futures.Executor, optional
-        Where the runs happen. Default: threads, one for each core, which run engines in child processes. A
-        process pool or a Dask client's ``get_executor()`` also works; its workers need this package and the
-        engines.
+        Where the runs happen. Default: threads, one for each core, which run engines in child processes.
+        Workers of another executor need this package and the engines.
     records_path : path, optional
         JSON lines file. Each record is appended as its run ends. Stored records are not made again, unless
         they ran out of a time limit that is shorter than the limit of the case.
     progress : callable, optional
         Called with the number of cases done, the number of all cases, and the new record.
     run : callable, optional
-        Makes the record of one case. Default: ``run_case``. ``run_here`` is faster in a process pool for many
-        short runs of an engine that neither hangs nor crashes.
+        Makes the record of one case. Default: ``run_case``, in a child process; ``run_here`` in this process.
+
+    Returns
+    -------
+    list of Record
+        Results and errors, as ``crosscheck run --json`` prints them, in the order of the cases.
     """
     keys = [key(case) for case in cases]
     records = known(cases, records_path)
@@ -224,12 +227,6 @@ def shown_name(engine_name: str) -> str:
         return engine_name
 
 
-def made_by() -> dict[str, Any]:
-    """Return the origin of a record: versions, commit, date (UTC) and machine."""
-    date = datetime.now(UTC).isoformat(timespec="seconds")
-    return {"versions": versions(), "commit": commit(), "date": date, "machine": machine()}
-
-
 def _asked(case: Case) -> dict[str, Any]:
     """Return the request: engine, options, end time, and the number of equally spaced samples, or, for other
     times, all sample times."""
@@ -237,41 +234,6 @@ def _asked(case: Case) -> dict[str, Any]:
     even = len(times) > 1 and np.array_equal(times, np.linspace(0.0, end, len(times)))
     when = {"samples": len(times)} if even else {"times": times.tolist()}
     return {"engine": case.engine, "options": dict(case.setting.options), "end": end, **when}
-
-
-@functools.cache
-def commit() -> str | None:
-    """Return the commit of the checkout that contains this code, with ``+`` after changes; None outside a
-    checkout."""
-    root = Path(__file__).parents[2]
-    if not (root / ".git").exists():
-        return None
-    reported = [_git(root, "rev-parse", "--short=12", "HEAD"), _git(root, "status", "--porcelain", "-uno")]
-    return None if reported[0] is None else reported[0] + ("+" if reported[1] else "")
-
-
-def _git(root: Path, *arguments: str) -> str | None:
-    try:
-        done = subprocess.run(
-            ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=True
-        )
-    except (OSError, subprocess.CalledProcessError):
-        return None
-    return done.stdout.strip()
-
-
-@functools.cache
-def versions() -> dict[str, str | None]:
-    """Return the versions of Python and of the packages on which results depend; None for missing
-    packages."""
-    installed = {name: _installed(name) for name in PACKAGES}
-    return {"python": platform.python_version(), "mbref": mbref.__version__, **installed}
-
-
-@functools.cache
-def machine() -> dict[str, str | int | None]:
-    """Return a description of the machine: processor, number of cores and operating system."""
-    return {"cpu": _processor(), "cores": os.cpu_count(), "system": platform.platform()}
 
 
 def _run_all(
@@ -312,19 +274,3 @@ def _version(engine_name: str) -> str:
 @functools.lru_cache(maxsize=32)
 def _truth(scene: Scene, reference_time: float) -> Truth | None:
     return truth_for(scene, reference_time)
-
-
-def _installed(package: str) -> str | None:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        lines = []
-    models = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return models[0] if models else platform.processor() or platform.machine()

@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import BRANCHES, Setting, engine
+from crosscheck.engine import Setting, engine
+from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Case, Record, run_case, study
 from crosscheck.study.record_view import error, is_completed
-from mbref.trajectory import Crossing
+from mbref.crossing import Crossing
 
 DIGITS = 6  # decimal digits kept of a position, relative to the size of the mechanism: finer than a pixel
 FRAMES = 75  # frames of the motion on a branch

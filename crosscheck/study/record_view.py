@@ -6,8 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from crosscheck.engine import ORIGIN
 from crosscheck.judge.reference.cache import mechanism
+from crosscheck.setting import ORIGIN
 from crosscheck.study.grid import Record
 from mbref.scene import Scene
 from mbref.trajectory import Outcome

@@ -6,7 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
-from crosscheck.engine import AS_IN_FILE
+from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.grid import Case, Unable, default_cases
 from crosscheck.study.ladder import families
 from mbref.scene import Scene

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mbref.crossing import Crossing
 from mbref.equations.along_trajectory import poses
 from mbref.equations.branches import MOST_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
@@ -15,7 +16,7 @@ from mbref.equations.model import Model, displaced
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Crossing, Outcome
+from mbref.trajectory import Outcome
 
 SAMPLES = 61  # poses of a motion at which ranks are computed
 ROUNDING = (

@@ -93,7 +93,8 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     """Return the static equilibria that are found from several starts.
 
     The starts are the scene's pose and poses that are reached from it along the constraints. There is no
-    guarantee that all equilibria are found. Drivers must stand still.
+    guarantee that all equilibria are found. Drivers must stand still. From each start Levenberg's method
+    (Quarterly of Applied Mathematics 2, 1944) reduces the accelerations to zero.
 
     Parameters
     ----------
@@ -101,6 +102,11 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
         The mechanism, the name of a built-in one, or a .toml file.
     starts : int
         Number of starts.
+
+    Returns
+    -------
+    list of Equilibrium
+        Different equilibria, in the order in which they are found.
 
     Raises
     ------
@@ -133,6 +139,11 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
         Number of the vibration in ``frequencies``, from 1.
     amplitude : float
         Largest displacement, in lengths of the mechanism.
+
+    Returns
+    -------
+    Motion
+        Poses over one period, s; velocities are zero.
 
     Raises
     ------

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from mbref.crossing import Crossing
 from mbref.ensembles.candidates import Candidates, candidates_of
 from mbref.ensembles.parameters import Parameters
 from mbref.equations.initial_state import LARGE
@@ -29,7 +30,6 @@ from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, 
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import NEARLY, Run
 from mbref.stepping.singular_start import begins_at_rest, begins_in_motion
-from mbref.trajectory import Crossing
 
 
 def may_lead(run: Run) -> bool:

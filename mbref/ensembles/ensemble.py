@@ -44,16 +44,41 @@ def ensemble(
     executor: Executor | None = None,
     path: str | Path | None = None,
 ) -> Iterator[tuple[int, Trajectory]]:
-    """(place in ``scenes``, trajectory) of every scene as its run ends; times (k,) in s as for ``simulate``.
+    """Simulate many scenes by one method, in batches of equal structure and in several processes.
 
-    Without ``method`` all runs are by the default method of the first scene (``method.default_method``).
-    ``scenes`` may be a generator: a few are drawn ahead of those that have ended.  ``executor`` is any of
-    concurrent.futures; by default one process a core, for which a script needs the usual
-    ``if __name__ == "__main__"``.  With ``path`` each result is appended to that file (JSON lines) before it
-    is handed out, and a run of the same scene, times, method and limits in the file is not repeated.  A run
-    whose process is killed has the outcome CRASHED; it is not stored, so that it is run again.  Raises the
-    errors of ``simulate`` for the first scene that cannot be simulated, and RecordsError or OSError for a
-    file that holds something else than records or cannot be written.
+    A run whose process is killed has the outcome CRASHED. Such a run is not stored, so that the next call
+    repeats it.
+
+    Parameters
+    ----------
+    scenes : iterable of Scene
+        The scenes. A generator is read a few scenes ahead of the results.
+    times : sequence of float or ndarray, shape (k,)
+        Increasing sample times, s, as for ``simulate``.
+    method : str, optional
+        Name of the method of all runs. Default: the default method of the first scene.
+    limits : Limits, optional
+        Tolerances and steps of every run.
+    executor : concurrent.futures.Executor, optional
+        Where the runs happen. Default: one process for each core, for which a script needs the usual
+        ``if __name__ == "__main__"``.
+    path : str or path, optional
+        JSON lines file. Each result is appended before it is yielded. A run of an equal scene with equal
+        times, method and limits in the file is not repeated.
+
+    Yields
+    ------
+    tuple of (int, Trajectory)
+        Index of the scene in ``scenes``, and its motion, as each run ends.
+
+    Raises
+    ------
+    SceneError, MethodError, ValueError
+        As ``simulate``, for the first scene that cannot be simulated.
+    RecordsError
+        If the file contains something else than records.
+    OSError
+        If the file cannot be read or written.
     """
     limits, times = limits or Limits(), checked_times(times)
     if method is None:

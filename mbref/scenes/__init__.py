@@ -82,6 +82,10 @@ def find_scene(name: str) -> Scene:
         A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), or the path of a .toml
         file.
 
+    Returns
+    -------
+    Scene
+
     Raises
     ------
     SceneError

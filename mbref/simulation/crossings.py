@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from mbref.crossing import Crossing
 from mbref.equations.branches import Passed, singular_position
 from mbref.equations.model import Model
-from mbref.trajectory import Crossing
 
 
 class Crossings(Sequence[Crossing]):

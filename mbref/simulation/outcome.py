@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from mbref import __version__
+from mbref.crossing import Crossing
 from mbref.equations.branches import Passed, tangents
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_reactions import Balance
@@ -28,7 +29,7 @@ from mbref.stepping.loop import (
 from mbref.stepping.ranks import Ranks
 from mbref.stepping.run import NEARLY, Run
 from mbref.stepping.singular_start import begins_at_rest, fits_no_branch, leaving_acceleration
-from mbref.trajectory import Cost, Crossing, Outcome
+from mbref.trajectory import Cost, Outcome
 
 OUTCOMES = {
     DONE: Outcome.COMPLETED,

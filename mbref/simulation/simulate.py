@@ -48,36 +48,35 @@ def simulate(
 
     Parameters
     ----------
-    scene
+    scene : Scene, str or path
         A Scene, the name of a built-in one, or a .toml file.
-    method
-        A Method or its name; by default ``method.default_method``: ``taylor``, or for many bodies
-        ``alf-dual+projection/dop853``.
-    times
-        Sample times (k,), s, increasing; by default 101 from 0 to the scene's duration.
-    limits
+    method : Method or str, optional
+        A method or its name. Default: ``taylor``, or ``alf-dual+projection/dop853`` for more than 100 bodies.
+    times : sequence of float or ndarray, shape (k,), optional
+        Increasing sample times, s. Default: 101 from 0 to the scene's duration.
+    limits : Limits, optional
         Tolerances, steps and branches of the run.
-    progress
+    progress : callable, optional
         Called with the time reached (s) between steps.
-    duration
-        End time, s, of the default sample times; by default the scene's.
-    rtol
+    duration : float, optional
+        End time, s, of the default sample times. Default: the scene's duration.
+    rtol : float, optional
         Relative tolerance; replaces the tolerance of ``limits``.
 
     Returns
     -------
     Motion
-        The states reached, with accelerations and reactions; a failure of the method is its outcome.
+        The states reached, with accelerations and reactions. A failure of the method is its outcome.
 
     Raises
     ------
     SceneError
-        The scene cannot be simulated.
+        If the scene cannot be simulated.
     ValueError
-        Times do not increase or are given beside a duration, or the integrator does not have the order.
+        If times do not increase or are given beside a duration, or the integrator does not have the order.
     MethodError
-        The method is unknown, has no generated code, or crosses no singular position at which ``limits`` ask
-        for a branch.
+        If the method is unknown, has no generated code, or crosses no singular position at which ``limits``
+        request a branch.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
     if duration is not None:

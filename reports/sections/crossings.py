@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from crosscheck.engine import BRANCHES
+from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Record
 from mbref.trajectory import Outcome
 from reports import mechanisms

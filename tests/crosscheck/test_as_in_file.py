@@ -10,11 +10,12 @@ import pytest
 
 from crosscheck.cli import request
 from crosscheck.cli.scene_request import RequestError, find_scenes, held
-from crosscheck.engine import AS_IN_FILE, Setting, engine
+from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.original import FAMILIES, FINER, STIFFER, STIFFER_RK4
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.free_fall import falls_freely
 from crosscheck.judge.metrics import violation_series
+from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.command import command
 from crosscheck.study.file_sentences import as_in_file, free_falls
 from crosscheck.study.grid import Case, run_here

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crosscheck.engine import AS_IN_FILE
+from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.file_sentences import OFF, as_in_file
 from crosscheck.study.verdict import Judged
 from mbref.scene import Body, Revolute, Scene

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from crosscheck.cli import main
-from crosscheck.engine import BRANCHES, Setting
+from crosscheck.engine import Setting
+from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Case, run_case
 from crosscheck.study.pictures import DIGITS, FRAMES, branches, shortened, shown, worst_runs
 from mbref.scenes import SCENES

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
+from mbref.crossing import Crossing
 from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.equations.parts import shape_of
 from mbref.scene import Force, Scene, SceneError, Spring
 from mbref.scene_paths import replaced_at
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Crossing
 from mbref.variation import Variation, variants
 from tests.coupled_scenes import gear_pair
 from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results

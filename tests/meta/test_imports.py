@@ -8,7 +8,7 @@ import pytest
 from imports import ROOT, children, circles, floors, graph, imported, sources, upward
 
 DOORS = (
-    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|trajectory|rotations|records"
+    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
@@ -21,9 +21,10 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        ["rotations", "records", "trajectory", "error_estimate", "scene_services"],
+        ["rotations", "records", "crossing", "trajectory", "error_estimate", "scene_services"],
         [
             "scene",
+            "scene_bodies",
             "scene_couplings",
             "scene_fields",
             "scene_functions",
@@ -32,6 +33,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
             "scene_lines",
             "scene_loads",
             "scene_paths",
+            "scene_reading",
             "scene_text",
             "scene_units",
             "scene_validation",
@@ -39,7 +41,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["command_line", "formats", "scenes", "scene_slips", "variation", "outputs"],
         ["drawing"],
         ["joint_motion", "actuation", "energy"],
-        ["motion"],
+        ["motion", "motion_columns", "motion_files"],
         ["kernels"],
         ["linear_algebra"],
         ["equations"],
@@ -59,7 +61,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     "crosscheck": (
         ["judge"],
         ["recorded"],
-        ["refusals"],
+        ["refusals", "setting"],
         ["engine"],
         ["engines"],
         ["processes"],

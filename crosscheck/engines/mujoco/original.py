@@ -15,13 +15,14 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import AS_IN_FILE, Setting
+from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import checked
 from crosscheck.engines.mujoco.importing.loads import controlled, is_motor, motor_force
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, options_of
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory

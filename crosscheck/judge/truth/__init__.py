@@ -41,7 +41,15 @@ __all__ = ["NoSolution", "Truth", "closed_form", "truth_for"]
 
 
 class Truth(Protocol):
-    """Interface of the exact motion of one scene."""
+    """Interface of the exact motion of one scene.
+
+    Attributes
+    ----------
+    name : str
+        Name of the family of closed forms, or "reference".
+    accuracy : float
+        Bound on the error of the poses, relative to the scene's length and to the angle turned.
+    """
 
     @property
     def name(self) -> str:
@@ -58,6 +66,16 @@ class Truth(Protocol):
         ----------
         times : ndarray, shape (k,)
             Sample times ≥ 0, s.
+
+        Returns
+        -------
+        Trajectory
+            States at the times, in the frames and units of Trajectory.
+
+        Raises
+        ------
+        NoSolution
+            If the motion is not known up to the last time.
         """
 
 

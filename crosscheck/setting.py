@@ -1,0 +1,46 @@
+"""Settings of engines: a family of settings and its options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+# name of the option that chooses the branch at a singular position, in engines that have such an option
+BRANCHES = "branches"
+# family of the most accurate settings of an engine, in engines that have a family of this name
+BEST = "tuned"
+AS_IN_FILE = "as in file"  # family that runs the file from which a scene was read, at the file's own settings
+ORIGIN = ("file", "import")  # options of "as in file": path of the file, options for reading
+# part of a method (such as "integrators") → name → its options with their defaults
+FamilyParts = Mapping[str, Mapping[str, Mapping[str, float]]]
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One way of running an engine.
+
+    Attributes
+    ----------
+    family : str
+        Group of settings that differ in accuracy only. ``"defaults"`` is the library's own choice,
+        ``"tuned"`` the most accurate one that its documentation allows.
+    options : mapping of str to Any
+        Numbers of the engine. Family and options reproduce the run.
+    """
+
+    family: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        return self.family + "".join(
+            f" {k}={v:g}" if isinstance(v, float) else f" {k}={v}" for k, v in self.options.items()
+        )
+
+
+def best_family(settings: Sequence[Setting]) -> list[Setting]:
+    """Return the settings of the family "tuned", or of the first family of settings if the engine has no such
+    family, coarse to fine."""
+    families = [setting.family for setting in settings]
+    best = BEST if BEST in families or not families else families[0]
+    return [setting for setting in settings if setting.family == best]

@@ -1,0 +1,63 @@
+"""Bodies and drivers as data: rigid bodies, and prescribed motions of joints."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pydantic import field_validator
+
+from mbref.scene_fields import Entry, Name, Point, Positive, Quaternion, Reals, Vector, as_list
+from mbref.scene_functions import TimeFunction
+from mbref.scene_validation import checked_inertia
+
+UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
+
+
+Inertia = tuple[float, float, float] | tuple[Vector, Vector, Vector] | None
+
+
+class Body(Entry):
+    """A rigid body; its frame sits at the centre of mass.
+
+    ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
+    (kg m²).  A kinematic analysis needs neither ``mass`` nor ``inertia``; a body has both or none of them.
+    ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed from the
+    constraints and the given velocities.
+    """
+
+    name: Name
+    mass: Positive | None = None
+    inertia: Inertia = None
+    position: Point
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    velocity: Vector | None = None
+    angular_velocity: Vector | None = None
+
+    @field_validator("inertia", mode="plain", json_schema_input_type=Inertia)
+    @classmethod
+    def _inertia_is_physical(cls, value: Any) -> Any:
+        return None if value is None else checked_inertia(as_list(value))
+
+    @field_validator("orientation")
+    @classmethod
+    def _orientation_is_unit(cls, q: tuple[float, ...]) -> tuple[float, ...]:
+        norm = math.hypot(*q)
+        if abs(norm - 1) > UNIT_TOLERANCE:
+            raise ValueError(f"must be a unit quaternion (w, x, y, z), got one of length {norm:.9g}")
+        return q if abs(norm - 1) <= 1e-15 else tuple(x / norm for x in q)
+
+
+class Driver(TimeFunction):
+    """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
+
+    value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute or cylindrical joint about its
+    axis (rad), or the displacement of a translational one along it (m).  value(0) must be zero.
+    """
+
+    joint: Name
+    polynomial: Reals = (0.0,)
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        return self.polynomial
