@@ -17,6 +17,8 @@ class JointMotion:
 
     Attributes
     ----------
+    name : str
+        Name of the joint.
     angle, rate : ndarray, shape (k,), or None
         Angle about the axis (rad, counted on over full turns) and its rate (rad/s), of revolute, cylindrical
         and planar joints.

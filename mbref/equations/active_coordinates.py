@@ -1,9 +1,9 @@
 """Active coordinates: the coordinates of a scene that can move; all others need no equation.
 
 Rows and columns of Φ_q that are connected by nonzero entries form a block. A block without force, γ, Φ, ν and
-initial velocity stays at rest with zero multipliers. An example are the motions of a planar mechanism out of
+initial velocity stays at rest with zero multipliers. An example is the motion of a planar mechanism out of
 its plane. Entries are tested for zero at random states of the active coordinates, since an expression that is
-not identically zero does not vanish there.
+not identically zero does not vanish at a random state.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from mbref.equations.model import Model, Terms
 from mbref.equations.random_states import RandomStates, random_states
 
-STATES = 2  # number of random states; two, because an entry may vanish at one of them by chance
+STATES = 2  # number of random states; an entry may vanish at one state by chance
 STILL = 1e-12  # relative to the length, 1 rad, or the largest velocity: smaller numbers are rounding
 
 
@@ -49,7 +49,7 @@ def active_entries(
 def _steady(model: Model) -> Model | None:
     """Return the model with all time-dependent loads at their full value; None if no load depends on time.
 
-    Otherwise a load that is zero at all random states would be overlooked.
+    With the actual values, a load that is zero at all random states would be overlooked.
     """
     if not any(load.over_time for load in model.scene.load):
         return None
@@ -114,7 +114,8 @@ def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
     """Return which coordinates can change from q (7 nb,) if these entries of v can be nonzero, as indices
     into q.
 
-    A rotation about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the two others.
+    A rotation about axis k of a body's own frame mixes the Euler parameters e0 and ek, and the two other
+    Euler parameters.
     """
     moves = [7 * (c // 6) + c % 6 for c in velocities.tolist() if c % 6 < 3]
     turns: dict[int, list[int]] = {}
@@ -129,8 +130,8 @@ def active_coordinates(q: np.ndarray, velocities: np.ndarray) -> np.ndarray:
 
 
 def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
-    """Return the Euler parameters that rotations about these axes make nonzero, in addition to those
-    reached."""
+    """Return the Euler parameters that rotations about these axes make nonzero, in addition to the Euler
+    parameters that are reached already."""
     pairs = [pair for k in axes for pair in ({0, 1 + k}, {1 + (k + 1) % 3, 1 + (k + 2) % 3})]
     while True:
         found = reached.union(*(pair for pair in pairs if pair & reached))

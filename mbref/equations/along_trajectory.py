@@ -42,8 +42,8 @@ def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarr
 
 
 def without_armatures(scene: Scene) -> Scene:
-    """Return the scene without armatures, because a model has a rotor for each, whose pose is not in the
-    trajectory."""
+    """Return the scene without armatures, because a model has a rotor for each armature, whose pose is not in
+    the trajectory."""
     bare = {"armature": 0.0}
     joints = [joint.model_copy(update=bare) if joint.reflected_inertia else joint for joint in scene.joint]
     return scene.with_(joint=joints)

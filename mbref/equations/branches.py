@@ -2,9 +2,10 @@
 
 At a pose where the rank of Φ_q drops, more velocities are possible, and each left null vector w of Φ_q gives
 an equation of second order, wᵀ γ(q, v, t) = 0: the quadratic cone of A. Müller (Mech. Mach. Theory 2016) and
-P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both are homogeneous: [Φ_q
--ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two different directions belong to two branches that
-cross. A double direction is a common tangent of branches, which only higher orders can separate.
+P. C. López-Custodio et al. (2020).  With time as one more coordinate, u = (v, t'), both equations are
+homogeneous: [Φ_q -ν] u = 0 and wᵀ (γ₂(v, v) + t' γ₁(v) + t'² γ₀) = 0.  Two different directions u belong to
+two branches that cross. A double direction u is a common tangent of branches, which only higher orders can
+separate.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from mbref.equations.units import row_lengths
 
 SMOOTH = 1  # number of the smooth branch, which is taken unless another is requested
 MOST_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
-RANK = 1e-6  # relative singular value below which it counts as zero at a singular position
+RANK = 1e-6  # relative singular value that counts as zero at a singular position
 FLAT = 1e-7  # relative size of a quadratic form below which it counts as zero
 SAME = 1e-4  # rad; directions at a smaller angle count as equal
 BROAD = 0.05  # distance of multiple roots, to which Newton's method converges slowly
@@ -54,9 +55,8 @@ class Passed(NamedTuple):
 
 
 class SingularPosition(NamedTuple):
-    """A crossing at a time (s): coordinates (7 nb,), velocities (b, n) of the branches, and the one taken.
-
-    The first branch is the smooth one; ``taken`` counts from 1.
+    """A crossing at a time (s): coordinates (7 nb,), velocities (b, n) of the branches, and the number of the
+    taken branch. The first branch is the smooth branch; ``taken`` counts from 1.
     """
 
     time: float
@@ -146,8 +146,8 @@ def velocities_along(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarr
 
 
 def _as_given(u: np.ndarray, v: np.ndarray, given: np.ndarray) -> np.ndarray | None:
-    """Return a direction (n + 1,) scaled to the given entries of v, or to the rate of time; None if they do
-    not agree."""
+    """Return a direction (n + 1,) scaled to the given entries of v, or to the rate of time; None if the
+    direction does not agree with them."""
     velocities, share = u[:-1], u[:-1] @ np.where(given, u[:-1], 0.0)
     if abs(u[-1]) > SAME * np.linalg.norm(u):
         velocities = velocities / u[-1]
@@ -226,8 +226,8 @@ def _fits(found: SecondOrder, a: np.ndarray) -> bool:
 
 
 def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
-    """Return isolated directions (d,) on which all forms are zero, and CONE, MULTIPLE or an empty text for
-    further directions."""
+    """Return isolated directions (d,) on which all forms are zero, and a text on further directions: CONE,
+    MULTIPLE or empty."""
     if not _is_singular(found):
         return [], ""
     several = (_roots(found.forms[0]), False) if len(found.kernel.T) == 2 else _roots_of_many(found.forms)
@@ -238,8 +238,8 @@ def _lines(found: SecondOrder) -> tuple[list[np.ndarray], str]:
 
 
 def _roots(form: np.ndarray) -> list[np.ndarray]:
-    """Return the lines through the origin on which a form of two variables is zero: none, a double line, or
-    two."""
+    """Return the lines through the origin on which a form of two variables is zero: no line, a double line,
+    or two lines."""
     values, axes = np.linalg.eigh(form)
     if values[0] * values[1] > SAME**2:
         return []
@@ -254,7 +254,7 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
     """Return simple lines on which all forms are zero, by Newton's method from random starts, and whether
     multiple lines exist.
 
-    None if lines are not isolated: at most 2ᵈ⁻¹ isolated ones exist (Bézout).
+    None if lines are not isolated: at most 2ᵈ⁻¹ isolated lines exist (Bézout).
     """
     d, random = forms.shape[1], np.random.default_rng(0)
     simple: list[np.ndarray] = []

@@ -50,7 +50,8 @@ def displace(q, x, change):
 
 @entry(INT(MATRIX, MATRIX, VECTOR))
 def displace_all(q, x, change):
-    """Displace every row of q (k, 7 nb) by one of x (k, 6 nb), both contiguous; return their number."""
+    """Displace every row of q (k, 7 nb) by the row of x (k, 6 nb) with equal index, both contiguous; return
+    k."""
     for k in range(q.shape[0]):
         displace(q[k], x[k], change)
     return q.shape[0]

@@ -1,8 +1,8 @@
 """Couplings as primitive equations between joint coordinates; rotors that represent armatures.
 
-The armature I of a joint coordinate q has the kinetic energy ½ I q'².  It is modelled by an additional body
-(rotor) that rotates about its centre of mass in the fixed frame; its coordinate is coupled with q with ratio
-1.
+The armature I of a joint coordinate q has the kinetic energy ½ I q'².  An additional body (rotor) that
+rotates about its centre of mass in the fixed frame models the armature; the coordinate of the rotor is
+coupled with q with ratio 1.
 """
 
 from __future__ import annotations

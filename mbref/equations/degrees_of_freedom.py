@@ -1,4 +1,5 @@
-"""Degrees of freedom that the drivers of a scene leave, without the additional ones of a singular start."""
+"""Degrees of freedom that the drivers of a scene leave, without the additional degrees of freedom of a
+singular start."""
 
 from __future__ import annotations
 
@@ -14,7 +15,8 @@ RANK_TOLERANCE = 1e-10  # relative residual of least squares below which rows ar
 
 
 def undriven_freedoms(scene: Scene) -> int:
-    """Return the degrees of freedom that no driver prescribes, counted near the start if that is singular."""
+    """Return the degrees of freedom that no driver prescribes, counted near the start if the start is
+    singular."""
     model = Model(scene)
     return freedoms_left(model, consistent_start(model))
 

@@ -47,15 +47,25 @@ class Diagnosis:
     """
 
     counts: Counts
-    redundant_by_joint: dict[str, int]  # rows that take part in a redundancy; their reactions are not unique
-    unique_reactions: tuple[str, ...]  # joints all of whose rows have a unique multiplier
-    smallest_singular_value: float  # of Φ_q with unit rows: distance to a singular position
+    redundant_by_joint: dict[str, int]
+    unique_reactions: tuple[str, ...]
+    smallest_singular_value: float
     largest_singular_value: float
     determined_reactions: dict[str, tuple[str, ...]] | None = None
 
 
 def counts(scene: Scene) -> Counts:
     """Return the counts of a scene at its corrected initial positions.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism; masses are not needed.
+
+    Returns
+    -------
+    Counts
+        Coordinates, rows by joint, rank, redundant rows and degrees of freedom.
 
     Raises
     ------
@@ -83,6 +93,11 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
     ----------
     scene : Scene, str or path
         The mechanism, the name of a built-in one, or a .toml file. Masses are not needed.
+
+    Returns
+    -------
+    Diagnosis
+        Redundancy by joint, singular values of Φ_q with unit rows, determined reactions.
 
     Raises
     ------
@@ -134,6 +149,6 @@ def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
 
 
 def rank_of(matrix: np.ndarray) -> int:
-    """Return the number of singular values above the rank tolerance times the largest one."""
+    """Return the number of singular values above the rank tolerance times the largest singular value."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(np.sum(values > RANK_TOLERANCE * values[0])) if values.size else 0

@@ -15,25 +15,26 @@ AT_REST = Sine(amplitude=0.0, frequency=0.0, phase=0.0)
 
 
 def functions_of(scene: Scene) -> list[TimeFunction]:
-    """Functions of time of a scene: of drivers, then of loads if bodies have masses."""
+    """Return the functions of time of a scene: of drivers, then of loads if bodies have masses."""
     loads = scene.load if scene.has_mass() else ()
     return [*scene.driver, *(load.over_time for load in loads if load.over_time)]
 
 
 def numbers_of(function: TimeFunction, terms: int) -> tuple[float, ...]:
-    """Amplitude, frequency, phase and polynomial."""
+    """Return amplitude, frequency, phase and polynomial of a function of time."""
     sine, coefficients = function.sine or AT_REST, function.coefficients
     return sine.amplitude, sine.frequency, sine.phase, *coefficients, *(0.0,) * (terms - len(coefficients))
 
 
 def pieces_of(function: TimeFunction) -> list[tuple[float, ...]]:
-    """Begin, part and cubic of each piece."""
+    """Return begin, part and cubic of each piece of a function."""
     return [(piece.begin, piece.part, *piece.cubic) for piece in function.pieces()]
 
 
 @kernel
 def function_value(f, t, equations):
-    """Value, rate and acceleration at time t of function f: polynomial, sine, and the cubic of a table."""
+    """Compute value, rate and acceleration at time t of function f: polynomial, sine, and the cubic of a
+    table."""
     functions, p = equations.scene.functions, equations.piece[f]
     amplitude, frequency, polynomial = functions.amplitude[f], functions.frequency[f], functions.polynomial
     value, rate, acceleration = 0.0, 0.0, 0.0

@@ -26,7 +26,7 @@ CONTRADICTED = 1e-3
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
 # weight of open velocities relative to given ones, and number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
-# residual of Φ_q v = ν / largest velocity; it is larger if the velocities belong to another branch
+# residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 MET = 1e-13
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
@@ -113,7 +113,7 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
 
 
 class Rates(NamedTuple):
-    """The velocity equations of a scene: the given velocities (n,), a mask of them, ν, and Φ_q.
+    """The velocity equations of a scene: the given velocities (n,), their mask, ν, and Φ_q.
 
     Φ_q (m, n) refers to velocities over their ``scale`` (n,); a large scene has blocks (m, 12) of Φ_q itself.
     """
@@ -155,7 +155,7 @@ def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
 
 def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarray:
     """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν, otherwise the most
-    accurate one, corrected to rounding."""
+    accurate velocities, corrected to rounding."""
     off = [rate_violation(model, q, w) for w in along]
     best = along[int(np.argmin(off)) if max(off) > MET else 0]
     terms = model.terms(0.0, q, best)
@@ -177,8 +177,8 @@ def _contradiction(model: Model, row: int) -> SceneError:
 
 
 def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError], Terms]:
-    """Return consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before, errors by index, and the
-    terms there at zero velocities."""
+    """Return consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before the correction, errors by
+    index, and the terms at the new coordinates for zero velocities."""
     faults: dict[int, SceneError] = {}
     most = GROSS * np.maximum(1.0, scenes.length)
     q, before, terms = _solved(scenes, q, most)
@@ -213,7 +213,8 @@ def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray,
     """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most``
     (s,).
 
-    The result is the coordinates, Φ (s, m) before, and the terms after, at zero velocities.
+    The results are the coordinates, Φ (s, m) before the correction, and the terms after it, at zero
+    velocities.
     """
     q, every, at_rest = q.copy(), np.arange(len(q)), np.zeros((len(q), scenes.model.n))
     first = terms = scenes.terms(every, q, at_rest)
@@ -249,8 +250,8 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere), and a mask of them,
-    from coordinates (s, 7 nb)."""
+    """Return the velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere), and the mask of the
+    given entries, from coordinates (s, 7 nb)."""
     shape = len(q), len(bodies[0]), 6
     v, given = np.zeros(shape), np.zeros(shape, dtype=bool)
     for k, own in enumerate(bodies):
@@ -267,11 +268,11 @@ def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[n
 
 
 def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Return velocities of a scene that satisfy Φ_q v = ν, the residual of the given ones, and whether some
-    may be undetermined.
+    """Return velocities of a scene that satisfy Φ_q v = ν, the residual of the given velocities, and whether
+    some velocities may be undetermined.
 
-    Among the solutions it is the nearest one to the given velocities (angular ones times the scene's length);
-    undetermined velocities are least in the metric of M.
+    Among the solutions the result is nearest to the given velocities (angular velocities times the scene's
+    length); undetermined velocities are least in the metric of M.
     """
     v, given, nu, scale, jacobian = rates
     wanted = v[given] / scale[given]
@@ -298,7 +299,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
 
 
 def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Return velocities by sparse solutions: nearest to the given ones first, then of least norm."""
+    """Return velocities by sparse solutions: nearest to the given velocities first, then of least norm."""
     from scipy.sparse import csr_array, vstack
 
     model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates

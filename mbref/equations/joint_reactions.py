@@ -41,15 +41,15 @@ class Balance:
         self._model = model
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave out the model, which another process makes when it needs it."""
+        """Leave out the model, which another process makes again when needed."""
         found = {**vars(self), "_model": None}
         found.pop("_blocks", None)
         return found
 
     @functools.cached_property
     def _blocks(self) -> tuple[Model, np.ndarray]:
-        """The model of the scene, and its constraint Jacobian Φ_q as blocks (k samples, m rows, 12 columns of
-        two bodies)."""
+        """Return the model of the scene, and its constraint Jacobian Φ_q as blocks (k samples, m rows, 12
+        columns of two bodies)."""
         model = self._model or Model(self._scene)
         blocks = model.blocks_along(self._times, self._q)
         model.release()
@@ -124,7 +124,7 @@ def _add_coupled(
 ) -> None:
     """Add the forces of couplings and armatures along the coordinates of joints to their wrenches (k, j, 6).
 
-    It is a force along, or a moment about, the axis that the first body carries.
+    Each is a force along, or a moment about, the axis that the first body carries.
     """
     primitives = model.data.primitives
     for p, place in enumerate(model.structure.places.primitives):
@@ -145,8 +145,8 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     each sample.
 
     Redundant rows leave reactions undetermined at all times, a singular position only when the motion passes
-    it. There a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J. Theor. Appl. Mech.
-    43, 2005). The argument ``blocks`` (k, m, 12) contains Φ_q.
+    it. At a singular position a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J.
+    Theor. Appl. Mech. 43, 2005). The argument ``blocks`` (k, m, 12) contains Φ_q.
     """
     vanishing, _ = vanishing_combinations(model, blocks)
     names = tuple(joint.name for joint in model.scene.joint)
@@ -161,9 +161,9 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
 def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> dict[str, np.ndarray]:
     """Return by joint which components (k, 6) of its reaction every solution of equilibrium shares.
 
-    Force and moment on the second body at the anchor, along world axes; from q (k, nb, 7) and the blocks
-    (k, m, 12) of Φ_q. A component is open where a vanishing combination of rows, added to the multipliers,
-    changes it.
+    Force and moment on the second body at the anchor, along world axes; from q (k, nb, 7) and the blocks (k,
+    m, 12) of Φ_q. A component is undetermined if a vanishing combination of rows, added to the multipliers,
+    changes the component.
     """
     found = {joint.name: np.ones((len(q), 6), dtype=bool) for joint in model.scene.joint}
     vanishing, lengths = vanishing_combinations(model, blocks)
@@ -177,7 +177,8 @@ def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> di
 def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return left null vectors (k, m, c) of the unit rows of Φ_q, and the lengths (k, m) of its rows.
 
-    From the blocks (k, m, 12). Samples with fewer null vectors than others have zeros in their place.
+    The argument is Φ_q as blocks (k, m, 12). Samples with fewer null vectors than other samples have zeros in
+    place of the missing vectors.
     """
     jacobian = model.dense(blocks)
     lengths = row_lengths(jacobian)
@@ -206,7 +207,7 @@ class Places(NamedTuple):
 
 @functools.lru_cache(maxsize=MOST_KEPT)
 def _places(structure: Structure, names: tuple[str, ...]) -> Places:
-    """Return the places of the named joints, which are the first ones in the structure."""
+    """Return the places of the named joints, which are the first joints in the structure."""
     of = np.array([names.index(name) for name in structure.row_joint if name in names], dtype=int)
     starts = np.searchsorted(of, np.arange(len(names)))
     bodies = structure.row_bodies[starts]

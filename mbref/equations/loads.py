@@ -103,8 +103,8 @@ def relative_angle(k, reference, loads, rotation):
 
 @kernel
 def act_about_axis(k, torque, loads, frames, angles, g):
-    """Moment torque - stiffness (φ - natural angle) - damping φ' on the second body, the opposite on the
-    first."""
+    """Add the moment torque - stiffness (φ - natural angle) - damping φ' on the second body, and the opposite
+    moment on the first body."""
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     axis = to_world(rotation, i, vector(loads.axis, k))
     angle = relative_angle(k, angles[loads.angle[k]], loads, rotation)
@@ -121,8 +121,8 @@ def act_about_axis(k, torque, loads, frames, angles, g):
 
 @kernel
 def act_along_axis(k, force, loads, frames, g):
-    """Force ``force`` - stiffness (x - natural displacement) - damping x' on the second body along the axis a
-    of the first, x = a · d; the opposite at the same place on the first body."""
+    """Add ``force`` - stiffness (x - natural displacement) - damping x' on the second body along the axis a
+    of the first body, with x = a · d, and the opposite force at an equal place on the first body."""
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     s_i, s_j = vector(loads.point_first, k), vector(loads.point_second, k)
     p_i, v_i = point_motion(i, s_i, frames)
@@ -138,7 +138,8 @@ def act_along_axis(k, force, loads, frames, g):
 
 @kernel
 def remember_angles(equations):
-    """Keep the angles of loads about axes and of couplings at the accepted state, from which they unwrap."""
+    """Save the angles of loads about axes and of couplings at the accepted state, from which later angles are
+    unwrapped."""
     loads, angles, primitives = equations.scene.loads, equations.angles, equations.scene.primitives
     for k in range(loads.angle.shape[0]):
         slot = loads.angle[k]

@@ -114,7 +114,7 @@ class Model:
 
     @property
     def has_angles(self) -> bool:
-        """Whether a load about a joint's axis or a coupling unwraps its angle."""
+        """True if a load about a joint's axis or a coupling unwraps its angle."""
         return self.structure.has_angles
 
     def start(self) -> np.ndarray:
@@ -165,7 +165,7 @@ class Model:
         return self.along(times, q.reshape(len(q), 7 * self.nb), np.zeros((len(q), self.n))).jacobian
 
     def at(self, q: np.ndarray, states: RandomStates) -> Terms:
-        """Return ``along`` at states displaced from q (7 nb,); their times are fractions of the duration."""
+        """Return ``along`` at states displaced from q (7 nb,); times are fractions of the duration."""
         moved = all_displaced(q, states.displacement)
         return self.along(states.part * self.scene.duration, moved, states.velocity)
 
@@ -249,8 +249,8 @@ def all_displaced(q: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def displacement(q: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Return the small (δr, δπ') for each body (6 nb,) that moves coordinates (7 nb,) to others, to first
-    order."""
+    """Return the small (δr, δπ') for each body (6 nb,) that moves coordinates (7 nb,) to other coordinates,
+    to first order."""
     here, there = q.reshape(-1, 7), target.reshape(-1, 7)
     turn = 2.0 * rotations.multiply(rotations.conjugate(here[:, 3:]), there[:, 3:])
     return np.concatenate([there[:, :3] - here[:, :3], np.sign(turn[:, :1]) * turn[:, 1:]], axis=1).ravel()

@@ -147,7 +147,7 @@ class Packs:
                 yield PrimitivePlace(p.kind, coupling.name, first, second, -1, k + 1, joint.name)
 
     def _load_place(self, place: int, load: Load, function: int) -> LoadPlace:
-        """Kind, bodies and function of time of load[place]; SceneError for a type without equations."""
+        """Return kind, bodies and function of time of load[place]; raises SceneError for an unknown type."""
         if isinstance(load, Moment | Force):
             return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0, function)
         if isinstance(load, Spring):
@@ -227,7 +227,7 @@ class Packs:
         return self.directions(self.structure.vector_body, vectors - origins)
 
     def _functions(self) -> Functions:
-        """All functions of time, their polynomials filled up with zeros to the highest degree."""
+        """Return all functions of time, with polynomials filled up with zeros to the highest degree."""
         functions = [function for scene in self.scenes for function in functions_of(scene)]
         terms, count = self.structure.places.terms, self.structure.places.functions
         numbers = self._rows(_once(partial(numbers_of, terms=terms), functions), 3 + terms)
@@ -260,8 +260,8 @@ def row_of(values: Any, place: Any) -> Any:
 
 
 def _once(function: Callable[[Any], Any], entries: Sequence[Any]) -> list[Any]:
-    """Return a function's values for all entries; it is called once for an entry that occurs several
-    times."""
+    """Return a function's values for all entries; the function is called once for an entry that occurs
+    several times."""
     known: dict[int, Any] = {}
     for entry in entries:
         if id(entry) not in known:
@@ -278,15 +278,15 @@ def _quaternions(axes: Sequence[np.ndarray | None]) -> np.ndarray:
 
 def _of_body(body: Body) -> tuple[tuple[float, ...], np.ndarray | None]:
     """Return position, orientation, mass and principal moments of a body, and the rotation from the principal
-    frame to its own frame (None if they are equal)."""
+    frame to its own frame (None if both frames are equal)."""
     mass = 1.0 if body.mass is None else body.mass
     moments, axes = _principal_axes(body.inertia)
     return (*body.position, *body.orientation, mass, *moments), axes
 
 
 def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
-    """Return principal moments and the rotation from the principal frame to the body's frame; None if they
-    are equal."""
+    """Return principal moments and the rotation from the principal frame to the body's frame; None if both
+    frames are equal."""
     if inertia is None:
         return (1.0, 1.0, 1.0), None
     if not isinstance(inertia[0], tuple):
@@ -316,7 +316,7 @@ def _numbers(p: Primitive) -> Numbers:
 
 def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
     """Return seven world vectors at t = 0, stiffness, damping, and natural length or angle of a load; unused
-    ones are zero. The vectors are force, two points, axis, x and y on the first body, and x on the second."""
+    vectors are zero. Vectors are force, two points, axis, x and y on the first body, and x on the second."""
     if isinstance(load, Moment):
         return *load.moment, *NONE * 7
     if isinstance(load, Force):

@@ -30,7 +30,7 @@ def shape_of(scene: Scene) -> Hashable:
 
 
 def _shape_of_function(function: TimeFunction | None) -> tuple[int, ...]:
-    """Numbers of coefficients and of pieces; none without a function."""
+    """Return the numbers of coefficients and of pieces; an empty result without a function."""
     return (len(function.coefficients), len(function.pieces())) if function else ()
 
 

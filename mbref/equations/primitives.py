@@ -1,16 +1,16 @@
 """The primitive constraint equations: Φ, their Jacobian blocks, ν and γ.
 
-Every joint is a list of these (Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988; Haug,
-Computer Aided Kinematics and Dynamics, 1989).  With body-fixed vectors a, b, s and A the rotation matrix of a
-body, the constraint equations Φ = 0 are
+Every joint is a list of primitive constraint equations (Nikravesh, Computer-Aided Analysis of Mechanical
+Systems, 1988; Haug, Computer Aided Kinematics and Dynamics, 1989).  With body-fixed vectors a, b, s and A the
+rotation matrix of a body, the constraint equations Φ = 0 are
 
     point      r_i + A_i s_i - r_j - A_j s_j = 0                       three rows
     dot-1      (A_i a)·(A_j b) = 0
     dot-2      (A_i a)·d = 0,   d = r_j + A_j s_j - r_i - A_i s_i
     distance   (d·d - l²) / (2 l) = 0
 
-A driver is a dot-1 whose a turns in body i by the prescribed angle, or a dot-2 less the prescribed
-displacement.  A coupling is one row, the sum of two joint coordinates times factors:
+A driver is a dot-1 constraint whose vector a turns in body i by the prescribed angle, or a dot-2 constraint
+minus the prescribed displacement.  A coupling is one row, the sum of two joint coordinates times factors:
 
     angle      arctan2(s, c),  s = (A_j u)·(A_i y),  c = (A_j u)·(A_i x)
     slide      (A_i a)·d
@@ -67,7 +67,7 @@ def place_of(b, s, sign, row, column, equations):
     """Return the world position of a body-fixed point and its acceleration for q̈ = 0; write ± s × Aᵀ into
     three rows of Φ_q.
 
-    Entries of the fixed frame are never read and left out.
+    Entries of the fixed frame are never read, and are left out.
     """
     frames, blocks = equations.frames, equations.system.blocks
     if b == frames.position.shape[0] - 1:
@@ -89,8 +89,8 @@ def put_translations(row, blocks):
 
 @kernel
 def turned_direction(p, t, equations):
-    """Return the direction on the first body, rotated by its driver if there is one, with its first and
-    second rate."""
+    """Return the direction on the first body, rotated by its driver, if any, with its first and second
+    rate."""
     primitives = equations.scene.primitives
     x, d = vector(primitives.direction_first, p), primitives.driver[p]
     if d < 0:
@@ -105,8 +105,8 @@ def turned_direction(p, t, equations):
 
 @kernel
 def dot1(p, t, equations):
-    """Evaluate a dot-1 constraint: vectors of both bodies stay perpendicular; a driver rotates the first
-    one."""
+    """Evaluate a dot-1 constraint: vectors of both bodies stay perpendicular; a driver rotates the vector of
+    the first body."""
     primitives, frames = equations.scene.primitives, equations.frames
     rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
     i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]

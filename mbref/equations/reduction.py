@@ -51,8 +51,7 @@ class Reduction:
     def scene(self, data: SceneData, all_move: bool, axis: int = 0) -> SceneData:
         """Return the data of a scene without the primitives that have no nonzero entry.
 
-        ``axis`` is the axis that counts primitives. With ``all_move`` all of the remaining ones are
-        evaluated.
+        ``axis`` is the axis that counts primitives. With ``all_move`` all remaining primitives are evaluated.
         """
         moving, still = self._all_moving if all_move else self._moving
         if axis:
@@ -65,12 +64,13 @@ class Reduction:
 
     @cached_property
     def _moving(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the indices, among the remaining primitives, of those that move and of those that do not."""
+        """Return the indices, among the remaining primitives, of primitives that move and of primitives at
+        rest."""
         return np.flatnonzero(~self.resting), np.flatnonzero(self.resting)
 
     @cached_property
     def _all_moving(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the indices as in ``_moving`` if all of them move."""
+        """Return the indices as in ``_moving`` if all remaining primitives move."""
         return np.arange(self.resting.size), np.zeros(0, dtype=np.int64)
 
 

@@ -2,14 +2,15 @@
 of a slider normal to its line.
 
 A group consists of rows that are perpendicular to each other, have constant length, prescribe no motion, and
-are as many as the columns in which they have entries. It is a square system Φ_q v = 0 that is never singular,
-so its only solution is v = 0. Such rows and columns are eliminated before the factorisation. Further groups
-may then appear among the remaining rows. The multipliers of eliminated rows balance the forces on their
-columns. Rows are examined at random states of all other coordinates; columns at rest need not be varied.
+are as many as the columns in which they have entries. A group is a square system Φ_q v = 0 that is never
+singular, so its only solution is v = 0. Such rows and columns are eliminated before the factorisation.
+Further groups may then appear among the remaining rows. The multipliers of eliminated rows balance the forces
+on their columns. Rows are examined at random states of all other coordinates; columns at rest need not be
+varied.
 
-Columns of redundant rows are not eliminated, because the distribution of reactions depends on all of them.
-Columns without mass are not eliminated either, because formulations must report them. If a driver contradicts
-a group, no row is eliminated.
+Columns of redundant rows are not eliminated, because the distribution of reactions depends on all redundant
+rows. Columns without mass are not eliminated either, because formulations must report them. If a driver
+contradicts a group, no row is eliminated.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ STATES = 3  # number of random states at which rows are examined
 MOST = 3  # largest number of columns that a group of rows determines
 SMALL = 1e-9  # length of a row (1 or m) below which it may be rounding
 ROUNDING = 1e-12  # relative rounding of constant lengths and of scalar products
-# component of a row in the left null space above which it is redundant; others have at most 1e-12
+# component of a row in the left null space above which the row is redundant; independent rows have 1e-12
 REDUNDANT = 1e-10
 
 
@@ -57,8 +58,8 @@ def are_held(held: Sequence[Held], n: int) -> np.ndarray:
 
 
 def lies_in(columns: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return which entries, in columns (m, 12), are in the wanted columns (n,); columns of the fixed frame
-    never are."""
+    """Return which entries, in columns (m, 12), are in the wanted columns (n,); entries in columns of the
+    fixed frame never are."""
     return np.append(wanted, np.zeros(6, dtype=bool))[columns]
 
 
@@ -78,8 +79,8 @@ def reduced_pattern(
 
 
 def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held]) -> StaticRows:
-    """Return the eliminated rows; other entries of their columns belong to rows whose multipliers are then
-    known."""
+    """Return the eliminated rows; other entries of their columns belong to rows whose multipliers are
+    computed before."""
     row, entry = np.nonzero(entries)
     width = columns.shape[1]
     in_column: dict[int, list[int]] = {}
@@ -102,8 +103,8 @@ def _static_rows(entries: np.ndarray, columns: np.ndarray, held: Sequence[Held])
 
 
 class Tried(NamedTuple):
-    """Rows that may keep these columns at rest, found in a round of random states, and those among them that
-    do."""
+    """Rows that may keep these columns at rest, found in a round of random states, and the rows among them
+    that keep columns at rest."""
 
     round: int
     rows: list[int]
@@ -201,7 +202,7 @@ def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarr
 
 
 class _Rows:
-    """Rows at random states: the remaining columns of each row, and its numbers there.
+    """Rows at random states: the remaining columns of each row, and its entries in these columns.
 
     Arguments are Jacobian blocks (STATES, m, 12), which entries (m, 12) can be nonzero, and which rows (m,)
     prescribe a motion and cannot belong to a group.
@@ -237,8 +238,8 @@ def _tries(
     """Yield candidates: columns that move and can rest (n,), the rows that may keep them at rest, and which
     rows do.
 
-    A group is found if these rows are as many as the columns. It comes after the groups that reduce its
-    columns.
+    A group is found if these rows are as many as the columns. The group comes after the groups that reduce
+    its columns.
     """
     free, rests, found = moving.tolist(), can_rest.tolist(), True
     while found:

@@ -22,8 +22,8 @@ from mbref.equations.static_constraints import MOST, ROUNDING, SMALL, Asked, are
 
 
 class Answers(NamedTuple):
-    """Properties of s scenes: the deciding ones (s, …), among them the active entries of each round of
-    states, (s, rounds, m, 12), and the acting rows and columns (s, rounds, m + n)."""
+    """Properties of s scenes: the deciding ones (s, …), including the active entries of each round of states,
+    (s, rounds, m, 12), and the acting rows and columns (s, rounds, m + n)."""
 
     decisive: np.ndarray
     entries: np.ndarray
@@ -84,8 +84,9 @@ class StructuralDecisions:
         return part, places, velocities
 
     def _agree(self, model: Model, answers: Answers) -> np.ndarray:
-        """Return which of s scenes give equal answers; rows and columns may differ if they reach equal
-        ones.  None does with loads over time, which may be switched off at all states that are read."""
+        """Return which of s scenes give equal answers; rows and columns may differ if they reach equal rows
+        and columns. No scene with loads over time agrees, because loads may be switched off at all states
+        that are read."""
         if any(load.over_time for load in model.scene.load):
             return np.zeros(len(answers.decisive), dtype=bool)
         same: np.ndarray = (answers.decisive == self._found.decisive).all(axis=1)
@@ -95,8 +96,8 @@ class StructuralDecisions:
         return same
 
     def _reach(self, model: Model, acting: np.ndarray) -> list[bytes]:
-        """Return the columns and rows that are reached in each round, from the acting ones (rounds, m +
-        n)."""
+        """Return the columns and rows that are reached in each round, from the acting rows and columns
+        (rounds, m + n)."""
         entries = np.logical_or.accumulate(self._found.entries[0], axis=0)
         rounds = zip(entries, acting, strict=True)
         found = (reached(model, e, a[: model.m], a[model.m :] | self._moves) for e, a in rounds)

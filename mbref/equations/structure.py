@@ -26,7 +26,7 @@ class PrimitivePlace(NamedTuple):
     second: int
     driver: int  # index of the driver, -1 without
     part: int = 0  # 1 or 2: which of the two joint coordinates in the row of a coupling; 0 otherwise
-    of: str = ""  # name of the joint whose coordinate it is
+    of: str = ""  # name of the joint to which the coordinate belongs
 
 
 class LoadPlace(NamedTuple):
@@ -35,14 +35,14 @@ class LoadPlace(NamedTuple):
     kind: int
     first: int  # index of the first body
     second: int  # index of the second body, 0 without
-    function: int  # of time, -1 without
+    function: int  # index of the load's function of time, -1 without
 
 
 class Places(NamedTuple):
     """Kinds and bodies of all primitives and loads, without numbers; body nb is the fixed frame.
 
     ``anchored`` are the bodies of the joints' anchors, ``functions`` the numbers of pieces of the functions
-    of time, ``terms`` is the length of the longest polynomial among them.
+    of time, ``terms`` is the length of their longest polynomial.
     """
 
     nb: int
@@ -98,7 +98,7 @@ class Structure:
 
     @functools.cached_property
     def has_angles(self) -> bool:
-        """Whether a load about a joint's axis or a coupling unwraps its angle."""
+        """True if a load about a joint's axis or a coupling unwraps its angle."""
         return bool((self.angle >= 0).any() or (self.places_in_row[3] >= 0).any())
 
     @functools.cached_property

@@ -37,8 +37,8 @@ def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Return the length (…, nb) of every body (m).
 
     A body with all anchors in its centre has the mean of all other lengths, or 1. Arguments are the joints'
-    anchors (…, e, 3) relative to the centres of mass of their bodies, and one over the number of anchors on
-    the body (e, nb).
+    anchors (…, e, 3), relative to the centres of mass of their bodies, and (e, nb) one over the number of
+    anchors on the body.
     """
     lengths = np.sqrt((arms * arms).sum(axis=-1)) @ shares
     has_arms = lengths > SMALLEST * lengths.max(axis=-1, keepdims=True, initial=0.0)

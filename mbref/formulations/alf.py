@@ -2,11 +2,11 @@
 
     (M + Φ_qᵀ α Φ_q) q̈_{i+1} = M q̈_i + Φ_qᵀ α (γ - 2 ω μ Φ' - ω² Φ),   M q̈_0 = g
 
-Eq. 19 is misprinted: its load has Φ_q q̈_i where the velocity violation Φ' = Φ_q q' - ν belongs, and Φ_q
-where Φ does.  Its β is used nowhere.  Eq. 20 stops when the change is ≤ epsilon; here relative to the
+Eq. 19 is misprinted: its load has Φ_q q̈_i in place of the velocity violation Φ' = Φ_q q' - ν, and Φ_q in
+place of Φ. The β of Eq. 19 is used nowhere.  Eq. 20 stops when the change is ≤ epsilon; here relative to the
 larger of 1 and the acceleration.  α weights rows of unit length in the metric of M, so that it does not
-depend on units.  The product with α loses digits: its rounding is α times the rounding of the accelerations
-(see ``alf-dual``).
+depend on units.  The product with α loses digits: the rounding of the product is α times the rounding of the
+accelerations (see ``alf-dual``).
 """
 
 from __future__ import annotations

@@ -2,14 +2,14 @@
 
     (S + I/α) Δλ = Φ_q q̈_i - γ,   q̈_{i+1} = q̈_i - M⁻¹ Φ_qᵀ Δλ,   S = Φ_q M⁻¹ Φ_qᵀ,   q̈_0 = M⁻¹ g
 
-By the Woodbury identity its iterates satisfy Eqs. 17 to 19.  α enters as 1/α added to S, and not as a
-factor of Φ_qᵀ Φ_q added to M, so that a large α costs no digits and few iterations are needed; no rank
-is decided.  Regularisation acts on rows of unit length in the metric of M.  The iteration is
+By the Woodbury identity its iterates satisfy Eqs. 17 to 19.  α enters as 1/α added to S, and not as a factor
+of Φ_qᵀ Φ_q added to M, so that a large α costs no digits and few iterations are needed; no rank is decided.
+Regularisation acts on rows of unit length in the metric of M.  The iteration is
 ``linear_algebra.minimum_norm`` with b = γ - Φ_q q̈_0, on a sparse factor of S + I/α; it stops when the next
 change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Clearly independent rows need no
-1/α: then the first iteration is exact, and is LM2's solution.  Small inertias cause small singular values; if
-rows are independent, the iteration is repeated with a larger α.  Rows that are nearly dependent at the start,
-as with two slightly tilted hinges, cause even smaller singular values, which conjugate directions resolve.
+1/α: the first iteration then gives the solution of LM2.  Small inertias cause small singular values; if rows
+are independent, the iteration is repeated with a larger α.  Rows that are nearly dependent at the start, as
+with two slightly tilted hinges, cause even smaller singular values, which conjugate directions resolve.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Options(NamedTuple):
     mu: float = 1.0
 
 
-# factor for the next α; above the second number 1/α is rounding compared with S
+# factor for the next α; α above which 1/α is rounding compared with S
 STRONGER, LARGEST_ALPHA = 1e3, 1e16
 INFINITE = 1e300  # α that stands for a matrix without 1/α
 # squared pivots: of clearly independent rows, and above which one iteration suffices
@@ -86,8 +86,9 @@ def solve_exactly(system):
     """Solve for independent rows, without 1/α; return False if they are not clearly independent.
 
     Rows that are less clearly independent need a second iteration, which removes the rounding errors of the
-    first one, unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small beside that and
-    M^(1/2) q̈_0: at high speeds accelerations along the rows are larger than those that forces give.
+    first iteration, unless its change of M^(1/2) q̈, √(rᵀ S⁻¹ r) with the residual r, is small compared with
+    M^(1/2) q̈ and M^(1/2) q̈_0: at high speeds accelerations along the rows exceed the accelerations that
+    forces cause.
     """
     factor = factor_of(system.scratch)
     row, step = factor.symbolic.row, factor.step
@@ -186,7 +187,7 @@ def start(alpha, system):
 def find_residual(x, system):
     """Compute γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
 
-    Both are written at once, because a later copy would wait for the numbers stored last.
+    Both arrays are written in one loop, because a later copy would wait for the numbers stored last.
     """
     factor = factor_of(system.scratch)
     row, start, column, d = factor.symbolic.row, factor.symbolic.d_start, factor.symbolic.d_column, factor.d

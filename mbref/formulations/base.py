@@ -28,7 +28,7 @@ class About(NamedTuple):
     meaning: str  # one line for `mbref list methods`
     formula: str  # LaTeX
     text: str  # equations of the source, in a sentence
-    use: str  # situations that it suits
+    use: str  # situations that the formulation suits
     fails: str
 
 
@@ -94,7 +94,7 @@ class Formulation:
     """A method of solving M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = γ (Eqs. 3 and 4), with its claims as data.
 
     ``accelerate(system) -> status`` is a kernel that reads a ``layout.System`` and writes its acceleration
-    and multipliers; it sees the terms only, never the scene.
+    and multipliers; the kernel reads the terms only, never the scene.
     """
 
     name: str
@@ -105,7 +105,7 @@ class Formulation:
     handles_redundancy: bool
     handles_singular_mass: bool
     crosses: Literal["no", "by regularisation"] = (
-        "no"  # a singular position at which no stabilisation ends the run
+        "no"  # how the formulation crosses a singular position if no stabilisation ends the run
     )
     # True if the formulation needs as many independent rows as coordinates, so no degree of freedom
     needs_independent_columns: bool = False

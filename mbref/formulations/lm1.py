@@ -1,10 +1,10 @@
-"""LM1: the augmented system of Eq. 5, solved as it stands by LU with partial pivoting.
+"""LM1: the augmented system of Eq. 5, solved directly by LU with partial pivoting.
 
     [M   Φ_qᵀ] [q̈]   [g]
     [Φ_q   0 ] [λ ] = [γ]
 
 The system is scaled symmetrically by M^(-1/2) and the length of the rows, so that the test for singularity
-does not depend on units. LM1 fails on redundant rows. It needs no M⁻¹, so that bodies without inertia are
+does not depend on units. LM1 fails on redundant rows. LM1 needs no M⁻¹, so that bodies without inertia are
 allowed if constraints determine their accelerations.
 """
 

@@ -1,7 +1,7 @@
 """MPI-GS: accelerations by the Moore–Penrose inverse from Gram–Schmidt orthogonalisation.
 
 Eqs. 29 and 30 need independent columns, which do not exist with redundant rows or degrees of freedom. Here
-columns are selected in the order of their size, dependent ones are left out, D P = Q R, and a second
+columns are selected in the order of their size, dependent columns are left out, D P = Q R, and a second
 orthogonalisation of the rows of R gives R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ, the true inverse for any rank.
 """
 

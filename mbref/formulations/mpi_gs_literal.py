@@ -1,7 +1,7 @@
 """MPI-GS as the paper prints it: D = Q R by Gram–Schmidt and D⁺ = R⁻¹ Qᵀ (Eqs. 29 and 30).
 
-Requires, as the paper says, that all columns of D are independent: as many independent rows as
-coordinates, which only a fully driven mechanism has.  Fails as SINGULAR otherwise.
+The method requires, as the paper states, that all columns of D are independent: as many independent rows as
+coordinates, which only a fully driven mechanism has.  With dependent columns the method fails as SINGULAR.
 """
 
 from __future__ import annotations

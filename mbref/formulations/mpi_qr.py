@@ -1,4 +1,5 @@
-"""MPI-QR: Eq. 26 by a Householder QR of Dᵀ with pivoting, the cheapest rank-revealing factorisation here.
+"""MPI-QR: Eq. 26 by a Householder QR of Dᵀ with pivoting, the cheapest rank-revealing factorisation among the
+formulations.
 
 Dᵀ P = Q R; the rows behind the rank are redundant and left out, so that x = Q₁ R₁⁻ᵀ b₁ is the
 solution of least norm and equals D⁺ b for consistent equations (Kim & Vanderploeg, ASME J. Mech.

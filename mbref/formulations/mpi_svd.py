@@ -1,7 +1,8 @@
 """MPI-SVD: accelerations by the Moore–Penrose inverse from the singular value decomposition.
 
-D = U S Vᵀ and D⁺ = V S⁺ Uᵀ (Eqs. 27 and 28) in Eq. 26.  Exists for any rank; singular values up to the
-rank tolerance times the largest count as zero.  The multipliers have least norm in scaled rows.
+D = U S Vᵀ and D⁺ = V S⁺ Uᵀ (Eqs. 27 and 28) in Eq. 26.  D⁺ exists for any rank; singular values up to the
+rank tolerance times the largest singular value count as zero.  The multipliers have least norm in scaled
+rows.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Adams: predictor–corrector of orders 1 to 12 and steps of any length, as in Shampine & Gordon's STEP.
 
-L. F. Shampine and M. K. Gordon, Computer Solution of Ordinary Differential Equations, Freeman, 1975.
-PECE with local extrapolation: predict with order k, evaluate, correct with order k + 1, evaluate.  Modified
-divided differences φ_i of y' are stored, and ψ_i, the time since the state i + 1 steps ago. They give the
-coefficients of a next step of any length.  Order and step are chosen from the errors estimated at orders k -
-2 to k + 1; a run starts at order 1, then increases the order and doubles the step until the error estimates
-forbid it.
+L. F. Shampine and M. K. Gordon, Computer Solution of Ordinary Differential Equations, Freeman, 1975. PECE
+with local extrapolation: predict with order k, evaluate, correct with order k + 1, evaluate.  Modified
+divided differences φ_i of y' are stored, and ψ_i, the time since the state i + 1 steps ago. These differences
+and times give the coefficients of a next step of any length.  Order and step are chosen from the errors
+estimated at orders k - 2 to k + 1; a run starts at order 1, then increases the order and doubles the step
+until the error estimates forbid it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Past(NamedTuple):
     implied: Annotated[Vector, "14*nb"]  # y' of the predicting polynomial
     change: Annotated[Vector, "14*nb"]  # evaluated y' minus the y' of the predicting polynomial
     past_psi: Annotated[Vector, HIGHEST + 3]  # s, time since the state i steps ago
-    psi: Annotated[Vector, HIGHEST + 3]  # at the attempt, like beta, g, sigma and the integrals of g
+    psi: Annotated[Vector, HIGHEST + 3]  # s, time since the state i steps ago, at the attempt
     beta: Annotated[Vector, HIGHEST + 3]
     g: Annotated[Vector, HIGHEST + 3]
     sigma: Annotated[Vector, HIGHEST + 3]

@@ -13,17 +13,17 @@ from mbref.kernels.compilation import Exchangeable
 class Integrator:
     """``step(rates, t, h, y, y', y_new, memory) -> error ratio`` and ``propose`` are kernels.
 
-    ``step`` writes ``y_new``; its result is the estimated local error over the tolerance (accept up to
-    1; a fixed-step method returns 0), or minus the status of an evaluation that failed.
+    ``step`` writes ``y_new``; its result is the estimated local error over the tolerance (a step is accepted
+    up to 1; a fixed-step method returns 0), or minus the status of an evaluation that failed.
 
-    ``propose(h, suggested, ratio, y, y', memory) -> next step`` chooses the length of the next attempt
-    once the last, of length h, is judged; ``suggested`` is h before the sample times cut it.  Accepted
-    (ratio from 0 to 1): y and y' are the new state and its rates.  Otherwise they are the old ones.  Before
-    the first step h is 0.
+    ``propose(h, suggested, ratio, y, y', memory) -> next step`` chooses the length of the next attempt after
+    the last attempt, of length h, is judged; ``suggested`` is h before the sample times cut it.  Accepted
+    (ratio from 0 to 1): y and y' are the new state and its rates.  After a rejected attempt y and y' are the
+    old state and its rates.  Before the first step h is 0.
 
     ``schema`` declares the integrator's own memory, in ``Memory.integrator``.  The states since step
-    ``clock.restart`` are one smooth piece: y changed its meaning or jumped there.  An option ``max_order``
-    bounds the order, which reaches the kernels as ``control.order``.
+    ``clock.restart`` are one smooth piece: at its first step y changed its meaning or jumped.  An option
+    ``max_order`` bounds the order, which reaches the kernels as ``control.order``.
 
     A method without ``step`` has steps of its own (``mbref.taylor``) in place of the compiled loop's.
     """
@@ -35,7 +35,7 @@ class Integrator:
     schema: type
     adaptive: bool
     options: Mapping[str, float] = field(default_factory=dict)
-    crosses: Literal["no", "by series"] = "no"  # how it crosses singular positions
+    crosses: Literal["no", "by series"] = "no"  # how the integrator crosses singular positions
 
     def highest_order(self, options: Mapping[str, float]) -> int:
         """Return the order that the options allow; raises ValueError unless ``max_order`` is a whole number

@@ -52,7 +52,7 @@ def stages_to(last: int) -> Callable:
     """Return a kernel that computes rows 1 to ``last`` of k, the slopes at those stages, and returns its
     status.
 
-    The stages are not a loop, whose different sums would take half as long again.
+    The stages are not written as a loop, because a loop over their different sums takes half as long again.
     """
     if last == 0:
         return no_stage

@@ -25,7 +25,7 @@ def first_step(y, y_rate, control):
 
 @inlined
 def next_step(h, suggested, ratio, trend, control):
-    """Return the next step after one of length h, multiplied by ``trend`` if that step was accepted."""
+    """Return the next step after a step of length h, multiplied by ``trend`` if that step was accepted."""
     if ratio > 1.0:
         return h * max(SHRINK, SAFETY * ratio ** (-1.0 / control.order))
     if not ratio >= 0.0:
@@ -42,9 +42,9 @@ def propose(h, suggested, ratio, y, y_rate, memory):
 
 @kernel
 def trend(h, ratio, memory):
-    """Return the factor, at most 1, by which growing errors shorten the step after one of length h.
+    """Return the factor, at most 1, by which growing errors shorten the step after a step of length h.
 
-    The error of steps of equal length is assumed to grow to the next step as it grew to the last one (K.
+    The error of steps of equal length is assumed to grow to the next step as it grew to the last step (K.
     Gustafsson, ACM Trans. Math. Software 20, 1994).
     """
     clock, taken = memory.loop.clock, memory.equations.system.counts.steps

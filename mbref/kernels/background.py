@@ -27,7 +27,7 @@ from {module} import {function}
 @contextmanager
 def compiled_in_background(kernels: Sequence[Exchangeable], module: str, function: str) -> Iterator[None]:
     """Compile the kernels by ``module.function()`` in a second process while the ``with`` block runs, then
-    wait for it.
+    wait for the process.
 
     No process is started if the cache has all kernels, or with one core. If the second process fails, the
     kernels are compiled at their first call.

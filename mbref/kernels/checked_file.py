@@ -19,7 +19,7 @@ DIGEST = hashlib.sha256().digest_size  # bytes before the data
 
 
 def read(path: Path) -> bytes | None:
-    """Return the data stored at this path; None if there are none, or the file is damaged.
+    """Return the data stored at this path; None if the file is missing or damaged.
 
     A damaged file is reported in one line on stderr and removed if possible.
     """

@@ -2,9 +2,9 @@
 
 ``kernel`` marks a helper that other kernels call, ``inlined`` a helper that is compiled into its callers,
 ``allocating`` the only type of kernel that may make arrays. ``exchangeable(signature)`` marks a kernel that
-is passed to another kernel as an argument (a formulation, a chart, an integrator). It is compiled at first
-use, and the kernels that receive it need not be compiled again.  With NUMBA_DISABLE_JIT=1 all of these
-decorators return the plain Python function.
+is passed to another kernel as an argument (a formulation, a chart, an integrator). An exchangeable kernel is
+compiled at first use, and the kernels that receive it need not be compiled again.  With NUMBA_DISABLE_JIT=1
+all of these decorators return the plain Python function.
 
 The cache lives in a folder named after a hash of the sources that have kernels, because numba does not
 notice an edit in a kernel that another file's kernel calls.
@@ -81,7 +81,8 @@ def inlined(function: Function) -> Function:
     """Return a kernel that is compiled into each of its callers, since calls would take half of the time of
     an evaluation.
 
-    Each caller compiles it again: inlined kernels that call each other take long to compile.
+    Each caller compiles the inlined kernel again, so that inlined kernels that call each other take long to
+    compile.
     """
     return _compiled(function, forceinline=True)
 
@@ -128,7 +129,8 @@ class Exchangeable:
 
     @functools.cached_property
     def pointer(self) -> Function:
-        """Return the function that kernels receive: the compiled one, or the plain one without the JIT."""
+        """Return the function that kernels receive: the compiled function, or the plain Python function
+        without the JIT."""
         if PLAIN:
             return self.function
         if not is_writable(CACHE):
@@ -151,7 +153,8 @@ class Exchangeable:
     def callable(self) -> Entry:
         """Return the kernel as a function that Python calls with arrays.
 
-        Compiled from a renamed copy: numba's cache distinguishes functions by name and signature only.
+        The function is compiled from a renamed copy, because numba's cache distinguishes functions by name
+        and signature only.
         """
         f = self.function
         copy = types_of_python.FunctionType(f.__code__, f.__globals__, f"{f.__name__}_entry")
@@ -172,7 +175,7 @@ class Exchangeable:
 
     @property
     def is_kept(self) -> bool:
-        """Return whether the cache of this machine has the compiled kernel, or none is needed."""
+        """Return whether the cache of this machine has the compiled kernel, or no compilation is needed."""
         return PLAIN or any(path.suffix == ".nbc" for path in files_of(CACHE, self.function))
 
 

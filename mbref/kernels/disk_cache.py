@@ -66,7 +66,7 @@ def files_of(folder: Path, function: Callable[..., Any]) -> list[Path]:
 
 
 def remove_damaged(folder: Path, function: Callable[..., Any]) -> None:
-    """Remove the files of a function unless the list has all their checksums; damaged ones are reported on
+    """Remove the files of a function unless the list has all their checksums; damaged files are reported on
     stderr.
 
     Files written since this process began to use the folder belong to a process that compiles now, and are
@@ -98,13 +98,13 @@ def record_files(folder: Path) -> None:
 
 @functools.cache
 def begin(folder: Path) -> float:
-    """Begin to use the folder; returns the time by the clock of its files (s)."""
+    """Begin to use the folder; return the time (s) by the clock of the folder's file system."""
     with tempfile.NamedTemporaryFile(dir=folder) as file:
         return os.stat(file.name).st_mtime
 
 
 def _known(folder: Path, path: Path) -> set[str]:
-    """Return the checksums that the list has for a file; processes that compile at the same time write it
+    """Return the checksums that the list has for a file; processes that compile at the same time write a file
     twice."""
     try:
         size = (folder / CHECKSUMS).stat().st_size
@@ -115,7 +115,7 @@ def _known(folder: Path, path: Path) -> set[str]:
 
 @functools.lru_cache(maxsize=2)
 def _checksums(folder: Path, _size: int) -> dict[str, set[str]]:
-    """Return the list of a folder, read again when its size has changed."""
+    """Return the list of checksums of a folder, read again if the size of the list has changed."""
     found: dict[str, set[str]] = {}
     for line in (folder / CHECKSUMS).read_text(errors="replace").splitlines():
         found.setdefault(line[LINE:], set()).add(line[: LINE - 1])
@@ -141,7 +141,7 @@ def _folders(folder: Path) -> list[Path]:
 
 
 def _names_in(folder: Path) -> list[str]:
-    """Return the names in a folder; none if it is missing or no folder. This takes a third of the time of
+    """Return the names in a folder; no names if the path is no folder. The call takes a third of the time of
     ``glob``."""
     try:
         return os.listdir(folder)

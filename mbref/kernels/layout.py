@@ -71,10 +71,11 @@ class Counts(NamedTuple):
 
 
 class System(NamedTuple):
-    """M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs: all that a formulation sees.  It writes acceleration and multipliers.
+    """M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = rhs: all that a formulation reads, and the accelerations and multipliers
+    that it writes.
 
     The constraint Jacobian stands as the blocks of the columns of each row's bodies, or as a dense matrix, or
-    both: a formulation says which one it reads (``LinearAlgebra``).
+    both: ``LinearAlgebra`` declares which form a formulation reads.
     """
 
     mass: Annotated[Vector, "n"]  # diagonal of M
@@ -122,8 +123,8 @@ class Symbolic(NamedTuple):
     """Positions of all numbers of D, S = D Dᵀ and its factor L; r rows and c columns are in the
     factorisation."""
 
-    row: Annotated[Unsigned, "r"]  # the system's row of each row here, in the order of elimination
-    column: Annotated[Unsigned, "c"]  # the system's column of each column here
+    row: Annotated[Unsigned, "r"]  # index in the system of each row, in the order of elimination
+    column: Annotated[Unsigned, "c"]  # index in the system of each column
     d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D = Φ_q M^(-1/2)
     d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
@@ -138,7 +139,8 @@ class Symbolic(NamedTuple):
 
 
 class StaticRows(NamedTuple):
-    """Statically determined rows: each determines columns at rest; its multiplier balances their force."""
+    """Statically determined rows: each row keeps columns at rest; its multiplier balances the force on these
+    columns."""
 
     row: Annotated[Unsigned, "h"]
     start: Annotated[Unsigned, "h + 1"]  # first entry of each row
@@ -203,7 +205,7 @@ class Clock(NamedTuple):
 
     time: float = 0.0  # s
     length: float = 0.0  # s, length of the last step
-    suggested: float = 0.0  # s, this length before it was limited by sample times
+    suggested: float = 0.0  # s, length of the last step before sample times limited it
     ratio: float = 0.0  # error of the last step over its tolerance
     past_length: float = 0.0  # s, length of the step before the last
     past_ratio: float = 0.0  # error / tolerance of the step before the last

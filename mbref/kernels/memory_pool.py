@@ -1,7 +1,8 @@
 """Memory pool: memory of kernels that is made and packed once, and reused by successive runs.
 
 To allocate and pack the memory of a small mechanism takes longer than a short run.  Released memory is
-acquired again for an equal key. Its numbers are then reset, so that no number of one run reaches the next.
+acquired again for an equal key. The numbers of acquired memory are reset, so that no number of a run reaches
+the next run.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ def arrays_in(values: Any) -> Iterator[np.ndarray]:
 class Pooled:
     """Packed memory of a schema, with its initial numbers.
 
-    ``part`` is other pooled memory inside it, which has its own initial numbers; ``number`` identifies it.
+    ``part`` is other pooled memory inside this memory, with its own initial numbers; ``number`` identifies
+    the memory.
     """
 
     def __init__(self, values: Any, key: Hashable, part: Pooled | None = None):
@@ -73,8 +75,8 @@ _numbers = itertools.count()
 
 
 def acquire(key: Hashable, make: Callable[[], Any], part: Pooled | None = None) -> Pooled:
-    """Return memory for a key, which determines everything that ``make`` returns, its part included: stored
-    memory, or new."""
+    """Return memory for a key: stored memory, or memory that ``make`` returns. The key determines everything
+    that ``make`` returns, its part included."""
     key = (key, part.number) if part else key
     kept = _kept.get(key)
     try:

@@ -9,8 +9,8 @@ A field of a schema is an array, a record of numbers, a kernel, another schema, 
         step: Annotated[Kernel, STEP]
 
 Kernels write ``rows.phi[i]`` and ``limits.steps += 1``.  In compiled code a schema is one pointer to a table
-of addresses, and only the fields that a kernel uses are loaded. Without compilation it is the NamedTuple
-itself. The table and its arrays must not be moved or freed while kernels run.
+of addresses, and only the fields that a kernel uses are loaded. Without compilation a schema is the
+NamedTuple itself. The table and its arrays must not be moved or freed while kernels run.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Indices = Annotated[np.ndarray, INDICES]  # int64 (k,)
 IndexTable = Annotated[np.ndarray, INDEX_TABLE]  # int64 (k, l)
 Unsigned = Annotated[np.ndarray, UNSIGNED]  # uint32 (k,): indices whose sign need not be tested
 Kernel = Callable[..., Any]  # annotated with its signature
-# address of a packed schema; ``opener`` of that schema gives access to it
+# address of a packed schema; the schema's ``opener`` gives access to the memory
 Address = Annotated[Any, "address"]
 
 WORD, WORDS = ir.IntType(64), 3  # words of a field: address, rows, columns
@@ -151,7 +151,7 @@ class Packed:
     """A schema or a record in the form that kernels accept: pass the field ``argument`` to a kernel. The
     object must exist while the kernel runs.
 
-    ``part`` is a schema inside it that is already packed, which saves time.
+    ``part`` is a schema inside this object that is already packed, which saves time.
     """
 
     def __init__(self, values: Any, part: Packed | None = None):
@@ -217,7 +217,7 @@ def _check_array(field: Field, value: Any) -> None:
 
 
 def _address_of_other(field: Field, value: Any) -> int:
-    """Return the address of a record, a kernel or a packed schema; 0 for none."""
+    """Return the address of a record, a kernel or a packed schema; 0 if there is no such object."""
     if field.dtype is not None:
         if getattr(value, "dtype", None) != field.dtype:
             raise TypeError(
@@ -229,7 +229,7 @@ def _address_of_other(field: Field, value: Any) -> int:
 
 
 def _address(values: np.ndarray | Numbers) -> int:
-    """Return the address of an array or record; for writable arrays the buffer gives it faster."""
+    """Return the address of an array or record; for writable arrays the buffer gives the address faster."""
     if isinstance(values, np.ndarray) and values.size and values.flags.writeable:
         return addressof(first_byte(values))
     return int(values.__array_interface__["data"][0])
@@ -302,5 +302,5 @@ def opener(schema: type) -> Callable[[Any], Any]:
 
 
 def _as_it_is(memory: Any) -> Any:
-    """Return the memory itself: without compilation an address is the schema."""
+    """Return the argument: without compilation an address is the schema itself."""
     return memory.values if isinstance(memory, Packed) else memory

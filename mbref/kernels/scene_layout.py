@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
 POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitive constraints
-MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two of joints
+MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two: of joints
 
 
 class Bodies(NamedTuple):
@@ -24,8 +24,8 @@ class Bodies(NamedTuple):
 class Primitives(NamedTuple):
     """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body.
 
-    Two joint coordinates, ANGLE or SLIDE, share the row of a coupling, to which each adds its value times the
-    factor in ``length``.
+    Two joint coordinates, ANGLE or SLIDE, share the row of a coupling. Each joint coordinate adds its value
+    times the factor in ``length`` to the row.
     """
 
     kind: Annotated[Indices, "p"]
@@ -62,8 +62,8 @@ class Functions(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """Loads; a kind uses the vectors that it needs. Points and axes are body-fixed, forces are in the world
-    frame."""
+    """Loads of all kinds; a kind uses some of the vectors only. Points and axes are body-fixed, forces are in
+    the world frame."""
 
     kind: Annotated[Indices, "l"]
     first: Annotated[Indices, "l"]
@@ -95,7 +95,7 @@ class SceneData(NamedTuple):
     bodies: Bodies
     primitives: Primitives
     moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
-    resting: Annotated[Indices, "resting"]  # rows that only give multipliers
+    resting: Annotated[Indices, "resting"]  # rows at rest, which are evaluated for multipliers only
     row_bodies: Annotated[IndexTable, "m", "sides"]  # bodies of each row, padded with the fixed frame
     functions: Functions
     loads: Loads

@@ -1,8 +1,8 @@
 """Solutions of least norm, and the null space, of dense equations: by QR if the rank is certain.
 
 Aᵀ P = Q R with column pivoting.  The rank is certain if the last nonzero pivot is at least CLEAR, for rows of
-length one, and the remaining entries are rounding. Otherwise, and if equations contradict each other,
-singular values decide, which take four times as long.
+length one, and the remaining entries are rounding. If the rank is not certain, or equations contradict each
+other, singular values decide; these take four times as long.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mbref.kernels.memory_pool import acquire, release
 from mbref.kernels.named_memory import Indices, Matrix, Named, Vector, allocate
 from mbref.linear_algebra.orthogonal_factorisations import apply_reflectors, minimum_norm, qr_pivoted
 
-CLEAR, ROUNDING = 1e-3, 1e-11  # pivot / longest row: nonzero above the first, zero below the second
+CLEAR, ROUNDING = 1e-3, 1e-11  # pivot / longest row: nonzero above CLEAR, zero below ROUNDING
 MET = 1e-13  # residual of a consistent row / largest entry of the solution
 UNCLEAR = -1
 

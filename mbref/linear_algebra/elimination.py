@@ -1,7 +1,7 @@
 """Dense factorisations by elimination: LU with partial and with full pivoting, Cholesky.
 
-For small matrices, because a call of LAPACK would take longer than the work. All functions work in place on
-C-contiguous arrays of the caller.
+The functions serve small matrices, for which a call of LAPACK takes longer than the factorisation. All
+functions work in place on C-contiguous arrays of the caller.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mbref.kernels.compilation import inlined, kernel
 
 @kernel
 def lu_factor(a, n, pivots, tolerance):
-    """LU with partial pivoting of a[:n, :n], in place; False where a pivot is ≤ tolerance.
+    """Factorise a[:n, :n] by LU with partial pivoting, in place; return False if a pivot is ≤ tolerance.
 
     ``pivots`` (n,) receives the row exchanged with each row.
     """
@@ -68,7 +68,8 @@ def multiplied(size, part, number):
 
 @kernel
 def determinant(a, n):
-    """The determinant of a[:n, :n]: whether it is negative, and the logarithm of its size; LU in place."""
+    """Return whether the determinant of a[:n, :n] is negative, and the logarithm of its size; LU factors
+    replace a."""
     negative, size, part = False, 0.0, 1.0
     for k in range(n):
         best = k
@@ -93,7 +94,7 @@ def determinant(a, n):
 
 @kernel
 def product_of_pivots(pivots, n):
-    """The product of the first n pivots: whether it is negative, and the logarithm of its size."""
+    """Return whether the product of the first n pivots is negative, and the logarithm of its size."""
     negative, size, part = False, 0.0, 1.0
     for k in range(n):
         negative = negative != (pivots[k] < 0.0)
@@ -103,11 +104,11 @@ def product_of_pivots(pivots, n):
 
 @kernel
 def full_pivot(a, m, n, rows, columns, tolerance):
-    """Gaussian elimination with full pivoting of a[:m, :n], in place; returns the rank (Eq. 10).
+    """Eliminate a[:m, :n] with full pivoting (Gauss), in place; return the rank (Eq. 10).
 
-    ``rows`` (m,) and ``columns`` (n,) receive the order of elimination: the first ``rank`` columns are
-    the dependent coordinates, the rest independent; the last rows are redundant.  A pivot counts when
-    it exceeds ``tolerance`` times the first.
+    ``rows`` (m,) and ``columns`` (n,) receive the order of elimination: the first ``rank`` columns are the
+    dependent coordinates, all other columns the independent coordinates; rows after the first ``rank`` are
+    redundant.  A pivot counts as nonzero if it exceeds ``tolerance`` times the first pivot.
     """
     for i in range(m):
         rows[i] = i
@@ -171,7 +172,7 @@ def back_substitute(r, n, x):
 
 @kernel
 def gram(dt, s):
-    """The upper half of D Dᵀ from Dᵀ (n, m); rows that a column does not touch cost nothing."""
+    """Compute the upper half of D Dᵀ from Dᵀ (n, m); zero entries of a column cost no operations."""
     n, m = dt.shape
     for i in range(m):
         for k in range(i, m):
@@ -186,9 +187,8 @@ def gram(dt, s):
 
 @kernel
 def cholesky_factor(a, n):
-    """Uᵀ D U of the upper half of a[:n, :n], in place; False where an entry of D is ≤ 0.
-
-    U has a unit diagonal, in whose place 1/D is kept: no roots, and no divisions when solving.
+    """Factorise the upper half of a[:n, :n] as Uᵀ D U, in place; return False if an entry of D is ≤ 0. U has
+    a unit diagonal, in whose place 1/D is stored: no roots are computed, and no divisions in solutions.
     """
     for k in range(n):
         if not a[k, k] > 0.0:

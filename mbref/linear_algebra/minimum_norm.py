@@ -2,10 +2,11 @@
 
     (S + I/α) Δ = b - D x,   x += Dᵀ Δ,   S = D Dᵀ,   x_0 = 0
 
-With D = Φ_q M^(-1/2) and change M^(-1/2) x, the change is the least in the metric of M by which Φ_q times it
-grows by b, and redundant rows do not disturb it; the rest of the growth shrinks by 1 / (1 + α σ²) an
-iteration, σ being a singular value of unit rows.  No rank is decided.  ALF-dual (``formulations.alf_dual``),
-the projection and the consistent start are this iteration.  b stands in ``factor.residual``.
+With D = Φ_q M^(-1/2), the change M^(-1/2) x is the least change in the metric of M for which Φ_q times the
+change equals b. Redundant rows do not disturb the change. An iteration reduces the remainder by the factor 1
+/ (1 + α σ²), with a singular value σ of unit rows.  No rank is decided.  ALF-dual
+(``formulations.alf_dual``), the projection and the consistent start are this iteration.  ``factor.residual``
+contains b.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from mbref.linear_algebra.vectors import copy
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-TINY, NEVER = 1e-300, 1e300  # divisors stay above the first number; the second one stands for no change yet
+TINY, NEVER = 1e-300, 1e300  # least divisor; size of a change that is not known yet
 # least number of iterations of ``solve_to_tolerance``; enough away from singular positions, so that it is
 # fixed there
 LEAST = 2
@@ -41,7 +42,7 @@ ALPHA = 1e10  # penalty for systems that are solved once; singular values below 
 ITERATIONS, ROUNDING = (
     20,
     1e-15,
-)  # most iterations of a system that is solved once; relative change that ends them
+)  # largest number of iterations of a system that is solved once; relative change that ends them
 DEPENDENT = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 
@@ -51,8 +52,9 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
     """Change ``target`` (n,) by the least change for which Φ_q times the change equals the residual.
 
     The iteration ends when the next change would be ≤ ``epsilon``, estimated from the previous changes.
-    ``multipliers`` (m,) become the sums of -Δ in the rows that take part.  Returns OK; NOT_CONVERGED after
-    ``most``.  L⁻¹ times the residual stands in ``factor.step`` already, where ``factorise`` leaves it.
+    ``multipliers`` (m,) become the sums of -Δ in the rows that take part.  Returns OK, or NOT_CONVERGED after
+    ``most`` iterations.  ``factor.step`` contains L⁻¹ times the residual, where ``factorise`` leaves this
+    product.
     """
     row, step, total = factor.symbolic.row, factor.step, factor.total
     total[:] = 0.0
@@ -125,7 +127,7 @@ def size_of(target, factor):
 
 @kernel
 def product(a, b):
-    """The inner product of two vectors."""
+    """Return the inner product of two vectors."""
     total = 0.0
     for i in range(a.shape[0]):
         total += a[i] * b[i]
@@ -159,7 +161,7 @@ def change_by_step(factor, target):
 
 @inlined
 def add_scaled(factor, target):
-    """Compute target (n,) += M^(-1/2) x; return the norm of that, relative to the larger of 1 and the
+    """Compute target (n,) += M^(-1/2) x; return the norm of this change, relative to the larger of 1 and the
     target's norm."""
     column, root, x, change, size = factor.symbolic.column, factor.root, factor.change, 0.0, 0.0
     for j in range(x.shape[0]):

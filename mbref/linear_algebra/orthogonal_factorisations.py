@@ -1,7 +1,7 @@
 """Dense factorisations by orthogonalisation, which decide rank: QR, Gram–Schmidt, singular values.
 
-Only the singular value decomposition calls LAPACK.  All in place on C-contiguous arrays
-given by the caller.
+Only the singular value decomposition calls LAPACK.  All functions work in place on C-contiguous arrays of the
+caller.
 """
 
 from __future__ import annotations
@@ -21,12 +21,13 @@ from mbref.linear_algebra.vectors import copy
 
 @kernel
 def qr_pivoted(tolerance, scratch):
-    """Householder QR with column pivoting of ``scratch.transposed`` (n, m), in place; returns the rank.
+    """Factorise ``scratch.transposed`` (n, m) by Householder QR with column pivoting, in place; return the
+    rank.
 
-    Reflector k stands below the diagonal of column k with scale ``tau[k]``; ``order`` (m,) has the columns
-    in the order chosen.  A column counts when its remaining norm exceeds ``tolerance`` times the largest
-    column norm.  Scratch is ``work`` (m,) and ``norms`` (2, m).
-    Golub & Van Loan, Matrix Computations, algorithm 5.4.1; norms recomputed when they have cancelled.
+    Reflector k stands below the diagonal of column k with scale ``tau[k]``; ``order`` (m,) has the columns in
+    the chosen order. A column counts as independent if its remaining norm exceeds ``tolerance`` times the
+    largest column norm.  Scratch is ``work`` (m,) and ``norms`` (2, m). Golub & Van Loan, Matrix
+    Computations, algorithm 5.4.1; norms are computed again after cancellation.
     """
     b, order, tau, norms, work = (
         scratch.transposed, scratch.order, scratch.tau, scratch.norms, scratch.work,
@@ -63,7 +64,7 @@ def qr_pivoted(tolerance, scratch):
 
 @kernel
 def largest_from(values, start, stop):
-    """Index of the largest entry in values[start:stop]."""
+    """Return the index of the largest entry in values[start:stop]."""
     best = start
     for j in range(start + 1, stop):
         if values[j] > values[best]:
@@ -98,9 +99,8 @@ def reflect(b, n, m, k, norm, tau, work):
 
 @kernel
 def minimum_norm(rank, scratch):
-    """``scratch.x`` (n,) of least norm with D x = ``scratch.b`` in the independent rows of D.
-
-    From ``qr_pivoted`` of Dᵀ.
+    """Compute ``scratch.x`` (n,) of least norm with D x = ``scratch.b`` in the independent rows of D, from
+    ``qr_pivoted`` of Dᵀ.
     """
     b, order, rhs, x = scratch.transposed, scratch.order, scratch.b, scratch.x
     x[:] = 0.0
@@ -114,7 +114,7 @@ def minimum_norm(rank, scratch):
 
 @kernel
 def apply_reflectors(rank, scratch):
-    """``scratch.x`` (n,) := Q x, with the first reflectors of ``qr_pivoted``."""
+    """Compute ``scratch.x`` (n,) := Q x, with the first reflectors of ``qr_pivoted``."""
     b, tau, x = scratch.transposed, scratch.tau, scratch.x
     n = b.shape[0]
     for k in range(rank - 1, -1, -1):
@@ -129,7 +129,8 @@ def apply_reflectors(rank, scratch):
 
 @kernel
 def equilibrate(jacobian, inverse_root, d, row_scale):
-    """D = R Φ_q M^(-1/2) (m, n) with unit rows; R into ``row_scale`` (m,), so that ranks ignore units."""
+    """Compute D = R Φ_q M^(-1/2) (m, n) with unit rows, and R in ``row_scale`` (m,), so that ranks do not
+    depend on units."""
     m, n = jacobian.shape
     for i in range(m):
         row_scale[i] = 0.0
@@ -145,7 +146,7 @@ def equilibrate(jacobian, inverse_root, d, row_scale):
 
 @kernel
 def row_multipliers(rank, scratch):
-    """``scratch.dual`` (m,) with Dᵀ dual = x of ``minimum_norm``; zero on dependent rows."""
+    """Compute ``scratch.dual`` (m,) with Dᵀ dual = x of ``minimum_norm``; zero on dependent rows."""
     b, order, values, z, dual = (
         scratch.transposed, scratch.order, scratch.b, scratch.work, scratch.dual,
     )  # fmt: skip
@@ -164,7 +165,7 @@ def row_multipliers(rank, scratch):
 def gram_schmidt(a, r, tolerance):
     """Orthonormalise the rows of a (count, length) in their order, in place: row j = Σ_k r[k, j] q_k.
 
-    Modified Gram–Schmidt with one reorthogonalisation.  False where a row keeps no more than
+    Modified Gram–Schmidt with one reorthogonalisation.  Return False if a row keeps no more than
     ``tolerance`` of its length: the rows are dependent.
     """
     count, length = a.shape
@@ -186,7 +187,7 @@ def gram_schmidt(a, r, tolerance):
 
 @kernel
 def row_norm(a, k):
-    """Length of row k."""
+    """Return the length of row k."""
     square = 0.0
     for l in range(a.shape[1]):
         square += a[k, l] * a[k, l]
@@ -206,10 +207,10 @@ def subtract_projection(a, i, k, r):
 
 @kernel
 def gram_schmidt_pivoted(a, count, order, r, tolerance):
-    """Orthonormalise rows of a[:count], the largest remaining first; returns the rank.
+    """Orthonormalise rows of a[:count], the largest remaining row first; return the rank.
 
-    Rows are exchanged with the record of their ``order``; row j (after exchange) = Σ_k r[k, j] q_k.
-    Modified Gram–Schmidt; the row chosen is reorthogonalised ("twice is enough").
+    Rows are exchanged with the record of their ``order``; row j (after exchange) = Σ_k r[k, j] q_k. Modified
+    Gram–Schmidt; the chosen row is orthogonalised twice ("twice is enough").
     """
     length, first = a.shape[1], 0.0
     for j in range(count):
@@ -240,7 +241,7 @@ def gram_schmidt_pivoted(a, count, order, r, tolerance):
 
 @kernel
 def gram_schmidt_solve(tolerance, scratch):
-    """x = D⁺ b and dual = (Dᵀ)⁺ x by two Gram–Schmidt orthogonalisations; returns the rank.
+    """Compute x = D⁺ b and dual = (Dᵀ)⁺ x by two Gram–Schmidt orthogonalisations; return the rank.
 
     D P = Q R, with the columns of D as rows of ``scratch.columns`` (n, m), then R = L Zᵀ: D⁺ = P Z L⁻¹ Qᵀ.
     Scratch is ``r``, ``l`` (n, n), ``c`` (n,), ``order`` and ``order_rows`` (n,).
@@ -271,11 +272,12 @@ def gram_schmidt_solve(tolerance, scratch):
 
 @allocating
 def svd_solve(d, rhs, tolerance, x, dual):
-    """x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); the rank.
+    """Compute x = D⁺ rhs and dual = (Dᵀ)⁺ x by the singular value decomposition (Eqs. 27 and 28); return the
+    rank.
 
-    One step of refinement, x += D⁺ (rhs - D x), takes out the rounding that the orthogonal factors
-    spread over all of x: a planar motion stays planar.  ``rhs`` (m,) becomes the residual.
-    -1 where an entry of D is not finite, which LAPACK would not survive.
+    One step of refinement, x += D⁺ (rhs - D x), removes the rounding that the orthogonal factors spread over
+    all entries of x, so that a planar motion stays planar.  ``rhs`` (m,) becomes the residual. Return -1 if
+    an entry of D is not finite, because LAPACK fails on such entries.
     """
     x[:] = 0.0
     dual[:] = 0.0
@@ -298,7 +300,7 @@ def svd_solve(d, rhs, tolerance, x, dual):
 
 @kernel
 def add_pseudo_solution(u, s, vt, rank, rhs, x, dual):
-    """x += V S⁺ Uᵀ rhs and dual += U S⁺ S⁺ Uᵀ rhs, of the first ``rank`` singular values."""
+    """Compute x += V S⁺ Uᵀ rhs and dual += U S⁺ S⁺ Uᵀ rhs, of the first ``rank`` singular values."""
     m, n = u.shape[0], vt.shape[1]
     for k in range(rank):
         value = 0.0

@@ -1,7 +1,8 @@
 """Sparse kernels: D = Φ_q M^(-1/2), the factor L Δ Lᵀ of S + I/α with S = D Dᵀ, solutions and products.
 
 α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the diagonal; a row without entries
-has 1 there and changes nothing.  Vectors of rows and columns are in the order of ``SparseFactor.symbolic``.
+has 1 on the diagonal and changes nothing.  Vectors of rows and columns are in the order of
+``SparseFactor.symbolic``.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ def assemble_gradients(factor, numbers, inverse_root):
 
 @inlined
 def product_of_rows(factor, entry):
-    """Return the number of S at an entry of L: the inner product of two rows of D."""
+    """Return the entry of S at the place of an entry of L: the inner product of two rows of D."""
     symbolic, d, value = factor.symbolic, factor.d, 0.0
     start, left, right = symbolic.s_start, symbolic.s_left, symbolic.s_right
     for p in range(start[entry], start[entry + 1]):
@@ -67,7 +68,7 @@ def factorise(factor, alpha, b):
 
 @inlined
 def regularised_factor(factor, numbers, inverse_root, alpha):
-    """Compute D and the factor of S + I/α; return False if that is not positive definite."""
+    """Compute D and the factor of S + I/α; return False if S + I/α is not positive definite."""
     assemble_gradients(factor, numbers, inverse_root)
     factor.step[:] = 0.0
     return factorise(factor, alpha, factor.step)

@@ -1,7 +1,8 @@
 """Sparse LU factors of the product of two gradients, D D̃ᵀ + diag(D Dᵀ)/α, without exchange of rows.
 
-They have the sparsity pattern of the Cholesky factor of D Dᵀ.  The product of the first k pivots is the
-determinant of the first k rows: it changes its sign where these rows lose rank between D̃ and D.
+The factors have the sparsity pattern of the Cholesky factor of D Dᵀ.  The product of the first k pivots is
+the determinant of the first k rows. The determinant changes its sign if these rows lose rank between D̃ and
+D.
 """
 
 from __future__ import annotations
@@ -14,8 +15,8 @@ def factorise_product(factor, other, alpha, product):
     """Compute the factors of D D̃ᵀ + diag(D Dᵀ)/α into ``product``; D belongs to the factor, D̃ is ``other``
     (nd,).
 
-    ``product.lower`` (nl,) has ones on the diagonal of L left out, ``product.upper`` the numbers of Uᵀ; its
-    pivots (r,) are over D Dᵀ's diagonal.
+    ``product.lower`` (nl,) contains L without the ones on its diagonal, ``product.upper`` the entries of Uᵀ.
+    The pivots (r,) are relative to the diagonal of D Dᵀ.
     """
     first, lower, upper, pivots = factor.symbolic.l_start, product.lower, product.upper, product.pivots
     for k in range(pivots.shape[0]):
@@ -31,7 +32,7 @@ def factorise_product(factor, other, alpha, product):
 
 @kernel
 def square_of_row(factor, diagonal):
-    """Return the squared length of a row of D, given by its place on the diagonal; 1 for a row without
+    """Return the squared length of a row of D, given by the row's place on the diagonal; 1 for a row without
     entries."""
     symbolic, d, square = factor.symbolic, factor.d, 0.0
     for p in range(symbolic.s_start[diagonal], symbolic.s_start[diagonal + 1]):

@@ -1,8 +1,8 @@
 """Symbolic factorisation of S = D Dᵀ: the positions of all numbers of D, S and its Cholesky factor L.
 
-It is made once for each scene. SuperLU determines the order of elimination and the fill (multiple minimum
-degree on the symmetric pattern). This module adds the lists of products for the kernels of
-``sparse_cholesky``. Indices are unsigned, because compiled code tests the sign of signed ones.
+The factorisation is made once for each scene. SuperLU determines the order of elimination and the fill
+(multiple minimum degree on the symmetric pattern). This module adds the lists of products for the kernels of
+``sparse_cholesky``. Indices are unsigned, because compiled code tests the sign of signed indices.
 """
 
 from __future__ import annotations
@@ -38,7 +38,8 @@ def symbolic_factorisation(
 
 @functools.lru_cache(maxsize=MOST_PATTERNS)
 def _of_pattern(*pattern: bytes) -> Symbolic:
-    """Return the symbolic factorisation of a pattern given by arrays as bytes; it is also cached on disk."""
+    """Return the symbolic factorisation of a pattern given by arrays as bytes; the result is also cached on
+    disk."""
     digest = hashlib.sha256(b"".join(len(part).to_bytes(8, "little") + part for part in pattern))
     path = CACHE / "patterns" / digest.hexdigest()[:32]
     data = checked_file.read(path)

@@ -1,6 +1,5 @@
-"""Three-vectors as tuples, for the kernels: compiled they cost nothing and allocate nothing.
-
-Also operations on whole vectors: copies (NumPy's slices would allocate), sorting, maximum (``larger``).
+"""Three-vectors as tuples, for the kernels: compiled code allocates no memory for them. Further functions
+operate on whole vectors: copies (NumPy's slices would allocate), sorting, maximum (``larger``).
 """
 
 from __future__ import annotations
@@ -122,7 +121,7 @@ def to_body(rotation, body, a):
 
 @kernel
 def put(table, row, column, a):
-    """Write a three-vector into a row."""
+    """Write a three-vector into a row of a table (k, 3)."""
     table[row, column] = a[0]
     table[row, column + 1] = a[1]
     table[row, column + 2] = a[2]

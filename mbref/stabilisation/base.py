@@ -19,12 +19,12 @@ class NoOptions(NamedTuple):
 class Stabilisation:
     """Feedback in γ and a chart: kernels between the state and the vector y that is integrated.
 
-    All take ``layout.Memory``.  ``enter(t, y, memory) -> length of y`` chooses y from ``memory.state``;
-    ``rates(t, y, y', memory) -> status`` evaluates y' and leaves the state in ``memory.state``;
-    ``accept(t, y, memory) -> status`` corrects y after an accepted step (CHANGED: new coordinates, new
-    length; SINGULAR_AHEAD: the rank has dropped, and the run ends); ``rates_with_outputs`` is ``rates`` where
-    a sample is taken: it leaves accelerations and multipliers as well.
-    ``memory`` is the schema of the chart's own memory, in ``Memory.chart``.
+    All kernels of a chart take ``layout.Memory``.  ``enter(t, y, memory) -> length of y`` chooses y from
+    ``memory.state``; ``rates(t, y, y', memory) -> status`` evaluates y' and leaves the state in
+    ``memory.state``; ``accept(t, y, memory) -> status`` corrects y after an accepted step (CHANGED: new
+    coordinates, new length; SINGULAR_AHEAD: the rank has dropped, and the run ends); ``rates_with_outputs``
+    is ``rates`` where a sample is taken: it also writes accelerations and multipliers. ``memory`` is the
+    schema of the chart's own memory, in ``Memory.chart``.
     """
 
     name: str

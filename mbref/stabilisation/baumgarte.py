@@ -1,4 +1,4 @@
-"""Baumgarte stabilisation: Φ_q q̈ = γ - 2 α Φ' - β² Φ (Eq. 9), α = β = 5 unless said."""
+"""Baumgarte stabilisation: Φ_q q̈ = γ - 2 α Φ' - β² Φ (Eq. 9), by default α = β = 5."""
 
 from collections.abc import Mapping
 from typing import NamedTuple

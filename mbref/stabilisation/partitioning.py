@@ -6,9 +6,10 @@ coordinates u follow from Φ(u, v, t) = 0 by Newton–Raphson (Eq. 15), started 
 last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14).  Φ_p = 2 Φ_π' L.
 
 The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
-value when the partition was chosen; then another one is chosen, and the integrator restarts.  With ``kept`` =
-0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger than with 0.6.
-A new partition with fewer dependent coordinates ends the run: it is at a singular position.
+value when the partition was chosen; then another partition is chosen, and the integrator restarts.  With
+``kept`` = 0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger
+than with 0.6. A new partition with fewer dependent coordinates ends the run: the run is at a singular
+position.
 """
 
 from __future__ import annotations
@@ -36,12 +37,12 @@ class Options(NamedTuple):
 
 
 class Partition(NamedTuple):
-    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, now and when the
-    partition was chosen."""
+    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, at the last state and
+    when the partition was chosen."""
 
     rank: int = 0
     pivot: float = 0.0
-    chosen_pivot: float = 0.0  # 0 until it is known
+    chosen_pivot: float = 0.0  # 0 until the pivot is known
 
 
 class Scratch(NamedTuple):
@@ -123,7 +124,7 @@ def enter(t, y, memory):
 
 @kernel
 def factorise_dependent(memory):
-    """Compute LU factors of Φ_u at the state of the last evaluation; return False if it is singular."""
+    """Compute LU factors of Φ_u at the state of the last evaluation; return False if Φ_u is singular."""
     scratch = scratch_of(memory.chart)
     a, lu, rank = scratch.jacobian, scratch.dependent, scratch.partition.rank
     rows, columns = scratch.row_order, scratch.column_order

@@ -1,10 +1,11 @@
 """Projection of positions and velocities onto the constraints after every accepted step.
 
-Mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear Dynamics 9,
-1996): positions by Newton's method, velocities with the same factor.  Only active coordinates are integrated
-(``equations.active_coordinates``, ``equations.static_constraints``).  Near a singular position the last of as
-many pivots as there are independent rows, in order of size, falls with the distance, which
-``stepping.singular_crossing`` watches.  A redundant row has a pivot of α^(-1/2); where two rows
+The projection is mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear
+Dynamics 9, 1996). Positions are corrected by Newton's method, velocities with the factor of the last Newton
+step.  Only active coordinates are integrated (``equations.active_coordinates``,
+``equations.static_constraints``).  Near a singular position the pivots are sorted by size, largest first.
+With r independent rows, the r-th pivot falls with the distance from the singular position;
+``stepping.singular_crossing`` monitors this pivot.  A redundant row has a pivot of α^(-1/2); where two rows
 exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 
@@ -100,8 +101,8 @@ def watch_pivots(memory):
 
 @inlined
 def watch(squares, pivots, record):
-    """Record the pivots, the largest rank so far, the smallest of that many pivots now, and its largest
-    value."""
+    """Record the pivots, the largest rank so far, the smallest pivot of independent rows, and its largest
+    value so far."""
     rank, smallest = 0, 1.0
     for k in range(squares.shape[0]):
         square = squares[k]
@@ -131,10 +132,11 @@ def remove_violation(violation, iterations, factor, target):
 
 @kernel
 def newton_step(t, before, memory):
-    """Make one step of Newton's method for Φ(q, t) = 0 in ``memory.state``; return the largest |Φ| before it.
+    """Make one step of Newton's method for Φ(q, t) = 0 in ``memory.state``; return the largest |Φ| before the
+    step.
 
     The last factor is used again while the violation ``before`` was small and decreases well. Positions whose
-    violation is rounding are not changed, so that the evaluated rows belong to them.
+    violation is rounding are not changed, so that the evaluated rows belong to the positions.
     """
     state, equations, scratch = memory.state, memory.equations, scratch_of(memory.chart)
     evaluate(t, state.coordinates, state.velocities, equations)
@@ -195,8 +197,8 @@ def project(t, y, memory):
 def follow_last_correction(t, memory):
     """Compute rows and factor again if the last correction moved positions by more than rounding.
 
-    This happens if the violation is rounding, but a light body next to a heavy one moves much farther. Return
-    False if no factor exists.
+    This happens if the violation is rounding, but a light body next to a heavy body moves much farther than
+    rounding. Return False if no factor exists.
     """
     equations, state = memory.equations, memory.state
     if not largest(scratch_of(memory.chart).correction) > MOVED * equations.system.settings.rounding:
@@ -222,8 +224,8 @@ def accept(t, y, memory):
 def rates(t, y, y_rate, memory):
     """Compute y' by the rows that were independent at the start of the step.
 
-    Rows depend on others only if the constraints are satisfied. A stage of a step violates them slightly.
-    There a dependent row contradicts the others, so it is left out.
+    Rows depend on others only if the constraints are satisfied. A stage of a step violates them slightly. At
+    such a stage a dependent row contradicts the other rows, so the dependent row is left out.
     """
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
@@ -242,8 +244,8 @@ def rates(t, y, y_rate, memory):
 def depend_on_others(memory):
     """Return whether rows clearly depended on others, as many as ever, at the last projected state.
 
-    Near a singular position more rows seem dependent. For a motion that may have started at one, the number
-    is unknown.
+    Near a singular position more rows seem dependent. For a motion that may have started at a singular
+    position, the number is unknown.
     """
     pivots, watched, independent = memory.pivots, memory.watch, 0
     if not watched.regular:

@@ -35,25 +35,54 @@ Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # crossing → branc
 
 @dataclass(frozen=True)
 class Limits:
-    """Tolerances, steps and code of a run; raises ValueError for a field outside its interval.
+    """Tolerances, steps and code of a run.
 
-    Whatever number is given, the field is a Python float or int: compiled code reads its bytes.
+    Whatever number is given, the field is a Python float or int: compiled code reads its bytes. Raises
+    ValueError for a field outside its interval.
+
+    Attributes
+    ----------
+    rtol : float
+        Relative local error of a step; smaller in runs of more than 1000 steps.
+    atol : float or None
+        Absolute local error (SI units). None: equal to ``rtol``.
+    rank_tolerance : float
+        Singular value or pivot, relative to the largest one, below which it counts as zero.
+    violation : float
+        Largest allowed |Φ| (m or rad), times the scene's length if that is over 1 m.
+    first_step : float
+        Length of the first step, s. 0: chosen by the integrator.
+    smallest_step : float
+        Shortest step, s. 0: 1e-12 of the duration.
+    forced_step : float
+        Step, s, that is so short that it is accepted whatever its error estimate. 0: no such step.
+    largest_step : float
+        Longest step, s, also for fixed steps. 0: the duration.
+    largest_turn : float
+        Largest rotation of the fastest body in an adaptive step, rad. 0: a safe angle.
+    most_steps : int
+        Largest number of steps of a run.
+    compared : bool
+        True to compare a run without projection with a projected run.
+    branches : mapping of int to int, or tuple of pairs
+        Crossing → branch to take there, both counted from 1. Default: the smooth branch.
+    code : {"auto", "generic", "generated"}
+        Code of ``taylor``: generic kernels, code generated for the scene, or the faster one.
     """
 
-    rtol: float = 1e-9  # relative local error of a step; smaller in runs of more than 1000 steps
-    atol: float | None = None  # absolute local error (SI units); None: equal to rtol
-    rank_tolerance: float = 1e-10  # singular value or pivot / largest one below which it counts as zero
-    violation: float = 3e-3  # largest allowed |Φ| (m or rad), times the scene's length if that is over 1 m
-    first_step: float = 0.0  # s; 0: chosen by the integrator
-    smallest_step: float = 0.0  # s; 0: 1e-12 of the duration
-    forced_step: float = 0.0  # s; a step this short is accepted whatever its error estimate; 0: none
-    largest_step: float = 0.0  # s, also for fixed steps; 0: the duration
-    # rad; largest rotation of the fastest body in an adaptive step; 0: a safe angle
+    rtol: float = 1e-9
+    atol: float | None = None
+    rank_tolerance: float = 1e-10
+    violation: float = 3e-3
+    first_step: float = 0.0
+    smallest_step: float = 0.0
+    forced_step: float = 0.0
+    largest_step: float = 0.0
     largest_turn: float = 0.0
     most_steps: int = 5_000_000
-    compared: bool = True  # compare a run without projection with a projected run
-    branches: Branches = ()  # branches to take at crossings, both counted from 1; default: the smooth branch
-    code: str = AUTO  # code of `taylor`: GENERIC, GENERATED for the scene, or AUTO
+    compared: bool = True
+    branches: Branches = ()
+    code: str = AUTO
 
     def __post_init__(self) -> None:
         for field in fields(self):

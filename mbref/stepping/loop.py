@@ -70,7 +70,7 @@ def share(suggested, memory):
 
     Errors of a motion's frequency add up to a phase error that grows with the square of the time. The number
     of steps is estimated from the mean step length so far, at first also from the suggested step (s). First
-    steps may be far shorter than later ones, so that their factor is at least EARLY.
+    steps may be far shorter than later ones, so that the factor of first steps is at least EARLY.
     """
     loop, steps, least = (
         memory.loop,
@@ -88,7 +88,7 @@ def share(suggested, memory):
 
 @kernel
 def proposed_or_first_step(suggested, memory):
-    """Return the user's first step if one is given, otherwise the integrator's proposal."""
+    """Return the user's first step if the limits give a first step, otherwise the integrator's proposal."""
     first = memory.control.first_step
     return first if memory.equations.system.counts.steps == 0 and first > 0.0 else suggested
 
@@ -155,7 +155,7 @@ def attempt(t, h, y, y_rate, y_new, memory):
 def accept_step(now, h, suggested, ratio, memory):
     """Correct and keep the new state; return OK, CHANGED (new coordinates), or the status of the failure.
 
-    SINGULAR_AHEAD, with nothing kept, if the step reaches a singular position or passes one.
+    SINGULAR_AHEAD, with nothing saved, if the step reaches or passes a singular position.
     """
     loop, counts = memory.loop, memory.equations.system.counts
     clock = loop.clock
@@ -180,9 +180,8 @@ def accept_step(now, h, suggested, ratio, memory):
 
 @kernel
 def advance(target, y, y_rate, memory):
-    """One accepted step towards the target time (s), as many attempts as it takes.
-
-    It ends at the end of a piece of a function of time, where a new smooth piece of the motion begins.
+    """Take one accepted step towards the target time (s), with as many attempts as needed. A step ends at the
+    end of a piece of a function of time, where a new smooth piece of the motion begins.
     """
     loop, control, counts = memory.loop, memory.control, memory.equations.system.counts
     propose, clock, end = memory.kernels.propose, loop.clock, end_of_pieces(memory.equations)

@@ -17,8 +17,8 @@ MOST_ROWS = 120  # rows; singular values of more rows are not computed
 
 
 class Ranks(NamedTuple):
-    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of those, and the next
-    one."""
+    """Singular values of unit rows of Φ_q: how many exceed a tolerance, the least of these values, and the
+    next smaller value."""
 
     rank: int
     least: float
@@ -33,7 +33,7 @@ def ranks_at(
 ) -> Ranks:
     """Return the ranks of the rows of a factor at q (7 nb,); for many rows, only a test by pivots.
 
-    ``blocks`` are the blocks of Φ_q there, if they are known.
+    ``blocks`` are the blocks of Φ_q at q, if they are known.
     """
     size = factor.symbolic.row.size
     if blocks is None:

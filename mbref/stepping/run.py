@@ -129,7 +129,7 @@ class Run:
         return model, at_rest(start, reduction.held), reduction
 
     def _check_freedoms(self, model: Model, start: Start) -> None:
-        """SceneError where bodies lack a mass and drivers leave a freedom."""
+        """Raise SceneError if bodies lack a mass and drivers leave a degree of freedom."""
         if model.kinematic and freedoms_left(model, start) > 0:
             raise SceneError(missing_masses(self.scene))
 

@@ -1,11 +1,13 @@
-"""Detection of singular positions by a run that monitors the rank of Φ_q: such a run ends there.
+"""Detection of singular positions by a run that monitors the rank of Φ_q: such a run ends at a singular
+position.
 
 At a drop of the rank of Φ_q, a pivot of its rows falls to zero and rises again. The pivots belong to unit
 rows in columns of unit length (``equations.units``), so that they do not depend on masses; the projection
 computes them after every step (``layout.Watch``). A step may end at a singular position. Rows may lose rank
 inside a step if a pivot of the product of the gradients at both ends is negative
 (``linear_algebra.sparse_lu``).  The pose at the zero of that pivot decides: at a singular position fewer
-nonzero pivots are left than the rank. Otherwise a redundant row has replaced the row whose pivot vanishes.
+nonzero pivots are left than the rank. At a regular position a redundant row has replaced the row whose pivot
+vanishes.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ def meets_singular_position(h, memory):
     """Return whether a step of h seconds, whose end has just been projected, reaches or passes a singular
     position.
 
-    Its place in the step and the pose are then in memory.
+    The place of the singular position in the step and the pose are then in memory.
     """
     watch = memory.watch
     if memory.control.closed_loops == 0.0 or watch.reference_pivot == 0.0:
@@ -59,7 +61,7 @@ def keep_position(part, h, memory):
 
 @kernel
 def passes_singular_position(h, memory):
-    """Whether the rank drops inside a step of h seconds.
+    """Return whether the rank drops inside a step of h seconds.
 
     Rows whose pivots are small at both ends are redundant, and are not examined.
     """
@@ -117,7 +119,7 @@ def zero_of_pivot(k, h, memory):
     """Return the fraction of a step of h seconds at which pivot k of the product changes its sign.
 
     The method is false position with the Pegasus rule (Dowell & Jarratt, BIT 12, 1972). Afterwards the factor
-    belongs to the pose there.
+    belongs to the pose at this fraction.
     """
     pivots, low, high, part = memory.loop.ends.pivots, 0.0, 1.0, 1.0
     at_low, at_high = memory.loop.ends.squared_pivots[k], pivots[k]

@@ -1,9 +1,10 @@
 """Starts on a singular position, which the motion leaves along one of the branches that meet there.
 
-There Φ_q allows more velocities than any branch has, and accelerations that it allows may violate the
-constraints. A motion continues along the branch of its velocities. This branch is unique if the rates of the
-second-order forms along these velocities are independent.  From rest, Gauss's principle of least constraint
-selects, among accelerations along the branches, the acceleration nearest to free bodies, in the metric of M.
+At a singular position Φ_q allows more velocities than any branch has, and accelerations that Φ_q allows may
+violate the constraints. A motion continues along the branch of its velocities. The branch is unique if the
+rates of the second-order forms along these velocities are independent.  From rest, Gauss's principle of least
+constraint selects, among accelerations along the branches, the acceleration nearest to free bodies, in the
+metric of M.
 """
 
 from __future__ import annotations
@@ -77,7 +78,7 @@ def begins_in_motion(run: Run) -> bool:
     """Return whether a run starts in motion, with closed loops and dependent rows, and two velocities or more
     are allowed.
 
-    Time counts as one of them if drivers prescribe the motion.
+    Time counts as one velocity if drivers prescribe the motion.
     """
     if run.ranks.rank == run.memory.pivots.size or not np.any(run.start.v):
         return False
@@ -88,7 +89,8 @@ def begins_near_singular(run: Run) -> bool:
     """Return whether a run starts so near to a singular position that rounding errors of the start change the
     direction of its velocities.
 
-    The velocities must satisfy Φ_q v = ν to rounding; velocities of no branch near a gap do not.
+    The velocities must satisfy Φ_q v = ν to rounding; velocities near a gap, which belong to no branch, do
+    not.
     """
     if not run.ranks.least < NEAR_SINGULAR or not np.any(run.start.v):
         return False
@@ -99,7 +101,7 @@ def leaving_acceleration(run: Run) -> np.ndarray | None:
     """Return the acceleration (n,) of a run from rest along a branch; None unless several branches meet
     there.
 
-    It is u (uᵀ g) / (uᵀ M u) for the direction u with the largest (uᵀ g)² / (uᵀ M u).
+    The acceleration is u (uᵀ g) / (uᵀ M u) for the direction u with the largest (uᵀ g)² / (uᵀ M u).
     """
     found = tangents(run.model, run.start.q)
     if len(found) < 2:

@@ -23,7 +23,7 @@ def advance_series(memory):
     """Begin a series unless one has begun, and advance until the end, a failure, or the limit of steps or
     singular positions in a call; return the status.
 
-    SINGULAR_AHEAD if a crossing cannot be short.
+    The status is SINGULAR_AHEAD if a crossing cannot be short.
     """
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     status = begin_once(memory)

@@ -1,7 +1,7 @@
 """Angles of joints in the rows of couplings: values, rates and gradients at given variables.
 
 With C = e₁ · f and S = e₂ · f of the directions e of the first body and f of the second, the angle is
-arctan2(S, C), which unwraps, and its gradient (C δS - S δC) / (C² + S²).
+arctan2(S, C), unwrapped, and its gradient is (C δS - S δC) / (C² + S²).
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from mbref.kernels.compilation import inlined, kernel
 
 @inlined
 def direction(s, first, order, variables, torsions):
-    """Return the three components of order 0 or 1 of a direction, the first of them ``first``."""
+    """Return the three components, of order 0 or 1, of a direction; ``first`` is the index of the first
+    component."""
     x, y, z = 0.0, 0.0, 0.0
     if order == 0:
         constant = torsions.constant
@@ -37,7 +38,7 @@ def inner(a, b):
 
 @kernel
 def add_angles(memory):
-    """Add the angles at the first coefficients, nearest to the last ones, to Φ of their rows."""
+    """Add the angles at the first coefficients, nearest to the previous angles, to Φ of their rows."""
     torsions, terms, phi = memory.polynomials.torsions, memory.series.terms, memory.solver.phi
     nz = memory.solver.pivot_columns.shape[0]
     for s in range(torsions.row.shape[0]):

@@ -64,8 +64,8 @@ def equations_of_all(
     """Return the arrays of memory in which the scenes with these indices differ, each with one row for every
     scene of ``packs``.
 
-    Also return the indices of scenes whose equations have the structure of those in memory. q (s, 7 nb) are
-    the coordinates of all scenes at the start.
+    Also return the indices of scenes whose equations have the structure of the equations in memory. q (s, 7
+    nb) are the coordinates of all scenes at the start.
     """
     if not places:
         return [], []
@@ -91,7 +91,7 @@ def equations_of_all(
 
 
 def _values_of_all(target: np.ndarray, source: np.ndarray, batch: Batch) -> np.ndarray | None:
-    """Return the values (s, …) of an array of the equations; None where it has another structure."""
+    """Return the values (s, …) of an array of the equations; None if the array has another structure."""
     if source.dtype == object:
         source = batch.spread(source)
     elif source.ndim == target.ndim:

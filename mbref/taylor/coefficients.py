@@ -27,7 +27,8 @@ def largest_used(k, memory):
 
 @kernel
 def distance_moved(h, memory):
-    """Return the largest distance that a variable moves in a step of h seconds, at the larger end rate."""
+    """Return the largest distance that a variable moves in a step of h seconds, at the larger of its rates at
+    both ends."""
     variables, series = memory.solver.pivot_columns.shape[0], memory.series
     before, after = (
         largest_coefficient(series.past, 1, variables), largest_coefficient(series.terms, 1, variables),

@@ -18,7 +18,7 @@ MAX_CORRECTIONS = 8  # largest number of corrections of a state
 
 @kernel
 def violation(memory):
-    """Evaluate Φ of every row at the first coefficients; return the largest."""
+    """Evaluate Φ of every row at the first coefficients; return the largest |Φ|."""
     solver, code, largest = memory.solver, memory.code, 0.0
     if code.violation != 0:
         violation_by_code(code.violation, memory.series.terms, solver.phi)
@@ -82,7 +82,7 @@ def subtract_violation(order, memory):
 
 @inlined
 def close(memory):
-    """Remove Φ by changing the variables, with generated code if there is any."""
+    """Remove Φ by changing the variables, with generated code if the scene has it."""
     solver, code, terms = memory.solver, memory.code, memory.series.terms
     if code.close != 0:
         close_by_code(code.close, terms, solver.phi, solver.response, solver.change)
@@ -92,7 +92,7 @@ def close(memory):
 
 @inlined
 def close_rate(memory):
-    """Remove Φ' by changing the rates, with generated code if there is any."""
+    """Remove Φ' by changing the rates, with generated code if the scene has it."""
     solver, code, terms = memory.solver, memory.code, memory.series.terms
     if code.close_rate != 0:
         close_by_code(code.close_rate, terms, solver.phi, solver.response, solver.change)

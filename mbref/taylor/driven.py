@@ -99,7 +99,8 @@ def take_accurate_step(memory):
 def take_predictor_step(memory):
     """Take one predictor step and its samples; return OK or the failure status.
 
-    SINGULAR_AHEAD, ready for high-accuracy steps, if the step may come to a singular position.
+    The status is SINGULAR_AHEAD, and memory is ready for high-accuracy steps, if the step may come to a
+    singular position.
     """
     control, counts, clock, step = (
         memory.run.control, memory.run.equations.system.counts, memory.run.loop.clock, memory.step,
@@ -166,7 +167,8 @@ def attempt_predictor_step(h, last, memory):
 
 @kernel
 def continues_motion(h, memory):
-    """Return whether the new series and the old one have equal second derivatives, within the tolerance."""
+    """Return whether the new series and the old series have equal second derivatives, within the
+    tolerance."""
     order, state, terms, off = memory.mode.order, memory.state, memory.series.terms, 0.0
     for i in range(memory.solver.pivot_columns.shape[0]):
         off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
@@ -177,8 +179,8 @@ def continues_motion(h, memory):
 def start_accurate_steps(ahead, stop, memory):
     """Start high-accuracy steps before a singular position, a time ``ahead`` (s) away.
 
-    If it is far, first take a predictor step to the distance from which one step crosses it.  Return
-    SINGULAR_AHEAD or the failure status.
+    If the singular position is far, first take a predictor step to the distance from which one step crosses
+    the position.  Return SINGULAR_AHEAD or the failure status.
     """
     h = length_before(ahead, memory)
     return_to_start(memory)
@@ -200,8 +202,8 @@ def start_accurate_steps(ahead, stop, memory):
 def length_before(ahead, memory):
     """Return the length (s) of a predictor step to the distance from which a high-accuracy step crosses best.
 
-    The length follows from the terms of the present series, whose order is lower; 0 if the step would be
-    short.
+    The length follows from the terms of the present series, whose order is lower. The result is 0 if the step
+    would be short.
     """
     order, accurate_order = memory.mode.order, memory.options.accurate_order
     across = longest_step(ACCURATE_TOLERANCE ** (order / accurate_order), memory)

@@ -17,8 +17,8 @@ Polynomial = dict[tuple[int, int], float]
 
 ONE = -1
 ROUNDING = 1e-12  # relative size below which coefficients count as zero
-VANISHING = 1e-9  # an equation with smaller coefficients follows from others, within rounding
-DEPENDENT = 1e-9  # largest coefficient / original one: a smaller polynomial is dependent
+VANISHING = 1e-9  # an equation with smaller coefficients follows from other equations, within rounding
+DEPENDENT = 1e-9  # largest coefficient / original coefficient: a smaller polynomial is dependent
 
 
 def combination(*terms: tuple[float, Expression]) -> Expression:
@@ -48,7 +48,7 @@ def product_sum(pairs: Iterable[tuple[Expression, Expression]], factor: float = 
 
 
 def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polynomial:
-    """Return a polynomial and an expression times a factor."""
+    """Return the sum of a polynomial and an expression times a factor."""
     total = dict(polynomial)
     for variable, coefficient in expression.items():
         key = (ONE, variable)
@@ -57,7 +57,8 @@ def plus(polynomial: Polynomial, factor: float, expression: Expression) -> Polyn
 
 
 def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
-    """Return a polynomial without coefficients of round-off size; only its constant if all others vanish."""
+    """Return a polynomial without coefficients of round-off size; only the constant if all other coefficients
+    vanish."""
     size = largest(c for key, c in equation.items() if key != constant)
     small = ROUNDING if size > VANISHING else VANISHING
     return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
@@ -83,7 +84,7 @@ class Elimination:
     def __init__(self, may_go: Callable[[int, int], bool]):
         self._may_go = may_go
         self.expressed: dict[int, Expression] = {}
-        self._users: dict[int, set[int]] = {}  # variable → the eliminated ones that depend on it
+        self._users: dict[int, set[int]] = {}  # variable → eliminated variables that depend on it
         self.left: list[Expression] = []  # equations that have eliminated nothing
 
     def __call__(self, expression: Expression) -> Expression:
@@ -105,7 +106,7 @@ class Elimination:
             self.left.append(reduced)
 
     def settle(self) -> None:
-        """Try the remaining equations again, until none of them eliminates a variable."""
+        """Try the remaining equations again, until no remaining equation eliminates a variable."""
         before = -1
         while before != len(self.expressed):
             before, equations, self.left = len(self.expressed), self.left, []
@@ -124,7 +125,7 @@ class Elimination:
 
 
 def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
-    """Return the linearly independent polynomials; those with fewer terms come first."""
+    """Return the linearly independent polynomials; polynomials with fewer terms come first."""
     reduced: dict[tuple[int, int], Polynomial] = {}  # keyed by the monomial that no other polynomial has
     kept = []
     for polynomial in sorted(polynomials, key=len):

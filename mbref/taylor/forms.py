@@ -1,4 +1,4 @@
-"""Expressions of a scene in natural coordinates as affine forms of the variables that are kept."""
+"""Expressions of a scene in natural coordinates as affine forms of the remaining variables."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Forms:
         return self._axes[body]
 
     def spread(self, array: np.ndarray) -> np.ndarray:
-        """Return the values of numbers, behind an axis that counts the scenes of a batch."""
+        """Return the values of numbers, with the scenes of a batch along the first axis."""
         return self.of.numbers.spread(array)
 
     @cached_property
@@ -57,7 +57,8 @@ class Forms:
 
     @cached_property
     def _of_inertia(self) -> np.ndarray:
-        """Return the parts (…, 4 nb, d, d) of M of each body: of its mass, and of ∫ x² dm of its axes."""
+        """Return the parts (…, 4 nb, d, d) of M that each body contributes: the part of its mass, and the
+        parts of ∫ x² dm along its three axes."""
         nb, d = self.of.nb, self.d
         axes = self.spread(np.array([self.of_axes(b)[1] for b in range(nb)]).reshape(nb, 3, 3, d))
         forms = np.concatenate([self.centres[..., None, :, :], axes], axis=-3)

@@ -47,11 +47,11 @@ class Solver(NamedTuple):
     first: Annotated[Vector, "nz"]
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
     past: Annotated[Vector, "nz"]  # pivots at the start of the step
-    past_motion: Annotated[Vector, "nz"]  # T of the first independent variable, if any, where the step began
-    past_gradient: Annotated[Matrix, "nz", "nr"]  # Gᵀ of the independent rows where the step began
+    past_motion: Annotated[Vector, "nz"]  # T of the first independent variable at the start of the step
+    past_gradient: Annotated[Matrix, "nz", "nr"]  # Gᵀ of the independent rows at the start of the step
     product: Annotated[Matrix, "nr", "nr"]  # product of the gradients at both ends of a step
     place: Annotated[Indices, "twofold"]  # index in the tableau of each product of rows
-    linear: Annotated[Matrix, "nr + 1", "lanes"]  # part of the tableau that depends on no variable
+    linear: Annotated[Matrix, "nr + 1", "lanes"]  # constant part of the tableau
     tableau: Annotated[Matrix, "nr + 1", "lanes"]  # [G 1] of the rows; the last row is for functions
     particular: Annotated[Matrix, "nz", "lanes"]  # N, in the lanes of multipliers
     null_space: Annotated[Matrix, "nz", "lanes"]  # Tᵀ, a row for each independent variable
@@ -84,14 +84,14 @@ class Mode(NamedTuple):
     """The kind of the next steps, as ``mbref.taylor.mode`` sets it."""
 
     kind: int = 0  # REGULAR, HIGH_ACCURACY or PREDICTOR
-    tolerance: float = 0.0  # of the last terms of the series
+    tolerance: float = 0.0  # tolerance of the last terms of the series
     order: int = 0  # of the series
 
 
 class Partition(NamedTuple):
     """The independent rows and the variables that depend on them."""
 
-    rank: int = 0  # of the constraint rows
+    rank: int = 0  # rank of the constraint rows
     partition_id: int = 0  # number of selections of rows and variables so far
     parity: int = 0  # 1 if the order of pivots is an odd permutation
     replaced_pivot: float = 0.0  # least pivot before the last selection; minus infinity if a sign had changed
@@ -112,11 +112,11 @@ class Step(NamedTuple):
     time_to_pole: float = 0.0  # s to the rounding pole that is subtracted; 0 without one
     time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
     deceleration: float = 0.0  # 1/s, relative rate of the speed if orders are computed by power; otherwise 0
-    violation: float = 0.0  # the largest before the last correction
-    correction: float = 0.0  # the largest change of a variable by the last correction
+    violation: float = 0.0  # largest violation before the last correction
+    correction: float = 0.0  # largest change of a variable by the last correction
     crossed: int = 0  # 1 if the last attempt crossed a singular position
     first_crossing: float = 0.0  # s from the start of the last step
-    second_crossing: float = 0.0  # s; negative if there was one
+    second_crossing: float = 0.0  # s; negative if the step crossed one position only
 
 
 class Progress(NamedTuple):
@@ -154,7 +154,7 @@ class SceneCode(NamedTuple):
 
     rank: int = 0
     expand: int = 0  # computes all orders
-    expand_by_power: int = 0  # computes them without multipliers, for one degree of freedom in motion
+    expand_by_power: int = 0  # computes the orders without multipliers, for one degree of freedom in motion
     factorise: int = 0  # computes pivots and response
     violation: int = 0  # computes Φ
     close: int = 0  # removes Φ

@@ -15,7 +15,8 @@ from mbref.taylor.polynomial_layout import Slides, Springs, TimedForces, Torsion
 
 
 def constant_forces(data: SceneData, forms: Forms) -> tuple[np.ndarray, np.ndarray]:
-    """Return forces on the variables: constant ones (…, d), and the matrix (…, d, d) of linear ones."""
+    """Return forces on the variables: constant forces (…, d), and the matrix (…, d, d) of forces that are
+    linear in the variables."""
     of, loads, d = forms.of, data.loads, forms.d
     weight = data.bodies.mass[..., None] * (data.gravity / of.length)[..., None, :]
     by_weight = weight[..., None] * forms.centres
@@ -125,12 +126,12 @@ def slides_of(loads: Loads, forms: Forms) -> Slides:
 
 
 def no_springs(d: int) -> Springs:
-    """Return springs of a scene of d variables that has none."""
+    """Return an empty table of springs for a scene of d variables."""
     return Springs(*_stacked([], 3, d))
 
 
 def no_slides(d: int) -> Slides:
-    """Return loads along joints' axes of a scene of d variables that has none."""
+    """Return an empty table of loads along joints' axes for a scene of d variables."""
     constant, form, stiffness, damping, natural = _stacked([], 6, d)
     return Slides(constant, form, stiffness, damping, natural, np.zeros(0), np.zeros(0, dtype=np.int64))
 

@@ -114,7 +114,8 @@ def grow_springs(k, memory):
 
 @kernel
 def add_springs(k, memory):
-    """Compute order k of their forces: -(stiffness (1 - natural / l) + damping l' / l) times the vector."""
+    """Compute order k of the forces of springs: -(stiffness (1 - natural / l) + damping l' / l) times the
+    vector."""
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
@@ -148,9 +149,10 @@ def time_to_no_length(memory):
 @kernel
 def part_behind_no_length(memory):
     """Return the fraction of a step after a position at which a spring has zero length and its force
-    reverses; 0 for none.
+    reverses; 0 without such a spring.
 
-    Such a spring has turned by more than a right angle. Its series continues with a negative length.
+    Such a spring has turned by more than a right angle. The series of its length continues with negative
+    values.
     """
     springs, series, largest = memory.polynomials.springs, memory.series, 0.0
     for s in range(springs.stiffness.shape[0]):
@@ -191,7 +193,8 @@ def grow_torsions(k, memory):
 
 @kernel
 def add_torsions(k, memory):
-    """Compute order k of their forces: (torque - stiffness (θ - natural) - damping θ') (C δS - S δC)."""
+    """Compute order k of the forces of loads about axes: (torque - stiffness (θ - natural) - damping θ') (C
+    δS - S δC)."""
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
@@ -256,7 +259,8 @@ def grow_slides(k, memory):
 
 @kernel
 def add_slides(k, memory):
-    """Compute order k of their forces: (force - stiffness (x - natural) - damping x') (a δd + d δa)."""
+    """Compute order k of the forces of loads along axes: (force - stiffness (x - natural) - damping x') (a δd
+    + d δa)."""
     slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(slides.stiffness.shape[0]):
         of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]

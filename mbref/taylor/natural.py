@@ -1,11 +1,11 @@
 """A scene in natural coordinates: joints as products of linear forms, with as few variables as rows allow.
 
-The variables of a body are its centre of mass and its rotation from the start, R (J. García de Jalón and
-E. Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994): points and directions fixed in it are
+The variables of a body are its centre of mass and its rotation from the start, R (J. García de Jalón and E.
+Bayo, Kinematic and Dynamic Simulation of Multibody Systems, 1994): points and directions fixed in it are
 linear in them, joints are rows of second degree, and the mass matrix is constant.  Bodies that keep their
-relative orientation share R.  Where an axis of R is known to rest, R has two variables, the components of
-one direction vector; otherwise it has three direction vectors, axes of joints first, so that joints share
-variables.  Linear equations eliminate variables (see ``expressions``).
+relative orientation share R.  If an axis of R is known to rest, R has two variables, the components of one
+direction vector. If not, R has three direction vectors, axes of joints first, so that joints share variables.
+Linear equations eliminate variables (see ``expressions``).
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from mbref.taylor.numbers import Batch, OneScene, largest, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
 MOST_TERMS = 40  # largest number of terms of an equation that eliminates a position
-MOST_FACTORS = 1  # further variables of an equation that eliminates a direction
+MOST_FACTORS = 1  # largest number of further variables of an equation that eliminates a direction
 MOST_KINEMATIC = 4  # largest number of terms if the equations serve kinematics only
 
 
@@ -63,9 +63,10 @@ class NaturalCoordinates:
     """The variables of a model from its pose at the start, lengths in the unit ``length`` (m), and rows.
 
     ``moving`` (n,) are the velocities that can be nonzero. ``kept`` are the remaining variables, ``given``
-    those that drivers prescribe: (driver, VALUE, COSINE or SINE) each.  ``angles`` belong to rows of
-    couplings, beside their products.  Where drivers prescribe the whole motion (``driven``), no forces are
-    needed: equations eliminate more, and driven cranks have linear rows.
+    the variables that drivers prescribe, each as (driver, VALUE, COSINE or SINE).  ``angles`` belong to rows
+    of couplings, in addition to the products of the rows.  If drivers prescribe the whole motion
+    (``driven``), no forces are needed: equations eliminate more variables, and driven cranks have linear
+    rows.
     """
 
     def __init__(self, model: Model, pose: Pose, moving: np.ndarray, driven: bool, numbers: OneScene | Batch):
@@ -216,8 +217,8 @@ class NaturalCoordinates:
         return _difference(*self._ends(p)[::-1])
 
     def _turned(self, p: int) -> int | None:
-        """Return the orientation that a driver turns about an axis at rest, from directions at rest;
-        otherwise None."""
+        """Return the orientation that a driver turns about an axis at rest, from directions at rest; None if
+        no such driver exists."""
         table = self.model.data.primitives
         if not self.driven or table.driver[p] < 0 or table.kind[p] != DOT1:
             return None
@@ -242,8 +243,8 @@ class NaturalCoordinates:
         return rows
 
     def _driven(self, p: int) -> list[Polynomial]:
-        """Return rows of a driven displacement or angle: the direction of the second body stays
-        perpendicular to the first's, turned by the driver: e = cos ψ y - sin ψ x."""
+        """Return rows of a driven displacement or angle: the direction of the second body stays perpendicular
+        to the direction e = cos ψ y - sin ψ x of the first body, which the driver turns."""
         table = self.model.data.primitives
         driver, body = int(table.driver[p]), int(table.first[p])
         if table.kind[p] == DOT2:

@@ -1,8 +1,8 @@
 """Numbers of many scenes at once: the equations of all scenes of a batch are computed together.
 
-Coefficients of a batch are floats if each scene has the same float, otherwise ``Numbers``.
-Every operation is one of IEEE arithmetic, so that a scene has equal bits in a batch and alone. The first
-scene makes decisions; the batch records which scenes would decide differently.
+Coefficients of a batch are floats if each scene has the same float, otherwise ``Numbers``. Every operation is
+an operation of IEEE arithmetic, so that a scene has equal bits in a batch and alone. The first scene makes
+decisions; the batch records which scenes would decide differently.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ class OneScene:
         return array
 
     def pattern(self, values: np.ndarray) -> np.ndarray:
-        """Return which values are other than zero."""
+        """Return which values are not zero."""
         return np.asarray(values != 0.0)
 
 
 class Batch:
-    """The scenes of a batch: ``agree`` (s,) are those that made all decisions like the first one."""
+    """The scenes of a batch: ``agree`` (s,) are the scenes that made all decisions like the first scene."""
 
     number_type: type = object
 
@@ -44,7 +44,7 @@ class Batch:
         return first
 
     def together(self, values: np.ndarray) -> np.ndarray:
-        """Return numbers (…) of values (s, …): an array of floats where the scenes agree."""
+        """Return numbers (…) of values (s, …): an array of floats if the scenes agree."""
         first = values[0]
         same = (values.view(np.int64) == first.view(np.int64)).all(axis=0) if values.dtype == float else None
         if same is None or same.all():
@@ -91,7 +91,7 @@ class Numbers:
     def __truediv__(self, other: Any) -> Numbers:
         return self._with(self.values / _values(other))
 
-    __radd__, __rmul__ = __add__, __mul__  # whose results do not depend on the order
+    __radd__, __rmul__ = __add__, __mul__  # sums and products do not depend on the order of the factors
 
     def __rsub__(self, other: Any) -> Numbers:
         return self._with(other - self.values)
@@ -147,7 +147,7 @@ def root(number: Any) -> Any:
 
 
 def largest(numbers: Iterable[Any]) -> Any:
-    """Return the largest magnitude; 0 of no number."""
+    """Return the largest magnitude; 0 without numbers."""
     sizes = [abs(number) for number in numbers]
     many = [size for size in sizes if type(size) is Numbers]
     if not many:
@@ -158,7 +158,7 @@ def largest(numbers: Iterable[Any]) -> Any:
 
 
 def array_of(numbers: Sequence[Any]) -> np.ndarray:
-    """Return numbers as an array, of floats where there are no others."""
+    """Return numbers as an array; of floats if all numbers are floats."""
     return np.array(numbers, dtype=object if any(type(number) is Numbers for number in numbers) else float)
 
 

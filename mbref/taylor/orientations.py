@@ -26,9 +26,10 @@ Frame = tuple[int, np.ndarray]  # number of an orientation, and an axis fixed in
 class Orientation:
     """Rotation matrix R of some bodies: fixed (no variables), rotating about an axis, or free.
 
-    The variables of a free one are the direction vectors of its ``basis``, three directions (3, 3) in rows. A
-    rotating one has a right-handed basis (arm, across, axis). Its variables are the components of the arm
-    along the first two rows of the fixed ``frame`` (3, 3), whose third row is the axis.
+    The variables of a free orientation are the direction vectors of its ``basis``, three directions (3, 3) in
+    rows. An orientation that rotates about an axis has a right-handed basis (arm, across, axis). Its
+    variables are the components of the arm along the first two rows of the fixed ``frame`` (3, 3), whose
+    third row is the axis.
     """
 
     variables: tuple[int, ...] = ()
@@ -75,7 +76,7 @@ FIXED = Orientation()
 
 
 class Orientations:
-    """The orientations of a model's bodies, by number: -1 is the fixed frame's.
+    """The orientations of a model's bodies, by number: -1 is the orientation of the fixed frame.
 
     ``axes`` (nb, 3, 3) are the principal frames at the start. ``moving`` (nb, 3) are True for principal axes
     about which a body can turn. The variables are added to ``direction_vectors``.
@@ -219,7 +220,7 @@ def _are_parallel(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def _keep(known: dict[int, list[np.ndarray]], group: int, axis: np.ndarray) -> bool:
-    """Add an axis to the known ones of an orientation; return whether it is new."""
+    """Add an axis to the known axes of an orientation; return whether the axis is new."""
     axes = known.setdefault(group, [])
     if len(axes) > 1 or any(map(functools.partial(_are_parallel, axis), axes)):
         return False

@@ -64,7 +64,7 @@ def put_rows(memory):
 def choose(memory):
     """Choose independent rows and dependent variables by complete pivoting; return their number.
 
-    The tableau is left with other numbers.
+    The tableau contains other numbers afterwards.
     """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     pivot_rows, pivot_columns, rank = solver.pivot_rows, solver.pivot_columns, 0
@@ -123,8 +123,8 @@ def subtract_pivot_row(i, factor, pivot, memory):
 
 @kernel
 def save_replaced_pivot(memory):
-    """Save the least pivot of the partition that is replaced; minus infinity where a sign differs from the
-    start of the step."""
+    """Save the least pivot of the partition that is replaced; minus infinity if a sign differs from the sign
+    at the start of the step."""
     solver, least = memory.solver, inf
     for k in range(memory.partition.rank):
         same = solver.last[k] * solver.past[k] > 0.0

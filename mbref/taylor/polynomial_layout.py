@@ -14,7 +14,7 @@ from mbref.kernels.named_memory import Indices, Matrix, Vector
 class PoseMaps(NamedTuple):
     """Variables as linear forms of their bodies' poses: position (m) and rotation matrix by rows.
 
-    A direction that a driver turns by ψ is cos ψ along - sin ψ across.
+    A direction that a driver turns by ψ is cos ψ times ``along`` minus sin ψ times ``across``.
     """
 
     body: Annotated[Indices, "nz"]  # nb for the ground
@@ -24,7 +24,7 @@ class PoseMaps(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Constraint rows Φ: products of two lanes (each of them twice), linear terms and constants."""
+    """Constraint rows Φ: products of two lanes (each product twice), linear terms and constants."""
 
     row: Annotated[Indices, "twofold"]
     lane: Annotated[Indices, "twofold"]
@@ -51,10 +51,10 @@ class Inertia(NamedTuple):
     """Mass matrix, constant force, and the force of constant moments, linear in the variables."""
 
     mass: Annotated[Matrix, "nz", "lanes"]
-    coupled: Annotated[Indices, "couplings"]  # variables with an inertia in common with one, itself included
+    coupled: Annotated[Indices, "couplings"]  # variables coupled with each by inertia, itself included
     first: Annotated[Indices, "nz + 1"]  # index in ``coupled`` of the first variable coupled with each
     force: Annotated[Vector, "lanes"]
-    source: Annotated[Indices, "moments"]  # lanes, of which each block of lanes has its blocks
+    source: Annotated[Indices, "moments"]  # lanes that each block of lanes reads
     weight: Annotated[Vector, "moments"]
     start: Annotated[Indices, "blocks + 1"]
 
@@ -95,10 +95,10 @@ class Torsions(NamedTuple):
     damping: Annotated[Vector, "torsions"]
     natural: Annotated[Vector, "torsions"]
     amount: Annotated[Vector, "torsions"]  # of a torque
-    function: Annotated[Indices, "torsions"]  # of time that multiplies the torque; -1 for none
-    slot: Annotated[Indices, "torsions"]  # of the unwrapped angle among the model's
-    row: Annotated[Indices, "torsions"]  # of the coupling to which the angle belongs; -1 of a load
-    factor: Annotated[Vector, "torsions"]  # of the angle in that row
+    function: Annotated[Indices, "torsions"]  # function of time that multiplies the torque; -1 without
+    slot: Annotated[Indices, "torsions"]  # index of the unwrapped angle among the model's angles
+    row: Annotated[Indices, "torsions"]  # row of the coupling to which the angle belongs; -1 for a load
+    factor: Annotated[Vector, "torsions"]  # factor of the angle in the row of its coupling
 
 
 class Slides(NamedTuple):
@@ -110,7 +110,7 @@ class Slides(NamedTuple):
     damping: Annotated[Vector, "slides"]
     natural: Annotated[Vector, "slides"]
     amount: Annotated[Vector, "slides"]  # of a force
-    function: Annotated[Indices, "slides"]  # of time that multiplies the force; -1 for none
+    function: Annotated[Indices, "slides"]  # function of time that multiplies the force; -1 without
 
 
 class TimedForces(NamedTuple):

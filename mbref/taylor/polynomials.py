@@ -127,7 +127,8 @@ def products_of_lanes(terms: Sequence[Sequence[tuple[Any, ...]]]) -> Products:
 def _slots(
     terms: Sequence[Sequence[tuple[Any, ...]]], nothing: tuple[Any, ...]
 ) -> tuple[list[tuple[Any, ...]], np.ndarray]:
-    """Return the terms of each lane in vectors, padded with nothing; where each block of lanes begins."""
+    """Return the terms of each lane in vectors, padded with nothing; and the slot at which each block of
+    lanes begins."""
     slots, start = [], [0]
     for block in range(0, len(terms), WIDTH):
         levels = itertools.zip_longest(*terms[block : block + WIDTH], fillvalue=nothing)

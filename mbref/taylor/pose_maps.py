@@ -35,7 +35,7 @@ def value_and_rate(i, forms, body, frames):
     """Return value and rate of the linear form in row i (12,) of a body's pose: position, rotation matrix R
     by rows.
 
-    A row a of R turns by a × ω', ω' in the body's frame.
+    A row a of R has the rate a × ω', with ω' in the body's frame.
     """
     position, velocity = frames.position, frames.velocity
     a, omega = frames.rotation, frames.angular_velocity

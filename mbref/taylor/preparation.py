@@ -1,6 +1,7 @@
 """Preparation of the series: its kernels, compiled or loaded before the clock of a run starts.
 
-Two processes can share the work: ``STEPPING`` takes about as long to compile as all others together.
+Two processes can share the work: the kernels of ``STEPPING`` take about as long to compile as all other
+kernels together.
 """
 
 from __future__ import annotations

@@ -49,8 +49,8 @@ def complete_samples(go_on, memory):
 
 @kernel
 def complete_until(end, memory):
-    """Complete the samples before ``end``; return OK, or the failure status of the sample at which the clock
-    then is."""
+    """Complete the samples before ``end``; return OK, or the failure status of the sample at the time of the
+    clock."""
     loop, progress, mode, status = memory.run.loop, memory.progress, memory.mode, OK
     order, tolerance = mode.order, mode.tolerance
     mode.order, mode.tolerance = 2, memory.options.accurate_tolerance

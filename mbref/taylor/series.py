@@ -36,7 +36,7 @@ def start_sums(memory):
 
 @inlined
 def put_sums(k, memory):
-    """Compute the right-hand side of order k, from the factors of order k + 1 and those known before."""
+    """Compute the right-hand side of order k, from the factors of order k + 1 and of lower orders."""
     series, products, terms = memory.series, memory.polynomials.products, memory.series.terms
     left, right, lanes, slots = series.left, series.right, terms.shape[1], series.left.shape[1]
     inertia = memory.polynomials.inertia
@@ -122,7 +122,7 @@ def expand_series(memory):
         )  # fmt: skip
         step.deceleration = abs(solver.rhs[0])
         length = memory.run.loop.clock.length
-        if length == 0.0:  # at the start, before a step: the time in which a variable moves by one
+        if length == 0.0:  # at the start, before a step: use the time in which a variable moves by one
             length = 1.0 / largest_coefficient(series.terms, 1, solver.pivot_columns.shape[0])
         if not turns_back_in(length, memory):
             return OK

@@ -1,9 +1,9 @@
 """The linear system of each order: M z + Gᵀ λ = f, G z = b, reduced to the motions that the rows allow.
 
-All variables are z = N b + T u of the independent ones u.  N and T come from Gauss–Jordan elimination of the
-tableau [G 1] by rows and dependent variables (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982), u from
-the reduced mass matrix Tᵀ M T, which is regular where each motion that the rows allow has inertia.  Rows that
-depend on others have no multiplier.  The inverse is symmetric.
+All variables are z = N b + T u with the independent variables u.  N and T come from Gauss–Jordan elimination
+of the tableau [G 1] by rows and dependent variables (R. A. Wehage and E. J. Haug, J. Mech. Design 104, 1982),
+u from the reduced mass matrix Tᵀ M T, which is regular where each motion that the rows allow has inertia.
+Rows that depend on other rows have no multiplier. The inverse is symmetric.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
 MIN_PIVOT_KEPT = 0.5  # pivot / first pivot below which rows and variables are selected again
-WITHOUT_INERTIA = 1e-13  # inertia / largest inertia: smaller ones count as zero
+WITHOUT_INERTIA = 1e-13  # inertia / largest inertia: smaller inertias count as zero
 
 
 @inlined
@@ -65,7 +65,7 @@ def subtract_multiple(matrix, i, factor, k):
 
 @inlined
 def split(memory):
-    """Put N in rows of all variables, and T in rows of the independent ones, from the tableau."""
+    """Put N in rows of all variables, and T in rows of the independent variables, from the tableau."""
     solver, rank, variable = memory.solver, memory.partition.rank, memory.series.variable
     tableau, rows, columns = solver.tableau, solver.pivot_rows, solver.pivot_columns
     lanes = tableau.shape[1]
@@ -159,7 +159,7 @@ def subtract_numbers(matrix, g, factor, f):
 @inlined
 def put_dependent(memory):
     """Compute the response of the dependent variables:  N, plus T times the response of the independent
-    ones."""
+    variables."""
     solver, rank = memory.solver, memory.partition.rank
     response, particular, null_space, columns = (
         solver.response, solver.particular, solver.null_space, solver.pivot_columns,
@@ -193,7 +193,7 @@ def put_multipliers(memory):
 
 @inlined
 def put_force(i, memory):
-    """Compute the remaining force at a variable: the applied one minus its inertia force."""
+    """Compute the remaining force at a variable: the applied force minus its inertia force."""
     solver, inertia, lanes = memory.solver, memory.polynomials.inertia, memory.solver.response.shape[1]
     response, forces, mass, coupled = solver.response, solver.forces, inertia.mass, inertia.coupled
     first, end = inertia.first[i], inertia.first[i + 1]
@@ -207,7 +207,7 @@ def put_force(i, memory):
 
 @inlined
 def is_sharp(solver):
-    """Return whether all pivots are nearly as large as when they were chosen."""
+    """Return whether all pivots are nearly as large as at the selection of rows and variables."""
     for k in range(solver.first.shape[0]):  # noqa: SIM110 - no generators in kernels
         if not abs(solver.last[k]) > MIN_PIVOT_KEPT * solver.first[k]:
             return False
@@ -216,7 +216,7 @@ def is_sharp(solver):
 
 @inlined
 def respond(memory):
-    """Compute pivots and response at the first coefficients, by generated code where there is some."""
+    """Compute pivots and response at the first coefficients, by generated code if the scene has it."""
     solver, code = memory.solver, memory.code
     if code.factorise != 0 and code.rank == memory.partition.rank:
         factorise_by_code(
@@ -231,7 +231,7 @@ def respond(memory):
 
 @inlined
 def put_inverse(solver):
-    """Compute the response of variables that rows determine, so that no force moves any."""
+    """Compute the response of variables that rows determine, so that no force moves a variable."""
     response, particular, nz = solver.response, solver.particular, solver.pivot_columns.shape[0]
     zero, lanes = 0.0 * load(solver.linear, 0), response.shape[1]
     for j in range(0, (nz + solver.pivot_rows.shape[0]) * lanes, WIDTH):
@@ -258,7 +258,7 @@ def respond_in_loops(memory):
 
 @kernel
 def factorise_equations(memory):
-    """Compute the response at the first coefficients; return OK, or SINGULAR where a rank changes."""
+    """Compute the response at the first coefficients; return OK, or SINGULAR if a rank changes."""
     memory.run.equations.system.counts.factorisations += 1
     respond(memory)
     if not is_sharp(memory.solver):
@@ -291,7 +291,7 @@ def inertia_left(memory):
 
 @kernel
 def add_functions(functions, memory):
-    """Compute the response to prescribed functions: the part in rows that depend on them, and themselves."""
+    """Compute the response to prescribed functions, in rows that depend on them and in themselves."""
     solver, rows, terms = memory.solver, memory.polynomials.rows, memory.series.terms
     response, n = solver.response, solver.pivot_columns.shape[0] + solver.pivot_rows.shape[0]
     for g in range(n, n + functions):

@@ -51,12 +51,13 @@ ROUNDING = 1e-16  # relative rounding of a singular value
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
 LEAST_ORDER, MOST_ORDER = 4, 30  # order of a series; rounding dominates higher terms
-# order of least cost: at a tolerance of 1, and increase for each digit
+# order of least cost at a tolerance of 1, and its increase for each digit
 CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:
-    """Return the order of the series: the one wanted, or for 0 the cheapest; ValueError outside 4 to 30."""
+    """Return the order of the series: the requested order, or for 0 the cheapest order; raises ValueError
+    outside 4 to 30."""
     if wanted == 0:
         first, per_digit = CHEAPEST[code]
         best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
@@ -130,7 +131,7 @@ class SeriesStepper:
         return moving
 
     def release(self) -> None:
-        """Release the memory for another run; results of this one must not be read afterwards."""
+        """Release the memory for another run; results of this run must not be read afterwards."""
         release(self._pooled)
 
     def _put_options(self) -> None:
@@ -154,7 +155,7 @@ class SeriesStepper:
         return self.taylor
 
     def enter(self) -> None:
-        """Start from the state in memory: the first step does."""
+        """Start from the state in memory: nothing to do, because the first step begins the series."""
 
     def begin_again(self) -> None:
         """Reset the memory of the stepper to the start of the run."""
@@ -167,7 +168,7 @@ class SeriesStepper:
         self, packs: Packs, q: np.ndarray, places: Sequence[int]
     ) -> tuple[list[tuple[Any, ...]], list[int]]:
         """Return (target array, values for each scene) for numbers that differ between the scenes, and the
-        indices of scenes whose equations have the structure of those in memory."""
+        indices of scenes whose equations have the structure of the equations in memory."""
         varied, alike = equations_of_all(packs, q, places, self._moving, self.follows_drivers, self.taylor)
         distances = START_ERROR * np.maximum(1.0, packs.length)
         return [(self.taylor.options, distances, "start_distance"), *varied], alike
@@ -275,8 +276,8 @@ class SeriesStepper:
         return bool(crossings) and crossings[-1].taken != self._asked(len(crossings))
 
     def _cross(self) -> int:
-        """Cross the singular position ahead; return PAUSED when it is far enough, DONE at the end, or the
-        failure status."""
+        """Cross the singular position ahead; return PAUSED when the distance is large enough, DONE at the
+        end, or the failure status."""
         self._calls += 1
         return self._until_clear(int(cross_position(self.argument)), [])
 
@@ -297,7 +298,7 @@ class SeriesStepper:
         return self._begin_again(self._until_clear(self._departure.from_start(self._way), []))
 
     def _until_clear(self, status: int, crossed: list[Passed]) -> int:
-        """Take high-accuracy steps until no singular position is near; the first ones are ``crossed``."""
+        """Take high-accuracy steps until no singular position is near, after crossings ``crossed``."""
         counts: Any = self.run.memory.equations.system.counts
         while status in (PAUSED, DONE):
             branch = self._record(crossed)
@@ -314,7 +315,7 @@ class SeriesStepper:
         return status
 
     def _record(self, crossed: list[Passed]) -> Passed | None:
-        """Add the crossings of the last step, up to one with a requested branch; return that one or None."""
+        """Add the crossings of the last step, up to and with a requested branch; return that one or None."""
         for passed in self.recorded():
             taken = self._asked(len(self.run.crossings) + len(crossed) + 1)
             crossed.append(passed._replace(taken=taken))

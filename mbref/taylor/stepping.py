@@ -44,7 +44,7 @@ ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding
 LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
 LOST_MOTION = 30.0  # error of accelerations times the square of the step, relative to tolerance × order²
 MOTION_ROUNDING = 1e-9  # error by rounding, relative to accelerations times the square of the step
-SHORTER = 0.7  # length of the next attempt, relative to the one that failed
+SHORTER = 0.7  # length of the next attempt / length of the failed attempt
 
 
 @exchangeable(EXPAND)
@@ -86,7 +86,7 @@ def longest_step(tolerance, memory):
 
 @kernel
 def first_lengths(left, memory):
-    """Return the longest step (s) by the tolerance, and the longest one that crosses; both are at most the
+    """Return the longest step (s) by the tolerance, and the longest step that crosses; both are at most the
     remaining time."""
     step = memory.step
     if not is_accurate(memory):
@@ -105,10 +105,10 @@ def first_lengths(left, memory):
 
 @kernel
 def next_length(h, regular, memory):
-    """Return the length (s) of the attempt after one of h seconds.
+    """Return the length (s) of the attempt after an attempt of h seconds.
 
     The step ends clearly after the singular position that the attempt approached or crossed, if the terms of
-    the series that are not rounding allow it. Otherwise it ends before the position.
+    the series that are not rounding allow it. If not, the step ends before the position.
     """
     step = memory.step
     near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * step.start_pivot
@@ -136,7 +136,7 @@ def order_of_least_term(h, memory):
 # --- attempts -------------------------------------------------------------------------------------------
 @kernel
 def save_series_without_pole(memory):
-    """Save the series that starts here, without its rounding pole unless that makes steps short.
+    """Save the series that starts here; its rounding pole is removed unless the removal makes steps short.
 
     Very near to a singular position rounding may dominate all but a few orders.
     """

@@ -1,4 +1,4 @@
-"""A joint as a list of primitive constraints between two bodies, and the vectors they need."""
+"""A joint as a list of primitive constraints between two bodies, and the vectors of these constraints."""
 
 from __future__ import annotations
 

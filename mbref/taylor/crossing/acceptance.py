@@ -7,9 +7,9 @@ Beyond the gap it violates the rows by at least g.  A step near a singular posit
 changes the direction of the velocity by that displacement over the pivot.  A motion that comes nearer than
 MIN_PIVOT and does not cross is
   UNDECIDED.  Rounding of the lengths may open a gap that a motion meets before it turns back nearer than
-  MIN_PIVOT_FREE: that is UNDECIDED too.  ``uniqueness`` judges other motions.
+  MIN_PIVOT_FREE: such a motion is UNDECIDED, too.  ``uniqueness`` judges other motions.
 - A correction that moves the state by as much as its distance from the singular position may change the
-  branch.  If a driver stands still there, the pivot itself depends on the correction.
+  branch.  If a driver stands still at the singular position, the pivot itself depends on the correction.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ def step_tolerance(memory):
 
 @kernel
 def crossing_tolerance(memory):
-    """Return the tolerance of a step that crosses; its last terms are rounding divided by the distance."""
+    """Return the tolerance of a step that crosses; the last terms of its series are rounding divided by the
+    distance."""
     distance = relative_distance(memory)
     if is_accurate(memory) and memory.step.approaching and distance < CROSSING_START:
         return max(memory.mode.tolerance, CROSSING_NOISE / distance)
@@ -87,7 +88,7 @@ def violation_by_rounding(memory):
 def judge_branch(h, last, memory):
     """Return OK, or the status that refuses a step of h seconds because its branch is in doubt.
 
-    Regular steps return SINGULAR_AHEAD where a singular position is near.
+    Regular steps return SINGULAR_AHEAD if a singular position is near.
     """
     step, pivot = memory.step, least_pivot(memory)
     step.crossed = memory.kernels.detect(h, pivot, memory)

@@ -37,8 +37,8 @@ class Departure:
         self._run, self._taylor, self._expand, self._state_at = run, taylor, expand, state_at
 
     def along_branch(self, passed: Passed) -> int:
-        """Continue from a singular position just passed along another branch than the smooth one; return
-        PAUSED or the failure status."""
+        """Continue along another branch than the smooth branch from a singular position that was just passed;
+        return PAUSED or the failure status."""
         crossing, run = singular_position(self._run.model, passed), self._run
         velocities, clock = crossing.velocities[crossing.taken - 1], run.memory.loop.clock
         clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
@@ -88,7 +88,7 @@ class Departure:
         self._state_at(0.0)
 
     def _put_sample(self, k: int, q: np.ndarray, v: np.ndarray, acceleration: np.ndarray) -> None:
-        """Record sample k; multipliers balance the forces by least squares, or at rest only along the
+        """Record sample k; multipliers balance the forces by least squares; at rest, only along the
         branch."""
         run = self._run
         samples, terms = run.memory.loop.samples, run.model.terms(float(run.times[k]), q, v)

@@ -1,10 +1,10 @@
 """Detection of singular positions: the decision whether a step of free or driven motion contains one.
 
-If rows, variables and signs of the pivots are equal at both ends, pivots have vanished twice or never, and
-twice needs a distance that is long compared with the pivots. Otherwise the determinant of the gradients
-decides (``determinants``). Its sign is unchanged if branches of several loops cross at once, or after two
-crossings. So it is also evaluated at its minimum if pivots change their signs, and at the place where a
-linearly falling least pivot vanishes.
+If rows, variables and signs of the pivots are equal at both ends, pivots have vanished twice or never; two
+zeros need a distance that is long compared with the pivots. Otherwise the determinant of the gradients
+decides (``determinants``). The sign of the determinant is unchanged if branches of several loops cross at
+once, or after two crossings. So the determinant is also evaluated at its minimum if pivots change their
+signs, and at the place where a linearly falling least pivot vanishes.
 """
 
 from __future__ import annotations
@@ -61,15 +61,16 @@ def is_near_singular(pivot, memory):
 
 @kernel
 def ends_near_singular(pivot, memory):
-    """Return whether a step of low accuracy ends near a singular position, and does not leave one."""
+    """Return whether a step of low accuracy ends near a singular position, and does not leave a singular
+    position."""
     leaves = memory.progress.leaving and pivot > memory.step.start_pivot
     return pivot < PIVOT_AHEAD * memory.progress.largest_pivot and not leaves
 
 
 @kernel
 def time_to_singular_position(h, memory):
-    """Return the time (s) at which a linear least pivot vanishes, from both ends of an attempt of h
-    seconds."""
+    """Return the time (s) at which the least pivot vanishes by linear extrapolation, from both ends of an
+    attempt of h seconds."""
     pivot, past = least_pivot(memory), memory.step.start_pivot
     return h * past / (past + pivot if memory.step.crossed else past - pivot)
 
@@ -171,7 +172,8 @@ def dips_to_zero(h, pivot, memory):
     """Return whether the determinant vanishes at the place, in a step of h seconds, where a linear least
     pivot vanishes.
 
-    A high-accuracy step that starts far away spans the position: there the minimum itself is evaluated.
+    A high-accuracy step that starts far away spans the position; for such a step the minimum itself is
+    evaluated.
     """
     start, (ends, _) = memory.step.start_pivot, end_logarithms(memory)
     vanishes = logarithm_at(h * start / (start + pivot), memory) - ends < LOG_DIP

@@ -1,11 +1,11 @@
 """Determinant det(G₁ G₀ᵀ) of the constraint gradients at two times of a step, by its sign and logarithm.
 
-It changes its sign if two branches cross, and keeps it if the rank of G is unchanged (a bordered test
-function:  W.  Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000).  G₀ is the
-gradient at the start of the step.  For a square G it is det G₁ det G₀, and det G at both ends is the
+The determinant changes its sign if two branches cross, and keeps its sign if the rank of G is unchanged (a
+bordered test function:  W.  Govaerts, Numerical Methods for Bifurcations of Dynamical Equilibria, 2000).  G₀
+is the gradient at the start of the step.  For a square G it is det G₁ det G₀, and det G at both ends is the
 product of the pivots.  With one degree of freedom the minors of G are the product of the pivots times the
-null vector T (one at the independent variable), so that the determinant is the product of both pivot
-products and T₁ · T₀.
+null vector T (one at the independent variable), so that the determinant is the product of both pivot products
+and T₁ · T₀.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
 from mbref.taylor.partition import evaluate_gradient, freedoms
 
-SMALLEST = 1e-300  # smaller numbers are replaced by this one before their logarithm is computed
+SMALLEST = 1e-300  # smaller numbers are replaced by SMALLEST before their logarithm is computed
 
 
 @kernel
@@ -57,7 +57,7 @@ def gradient_determinant(y, memory):
 def square_determinant(memory):
     """Return whether det G of a square gradient in ``work`` is negative, and its logarithm.
 
-    Rows and variables are in their pivot order, so that it is the product of the pivots.
+    Rows and variables are in their pivot order, so that the determinant is the product of the pivots.
     """
     solver, rank = memory.solver, memory.partition.rank
     for i in range(rank):
@@ -145,8 +145,8 @@ def rates_oppose(memory):
     """Return whether the motion, without drivers, has the direction of the minors' null vector at one end of
     the step only.
 
-    This happens if branches cross, because the minors are smooth and vanish at the crossing, however far they
-    turn in between.
+    This happens if branches cross, because the minors are smooth and vanish at the crossing, however far the
+    null vector turns in the step.
     """
     solver, past, terms, before, after = memory.solver, memory.series.past, memory.series.terms, 0.0, 0.0
     for i in range(solver.pivot_columns.shape[0]):

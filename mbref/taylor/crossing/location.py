@@ -30,8 +30,8 @@ NEGATIVE = -1e300  # stands for the logarithm of a negative determinant
 def find_crossings(h, memory):
     """Return the times (s, from its start) of one or two singular positions in a step of h seconds.
 
-    The second time is negative if there is one position.  The determinant vanishes there, and changes its
-    sign unless branches of several loops cross at once.
+    The second time is negative if there is one position.  The determinant vanishes at a singular position,
+    and changes its sign unless branches of several loops cross at once.
     """
     save_start_determinant(memory)
     change = sign_change(h, memory)
@@ -48,8 +48,8 @@ def count_crossings(h, memory):
 
 @kernel
 def find_pair(h, memory):
-    """Return the times (s) of two sign changes in a step with equal signs at its ends, else its minimum and
-    -1.
+    """Return the times (s) of two sign changes in a step with equal signs at its ends, otherwise the time of
+    the minimum and -1.
 
     Between two singular positions of different loops the determinant has the other sign.
     """
@@ -80,9 +80,9 @@ def sign_change(h, memory):
     """Return the time (s) of the sign change inside a step of h seconds; -1 if the signs at its ends are
     equal.
 
-    By inverse quadratic interpolation (R.  P.  Brent, Computer J. 14, 1971), and by bisection where it is
-    slow: at the multiple root of several loops.  The search starts at the rounding pole, if the series had
-    one.  It ends where the next estimate would differ by less than LOCATION_ERROR of the step.
+    The method is inverse quadratic interpolation (R. P. Brent, Computer J. 14, 1971), and bisection where
+    interpolation is slow: at the multiple root of several loops.  The search starts at the rounding pole, if
+    the series had one.  The search ends if the next estimate differs by less than LOCATION_ERROR of the step.
     """
     unit, (negative, size) = log_determinant_at_start(memory), gradient_determinant_at_end(memory)
     start, end, middle, changed = 0.0, h, -h, h
@@ -115,7 +115,7 @@ def sign_change(h, memory):
 @kernel
 def interpolated(a, at_a, b, at_b, c, at_c):
     """Return the zero between a and b, of values with different signs, by inverse quadratic interpolation
-    through c; by linear interpolation where that leaves the interval."""
+    through c; by linear interpolation if the result leaves the interval."""
     place = (a * at_b - b * at_a) / (at_b - at_a)
     if at_c in (at_a, at_b):
         return place
@@ -126,7 +126,8 @@ def interpolated(a, at_a, b, at_b, c, at_c):
 
 @kernel
 def value_at(h, unit, memory):
-    """Return the determinant at a time h (s) of the step, relative to one of logarithm ``unit``."""
+    """Return the determinant at a time h (s) of the step, relative to a determinant whose logarithm is
+    ``unit``."""
     evaluate_series(h, memory)
     negative, size = gradient_determinant(memory.state, memory)
     return signed(negative, size - unit)

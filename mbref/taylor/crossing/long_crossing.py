@@ -1,8 +1,8 @@
 """Long crossings: high-accuracy steps across singular positions until the distance is large enough, confirmed
 by a perturbed run.
 
-A long crossing follows if a short one (``short_crossing``) cannot show that the motion is determined. The
-order of the steps is lower here, because lower orders amplify rounding less. Unless drivers prescribe the
+A long crossing follows if a short crossing (``short_crossing``) cannot show that the motion is determined.
+The order of the steps is lower here, because lower orders amplify rounding less. Unless drivers prescribe the
 whole motion, a perturbed run repeats the crossing (``uniqueness``).
 """
 
@@ -93,7 +93,7 @@ def end_crossing(status, memory):
     """Return to regular steps after a crossing that ended with a status.
 
     Return PAUSED, DONE or the failure status; UNDECIDED if a perturbed run ends at another state. Steps of
-    that run are not counted.
+    the perturbed run are not counted.
     """
     run, counts = memory.run, memory.run.equations.system.counts
     if status == PAUSED or status == DONE:  # noqa: SIM109 - no containers in kernels

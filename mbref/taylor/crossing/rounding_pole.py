@@ -1,10 +1,10 @@
 """Removal of the rounding pole from a series near a singular position.
 
 Rounding moves a state to a motion that passes the singular position at a gap g. Let d be the time to the
-singular position and p the least pivot. That motion differs from the exact one by (g / p) d / (d - t) along
-the direction in which the rows lose rank: a pole at t = d. Its coefficients (g / p) / d^k grow faster than
-the coefficients of the motion, so that the last ones contain the pole only. After its removal a step may be
-many times as long as d.
+singular position and p the least pivot. The motion with rounding differs from the exact motion by (g / p) d /
+(d - t) along the direction in which the rows lose rank: a pole at t = d. Its coefficients (g / p) / d^k grow
+faster than the coefficients of the motion, so that the last coefficients contain the pole only. After its
+removal a step may be many times as long as d.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from mbref.taylor.simd import WIDTH, load, store
 
 @kernel
 def time_of_pole(memory):
-    """Return the time (s) of the pole in the series in use; 0 without one.
+    """Return the time (s) of the pole in the series in use; 0 without a pole.
 
     The last coefficients must contain a pole only, with a gap that rounding explains. A negative time belongs
     to a position in the past.

@@ -20,13 +20,13 @@ from mbref.taylor.step_start import return_to_start
 
 @kernel
 def may_be_short(memory):
-    """Return whether the motion has no degree of freedom, or one and no drivers."""
+    """Return whether the motion has no degree of freedom, or one degree of freedom and no drivers."""
     return freedoms(memory) <= is_undriven(memory)
 
 
 @kernel
 def switches_branch(crossing, memory):
-    """Return whether another branch than the smooth one is requested at a crossing, counted from 1."""
+    """Return whether another branch than the smooth branch is requested at a crossing, counted from 1."""
     for number in memory.branch_switches:  # noqa: SIM110 - no generators in kernels
         if number == crossing:
             return True
@@ -42,7 +42,7 @@ def is_full(memory):
 @kernel
 def switches_branch_in_pair(before, memory):
     """Return whether the last step crossed twice, after ``before`` crossings, and another branch than the
-    smooth one is requested at one of them."""
+    smooth branch is requested at one of the crossings."""
     if memory.run.equations.system.counts.crossings < before + 2:
         return False
     return switches_branch(before + 1, memory) or switches_branch(before + 2, memory)
@@ -50,8 +50,8 @@ def switches_branch_in_pair(before, memory):
 
 @kernel
 def cross_briefly(memory):
-    """Cross the singular position ahead of the start of the last step; if that fails, restore all and return
-    False."""
+    """Cross the singular position ahead of the start of the last step; if that fails, restore the state and
+    return False."""
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
     if not may_be_short(memory) or is_full(memory):
         return False
@@ -95,7 +95,7 @@ def restore_step_start(memory):
 
 @kernel
 def take_crossing_steps(memory):
-    """Take a few high-accuracy steps until one crosses; return whether it did and the motion is
+    """Take a few high-accuracy steps until one crosses; return whether a step crossed and the motion is
     determined."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     crossings, is_free = counts.crossings, freedoms(memory) > 0

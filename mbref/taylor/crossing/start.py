@@ -24,7 +24,7 @@ from mbref.taylor.samples import put_terms
 
 @kernel
 def judge_start(status, memory):
-    """Return the status of the start, or UNDECIDED where rounding hides the motion.
+    """Return the status of the start, or UNDECIDED if rounding hides the motion.
 
     ``status`` is OK, or SINGULAR for a rank that rounding changes.
     """
@@ -53,9 +53,9 @@ def hides_rank(memory):
 def misses_state(memory):
     """Return whether the series misses the state in memory.
 
-    Then small numbers were wrongly treated as rounding, or rounding divided by the distance from a singular
-    position has changed the direction of the velocities. Velocities that drivers prescribe determine the
-    motion nevertheless.
+    In this case small numbers were wrongly treated as rounding, or rounding divided by the distance from a
+    singular position has changed the direction of the velocities. Velocities that drivers prescribe determine
+    the motion nevertheless.
     """
     state, before = memory.run.state, memory.run.previous
     copy_state(state, before)
@@ -81,11 +81,9 @@ def rests_near(memory):
 @kernel
 def is_turned(memory):
     """Return whether rounding changes the direction of a motion that started at rest near a singular position
-    and is still near.
-
-    A rounding error of a row moves the state by (error / p) with the least pivot p. This changes the
-    direction of the motion, which gains a fraction √p of its speed over a distance p. Rows of loops with
-    equal dimensions may have no rounding error.
+    and is still near it. A rounding error of a row moves the state by (error / p) with the least pivot p.
+    This changes the direction of the motion, which gains a fraction √p of its speed over a distance p. Rows
+    of loops with equal dimensions may have no rounding error.
     """
     progress, pivot = memory.progress, least_pivot(memory)
     progress.rests_near = progress.rests_near and pivot < REST_PIVOT

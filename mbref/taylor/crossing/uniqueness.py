@@ -5,11 +5,12 @@ errors are not amplified.
 
 A mechanism of one degree of freedom without drivers moves along a curve. In the arc length σ of the metric of
 M, σ'' = Q(σ) - c(σ) σ' with c ≥ 0, because loads and dampers do not depend on time. By Liouville's formula a
-motion that starts faster by a fraction ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, W = exp(-∫ c dt)
-≤ 1, and its variables by at most ε x' ∫ v₀² / v² dt. If this bound is small, no further run is needed.
+motion that starts faster by a fraction ε, with v = σ', is ahead by δσ = ε v₀² v ∫ W / v² dt, with the speed
+v₀ at the start and W = exp(-∫ c dt) ≤ 1. Its variables x are ahead by at most ε x' ∫ v₀² / v² dt. If this
+bound is small, no further run is needed.
 
-Otherwise a perturbed run repeats the crossing from slightly larger velocities: the motion is determined if
-both runs end in nearby states.
+If the bound is large, a perturbed run repeats the crossing from slightly larger velocities: the motion is
+determined if both runs end in nearby states.
 """
 
 from __future__ import annotations
@@ -51,8 +52,8 @@ def energy_in_middle(memory):
 
 @kernel
 def keeps_moving(least, first, memory):
-    """Return whether the motion has not reversed in the last step, and has not lost nearly all of its first
-    energy."""
+    """Return whether the motion has not reversed in the last step, and has not lost nearly all of its initial
+    kinetic energy."""
     moved = kinetic_energy(memory.series.past, memory) > 0.0
     reverses = moved and turns_back(memory.series.terms, memory)
     return least > 0.0 and least >= MIN_ENERGY * first and not reverses

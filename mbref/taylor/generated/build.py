@@ -29,7 +29,7 @@ MOST_VECTORS = 2_000  # products of vectors that LLVM compiles in a second
 def put_code(taylor: TaylorMemory) -> Code:
     """Write the addresses of a scene's functions into memory; they are valid while the code returned lives.
 
-    Raises NoGeneratedCode where the functions would be long, or there is no JIT.
+    Raises NoGeneratedCode if the functions would be too long, or without the JIT.
     """
     names = functions_of(taylor)
     code = code_of(taylor, names)
@@ -66,7 +66,7 @@ def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
 
 
 def rank_of_rows(taylor: TaylorMemory) -> int:
-    """Return the rank of the rows that leaves the start's degrees of freedom."""
+    """Return the rank of the rows for which the degrees of freedom equal those at the start."""
     return taylor.solver.pivot_columns.size - int(taylor.options.start_freedoms)
 
 

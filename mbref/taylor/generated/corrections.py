@@ -83,7 +83,7 @@ class Correction:
                 yield weights, left, right
 
     def _linear(self, vector: int, row: Vectors) -> list[ir.Value]:
-        """Return the linear terms in a vector of rows, one of each row at a time."""
+        """Return the linear terms in a vector of rows, one term of each row at a time."""
         rows = self._taylor.polynomials.rows
         places = (np.flatnonzero(rows.linear_row + self._nz == lane) for lane in self._lanes_of(vector))
         terms = [[(rows.linear_weight[e], int(rows.linear_lane[e])) for e in of_row] for of_row in places]
@@ -92,7 +92,7 @@ class Correction:
         ]
 
     def _masked(self, vector: int, numbers: np.ndarray) -> np.ndarray:
-        """Return numbers of a vector, with zero in lanes that are no rows."""
+        """Return numbers of a vector, with zero in lanes without a row."""
         return np.where([lane in self._rows for lane in self._lanes_of(vector)], numbers, 0.0)
 
     def _lanes_of(self, vector: int) -> range:

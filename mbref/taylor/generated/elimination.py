@@ -69,7 +69,7 @@ class Elimination:
         return levels([[(rows.weight[e], int(rows.other[e])) for e in of_one] for of_one in places])
 
     def _eliminate(self, k: int) -> None:
-        """Take the k-th dependent variable out of all other rows, first out of the one that is next."""
+        """Eliminate the k-th dependent variable from all other rows, first from the next pivot row."""
         write, column = self._write, self._columns[k]
         pivot = write.number(self._tableau, self._rows[k], column)
         write.put(pivot, self._last, k)
@@ -180,7 +180,7 @@ class Elimination:
         return solved
 
     def _momentum(self, f: int, motion: Row) -> Row:
-        """Return M times a motion, whose variables are in memory too."""
+        """Return M times a motion, whose variables are also in memory."""
         mass = self._taylor.polynomials.inertia.mass
         row = {}
         for vector in self._of_variables:

@@ -134,7 +134,7 @@ class Instructions:
         return vector
 
     def difference(self, one: ir.Value, other: ir.Value) -> ir.Value:
-        """Return one minus the other; fused where the other is a product."""
+        """Return the difference of two vectors; with fused multiply-add if the second vector is a product."""
         return self._builder.fsub(one, other, flags=FUSED)
 
     def times(self, numbers: np.ndarray, vector: ir.Value) -> ir.Value:
@@ -146,7 +146,7 @@ class Instructions:
         return self._builder.fmul(one, other, flags=FUSED)
 
     def total(self, vectors: Sequence[ir.Value]) -> ir.Value:
-        """Return the sum of vectors, zero without any, added up in several chains."""
+        """Return the sum of vectors, added up in several chains; zero without vectors."""
         vectors = vectors or [constant([0.0] * WIDTH)]
         chains = [functools.reduce(self._sum, vectors[k::CHAINS]) for k in range(min(CHAINS, len(vectors)))]
         while len(chains) > 1:
@@ -200,7 +200,7 @@ def constant(numbers: Sequence[float] | np.ndarray) -> ir.Constant:
 def levels(terms: Sequence[Sequence[tuple[float, int]]]) -> Iterator[tuple[np.ndarray, list[int]]]:
     """Yield weights (WIDTH,) and lanes of terms, given by weight and lane of each number of a vector.
 
-    One term of each number at a time; lane -1 for a number that has no more.
+    One term of each number is yielded at a time; lane -1 stands for a number without further terms.
     """
     for level in range(max(map(len, terms), default=0)):
         weights, lanes = np.zeros(WIDTH), [-1] * WIDTH

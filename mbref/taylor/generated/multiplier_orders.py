@@ -61,7 +61,7 @@ class MultiplierOrders(Orders):
         return self._respond(place, sums)
 
     def _total(self, vector: int, known: Sums, newest: Newest, others: Sequence[ir.Value] = ()) -> ir.Value:
-        """Return the sum of the products of a vector and of others, the newest last."""
+        """Return the sum of the products of a vector and of other vectors, the newest product last."""
         write, start = self._write, self._products.start
         slots = range(start[vector], start[vector + 1], WIDTH)
         parts = [*(known[c] for c in slots if c in known), *others]

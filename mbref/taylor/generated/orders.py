@@ -39,9 +39,10 @@ class Factors(NamedTuple):
 
 
 class Orders(ABC):
-    """Code for the orders of a series from the first two; two orders at a time share their factors.
+    """Code for the orders of a series from the first two orders; two successive orders share their factors.
 
-    Factors of ``products``, and of further ones that give ``slots``, are stored in ``left`` and ``right``.
+    Factors of ``products``, and of further products that give ``slots``, are stored in ``left`` and
+    ``right``.
     """
 
     def __init__(self, taylor: TaylorMemory, write: Instructions, products: Products, slots: int):
@@ -60,7 +61,7 @@ class Orders(ABC):
         self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Vectors:
         """Write order k + 2 of the variables, from the row of terms before, its factors, and the sums of
-        products of earlier ones; the second one of a pair lacks two more."""
+        products of earlier ones; the second order of a pair lacks two more products."""
 
     def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """Return the factors of order k by the places of their slots, kept for later orders."""

@@ -1,9 +1,9 @@
 """Machine code for the orders of a series with one degree of freedom and no drivers, without multipliers.
 
-The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w =
-0 with w = M a - Q (P.  E.  B.  Jourdain, Quart.  J.  Pure Appl.  Math. 40, 1909).  With the rows it gives
-each order, while multipliers take most of the products in ``multiplier_orders``.  In Taylor coefficients,
-with v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
+The rows allow one motion, along the velocity v: the power of inertia and forces along it vanishes, v · w = 0
+with w = M a - Q (P.  E.  B.  Jourdain, Quart.  J.  Pure Appl.  Math. 40, 1909).  The power equation and the
+rows give each order without multipliers, which take most of the products in ``multiplier_orders``.  In Taylor
+coefficients, with v_k = (k + 1) z_{k+1} and w_k = (k + 1) (k + 2) M z_{k+2} - Q_k,
 
     (k + 1) (k + 2) v_0 · M z_{k+2} = v_0 · Q_k - Σ_{i=1…k} v_i · w_{k-i},
     z_{k+2} = B z_{k+1} - R s_k + v_0 (v_0 · M z_{k+2}) / (v_0 · M v_0),
@@ -180,7 +180,7 @@ class PowerOrders(Orders):
         return self._write.vector(self._response, (self._nz + e) * self._lanes + b * WIDTH)
 
     def _put(self, k: ir.Value, row: Vectors, power: ir.Value, factor: ir.Value) -> Vectors:
-        """Write order k + 2: a row plus the motion that a power, times a factor, adds."""
+        """Write order k + 2: a row plus the motion that the power, times a factor, adds."""
         write = self._write
         moved = (write.product(power, share) for share in self._scaled(factor, self._share))
         row = [write.total(pair) for pair in zip(row, moved, strict=True)]
