@@ -155,7 +155,9 @@ def test_static_models_links_without_inertial_and_several_models(tmp_path):
     )
     found = read(tmp_path, text)
     assert [body.name for body in found.scene.body] == ["m::a", "m::lamp", "m::b"]
-    assert found.scene.body[1].mass == 1.0 and any("'lamp' has no inertial" in note for note in found.notes)
+    assert found.scene.body[1].mass == 1.0 and any(
+        "'m::lamp' has no inertial" in note for note in found.notes
+    )
     assert found.scene.joint[0].bodies == (GROUND, "m::a")
 
 
@@ -175,7 +177,7 @@ def test_a_link_is_held_on_request(tmp_path):
         (pair("screw"), "joint 'B': a screw needs screw_thread_pitch"),
         (pair(more="<dynamics><friction>1</friction></dynamics>"), "dry friction of joint 'B': it changes"),
         (pair("universal", "<dynamics><damping>1</damping></dynamics>"), "damping of joint 'B': it changes"),
-        (pair().replace("<parent>a<", "<parent>c<"), "frame 'c': is attached to no link"),
+        (pair().replace("<parent>a<", "<parent>c<"), "joint 'B': the file has no link or frame 'c'"),
         (
             pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="q">0 0 1 0 0 0<'),
             "frame 'q': the model has",
@@ -188,7 +190,30 @@ def test_a_link_is_held_on_request(tmp_path):
             pair().replace("<pose>0 0 1 0 0 0<", '<pose relative_to="a">0 0 1 0 0 0<'),
             "relative to itself, by a → a",
         ),
-        (pair(joint="<include><uri>x</uri></include>"), "contains <include>, which is not read"),
+        (pair(joint="<include><uri>x</uri></include>"), "model 'm': includes 'x', which is not read"),
+        (pair().replace("<parent>a</parent>", ""), "joint 'B': names no parent"),
+        (pair().replace("<child>b<", "<child>a<"), "joint 'B': both sides are on link 'a'"),
+        (pair().replace("<mass>0.5<", "<mass>0<"), "link 'a': mass must be positive, got 0"),
+        (
+            pair().replace("<inertial>", '<inertial auto="true">'),
+            "link 'a': inertial auto='true' is not read",
+        ),
+        (
+            pair(link="<velocity_decay/>").replace("</link><velocity_decay/>", "<velocity_decay/></link>"),
+            "velocity_decay of link 'a'",
+        ),
+        (pair().replace('name="m"', 'name="m" placement_frame="a"'), "model 'm': has a placement_frame"),
+        (
+            pair().replace("<pose>0 0 1", '<pose rotation_format="axis">0 0 1'),
+            "rotation_format 'axis' is none",
+        ),
+        (pair().replace("1.7", "new"), "version 'new': is no version of SDF"),
+        (
+            pair()
+            .replace("<model", "<model name='f'><static>1</static><link name='p'/></model><!--")
+            .replace("</model></sdf>", "--></sdf>"),
+            "has no body that moves",
+        ),
         (
             pair(more='<mimic joint="A"><multiplier>1</multiplier><offset>1</offset></mimic>'),
             "its offset contradicts the poses",
@@ -207,3 +232,44 @@ def test_parts_without_effect_are_listed_and_others_left_out_on_request(tmp_path
     assert any("--without friction" in part for part in found.left_out)
     with pytest.raises(SceneError, match="an SDF file gives the poses"):
         read(tmp_path, pair(), keyframe="home")
+
+
+def test_nested_models_have_full_names_and_frames_of_their_own(tmp_path):
+    """A copy of a link in a nested model, turned by half a turn about z, and a joint between both models."""
+    inner = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
+    inner += '<frame name="tip" attached_to="a"><pose>0.2 0 0 0 0 0</pose></frame>'
+    hinge = HINGE.format(name="A", kind="revolute", parent="world", child="a", more="")
+    nested = f'<model name="n"><pose>0.3 0 0 0 0 3.141592653589793</pose>{inner}{hinge}</model>'
+    joint = HINGE.format(name="C", kind="ball", parent="a", child="n::tip", more="")
+    found = read(tmp_path, pair(joint=nested + joint)).scene
+    assert [body.name for body in found.body] == ["a", "b", "n::a"]
+    assert np.allclose(found.body[2].position, (0.2, 0, 1))
+    hinge, ball = found.joint_named("n::A"), found.joint_named("C")
+    assert hinge.bodies == (GROUND, "n::a") and np.allclose(hinge.axis, (0, -1, 0))
+    assert ball.bodies == ("a", "n::a") and np.allclose(ball.anchor, (0.1, 0, 1))
+
+
+def test_frames_and_joints_of_the_world(tmp_path):
+    link = LINK.format(name="a", pose="0 0 1 0 0 0", centre="0.1 0 0")
+    models = [
+        f'<model name="{m}"><pose relative_to="f">{x} 0 0 0 0 0</pose>{link}</model>'
+        for m, x in (("p", 1), ("q", 2))
+    ]
+    frame = '<frame name="f"><pose>0 5 0 0 0 0</pose></frame>'
+    joint = HINGE.format(name="J", kind="revolute", parent="p::a", child="q::a", more="")
+    text = f'<sdf version="1.10"><world name="w">{frame}{"".join(models)}{joint}</world></sdf>'
+    scene = read(tmp_path, text).scene
+    assert scene.joint[0].bodies == ("p::a", "q::a") and np.allclose(scene.joint[0].anchor, (2, 5, 1))
+    assert np.allclose(scene.body[0].position, (1.1, 5, 1))
+
+
+@pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.5", (0, 0, 1))])
+def test_axes_of_old_files_are_given_in_the_frame_of_the_model(version, axis, tmp_path):
+    text = pair().replace("1.7", version).replace("<pose>0 0 1 0 0 0<", "<pose>0 0 1 1.5707963267948966 0 0<")
+    assert np.allclose(read(tmp_path, text).scene.joint_named("A").axis, axis)
+
+
+def test_a_link_with_the_name_of_the_fixed_frame_gets_another_one(tmp_path):
+    scene = read(tmp_path, pair().replace('"a"', '"ground"').replace(">a<", ">ground<")).scene
+    assert [body.name for body in scene.body] == ["link ground", "b"]
+    assert scene.joint_named("B").bodies == ("link ground", "b")

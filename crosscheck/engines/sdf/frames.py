@@ -80,17 +80,20 @@ def _about(axis: int, angle: float) -> np.ndarray:
 
 @dataclass
 class Frames:
-    """The frames of one model, whose own pose in the world is ``base``."""
+    """The frames of one flat model, each of which names the frame that it is given in."""
 
     model: ET.Element
-    base: Pose
 
     def __post_init__(self) -> None:
         self._elements: dict[str, ET.Element] = {}
-        self._known: dict[str, Pose] = {MODEL: self.base, WORLD: ORIGIN}
+        self._known: dict[str, Pose] = {WORLD: ORIGIN}
         for element in self.model:
             if element.tag in ("link", "joint", "frame"):
                 self._elements[str(element.get("name"))] = element
+
+    def has(self, name: str) -> bool:
+        """Return whether the model has a link, joint or frame of this name."""
+        return name in self._elements
 
     def world(self, name: str, within: tuple[str, ...] = ()) -> Pose:
         """Return the world pose of a frame; raises SceneError for an unknown frame and for frames that refer
@@ -104,7 +107,9 @@ class Frames:
                 [f"frame {name!r}: is given relative to itself, by {' → '.join((*within, name))}"]
             )
         element = self._elements[name]
-        base = self.world(self._relative_to(element), (*within, name))
+        pose = element.find("pose")
+        relative_to = str(pose.get("relative_to")) if pose is not None else WORLD
+        base = self.world(relative_to, (*within, name))
         self._known[name] = base.then(pose_of(element, f"{element.tag} {name!r}: pose"))
         return self._known[name]
 
@@ -120,12 +125,3 @@ class Frames:
             seen.append(name)
             name = element.findtext("child", "").strip() or element.get("attached_to") or ""
         return name
-
-    def _relative_to(self, element: ET.Element) -> str:
-        pose = element.find("pose")
-        given = pose.get("relative_to") if pose is not None else None
-        if given:
-            return given
-        if element.tag == "joint":
-            return element.findtext("child", "").strip()
-        return element.get("attached_to") or MODEL if element.tag == "frame" else MODEL

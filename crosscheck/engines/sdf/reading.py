@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_others
-from crosscheck.engines.sdf.frames import MODEL, ORIGIN, WORLD, Frames, Pose, numbers, pose_of
+from crosscheck.engines.sdf.flattening import STATIC, flattened
+from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, Pose, numbers, pose_of
 from mbref import rotations
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import (
@@ -61,11 +62,11 @@ def read(path: Path, options: ImportOptions) -> Imported:
         raise SceneError([f"{path}: is no XML: {error}"]) from None
     reader = _Reader()
     world = root.find("world")
-    models = list((root if world is None else world).findall("model"))
-    if root.tag != "sdf" or not models:
+    if root.tag != "sdf" or (root if world is None else world).find("model") is None:
         raise SceneError([f"{path}: has no model"])
-    for model in models:
-        reader.read(model, f"{model.get('name')}::" if len(models) > 1 else "")
+    reader.read(flattened(root))
+    if not reader.bodies:
+        raise SceneError([f"{path}: has no body that moves"])
     refuse_others(reader.parts, without)
     given = world.find("gravity") if world is not None else None
     gravity = GRAVITY if given is None else tuple(numbers(given, "gravity", 3).tolist())
@@ -112,25 +113,18 @@ class _Reader:
             load=tuple(self.loads),
         )
 
-    def read(self, model: ET.Element, prefix: str) -> None:
-        """Read a model; ``prefix`` begins the names of its links and joints."""
-        name = str(model.get("name"))
-        for tag in ("include", "model"):
-            if model.find(tag) is not None:
-                raise SceneError(
-                    [f"model {name!r}: contains <{tag}>, which is not read; give one flat model"]
-                )
-        frames = Frames(model, pose_of(model, f"model {name!r}: pose"))
-        self.fixed = {WORLD}
-        if _is_true(model.find("static")):
-            self.fixed |= {str(link.get("name")) for link in model.findall("link")}
-        self.name_of = {link: GROUND for link in self.fixed}
+    def read(self, model: ET.Element) -> None:
+        """Read a flat model."""
+        frames = Frames(model)
+        self.name_of = {WORLD: GROUND}
         for link in model.findall("link"):
-            if (own := str(link.get("name"))) not in self.fixed:
-                self.name_of[own] = prefix + own
+            own = str(link.get("name"))
+            is_fixed = link.get(STATIC) is not None
+            self.name_of[own] = GROUND if is_fixed else f"link {own}" if own == GROUND else own
+            if not is_fixed:
                 self.bodies.append(self._body(link, own, frames))
         for joint in model.findall("joint"):
-            self._joint(joint, prefix, frames)
+            self._joint(joint, frames)
 
     def _body(self, link: ET.Element, own: str, frames: Frames) -> Body:
         inertial = link.find("inertial")
@@ -140,12 +134,18 @@ class _Reader:
             self.notes.append(f"link {own!r} has no inertial: 1 kg and 1 kg m², the defaults of SDF")
         else:
             place = pose_of(inertial, f"link {own!r}: inertial pose")
+            if inertial.get("auto", "false").lower() in ("true", "1"):
+                raise SceneError([f"link {own!r}: inertial auto='true' is not read; give mass and inertia"])
             mass = _number(inertial.find("mass"), f"link {own!r}: mass", 1.0)
+            if not mass > 0:
+                raise SceneError([f"link {own!r}: mass must be positive, got {mass:g}"])
             inertia = _inertia(inertial.find("inertia"), own)
             if inertial.find("fluid_added_mass") is not None:
                 self.parts.append(Part("fluid", f"the added mass of link {own!r} in a fluid"))
         if link.find("gravity") is not None and not _is_true(link.find("gravity")):
             self.parts.append(Part("gravity-compensation", f"link {own!r} without weight"))
+        if link.find("velocity_decay") is not None:
+            self.parts.append(Part("damping", f"velocity_decay of link {own!r}"))
         centre = at.then(place)
         turn = place.turn
         return Body(
@@ -156,12 +156,17 @@ class _Reader:
             orientation=rotations.from_matrix(at.turn).tolist(),
         )
 
-    def _joint(self, joint: ET.Element, prefix: str, frames: Frames) -> None:
+    def _joint(self, joint: ET.Element, frames: Frames) -> None:
         name, kind = str(joint.get("name")), str(joint.get("type"))
         if kind not in TYPES:
             raise SceneError([f"joint {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
         ends = [joint.findtext(side, "").strip() for side in ("parent", "child")]
+        for end in ends:
+            if end != WORLD and not frames.has(end):
+                raise SceneError([f"joint {name!r}: the file has no link or frame {end!r}"])
         first, second = (self.name_of[frames.link_of(end)] for end in ends)
+        if first == second and first != GROUND:
+            raise SceneError([f"joint {name!r}: both sides are on link {first!r}"])
         if first == second:
             self.notes.append(f"joint {name!r}: both sides are fixed to the ground")
             return
@@ -174,14 +179,14 @@ class _Reader:
         }
         if TYPES[kind] is Universal and abs(axes[0] @ axes[1]) > SQUARE:
             raise SceneError([f"joint {name!r}: the axes of a universal joint must be perpendicular"])
-        made: Joint = TYPES[kind].at(prefix + name, (first, second), **places)
+        made: Joint = TYPES[kind].at(name, (first, second), **places)
         self.joints.append(made)
         if kind == "screw":
             self._screw(joint, made)
         for tag in ("axis", "axis2"):
             if (axis := joint.find(tag)) is not None:
                 self._dynamics(axis, made)
-                self._mimic(axis, made, prefix)
+                self._mimic(axis, made)
 
     def _screw(self, joint: ET.Element, made: Joint) -> None:
         if joint.find("screw_thread_pitch") is None:
@@ -215,7 +220,7 @@ class _Reader:
             if number:
                 self.parts.append(Part(kind, f"{kind} of joint {made.name!r}"))
 
-    def _mimic(self, axis: ET.Element, made: Joint, prefix: str) -> None:
+    def _mimic(self, axis: ET.Element, made: Joint) -> None:
         mimic = axis.find("mimic")
         if mimic is None:
             return
@@ -228,7 +233,7 @@ class _Reader:
             raise SceneError(
                 [f"{where}: its offset contradicts the poses of the file, where all joints are 0"]
             )
-        pair = prefix + other, made.name
+        pair = other, made.name
         self.couplings.append(Coupling(name=f"{made.name} mimics {other}", joints=pair, ratio=ratio))
 
 
@@ -243,8 +248,6 @@ def _axis(axis: ET.Element | None, name: str, at: Pose, frames: Frames) -> np.nd
     if not size:
         raise SceneError([f"{where}: has no length"])
     expressed = xyz.get("expressed_in") if xyz is not None else None
-    if _is_true(axis.find("use_parent_model_frame")):
-        expressed = MODEL
     turn = at.turn if expressed is None else frames.world(expressed).turn
     return np.asarray(turn @ direction / size)
 
