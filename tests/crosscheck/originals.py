@@ -11,18 +11,23 @@ from crosscheck.engines.mujoco.importing.reading import Source
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import rotations
 
-OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "REFSAFE")
+OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "REFSAFE", "ACTUATION")
 NO_SOFTNESS = -1e-300  # stiffness and damping of closures: reference accelerations are those of exact joints
 RTOL, RANK = 1e-13, 1e-9  # of the integrations; of the rank of rows
 LEAST = 1e-4  # m: a shorter way is of a structure whose loops leave no motion
 
 
-def own_motion(model, found: Source, times) -> np.ndarray:
-    """Centres of mass (k, nb, 3) of the scene's bodies: the file's masses, forces and rows, by MuJoCo."""
-    for name in OFF:
+def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
+    """Centres of mass (k, nb, 3) of the scene's bodies: the file's masses, forces and rows, by MuJoCo.
+
+    ``key`` is the keyframe whose control values act.
+    """
+    for name in OFF if key < 0 else OFF[:-1]:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     model.opt.jacobian, model.eq_solref[:] = mujoco.mjtJacobian.mjJAC_DENSE, NO_SOFTNESS
     data, groups = mujoco.MjData(model), Groups(mujoco, model)
+    if key >= 0:
+        data.ctrl[:] = model.key_ctrl[key]
     turns = [
         (int(q) + 3 * (k == 0), int(v) + 3 * (k == 0))
         for k, q, v in zip(model.jnt_type, model.jnt_qposadr, model.jnt_dofadr, strict=True)
@@ -35,6 +40,7 @@ def own_motion(model, found: Source, times) -> np.ndarray:
         data.qpos[:], data.qvel[:] = y[: model.nq], y[model.nq :]
         mujoco.mj_fwdPosition(model, data)
         mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_fwdActuation(model, data)
         moved = np.zeros(model.nq)
         moved[single] = data.qvel[rates]
         for q, v in turns:
@@ -60,17 +66,17 @@ def _accelerations(model, data) -> np.ndarray:
     held = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
     rows = data.efc_J[: data.nefc * model.nv].reshape(data.nefc, model.nv)[held]
     root = np.linalg.cholesky(mass)
-    free = np.linalg.solve(mass, data.qfrc_passive - data.qfrc_bias)
+    free = np.linalg.solve(mass, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
     weighted = np.linalg.solve(root, rows.T).T
     missing = data.efc_aref[: data.nefc][held] - rows @ free
     return free + np.linalg.solve(root.T, np.linalg.pinv(weighted, rcond=RANK) @ missing)
 
 
-def apart(model, found: Source, end: float) -> float:
+def apart(model, found: Source, end: float, key: int = -1) -> float:
     """Largest difference of a body's place between scene and original model, over the largest way moved."""
     times = (0.0, end / 2, end)
     run = gauss_motion(found.imported.scene, times, RTOL)
     moved = np.linalg.norm(run.position - run.position[0], axis=-1).max()
     moved = max(moved, LEAST)
-    off = np.linalg.norm(run.position - own_motion(model, found, times), axis=-1).max()
+    off = np.linalg.norm(run.position - own_motion(model, found, times, key), axis=-1).max()
     return float(off / moved)

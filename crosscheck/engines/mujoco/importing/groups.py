@@ -28,7 +28,8 @@ class Groups:
 
     def __init__(self, mujoco: Any, model: Any):
         self.mujoco, self.model = mujoco, model
-        self.of = model.body_weldid.astype(int)
+        mocaps = np.flatnonzero(model.body_mocapid >= 0)  # no joint moves them
+        self.of = np.where(np.isin(model.body_weldid, mocaps), WORLD, model.body_weldid).astype(int)
         self.members: dict[int, list[int]] = {}
         for b in range(model.nbody):
             self.members.setdefault(int(self.of[b]), []).append(b)
@@ -69,7 +70,8 @@ class Groups:
         if group == WORLD:
             return GROUND
         b = self.main(group)
-        return self.model.body(b).name or f"body {b}"
+        name = self.model.body(b).name or f"body {b}"
+        return f"{name} {b}" if name == GROUND else name
 
     def placed(self, data: Any, group: int) -> Placed:
         """Return a group at the pose of the data, whose kinematics and centres MuJoCo has computed."""

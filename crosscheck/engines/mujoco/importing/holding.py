@@ -1,4 +1,5 @@
-"""Bodies that are fixed to the world: robots with a free base would only fall without contacts."""
+"""Bodies that are fixed to the world: robots with a free base, which would only fall without contacts, and
+motion-capture bodies."""
 
 from __future__ import annotations
 
@@ -6,17 +7,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from mbref.scene import SceneError
 
 
 def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any:
     """Return the model of an MJCF file in which some bodies have no joint to the world.
 
-    These bodies stay at the pose of the keyframe, or of the reference. Raises SceneError for a body without
-    joints to the world, ValueError if MuJoCo cannot read the file.
+    These and motion-capture bodies stay at the pose of the keyframe, or of the reference. Raises SceneError
+    for a body without joints to the world, ValueError if MuJoCo cannot read the file.
     """
     if not hold:
-        return mujoco.MjModel.from_xml_path(str(path))
+        return _with_placed_mocaps(mujoco, mujoco.MjModel.from_xml_path(str(path)), keyframe)
     spec = mujoco.MjSpec.from_file(str(path))
     placed = _placed(mujoco, spec.compile(), keyframe)
     world = [body for body in spec.bodies if body.parent == spec.worldbody and body.joints]
@@ -35,6 +38,16 @@ def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any
     for name in hold:  # after compilation, because a position in the file may count from a frame
         body = model.body(name).id
         model.body_pos[body], model.body_quat[body] = placed.body(name).xpos, placed.body(name).xquat
+    return _with_placed_mocaps(mujoco, model, keyframe)
+
+
+def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:
+    """Return a model whose motion-capture bodies stand where a keyframe has them."""
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe or "\0")
+    for b in np.flatnonzero(model.body_mocapid >= 0) if key >= 0 else ():
+        k = int(model.body_mocapid[b])
+        model.body_pos[b] = model.key_mpos[key, 3 * k : 3 * k + 3]
+        model.body_quat[b] = model.key_mquat[key, 4 * k : 4 * k + 4]
     return model
 
 

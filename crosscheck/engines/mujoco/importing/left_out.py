@@ -69,8 +69,12 @@ def of_model(model: Any, kept: Collection[int]) -> Iterator[Part]:
         yield Part("fluid", "the fluid around the bodies")
     if found := [model.body(int(b)).name for b in np.flatnonzero(model.body_gravcomp)]:
         yield Part("gravity-compensation", f"compensation of the weight of {_listed(found)}")
-    if model.nflex:
-        yield Part("flexible-bodies", f"{model.nflex} flexible bodies")
+    yield from flexible(model)
+
+
+def flexible(model: Any) -> list[Part]:
+    """Return one part for all flexible bodies of a model."""
+    return [Part("flexible-bodies", f"{model.nflex} flexible bodies")] if model.nflex else []
 
 
 def _joint_names(model: Any, numbers: np.ndarray) -> list[str]:
@@ -97,7 +101,7 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     counts = {
         "contact pairs": model.npair,
         "plugins": model.nplugin,
-        "motion-capture bodies": model.nmocap,
+        "motion-capture bodies, which are fixed at their pose": model.nmocap,
         "geoms that could touch others": touching if touching > 1 else 0,
         "sensors": model.nsensor,
         "sites without a joint": model.nsite - len(_holding_sites(mujoco, model)),

@@ -23,6 +23,7 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
 
     ``joint_of`` maps a MuJoCo joint to the scene's joint that consists of this MuJoCo joint alone.
     """
+    yield from _plastic(model)
     for j in range(model.njnt):
         stiffness, damping = _springs(mujoco, model, j)
         if not stiffness and not damping:
@@ -104,6 +105,17 @@ def _unknown(model: Any, j: int, stiff: bool, damped: bool) -> Iterator[Part]:
         yield Part("damping", f"damping of joint {joint_name(model, j)}")
 
 
+def _plastic(model: Any) -> Iterator[Part]:
+    """Return the springs that yield, without their stiffness in the model."""
+    for what, stiffness, limit, name_of in (
+        ("joint", model.jnt_stiffness, model.jnt_springyield, lambda k: joint_name(model, k)),
+        ("tendon", model.tendon_stiffness, model.tendon_springyield, lambda k: repr(model.tendon(k).name)),
+    ):
+        for k in np.flatnonzero(limit):
+            yield Part("springs", f"plastic spring of {what} {name_of(int(k))}")
+            stiffness[k] = 0
+
+
 def _dofs(model: Any, j: int) -> slice:
     first = int(model.jnt_dofadr[j])
     return slice(first, first + int(np.sum(model.dof_jntid == j)))
@@ -111,13 +123,19 @@ def _dofs(model: Any, j: int) -> slice:
 
 def _polynomials(model: Any) -> Iterator[Part]:
     """Return sentences on stiffness and damping that are not constant."""
-    for kind, numbers, joint in (
-        ("springs", model.jnt_stiffnesspoly, np.arange(model.njnt)),
-        ("damping", model.dof_dampingpoly, model.dof_jntid),
+
+    def joint(k: int) -> str:
+        return f"joint {joint_name(model, k)}"
+
+    for kind, numbers, owner in (
+        ("springs", model.jnt_stiffnesspoly, joint),
+        ("damping", model.dof_dampingpoly, lambda k: joint(int(model.dof_jntid[k]))),
+        ("springs", model.tendon_stiffnesspoly, lambda k: f"tendon {model.tendon(k).name!r}"),
+        ("damping", model.tendon_dampingpoly, lambda k: f"tendon {model.tendon(k).name!r}"),
     ):
-        found = np.any(np.reshape(numbers, (len(numbers), -1)), axis=1) if len(numbers) else np.zeros(0, bool)
-        for j in dict.fromkeys(int(j) for j in joint[found]):
-            yield Part(kind, f"polynomial {kind} of joint {joint_name(model, j)}")
+        found = [k for k, row in enumerate(numbers) if np.any(row)]
+        for name in dict.fromkeys(owner(k) for k in found):
+            yield Part(kind, f"polynomial {kind} of {name}")
         numbers[...] = 0
 
 

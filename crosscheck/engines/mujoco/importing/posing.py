@@ -17,6 +17,7 @@ CLOSED = 1e-12  # smaller gaps, relative to the model's extent or in rad, count 
 ROUNDED = 1e-9  # limit like CLOSED near singular positions, where Newton's method is less accurate
 ITERATIONS = 200
 LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in one iteration
+FALL = 0.1  # rad, or fraction of the model's extent: change of a coordinate that leaves a straight pose
 RANK = 1e-9  # singular value / largest singular value; smaller values belong to redundant rows
 
 
@@ -69,16 +70,17 @@ class Poses:
     def close(self) -> None:
         """Move the coordinates until all loops are closed, by the least change weighted with the masses.
 
-        Coordinates of ``--pose`` are unchanged if the loops allow it. Raises SceneError with the remaining
-        gap.
+        Coordinates of ``--pose`` are unchanged if the loops allow it. If no small motion closes the loops, as
+        for a straight chain, the pose is first moved in the direction in which the weight accelerates it.
+        Raises SceneError with the remaining gap.
         """
         start = self.data.qpos.copy()
-        if self._newton(self.held):
-            return
-        if self.held:
+        for held, falls in ((self.held, False), (self.held, True), ([], False), ([], True)):
             self.data.qpos[:] = start
+            if falls:
+                self.mujoco.mj_integratePos(self.model, self.data.qpos, self._fall(), 1.0)
             self.place()
-            if self._newton([]):
+            if self._newton(held):
                 return
         name, gap = max(self.gaps().items(), key=lambda item: item[1])
         raise SceneError(
@@ -87,6 +89,18 @@ class Poses:
                 "or rad; begin at another pose with --pose joint=value or --keyframe NAME"
             ]
         )
+
+    def _fall(self) -> np.ndarray:
+        """Return the direction (nv,) of the accelerations from rest without closures, of length ``FALL``."""
+        mujoco, model, fallen = self.mujoco, self.model, self.mujoco.MjData(self.model)
+        fallen.qpos[:] = self.data.qpos
+        for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon, mujoco.mj_fwdVelocity):
+            stage(model, fallen)
+        force, mass = fallen.qfrc_passive - fallen.qfrc_bias, self.mass()
+        found = np.linalg.lstsq(mass, force, rcond=RANK)[0]
+        found[self.held] = 0.0
+        size = np.abs(found).max(initial=0.0)
+        return found * (FALL * min(1.0, self.extent) / size if size > 0 else 0.0)
 
     def _newton(self, held: list[int]) -> bool:
         for _ in range(ITERATIONS):

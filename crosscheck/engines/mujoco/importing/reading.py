@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.importing import left_out, loads, urdf
+from crosscheck.engines.mujoco.importing import actuators, couplings, left_out, loads, urdf
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
 from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, kind_of, without_effect
@@ -61,6 +61,7 @@ def source(path: Path, options: ImportOptions) -> Source:
     reader = _Reader(mujoco, model, text, options, without)
     if not reader.groups.massive:
         raise SceneError([f"{path}: has no body that moves"])
+    left_out.refuse_others(left_out.flexible(model), without)
     reader.read()
     left_out.refuse_others(reader.parts, without)
     scene, data = reader.scene(path.stem), reader.poses.data
@@ -79,13 +80,11 @@ def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urd
         if path.suffix != ".urdf":
             path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
             return compiled(mujoco, path, options.hold, options.keyframe), None
-        text = urdf.prepared(path.read_text(encoding="utf-8"))
+        text = urdf.prepared(path.read_text(encoding="utf-8"), options.hold)
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
     text.take_back(mujoco, model)
-    if options.hold:
-        raise SceneError([f"--hold {options.hold[0]}: the base of a URDF is fixed to the ground already"])
     return model, text
 
 
@@ -125,6 +124,7 @@ class _Reader:
     def read(self) -> None:
         """Read everything, at a pose with closed loops."""
         mujoco, model = self.mujoco, self.model
+        self.parts += actuators.moved_to_joints(mujoco, model)
         closures = self._closures()
         self.poses = Poses(mujoco, model, closures, self.rows, _extent(mujoco, model))
         self.poses.start(self.options.keyframe, self.options.pose)
@@ -186,28 +186,14 @@ class _Reader:
         return first != second
 
     def _read_equalities(self) -> None:
-        """Read equalities: locked joint coordinates become rows, all others are parts to be left out."""
-        kinds, model = self.mujoco.mjtEq, self.model
-        for e in range(model.neq):
-            name, kind = model.equality(e).name or f"equality {e}", model.eq_type[e]
-            if not model.eq_active0[e]:
-                self.notes.append(f"equality {name!r} is not active: it is not part of the scene")
-            elif kind == kinds.mjEQ_JOINT and self._reads_row(e):
-                first, second = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
-                offset, ratio = map(float, model.eq_data[e, :2])
-                ends = (first, second if ratio else -1)
-                self.rows.append(JointRow(name, ends, offset, ratio if ends[1] >= 0 else 0.0))
-            elif kind != kinds.mjEQ_CONNECT and kind != kinds.mjEQ_WELD:
-                what = kinds(kind).name.removeprefix("mjEQ_").lower()
-                if kind == kinds.mjEQ_JOINT and np.any(model.eq_data[e, 2:5]):
-                    what += ", whose polynomial is not linear"
-                self.parts.append(Part("couplings", f"equality {name!r} of type {what}"))
-                model.eq_active0[e] = 0
-
-    def _reads_row(self, e: int) -> bool:
-        """Return whether an equality of joints locks a joint, or is linear and not to be left out."""
-        is_linear = not np.any(self.model.eq_data[e, 2:5])
-        return self.model.eq_obj2id[e] < 0 or (is_linear and "couplings" not in self.without)
+        """Read equalities of joints and tendons: rows of coordinates, parts to be left out and notes."""
+        for found in couplings.of_equalities(self.mujoco, self.model, self.without):
+            if isinstance(found, Part):
+                self.parts.append(found)
+            elif isinstance(found, JointRow):
+                self.rows.append(found)
+            else:
+                self.notes.append(found)
 
     def _close(self) -> None:
         """Close the loops, and report how large their gaps were."""

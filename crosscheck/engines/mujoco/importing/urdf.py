@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.importing import urdf_faults
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow
@@ -45,18 +46,24 @@ class Text:
             b = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, link)
             if b > 0:
                 model.body_mass[b] = max(model.body_mass[b] - mass, 0.0)
-                model.body_inertia[b] = np.maximum(model.body_inertia[b] - moment, 0.0)
+                left = model.body_inertia[b] - moment
+                model.body_inertia[b] = np.where(left > LEAST * moment, left, 0.0)  # the rest is rounding
         model.body_subtreemass[:] = model.body_mass
         for b in range(model.nbody - 1, 0, -1):
             model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
 
 
-def prepared(text: str) -> Text:
-    """Return the URDF without shapes, loops and actuators; links are not merged."""
+def prepared(text: str, hold: Sequence[str] = ()) -> Text:
+    """Return the URDF without shapes, loops and actuators; links are not merged, and those of ``hold`` fixed.
+
+    Raises SceneError for a text that is no tree of links.
+    """
     try:
         root, whole = ET.fromstring(text), ET.fromstring(text)
     except ET.ParseError as error:
         raise SceneError([f"URDF: is no XML: {error}"]) from None
+    urdf_faults.check(root)
+    urdf_faults.hold(root, hold)
     for parent in list(root.iter()):
         for child in [c for c in parent if c.tag in PARTS]:
             parent.remove(child)

@@ -1,0 +1,73 @@
+"""Faults of a URDF that are reported with the names of its links and joints before MuJoCo reads it."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+from mbref.scene import SceneError
+
+REMEDY = "write the URDF with `xacro FILE > robot.urdf`"
+SHOWN = 6  # links that a message names
+
+
+def check(root: ET.Element) -> None:
+    """Raise SceneError with every fault: macros of xacro, unknown links, links with two parents, circles."""
+    if faults := [*_macros(root)] or [*_structure(root)]:
+        raise SceneError(faults)
+
+
+def _macros(root: ET.Element) -> Iterator[str]:
+    """Return a fault for the first element or value of xacro, which a program must replace beforehand."""
+    for element in root.iter():
+        shown = element.tag.split("}")[-1]
+        if "xacro" in element.tag:
+            yield f"element <xacro:{shown}>: is a macro of xacro; {REMEDY}"
+            return
+        for key, value in element.attrib.items():
+            if "${" in value or "$(" in value:
+                yield f"<{shown} {key}={value!r}>: is an expression of xacro; {REMEDY}"
+                return
+
+
+def _structure(root: ET.Element) -> Iterator[str]:
+    links = [str(link.get("name")) for link in root.findall("link")]
+    parents: dict[str, str] = {}
+    yield from (f"link {name!r}: is in the file {n} times" for name, n in Counter(links).items() if n > 1)
+    for joint in root.findall("joint"):
+        parent, child = (_end(joint, side) for side in ("parent", "child"))
+        for side, link in (("parent", parent), ("child", child)):
+            if link not in links:
+                yield f"joint {joint.get('name')!r}: its {side} link {link!r} is not in the file"
+        if child in parents:
+            yield (
+                f"link {child!r}: is the child of two joints, {parents[child]!r} and {joint.get('name')!r}; "
+                "let the second joint carry a link of its own, and close the loop with --close"
+            )
+        parents.setdefault(child, str(joint.get("name")))
+    roots = [name for name in links if name not in parents]
+    if links and not roots:
+        yield "every link is the child of a joint: the joints form a circle; close loops with --close"
+    if len(roots) > 1:
+        names = ", ".join(map(repr, roots[:SHOWN])) + (" and more" if len(roots) > SHOWN else "")
+        yield f"links {names}: no joint carries them; a URDF has one such link, its base"
+
+
+def _end(joint: ET.Element, side: str) -> str:
+    found = joint.find(side)
+    return str(found.get("link")) if found is not None else ""
+
+
+def hold(root: ET.Element, links: Sequence[str]) -> None:
+    """Make the floating or planar joints of some links fixed ones; raises SceneError for another link."""
+    bases = {
+        _end(joint, "child"): joint
+        for joint in root.findall("joint")
+        if joint.get("type") in ("floating", "planar")
+    }
+    for link in links:
+        if link not in bases:
+            known = ", ".join(bases) or "none, so that the base is fixed to the ground already"
+            raise SceneError([f"--hold {link}: is no link of a floating or planar joint; known: {known}"])
+        bases[link].set("type", "fixed")

@@ -1,0 +1,135 @@
+"""One MJCF or URDF file for each kind of part: it moves as MuJoCo's own model, or is refused by name."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from crosscheck.engines.mujoco.importing.reading import Source, source
+from mbref.formats import ImportOptions
+from mbref.scene import SceneError
+from tests.crosscheck.originals import apart
+from tests.crosscheck.test_importing import LUMP, hinge, read
+
+KINDS = Path(__file__).parent / "models" / "kinds"
+SAME = 1e-9  # of the largest distance moved, and of the largest entry of a matrix; worst measured 2e-11
+OPTIONS = {
+    "close.urdf": ImportOptions(close=["fb=fc"]),
+    "close_revolute.urdf": ImportOptions(close=["fb=fc:revolute:y"]),
+    "close_unknown.urdf": ImportOptions(close=["fb=fd"]),
+    "hold_floating.urdf": ImportOptions(hold=["base"]),
+}
+ROW = "in a row have links without mass"
+REFUSED = {
+    "actuator_armature_on_a_ball.xml": "armature of 'd', which is no actuator of a hinge or slide",
+    "ball_with_armature.xml": "armature of 'x'.*--without armature",
+    "ball_with_damper.xml": "stiffness of joint 'x'.*--without springs",
+    "circle.urdf": "the joints form a circle",
+    "close_unknown.urdf": "no link, body or site 'fd'; known: world",
+    "fixed_tendon_spring.xml": "tendon 't', which is not a spring between two sites",
+    "flexcomp.xml": "1 flexible bodies.*--without flexible-bodies",
+    "fluid.xml": "the fluid around the bodies.*--without fluid",
+    "friction.urdf": "dry friction of 'A'.*--without friction",
+    "frictionloss.xml": "dry friction of 'B'.*--without friction",
+    "gantry.xml": f"body 'a': joints slide, slide {ROW}",
+    "gantry_3.xml": f"body 'a': joints slide, slide, slide {ROW}",
+    "gimbal_with_armature.xml": "armature of 'x'.*--without armature",
+    "gravcomp.xml": "compensation of the weight of b.*--without gravity-compensation",
+    "hinge_then_slide_across.xml": f"body 'a': joints hinge, slide {ROW}",
+    "hinges_not_crossing.xml": f"body 'a': joints hinge, hinge {ROW}",
+    "joint_coupled_quadratically.xml": "equality 'e' of type joint, whose polynomial is not linear",
+    "mimic_of_a_fixed_joint.urdf": "joint 'C' mimics 'A': the file has no such joint that moves",
+    "motor_of_tendon.xml": "control value of 's' in the keyframe, no motor of a joint.*--without motors",
+    "motor_with_filter.xml": "control value of 'actuator 0' in the keyframe, no motor of a joint",
+    "planar_base_with_armature.xml": "armature of 'x'.*--without armature",
+    "plastic_spring.xml": "plastic spring of joint 'B'.*--without springs",
+    "polar.xml": f"body 'a': joints hinge, slide, slide {ROW}",
+    "servo_at_keyframe.xml": "control value of 's' in the keyframe, no motor of a joint",
+    "site_transmission.xml": "control value of 'actuator 0' in the keyframe, no motor of a joint",
+    "slide_and_ball.xml": f"body 'a': joints slide, ball {ROW}",
+    "slide_then_hinge_across.xml": f"body 'a': joints slide, hinge {ROW}",
+    "spatial_tendon_equality.xml": "type tendon, of a tendon that no fixed sum of joint coordinates gives",
+    "stiffness_arrays.xml": "polynomial springs of joint 'A'.*polynomial damping of joint 'A'",
+    "straight_without_gravity.xml": "closure 'e': cannot be closed from this pose; the least gap found",
+    "tendon_armature.xml": "armature of tendons t.*--without armature",
+    "tendon_limits_and_friction.xml": "friction of tendons t.*--without friction",
+    "tendon_of_three.xml": "equality 'e' of type tendon, which couples 3 joints instead of two",
+    "tendon_through_a_pulley.xml": "tendon 's', which is not a spring between two sites",
+    "two_parents.urdf": "link 'c': is the child of two joints, 'C' and 'D'",
+    "two_roots.urdf": "links 'base', 'stray': no joint carries them",
+    "unknown_link.urdf": "joint 'C': its parent link 'nothing' is not in the file",
+    "velocity_at_keyframe.xml": "control value of 's' in the keyframe, no motor of a joint",
+    "xacro_macro.urdf": "element <xacro:macro>: is a macro of xacro; write the URDF with",
+    "xacro_property.urdf": r"<mass value='\$\{m\}'>: is an expression of xacro",
+}
+FREE_IN_PINOCCHIO = ("floating_root.urdf", "hold_floating.urdf", "planar_root.urdf")  # coordinates differ
+ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
+READ = sorted(path.name for path in KINDS.iterdir() if path.name not in REFUSED)
+
+
+def found(name: str) -> Source:
+    text = (KINDS / name).read_text()
+    options = OPTIONS.get(name, ImportOptions(keyframe="k" if "<keyframe>" in text else ""))
+    return source(KINDS / name, options)
+
+
+@pytest.mark.parametrize("name", [name for name in READ if not name.startswith(ROWS_OF_OUR_OWN)])
+def test_a_file_of_each_kind_moves_as_its_own_model(name):
+    read_file = found(name)
+    assert apart(read_file.original, read_file, 0.02, read_file.original.nkey - 1) < SAME
+
+
+@pytest.mark.parametrize("name", sorted(REFUSED))
+def test_a_file_of_each_kind_is_refused_by_name(name):
+    with pytest.raises(SceneError) as refusal:
+        found(name)
+    assert re.search(REFUSED[name], " ".join(str(refusal.value).split()))
+
+
+@pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and n not in FREE_IN_PINOCCHIO])
+def test_a_urdf_has_the_masses_and_weights_of_pinocchio_s_own_reading(name):
+    """Mass matrix and weight in joint coordinates, at random coordinates."""
+    pinocchio = pytest.importorskip("pinocchio")
+    model, ours = pinocchio.buildModelFromXML((KINDS / name).read_text()), found(name).original
+    data, random = mujoco.MjData(ours), np.random.default_rng(0)
+    joints = [model.getJointId(ours.joint(j).name) for j in range(ours.njnt)]
+    order, q = [model.idx_vs[j] for j in joints], pinocchio.neutral(model)
+    assert sorted(order) == list(range(model.nv))
+    for k, j in enumerate(joints):
+        value, at = random.uniform(-1, 1), model.idx_qs[j]
+        data.qpos[k] = value
+        q[at : at + model.nqs[j]] = (np.cos(value), np.sin(value)) if model.nqs[j] == 2 else value
+    theirs = pinocchio.crba(model, model.createData(), q)
+    theirs = (np.triu(theirs) + np.triu(theirs, 1).T)[np.ix_(order, order)]
+    weight = pinocchio.computeGeneralizedGravity(model, model.createData(), q)[order]
+    mass = np.zeros((ours.nv, ours.nv))
+    mujoco.mj_forward(ours, data)
+    mujoco.mj_fullM(ours, data, mass)
+    assert np.abs(mass - theirs).max() < SAME * np.abs(mass).max()
+    assert np.abs(data.qfrc_bias - weight).max() < SAME * np.abs(weight).max()
+
+
+def test_files_that_include_and_attach_others(tmp_path):
+    """A body of an included file, and one of a model that is attached with a prefix."""
+    arm = f'<body name="arm" pos="0 0 0.5">{hinge("A")}{LUMP}</body>'
+    (tmp_path / "arm.xml").write_text(f"<mujoco><worldbody>{arm}</worldbody></mujoco>")
+    both = """<mujoco><include file="arm.xml"/><asset><model name="other" file="arm.xml"/></asset><worldbody>
+    <frame pos="1 0 0" euler="0 0 30"><attach model="other" body="arm" prefix="left/"/></frame>
+    </worldbody></mujoco>"""
+    read_file = read(tmp_path, both)
+    assert [body.name for body in read_file.imported.scene.body] == ["arm", "left/arm"]
+    assert apart(read_file.original, read_file, 0.02) < SAME
+
+
+def test_straight_chains_are_closed_in_the_direction_in_which_they_fall():
+    scene = found("connect_by_sites.xml").imported.scene
+    assert scene.joint_named("C").anchor[2] < 1.0  # the chain is straight at a height of 1 m
+
+
+def test_motion_capture_bodies_stand_where_the_keyframe_has_them():
+    scene = found("mocap_in_a_keyframe.xml").imported.scene
+    assert np.allclose(scene.joint_named("e").anchor, (0.6, 0.1, 1.5))
