@@ -59,7 +59,7 @@ class _Writer:
     def add_model(
         self, model: ET.Element, prefix: str, outer: str, is_alone: bool = False, is_static: bool = False
     ) -> None:
-        """Add a model in the frame ``outer``; the names of what is beside it begin with ``prefix``."""
+        """Add a model in the frame ``outer``, in which all names begin with ``prefix``."""
         name = prefix + str(model.get("name"))
         _refuse_parts(model, f"model {name!r}")
         inner, frame = ("", MODEL) if is_alone else (f"{name}::", name)

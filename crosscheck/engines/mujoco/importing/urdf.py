@@ -54,9 +54,9 @@ class Text:
 
 
 def prepared(text: str, hold: Sequence[str] = ()) -> Text:
-    """Return the URDF without shapes, loops and actuators; links are not merged, and those of ``hold`` fixed.
+    """Return the URDF without shapes, loops and actuators; links are not merged.
 
-    Raises SceneError for a text that is no tree of links.
+    The joints of the links ``hold`` become fixed joints. Raises SceneError if the text is no tree of links.
     """
     try:
         root, whole = ET.fromstring(text), ET.fromstring(text)
