@@ -151,15 +151,7 @@ def test_mujoco_moves_as_the_reference(make):
 
 @every
 def test_exudyn_moves_as_the_reference(make):
-    """Without armatures, which its adapter refuses."""
     scene, exudyn = make(), engine("exudyn")
-    if any(joint.reflected_inertia for joint in scene.joint):
-        refusal = exudyn.cannot(scene)
-        assert refusal is not None and "has an armature" in refusal.reason
-        bare = {"armature": 0.0}
-        scene = scene.with_(
-            joint=[j.model_copy(update=bare) if j.reflected_inertia else j for j in scene.joint]
-        )
     scene = scene.with_(duration=0.5)
     run = exudyn.run(scene, np.array([0.0, 0.2, 0.5]), exudyn.settings_of(scene, "tuned")[-1])
     found = measure(scene, run, truth_for(scene))

@@ -52,6 +52,7 @@ SUPPORTS = Supports(
     loads=tuple(LOAD_TYPES),
     over_time=(FACTOR,),
     couplings=("angle", "displacement"),
+    armatures=("angle", "displacement"),
 )
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from crosscheck.engines.driver_motion import motion, moving
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
 from crosscheck.engines.geometry import unit
-from crosscheck.judge.constraints import initial_twists
+from crosscheck.judge.constraints import initial_poses, initial_twists
+from crosscheck.judge.joint_coordinates import coordinate_jacobian
 from mbref import rotations
 from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 
@@ -31,7 +32,7 @@ class System:
     nodes: list[int]
     sensors: list[list[int]]  # sensors of each node: coordinates (7), their rates and second rates
     drivers: list[int]  # object numbers of the driver constraints
-    # sensors of the outputs of JOINTS for each joint; then of the forces of drivers and couplings
+    # sensors of the outputs of JOINTS for each joint; then of the forces of drivers, couplings and rotors
     joint_sensors: list[int]
     redundant: int  # number of redundant constraints in the assembled configuration
 
@@ -60,7 +61,8 @@ def build(exu: Any, scene: Scene, forces: bool) -> System:
         for output in JOINTS[joint.type].outputs
     ]
     couplings = [parts.coupling(coupling) for coupling in scene.coupling]
-    of_joints += [parts.sensor(number, "Force") for number in (*drivers, *couplings)]
+    rotors = [parts.rotor(joint) for joint in scene.joint if joint.reflected_inertia] if forces else []
+    of_joints += [parts.sensor(number, "Force") for number in (*drivers, *couplings, *rotors)]
     if forces:
         for load in scene.load:
             parts.load(load)
@@ -150,6 +152,24 @@ class _Parts:
             markerNumbers=[second, first], factor1=coupling.ratio
         )
         return self.mbs.AddObject(constraint)
+
+    def rotor(self, joint: Joint) -> int:
+        """Add the armature of a joint: a mass of one coordinate that a constraint holds equal to the
+        joint's."""
+        rates = coordinate_jacobian(self.scene, joint.name, *initial_poses(self.scene))
+        rates = rates @ np.hstack(initial_twists(self.scene)).ravel()
+        turning = joint.facts.driven == "angle"
+        node = self.mbs.AddNode(
+            self.items.Node1D(
+                referenceCoordinates=[0],
+                initialCoordinates=[0],
+                initialVelocities=[rates[0 if turning else 1]],
+            )
+        )
+        self.mbs.AddObject(self.items.ObjectMass1D(mass=joint.reflected_inertia, nodeNumber=node))
+        ends = [self.mbs.AddMarker(self.items.MarkerNodeCoordinate(nodeNumber=node, coordinate=0))]
+        ends.append(self._rotation(joint) if turning else self._translation(joint))
+        return self.mbs.AddObject(self.items.ObjectConnectorCoordinate(markerNumbers=ends))
 
     def _relative(self, joint: Joint) -> dict[str, Any]:
         ends = zip(joint.bodies, joint.anchor_pair, strict=True)

@@ -21,7 +21,8 @@ def reactions(
     """Return force and moment (k, 6), world, on each joint's second body at the anchor on that body.
 
     ``moved`` (k, nb, 3) and ``turned`` (k, nb, 4) are the bodies' displacements and rotations since
-    t = 0; ``forces`` (k, ·) the outputs of each joint in JOINTS, then the force of each driver and coupling.
+    t = 0; ``forces`` (k, ·) the outputs of each joint in JOINTS, then the force of each driver, coupling and
+    armature.
     """
     turn = rotations.to_matrix(turned)
     found, at = {}, 0
@@ -34,15 +35,22 @@ def reactions(
         found[joint.name] = np.concatenate(_wrench(scene, joint, axes, moved, turn, outputs), axis=-1)
     for n, driver in enumerate(scene.driver):
         joint = scene.joint_named(driver.joint)
-        axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])
-        part = slice(0, 3) if joint.facts.driven == "displacement" else slice(3, 6)
-        found[joint.name][:, part] -= forces[:, at + n, None] * axis
+        _push(scene, found[joint.name], joint, joint.facts.driven, turn, -forces[:, at + n])
     for n, coupling in enumerate(scene.coupling, at + len(scene.driver)):
         for factor, (joint, kind) in zip((-coupling.ratio, 1.0), scene.coupled(coupling), strict=True):
-            axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])
-            part = slice(0, 3) if kind == "displacement" else slice(3, 6)
-            found[joint.name][:, part] += factor * forces[:, n, None] * axis
+            _push(scene, found[joint.name], joint, kind, turn, factor * forces[:, n])
+    rotors = [joint for joint in scene.joint if joint.reflected_inertia]
+    for n, joint in enumerate(rotors, at + len(scene.driver) + len(scene.coupling)):
+        _push(scene, found[joint.name], joint, joint.facts.driven, turn, -forces[:, n])
     return found
+
+
+def _push(
+    scene: Scene, wrench: np.ndarray, joint: Joint, kind: str, turn: np.ndarray, size: np.ndarray
+) -> None:
+    """Add a force or torque of ``size`` (k,) along a joint's axis on the first body to wrenches (k, 6)."""
+    axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])
+    wrench[:, slice(0, 3) if kind == "displacement" else slice(3, 6)] += size[:, None] * axis
 
 
 def _wrench(
