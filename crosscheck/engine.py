@@ -60,6 +60,8 @@ class Engine(ABC):
     ----------
     name, package : str
         Name of the engine, and the package to install when it is missing.
+    modules : collection of str
+        Modules of the package that `prepare` imports before the first run.
     supports : Supports
         Joint types, drivers and loads that the adapter maps. Everything else is refused.
     rounding : float
@@ -72,6 +74,7 @@ class Engine(ABC):
 
     name: str
     package: str
+    modules: Collection[str] = ()
     supports: Supports = Supports()
     rounding: float = 2.0**-52
     families: Mapping[str, str] = {}
@@ -216,13 +219,17 @@ class Engine(ABC):
         """
         return ""
 
-    def prepare(self, families: Sequence[str]) -> None:  # noqa: B027 - most engines need nothing
+    def prepare(self, families: Sequence[str]) -> None:
         """Import and compile what the families need, before the first run in a process.
+
+        By default the modules in ``modules`` are imported.
 
         Parameters
         ----------
         families : sequence of str
         """
+        for module in self.modules:
+            import_module(module)
 
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

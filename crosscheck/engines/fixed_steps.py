@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from crosscheck.engine import Engine, Setting
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
 from crosscheck.engines.spanning_tree import Closure, Tree
-from crosscheck.engines.tree_reactions import LinkMotion, sample_of
+from crosscheck.engines.tree_reactions import LinkMotion, applied, sample_of
 from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.time_functions import ends
 from mbref.scene import Moment, Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -108,9 +110,33 @@ def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 
     return sorted({*kept, *([default] if default else [])}, reverse=True)
 
 
-def is_constant(scene: Scene) -> bool:
-    """Return whether the loads on the links never change: moments are constant in world axes."""
-    return all(isinstance(load, Moment) for load in scene.load)
+class Loads:
+    """The loads of a scene on the links of its tree, at the motion that ``motion`` returns.
+
+    Moments are constant in world axes, so that a scene without other loads asks for one motion only.
+    """
+
+    def __init__(self, scene: Scene, tree: Tree, motion: Callable[[], LinkMotion]):
+        self.scene, self.tree, self.motion = scene, tree, motion
+        is_constant = all(isinstance(load, Moment) and not load.over_time for load in scene.load)
+        self.constant = applied(scene, tree, motion()) if is_constant else None
+
+    def at(self, t: float) -> list[tuple[int, np.ndarray, np.ndarray]]:
+        """Return links, each with a force and a moment about the origin of its frame (world), at time t
+        (s)."""
+        if self.constant is not None:
+            return self.constant
+        return applied(self.scene, self.tree, replace(self.motion(), time=t))
+
+
+def unended_piece(scene: Scene) -> Cannot | None:
+    """Return the refusal of a load whose function of time has pieces, for steps that do not end where a piece
+    ends; None for all other scenes."""
+    for k, load in enumerate(scene.load):
+        if load.over_time and ends(load.over_time):
+            reason = f"load[{k}] follows a table or is switched, but steps do not end where its pieces do"
+            return Cannot(Owner.ADAPTER, reason)
+    return None
 
 
 def held_points(scene: Scene, closure: Closure) -> Sequence[np.ndarray]:

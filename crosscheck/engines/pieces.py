@@ -12,14 +12,16 @@ import numpy as np
 
 from crosscheck.engine import Supports
 from crosscheck.engines.spanning_tree import GROUND_LINK, Mobility, Tree
-from mbref.scene import JOINT_TYPES
+from crosscheck.refusals import FACTOR
+from mbref.scene import JOINT_TYPES, LOAD_TYPES
 
 EVERYTHING = Supports(
     joints=tuple(kind for kind in JOINT_TYPES if kind != "inline"),
     drivers=("angle", "displacement"),
-    loads=("moment", "force", "spring", "torsion_spring"),
+    loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),
     armatures=("angle", "displacement"),
+    over_time=(FACTOR,),
 )
 O = np.zeros(3)
 

@@ -23,7 +23,7 @@ import numpy as np
 
 from crosscheck.engines.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
-from mbref.scene import Body, Distance, Joint, JointFacts, Scene, Spherical
+from mbref.scene import Body, Distance, Joint, JointFacts, JointLoad, Scene, Spherical
 from mbref.scene_joints import DISPLACEMENT, Coordinate
 
 GROUND_LINK = -1
@@ -149,7 +149,8 @@ class _Edge:
 def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
     """Return the scene as links and closures; bodies without mass (kinematics) have 1 kg and 1 kg m².
 
-    ``closes`` are the types of joints that the engine closes by itself, without splitting a body.
+    ``closes`` are the types of joints that the engine closes by itself, without splitting a body, unless a
+    driver, coupling or load needs the joint's coordinate.
     """
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
@@ -165,7 +166,10 @@ def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
             anchor = np.array(joint.anchor_pair[0])
             edges.append(_Edge(joint.type, joint.facts, j, pair, anchor, _axes(joint), weight))
     kept, cut = _kruskal(len(nodes), edges)
-    closures = _cut_open(nodes, kept, cut, closes)
+    acting |= {load.joint for load in scene.load if isinstance(load, JointLoad)}
+    needed = {j for j, joint in enumerate(scene.joint) if joint.name in acting}  # joints with a coordinate
+    closable = [edge.kind in closes and edge.joint not in needed for edge in cut]
+    closures = _cut_open(nodes, kept, list(zip(cut, closable, strict=True)))
     return _depth_first(nodes, kept, closures, len(scene.body))
 
 
@@ -231,15 +235,13 @@ def _kruskal(count: int, edges: list[_Edge]) -> tuple[list[_Edge], list[_Edge]]:
     return kept, cut
 
 
-def _cut_open(
-    nodes: list[Link], kept: list[_Edge], cut: list[_Edge], closes: Collection[str]
-) -> list[Closure]:
-    """Return the closures of the cut edges; adds the ghosts to the nodes and their joints to the kept
-    edges."""
+def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[tuple[_Edge, bool]]) -> list[Closure]:
+    """Return the closures of the cut edges, each with whether the engine closes its joint by itself; adds the
+    ghosts to the nodes and their joints to the kept edges."""
     closures: list[Closure] = []
     ghosts: dict[int, list[int]] = {}
-    for edge in cut:
-        if edge.kind in closes:
+    for edge, is_closable in cut:
+        if is_closable:
             kind = "point" if edge.facts == BALL else edge.kind
             closures.append(Closure(kind, edge.joint, edge.nodes, edge.anchor))
             continue

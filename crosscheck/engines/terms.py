@@ -13,7 +13,7 @@ integrated by DOP853 and projected onto the closures after every step, by the le
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -154,7 +154,7 @@ class Simulation:
         """Return v' (nv,), the closures' forces λ (m,), the links' motion with these accelerations, and the
         rows."""
         terms = self._terms(q, v)
-        motion_now, rows = self._motion(terms, q, v), self._rows(terms, q, v)
+        motion_now, rows = self._motion(t, terms, q, v), self._rows(terms, q, v)
         a = np.zeros(self.at.nv)
         for i, driver in self.driven:
             a[i] = motion(driver, t)[2]
@@ -205,7 +205,7 @@ class Simulation:
             found.append(wrench(force, place, moment))
         return found
 
-    def _motion(self, terms: Terms, q: np.ndarray, v: np.ndarray) -> LinkMotion:
+    def _motion(self, t: float, terms: Terms, q: np.ndarray, v: np.ndarray) -> LinkMotion:
         twists = terms.jacobian @ v
         return LinkMotion(
             terms.rotation,
@@ -216,20 +216,12 @@ class Simulation:
             UNKNOWN,
             self.at.of_velocities(q),
             v,
+            t,
         )
 
     def _accelerated(self, terms: Terms, of: LinkMotion, a: np.ndarray) -> LinkMotion:
         change = terms.jacobian @ a + terms.drift
-        return LinkMotion(
-            of.rotation,
-            of.position,
-            of.velocity,
-            of.angular_velocity,
-            change[:, :3],
-            change[:, 3:],
-            of.coordinates,
-            of.rates,
-        )
+        return replace(of, acceleration=change[:, :3], angular_acceleration=change[:, 3:])
 
     def _forces(self, terms: Terms, of: LinkMotion) -> np.ndarray:
         """Return generalised forces (nv,) of the loads."""

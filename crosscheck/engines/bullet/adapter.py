@@ -15,12 +15,12 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.bullet.model import STRONGEST, Mechanism
 from crosscheck.engines.driver_motion import mean_rate
-from crosscheck.engines.fixed_steps import FixedSteps, is_constant, scouted_rate, simulated, steps
+from crosscheck.engines.fixed_steps import FixedSteps, Loads, scouted_rate, simulated, steps, unended_piece
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pieces import EVERYTHING
 from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion, applied
+from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -40,15 +40,14 @@ class Bullet(Engine):
 
     name = "bullet"
     package = "pybullet"
+    modules = ("pybullet",)
     supports = replace(EVERYTHING, couplings=(), armatures=())
     families, options = FAMILIES, OPTIONS
 
-    def prepare(self, families: Sequence[str]) -> None:
-        import pybullet  # noqa: F401
-
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely."""
-        return lacks_mass(scene)
+        """Refuse scenes without masses whose motion the drivers do not determine completely, and loads over
+        time that have pieces."""
+        return lacks_mass(scene) or unended_piece(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return settings whose steps are chosen by the angle that a body turns in one step."""
@@ -95,7 +94,7 @@ class _World:
         self.driven = [
             (mechanism.joints[self.tree.coordinate(self.scene, d.joint)], d) for d in self.scene.driver
         ]
-        self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
+        self.loads = Loads(self.scene, self.tree, self.motion)
 
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s) from time t."""
@@ -105,16 +104,16 @@ class _World:
             for joint, driver in self.driven:
                 speed = mean_rate(driver, t + n * h, h)
                 p.setJointMotorControl2(*joint, p.VELOCITY_CONTROL, targetVelocity=speed, force=STRONGEST)
-            self._load()
+            self._load(t + n * h)
             p.stepSimulation()
 
-    def _load(self) -> None:
-        now = self.motion() if self.constant is None else None
-        loads = self.constant if now is None else applied(self.scene, self.tree, now)
-        for link, force, moment in loads or ():
+    def _load(self, t: float) -> None:
+        loads = self.loads.at(t)
+        origins = self.motion().position if any(force.any() for _, force, _ in loads) else ()
+        for link, force, moment in loads:
             place = self.mechanism.places[link]
-            if now is not None:
-                at = now.position[link].tolist()
+            if len(origins):
+                at = origins[link].tolist()
                 self.p.applyExternalForce(place.body, place.link, force.tolist(), at, self.p.WORLD_FRAME)
             self.p.applyExternalTorque(place.body, place.link, moment.tolist(), self.p.WORLD_FRAME)
 

@@ -15,12 +15,20 @@ from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines import terms
 from crosscheck.engines.dart.model import Mechanism
 from crosscheck.engines.driver_motion import mean_rate, motion, stated_rate
-from crosscheck.engines.fixed_steps import FixedSteps, Simulation, is_constant, scouted_rate, simulated, steps
+from crosscheck.engines.fixed_steps import (
+    FixedSteps,
+    Loads,
+    Simulation,
+    scouted_rate,
+    simulated,
+    steps,
+    unended_piece,
+)
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pieces import EVERYTHING
 from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion, applied
+from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -47,15 +55,14 @@ class Dart(Engine):
 
     name = "dart"
     package = "dartpy"
+    modules = ("dartpy",)
     supports = EVERYTHING
     families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
 
-    def prepare(self, families: Sequence[str]) -> None:
-        import dartpy  # noqa: F401
-
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely."""
-        return lacks_mass(scene)
+        """Refuse scenes without masses whose motion the drivers do not determine completely, and loads over
+        time that have pieces."""
+        return lacks_mass(scene) or unended_piece(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return settings by tolerance, and by the angle that a body turns in one step; only settings by
@@ -123,7 +130,7 @@ class _World:
         for joint, driver in self.driven:
             joint.setActuatorType(dart.dynamics.ActuatorType.ACCELERATION)
             joint.setVelocity(0, motion(driver, 0.0)[1])
-        self.constant = applied(self.scene, self.tree, self.motion()) if is_constant(self.scene) else None
+        self.loads = Loads(self.scene, self.tree, self.motion)
 
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s) from time t."""
@@ -131,14 +138,11 @@ class _World:
         for n in range(count):
             for joint, driver in self.driven:
                 joint.setCommand(0, (mean_rate(driver, t + n * h, h) - joint.getVelocity(0)) / h)
-            self._load()
+            self._load(t + n * h)
             self.world.step()
 
-    def _load(self) -> None:
-        loads = self.constant
-        if loads is None:
-            loads = applied(self.scene, self.tree, self.motion())
-        for link, force, moment in loads:
+    def _load(self, t: float) -> None:
+        for link, force, moment in self.loads.at(t):
             node = self.mechanism.nodes[link]
             node.addExtForce(force, np.zeros(3), False, True)
             node.addExtTorque(moment, False)

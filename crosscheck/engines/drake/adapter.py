@@ -18,13 +18,21 @@ from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines import terms
 from crosscheck.engines.drake.model import Mechanism
 from crosscheck.engines.driver_motion import stated_rate
-from crosscheck.engines.fixed_steps import FixedSteps, Simulation, is_constant, scouted_rate, simulated, steps
+from crosscheck.engines.fixed_steps import (
+    FixedSteps,
+    Loads,
+    Simulation,
+    scouted_rate,
+    simulated,
+    steps,
+    unended_piece,
+)
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pieces import EVERYTHING
 from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.sampling import Failed
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree, spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion, applied
+from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -48,15 +56,14 @@ class Drake(Engine):
 
     name = "drake"
     package = "drake"
+    modules = ("pydrake.multibody.plant", "pydrake.multibody.tree")
     supports = EVERYTHING
     families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
 
-    def prepare(self, families: Sequence[str]) -> None:
-        from pydrake.multibody import plant, tree  # noqa: F401
-
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely."""
-        return lacks_mass(scene)
+        """Refuse scenes without masses whose motion the drivers do not determine completely, and loads over
+        time that have pieces."""
+        return lacks_mass(scene) or unended_piece(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return settings by tolerance for the continuous plant, and settings by step for the discrete plant.
@@ -116,7 +123,7 @@ class _Plant:
         self.scene, self.tree = scene, tree
         self.plants: dict[float, Mechanism] = {}
         self.now = self._of(step)
-        self.constant = self._external(self.motion()) if is_constant(scene) else None
+        self.loads = Loads(scene, tree, self.motion)
 
     def _of(self, step: float) -> Mechanism:
         key = float(f"{step:.12g}")
@@ -130,24 +137,22 @@ class _Plant:
         other.context.SetDiscreteState(self.now.context.get_discrete_state().Clone())
         self.now = other
         port = other.plant.get_applied_spatial_force_input_port()
-        if self.constant is not None:
-            port.FixValue(other.context, self.constant)
         for n in range(count):
-            if self.constant is None:
-                port.FixValue(other.context, self._external(self.motion()))
+            if n == 0 or self.loads.constant is None:
+                port.FixValue(other.context, self._external(t + n * h))
             try:
                 after = other.plant.EvalUniquePeriodicDiscreteUpdate(other.context)
             except RuntimeError as error:
                 raise Failed(Outcome.STEP_FAILED, t + n * h, f"Drake stopped: {error}") from None
             other.context.SetDiscreteState(after)
 
-    def _external(self, motion: LinkMotion) -> Any:
+    def _external(self, t: float) -> Any:
         from pydrake.common.value import Value
         from pydrake.multibody.math import SpatialForce
         from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 
         found = []
-        for link, force, moment in applied(self.scene, self.tree, motion):
+        for link, force, moment in self.loads.at(t):
             push = ExternallyAppliedSpatialForce()
             push.body_index = self.now.bodies[link].index()
             push.F_Bq_W = SpatialForce(tau=moment, f=force)

@@ -20,9 +20,9 @@ from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines.exudyn.joints import SUPPORTS
 from crosscheck.engines.exudyn.reactions import reactions
 from crosscheck.engines.exudyn.static import drive
+from crosscheck.engines.fixed_steps import unended_piece
 from crosscheck.engines.written import Written
 from crosscheck.judge.constraints import initial_poses, jacobian
-from crosscheck.judge.time_functions import ends
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import Driver, Scene
@@ -62,11 +62,7 @@ class Exudyn(Engine):
             return Cannot(
                 Owner.MODEL, "without masses only a mechanism whose whole motion is driven can be analysed"
             )
-        for k, load in enumerate(scene.load):
-            if load.over_time and ends(load.over_time):
-                reason = f"load[{k}] follows a table or is switched, but steps do not end where its pieces do"
-                return Cannot(Owner.ADAPTER, reason)
-        return None
+        return unended_piece(scene)
 
     def serves(self, scene: Scene, family: str) -> bool:
         return scene.has_mass() if family == "tuned" else super().serves(scene, family)

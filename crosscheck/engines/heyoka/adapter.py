@@ -36,10 +36,8 @@ class Heyoka(Generator):
     """heyoka (PyPI ``heyoka``)."""
 
     name = package = "heyoka"
+    modules = ("heyoka",)
     families, options = FAMILIES, RTOL
-
-    def prepare(self, families: Sequence[str]) -> None:
-        import heyoka  # noqa: F401
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return the settings of the one family, by tolerance."""

@@ -23,8 +23,7 @@ from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
-LOADS = ("moment", "force", "spring", "torsion_spring")
-SUPPORTS = replace(OF_MUJOCO, loads=LOADS, couplings=(), armatures=(), over_time=())
+SUPPORTS = replace(OF_MUJOCO, over_time=())
 DEFAULT_STEP = 2e-3  # s
 # impedance parameters; MuJoCo clamps the first two at this value
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -69,7 +68,7 @@ class PortedModel:
             model.eq_solref[:], model.eq_solimp[:] = (2 * setting.options["step"], 1.0), STIFFEST
         self.data = mujoco.MjData(model)
         self.data.qvel[:] = self.built.rates
-        self.data.xfrc_applied[:] = self.built.applied
+        self.built.apply(self.data, 0.0)
         mujoco.mj_forward(model, self.data)
 
     def motion(self, qpos: Any, qvel: Any) -> LinkMotion:

@@ -38,11 +38,9 @@ class Ondsel(Engine):
 
     name = "ondsel"
     package = "pyondsel"
+    modules = ("pyondsel.solve_raw",)
     supports = SUPPORTS
     families, options = FAMILIES, {"step": "largest step from pose to pose, s"}
-
-    def prepare(self, families: Sequence[str]) -> None:
-        import pyondsel.solve_raw  # noqa: F401
 
     def cannot(self, scene: Scene) -> Cannot | None:
         """Refuse distance joints, which OndselSolver lacks, and then scenes that any engine may refuse."""

@@ -38,11 +38,9 @@ class Simbody(Engine):
 
     name = "simbody"
     package = "opensim"
+    modules = ("opensim",)
     supports = SUPPORTS
     families, options = FAMILIES, OPTIONS
-
-    def prepare(self, families: Sequence[str]) -> None:
-        import opensim  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse armatures, drivers that add a sine to a polynomial, and scenes without masses whose motion

@@ -35,6 +35,7 @@ class Sundials(Engine):
 
     name = "sundials"
     package = "scikit-sundae"
+    modules = ("sksundae.ida",)
     families, options = FAMILIES, {"rtol": "relative tolerance"}
     supports = Supports(
         joints=(
@@ -50,9 +51,6 @@ class Sundials(Engine):
         drivers=("angle", "displacement"),
         loads=("moment", "force", "spring", "torsion_spring"),
     )
-
-    def prepare(self, families: Sequence[str]) -> None:
-        import sksundae.ida  # noqa: F401
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse scenes without masses whose motion the drivers do not determine completely."""
