@@ -255,7 +255,8 @@ class Engine(ABC):
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # these run by default if their packages are installed
 GENERATORS = ("casadi", "heyoka")  # these run only if they are named: they compile code for each scene
-LARGE = ("drake", "dart", "bullet", "mjx", "warp")  # these run only if they are named: large packages
+# these run only if they are named: large packages
+LARGE = ("drake", "dart", "bullet", "mjx", "warp", "newton")
 ON_REQUEST = (*GENERATORS, *LARGE)
 ALL = "all"  # this name selects every installed engine
 ENTRY_POINTS = "crosscheck.engines"

@@ -1,0 +1,147 @@
+"""Newton and truth; its adapter and Newton's own kinematics and steps. Kernels compile for minutes."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from crosscheck.closed_loops.mechanisms import FOLDER
+from crosscheck.engine import Owner, Setting, engine
+from crosscheck.engines.newton.adapter import JOINTS
+from crosscheck.engines.newton.model import Mechanism
+from crosscheck.engines.newton.solvers import ALPHAS, FAMILIES
+from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.judge.constraints import initial_twists
+from crosscheck.judge.gauss_principle import gauss
+from crosscheck.judge.metrics import error_series
+from crosscheck.judge.truth import truth_for
+from mbref.scene import Body, Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome
+
+INSTALLED = pytest.mark.skipif(find_spec("newton") is None, reason="newton is not installed")
+STEP = 1e-3  # s
+HALF = {"padmm, moreau": 4.0, "lox, moreau": 4.0, "dvi": 2.0}  # error over the error of half the step
+# largest errors measured on the four-bar over 0.2 s at this step
+ERRORS = {
+    "padmm, moreau": 6.3e-5,
+    "dvi, moreau": 7.2e-5,
+    "lox, moreau": 6.3e-5,
+    "dvi": 3.7e-4,
+    "lox": 7.5e-5,
+    "defaults": 3.7e-4,
+    "mujoco": 6.5e-5,
+    "xpbd": 3.5e-3,
+    "semi-implicit": 7.8e-3,
+}
+MARGIN = 1.5
+
+
+def setting(family: str, step: float = STEP) -> Setting:
+    return Setting(family, {"step": step, **({"alpha": ALPHAS[family]} if family in ALPHAS else {})})
+
+
+def four_bar() -> Scene:
+    return Scene.from_file(FOLDER / "four_bar_free.toml").with_(duration=0.2)
+
+
+def off(family: str, step: float = STEP) -> float:
+    scene, times = four_bar(), np.array([0.0, 0.1, 0.2])
+    run = engine("newton").run(scene, times, setting(family, step))
+    assert run.outcome is Outcome.COMPLETED, run.message
+    return float(error_series(scene, run, truth_for(scene).poses(times)).max())
+
+
+def test_refusals_name_the_owner_and_the_part():
+    newton = engine("newton")
+    driven = newton.cannot(SCENES["four_bar"]())
+    assert driven.owner is Owner.ENGINE and "joint 'A'" in driven.reason, driven
+    scene = SCENES["bennett"]()
+    sprung = newton.cannot(scene.with_(load=[TorsionSpring(joint="R1", stiffness=1.0)]))
+    assert sprung.owner is Owner.ADAPTER and "load[0]" in sprung.reason, sprung
+    assert newton.cannot(scene) is None and newton.rounding == 2.0**-23
+
+
+def test_settings_are_coarse_to_fine_and_have_their_options():
+    found = engine("newton").settings(SCENES["bennett"]())
+    for family in {s.family for s in found}:
+        steps = [s.options["step"] for s in found if s.family == family]
+        assert steps == sorted(steps, reverse=True) and len(set(steps)) == len(steps)
+        assert all(("alpha" in s.options) is (family in ALPHAS) for s in found if s.family == family)
+
+
+@INSTALLED
+@pytest.mark.slow
+@pytest.mark.parametrize("family", ERRORS)
+def test_solvers_move_a_four_bar_as_measured(family):
+    assert 0 < off(family) < MARGIN * ERRORS[family]
+
+
+@INSTALLED
+@pytest.mark.slow
+@pytest.mark.parametrize("family", HALF)
+def test_orders_of_kaminos_integrators(family):
+    """Moreau's is of second order, Euler's of first."""
+    assert off(family, 2e-3) / off(family) == pytest.approx(HALF[family], rel=0.25)
+
+
+@INSTALLED
+@pytest.mark.slow
+def test_featherstone_does_not_close_the_loop():
+    assert off("featherstone") > 0.1
+
+
+def spatial() -> Scene:
+    """A turning tree with most joints, of which no axis is along an axis of the world."""
+    return SCENES["spatial_slider_crank_gravity"]()
+
+
+@INSTALLED
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
+def test_newtons_own_kinematics_have_the_poses_and_velocities_at_the_start(name):
+    """Newton computes them from the joint velocities; the judge from the scene."""
+    scene = SCENES[name]()
+    mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
+    state = mechanism.model.state()
+    state.joint_qd.assign(mechanism.state.joint_qd)
+    mechanism.newton.eval_fk(mechanism.model, mechanism.model.joint_q, state.joint_qd, state)
+    given, found = mechanism.state.body_qd.numpy(), state.body_qd.numpy()
+    assert np.abs(found - given).max() < 1e-5 * (1 + np.abs(given).max())
+    start = mechanism.model.body_q.numpy()[:, :3] - state.body_q.numpy()[:, :3]
+    assert np.abs(start).max() < 1e-6
+    linear, angular = initial_twists(scene)
+    own = list(mechanism.tree.own)
+    assert np.abs(mechanism.motion().velocity[own] - linear).max() < 1e-5 * (1 + np.abs(linear).max())
+    assert np.abs(given[own, 3:] - angular).max() < 1e-5 * (1 + np.abs(angular).max())
+
+
+def pushed() -> Scene:
+    """A free body with a force beside its centre, a moment and a spring to the ground."""
+    inertia = ((0.3, 0.02, 0.01), (0.02, 0.4, -0.03), (0.01, -0.03, 0.5))
+    body = Body(name="bob", mass=1.5, inertia=inertia, position=(0.3, 0.1, 0.2))
+    loads = [
+        Force(body="bob", point=(0.5, 0.2, 0.1), force=(2.0, 3.0, -1.0)),
+        Moment(body="bob", moment=(0.2, -0.1, 0.3)),
+        Spring(bodies=("bob", "ground"), points=((0.4, 0.1, 0.1), (0.0, 0.8, 0.0)), stiffness=60.0),
+    ]
+    return Scene(name="pushed", gravity=(0.5, -9.81, 2.0), duration=0.1, body=[body], load=loads)
+
+
+@INSTALLED
+@pytest.mark.slow
+@pytest.mark.parametrize("make", [pushed, spatial])
+@pytest.mark.parametrize("family", ["padmm, moreau", "lox"])
+def test_a_first_step_has_the_accelerations_of_gausss_principle(family, make):
+    """The change of the velocities over a short step; a load of another sign, frame or unit is seen."""
+    scene, h = make(), 1e-3
+    run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
+    change = np.vstack([run.velocity[1] - run.velocity[0], run.angular_velocity[1] - run.angular_velocity[0]])
+    exact = gauss(scene)
+    assert np.abs(change / h - exact).max() < 0.02 * np.abs(exact).max()
+
+
+def test_every_family_is_tested():
+    assert set(ERRORS) | {"featherstone"} == set(FAMILIES)
