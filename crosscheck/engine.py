@@ -105,7 +105,6 @@ class Engine(ABC):
         Returns
         -------
         Cannot or None
-            None if the engine can run the scene.
         """
         return self.supports.missing(scene) or self.refuses(scene)
 
@@ -119,7 +118,6 @@ class Engine(ABC):
         Returns
         -------
         Cannot or None
-            None if the engine can run the scene.
         """
         return None
 
@@ -210,7 +208,6 @@ class Engine(ABC):
         ----------
         scene : Scene
         setting : Setting
-            Family and options.
 
         Returns
         -------
@@ -220,9 +217,7 @@ class Engine(ABC):
         return ""
 
     def prepare(self, families: Sequence[str]) -> None:
-        """Import and compile what the families need, before the first run in a process.
-
-        By default the modules in ``modules`` are imported.
+        """Import ``modules``; or import and compile what the families need, before a process's first run.
 
         Parameters
         ----------
@@ -238,11 +233,9 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
-            The mechanism.
         times : ndarray, shape (k,)
             Increasing sample times, s. The first one may be 0.
         setting : Setting
-            Family and options.
 
         Returns
         -------
@@ -255,8 +248,7 @@ class Engine(ABC):
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # these run by default if their packages are installed
 GENERATORS = ("casadi", "heyoka")  # these run only if they are named: they compile code for each scene
-# these run only if they are named: large packages
-LARGE = ("drake", "dart", "bullet", "mjx", "warp", "newton")
+LARGE = ("drake", "dart", "bullet", "mjx", "warp", "newton")  # these run only if named: large packages
 ON_REQUEST = (*GENERATORS, *LARGE)
 ALL = "all"  # this name selects every installed engine
 ENTRY_POINTS = "crosscheck.engines"
