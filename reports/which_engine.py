@@ -44,7 +44,7 @@ crosscheck tune mujoco my.toml     # the cheapest settings of one engine
 
 Times are CPU time of stepping, of one machine; compare them within a table only. `crosscheck list settings`
 explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
-crosscheck, not by the engine. The [matrix of closed loops](closed-loops.md) has the
+crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the
 errors of more engines on more kinds (redundant spatial loops, long runs, couplings). [Compare
 engines](compare.md#verdicts) explains errors and grades, and the [support table](engines.md#support) has the
 joints and loads of each engine.

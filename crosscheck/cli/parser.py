@@ -246,7 +246,9 @@ def _add_closed_loops(commands: Commands) -> None:
     parser.add_argument(
         "--records", default=str(FILE), metavar="FILE", help="default: the records of the package"
     )
-    parser.add_argument("--page", metavar="FILE", help="also write the matrix as a page in Markdown")
+    parser.add_argument(
+        "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"
+    )
 
 
 def _add_report(commands: Commands) -> None:

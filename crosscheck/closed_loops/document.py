@@ -18,7 +18,7 @@ is hard in one way. A cell has the largest error of any body at any sample, agai
 [reference solution](reference.md). Its link leads to the settings, the reason and the command.
 
 ```sh
-crosscheck closed-loops                        # print this matrix; nothing is simulated
+crosscheck closed-loops                        # print the two tables; nothing is simulated
 crosscheck closed-loops --run --engine drake   # measure an engine that is installed here
 crosscheck closed-loops --page docs/closed-loops.md
 ```
@@ -71,20 +71,24 @@ def _mechanisms() -> Iterator[str]:
 
 
 def _engine(name: str, row: Mapping[str, Cell]) -> Iterator[str]:
+    """Return the runs of an engine as a table, and the commands of its best runs."""
     version = next(record["version"] for cell in row.values() for record in cell.records)
     yield f"### {name}\n\nVersion {version}.\n"
+    yield "| mechanism | result | family of settings, its options, error and time; or the reason |"
+    yield "| --- | --- | --- |"
     for cell in row.values():
         yield from _cell(cell)
+    commands = [rerun(best) for cell in row.values() if (best := cell.best()) and not is_refusal(best)]
+    if commands:
+        yield from ("", "Commands that repeat the best runs:", "", "```text", *commands, "```")
+    yield ""
 
 
 def _cell(cell: Cell) -> Iterator[str]:
-    """Return the runs of a cell by family, with the command of the best run."""
+    """Return one line of the table for each family of settings, the first with the anchor of the cell."""
     best = cell.best()
-    if best is None:
-        return
-    yield f'<a id="{cell.place}"></a>**{cell.column.heading}**\n'
-    found = [best] if is_refusal(best) else list(cell.families().values())
-    yield from (f"- {shown(record)} {sentence(record)}" for record in found)
-    yield ""
-    if not is_refusal(best):
-        yield f"```text\n{rerun(best)}\n```\n"
+    found = [] if best is None else [best] if is_refusal(best) else list(cell.families().values())
+    for k, record in enumerate(found):
+        place = "" if k else f'<a id="{cell.place}"></a>{cell.column.heading}'
+        text = sentence(record).replace("|", "\\|").replace("\n", " ")
+        yield f"| {place} | {shown(record)} | {text} |"

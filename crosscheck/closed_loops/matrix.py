@@ -23,8 +23,8 @@ REFUSES, NOT_RUN = "–", "○"
 NO_FAMILY = "no family of the engine's own steps serves this mechanism here"
 LEGEND = {
     "✓ 3e-12": f"right: the largest error, at most {FLOOR:g} of the mechanism's length or rad",
-    "≈ 3e-05": f"accurate to this error, at most {FALSE_SUCCESS:g}",
-    "✗ 0.95": "wrong: the run completes without a message, and this is its error",
+    "≈ 3e-05": f"inaccurate: the largest error, at most {FALSE_SUCCESS:g} of the length or rad",
+    "✗ 0.95": "wrong: the run completes without a message, with this error",
     "! ended": "the run ended early with a message, crashed, or did not end within its limit of CPU time",
     REFUSES: "refused: the engine or crosscheck's adapter cannot model it; the reason is below",
     NOT_RUN: "not measured",

@@ -28,7 +28,7 @@ Cells = Mapping[str, Mapping[str, Cell]]
 
 
 def render(records: Sequence[Record]) -> list[Block]:
-    """Return the matrix at the best settings and at the defaults, the mechanisms, and the runs of each
+    """Return the tables at the best settings and at the defaults, the mechanisms, and the runs of each
     cell."""
     cells = matrix(records)
     return [
