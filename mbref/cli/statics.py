@@ -28,10 +28,11 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     rest = commands.add_parser(
         "equilibrium",
-        help="static equilibria of a mechanism, with forces and stability",
+        help="static equilibria or steady motions of a mechanism, with forces and stability",
         formatter_class=TEXT,
         description="Static equilibria under gravity, springs and constant loads, from several starts:\n"
-        "pose, reactions and stability of each. " + LIMITS,
+        "pose, reactions and stability of each. With a driver that turns a body at a constant rate\n"
+        "about an axis parallel to gravity: steady motions in which all bodies turn with it.\n" + LIMITS,
         epilog="examples:\n  mbref equilibrium four_bar_gravity\n"
         "  mbref equilibrium mechanism.toml --number 2 --out rest.toml",
     )
@@ -41,10 +42,11 @@ def add(commands: Any) -> None:
 
     shake = commands.add_parser(
         "modes",
-        help="eigenvalues and vibrations about an equilibrium",
+        help="eigenvalues and vibrations about an equilibrium or a steady motion",
         formatter_class=TEXT,
-        description="Eigenvalues, frequencies and damping ratios of small motions about an equilibrium, by\n"
-        "default the first stable one. --out writes one vibration as a moving picture.",
+        description="Eigenvalues, frequencies and damping ratios of small motions about an equilibrium or a\n"
+        "steady motion (see `mbref equilibrium`), by default about the first stable one.\n"
+        "--out writes one vibration as a moving picture.",
         epilog="examples:\n  mbref modes four_bar_gravity\n"
         "  mbref modes mechanism.toml --mode 2 --out second.svg",
     )
@@ -98,7 +100,7 @@ def _equilibrium(options: argparse.Namespace) -> int:
 
 
 def _lines(number: int, each: Equilibrium) -> list[str]:
-    lines = [f"equilibrium {number}: {each.stability}"]
+    lines = [_title(number, each)]
     for body in each.scene.body:
         turned = np.round(to_vector(np.array([body.orientation]))[0], 12) + 0.0
         lines.append(
@@ -109,6 +111,13 @@ def _lines(number: int, each: Equilibrium) -> list[str]:
     return lines
 
 
+def _title(number: int, each: Equilibrium) -> str:
+    """Return the heading of an equilibrium, or of a steady motion with its rate."""
+    if each.rate:
+        return f"steady motion {number}: {each.stability}, turns at {each.rate:.9g} rad/s"
+    return f"equilibrium {number}: {each.stability}"
+
+
 def _three(vector: Any) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in np.round(vector, 9) + 0.0) + ")"
 
@@ -116,6 +125,7 @@ def _three(vector: Any) -> str:
 def _record(each: Equilibrium) -> dict[str, Any]:
     return {
         "stability": each.stability,
+        "rate": each.rate,
         "scene": each.scene.to_dict(),
         "eigenvalues": [[float(s.real), float(s.imag)] for s in each.eigenvalues],
         "frequencies": each.frequencies.tolist(),
@@ -147,7 +157,7 @@ def _modes(options: argparse.Namespace) -> int:
 
 
 def _mode_lines(number: int, each: Equilibrium) -> list[str]:
-    lines = [f"equilibrium {number}: {each.stability}", "  eigenvalues, 1/s"]
+    lines = [_title(number, each), "  eigenvalues, 1/s"]
     lines += [f"    {s.real:+.12g} {s.imag:+.12g} i" for s in np.round(each.eigenvalues, 12) + 0.0]
     pairs = enumerate(zip(each.frequencies, each.damping_ratios, strict=True), 1)
     lines += [f"  vibration {k}: {hertz:.9g} Hz, damping ratio {ratio:.6g}" for k, (hertz, ratio) in pairs]

@@ -1,4 +1,4 @@
-"""Static equilibria of a mechanism, their stability, and small vibrations about them."""
+"""Static equilibria and steady motions of a mechanism, their stability, and small vibrations about them."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
-from mbref.design.linearisation import OffConstraints, Tangent, multipliers
+from mbref.design.linearisation import OffConstraints, Tangent, multipliers, unsteady
 from mbref.design.placed import placed
+from mbref.design.turning import Turning, turning
 from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
@@ -38,25 +39,30 @@ AMPLITUDE, FRAMES = 0.1, 49
 
 @dataclass(frozen=True, repr=False)
 class Equilibrium:
-    """A pose at which a mechanism stays at rest.
+    """A pose at which a mechanism stays at rest, or turns with its driver as if it were one body.
 
     Attributes
     ----------
     scene : Scene
-        The scene with its bodies at this pose, at rest; springs, joints and loads are carried along.
+        The scene with its bodies at this pose, at rest or turning; springs, joints and loads are carried
+        along.
     eigenvalues : ndarray, shape (2f,), complex
         Exponents s of small motions exp(s t), 1/s, of the f degrees of freedom.
     shapes : ndarray, shape (2f, nb, 6), complex
         Motion of each body for each eigenvalue: displacement of the centre of mass (m) and rotation vector
-        (rad), world frame. The largest is one length of the mechanism, or one radian, and real.
+        (rad), world frame, relative to the turning mechanism. The largest is one length of the mechanism, or
+        one radian, and real.
     reactions : dict of str to ndarray, shape (6,)
         Force (N) and moment (N m) on the second body of each joint at its anchor, world frame.
+    rate : float
+        Angular speed with which the mechanism turns, rad/s; zero at a static equilibrium.
     """
 
     scene: Scene
     eigenvalues: np.ndarray
     shapes: np.ndarray
     reactions: dict[str, np.ndarray]
+    rate: float = 0.0
 
     @property
     def stability(self) -> str:
@@ -86,15 +92,18 @@ class Equilibrium:
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{f:.6g} Hz" for f in self.frequencies)
-        return f"<Equilibrium of {self.scene.name!r}: {self.stability}{'; ' * bool(listed)}{listed}>"
+        kind = "Steady motion" if self.rate else "Equilibrium"
+        return f"<{kind} of {self.scene.name!r}: {self.stability}{'; ' * bool(listed)}{listed}>"
 
 
 def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibrium]:
-    """Return the static equilibria that are found from several starts.
+    """Return the static equilibria, or steady motions, that are found from several starts.
 
     The starts are the scene's pose and poses that are reached from it along the constraints. There is no
-    guarantee that all equilibria are found. Drivers must stand still. From each start Levenberg's method
-    (Quarterly of Applied Mathematics 2, 1944) reduces the accelerations to zero.
+    guarantee that all equilibria are found. Drivers must stand still. One driver may turn a body relative to
+    the ground at a constant rate about an axis parallel to gravity: then the result has the steady motions
+    in which the whole mechanism turns with it. From each start Levenberg's method (Quarterly of Applied
+    Mathematics 2, 1944) reduces the accelerations to zero.
 
     Parameters
     ----------
@@ -111,12 +120,14 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     Raises
     ------
     SceneError
-        If a body has no mass, a driver moves, or the mechanism has no degree of freedom.
+        If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
     """
     scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
-    _refuse(scene)
-    model = Model(scene)
-    poses = list(_starts(Tangent(model, consistent_start(model).q), starts))
+    frame, model = _frame(scene), Model(scene)
+    first = Tangent(model, consistent_start(model).q, frame)
+    if reason := unsteady(first):
+        raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
+    poses = list(_starts(first, starts))
     scale = _scale(poses)
     if scale <= NOTHING * model.length / scene.duration**2:
         return [_equilibrium(poses[0])]
@@ -174,20 +185,18 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
     )
 
 
-def _refuse(scene: Scene) -> None:
+def _frame(scene: Scene) -> Turning:
+    """Return the frame in which the scene can rest; raises SceneError if there is none."""
     if not scene.has_mass():
         without = next(body.name for body in scene.body if body.mass is None)
         raise SceneError([f"body[{without}].mass: is missing; an equilibrium needs the mass of every body"])
-    for driver in scene.driver:
-        if not driver.is_constant:
-            raise SceneError(
-                [f"driver[{driver.joint}]: moves; an equilibrium needs drivers that stand still"]
-            )
     for k, load in enumerate(scene.load):
         if load.over_time and not load.over_time.is_constant:
             raise SceneError([f"load[{k}].factor: varies; an equilibrium needs loads that stay the same"])
+    frame = turning(scene)
     if scene.counts().degrees_of_freedom == 0:
         raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
+    return frame
 
 
 def _scale(poses: list[Tangent]) -> float:
@@ -211,14 +220,12 @@ def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
     for k in range(1, count):
         forth = k % 2 == 1
         tangent = there if forth else back
-        ahead = tangent.basis.T @ first.basis @ direction if tangent.freedoms == freedoms else direction
+        ahead = tangent.basis.T @ first.basis @ direction
         sign = 1.0 if forth else -1.0
-        try:
-            q = tangent.pose(sign * STRIDE * first.model.length * _unit(ahead))
-        except OffConstraints:
+        moved = _moved(tangent, sign * STRIDE * first.model.length * _unit(ahead))
+        if moved is None or moved.freedoms != freedoms:
             direction = _unit(rng.standard_normal(freedoms))
             continue
-        moved = Tangent(first.model, q)
         there, back = (moved, back) if forth else (there, moved)
         direction = _unit(direction + 0.3 * rng.standard_normal(freedoms)) if freedoms > 1 else direction
         yield moved
@@ -234,7 +241,7 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
     off = tangent.accelerations(*_rest(tangent))
     for _ in range(MOST_STEPS):
         if np.linalg.norm(off) <= BALANCED * scale:
-            return tangent
+            return _refined(tangent, off)
         try:
             slope = tangent.slope()
         except OffConstraints:
@@ -253,9 +260,21 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
     return None
 
 
+def _refined(tangent: Tangent, off: np.ndarray) -> Tangent:
+    """Return the pose after one more Newton step, if that is better: exponents near each other need it."""
+    try:
+        slope = tangent.slope()
+    except OffConstraints:
+        return tangent
+    moved = _moved(tangent, -np.linalg.lstsq(slope, off, rcond=None)[0])
+    if moved is None or moved.freedoms != tangent.freedoms:
+        return tangent
+    return moved if np.linalg.norm(moved.accelerations(*_rest(moved))) < np.linalg.norm(off) else tangent
+
+
 def _moved(tangent: Tangent, y: np.ndarray) -> Tangent | None:
     try:
-        return Tangent(tangent.model, tangent.pose(y))
+        return Tangent(tangent.model, tangent.pose(y), tangent.frame)
     except OffConstraints:
         return None
 
@@ -280,14 +299,14 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     # the shape is scaled such that this entry becomes 1
     largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]
     q = tangent.q.reshape(1, model.nb, 7)
-    forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(model, tangent.q)[None])
+    forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(tangent)[None])
     scene = _with_angles(placed(model, tangent.q), model, tangent.q)
-    still = [body.model_copy(update={"velocity": None, "angular_velocity": None}) for body in scene.body]
     return Equilibrium(
-        scene.with_(body=still),
+        scene.with_(body=tangent.frame.bodies(scene)),
         values[order],
         shapes / largest[:, None, None],
         {name: wrench[0] for name, wrench in forces.items()},
+        tangent.frame.rate,
     )
 
 

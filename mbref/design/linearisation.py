@@ -1,22 +1,24 @@
 """Equations of motion about a pose at rest, in coordinates along the constraints' tangent.
 
 With x = (δr, δπ') the displacements of the bodies from a pose q0, S = diag(1 m, 1/L rad) and an orthonormal
-basis Z of the null space of Φ_q S, a pose has the coordinates y: q(y) is the pose q0 ⊕ S Z y, projected onto
-the constraints. About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ S⁻¹
-q''.
+basis Z of the null space of Φ_q S, a pose has the coordinates y: q(y) is q0 ⊕ S Z y put onto the constraints.
+About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ S⁻¹ q''. In a steady
+motion the pose is at rest in a frame that turns with the driver (turning.py), and q'' is relative to it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from mbref.design.turning import ANGLE, UNCHANGED, Turning
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 
 RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
-STEP = 0.02  # increment of difference quotients / mechanism's length; its eighth power is rounding
-SHORT = 0.01  # factor on STEP for differences of second order
+# increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
+STEP = 0.005
+SHORT = 0.04  # factor on STEP for differences of second order
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 MET = 1e-10  # largest |Φ| / mechanism's length for a pose that satisfies the constraints
 
@@ -26,10 +28,10 @@ class OffConstraints(Exception):
 
 
 class Tangent:
-    """Coordinates y (f,), m, of poses near a pose q0 (7 nb,) at rest."""
+    """Coordinates y (f,), m, of poses near a pose q0 (7 nb,) at rest in a frame."""
 
-    def __init__(self, model: Model, q: np.ndarray):
-        self.model, self.q = model, q
+    def __init__(self, model: Model, q: np.ndarray, frame: Turning):
+        self.model, self.q, self.frame = model, q, frame
         length = max(model.length, 1e-12)
         self.units = np.tile(np.repeat([1.0, 1.0 / length], 3), model.nb)
         self.step = STEP * length
@@ -53,7 +55,8 @@ class Tangent:
         """Return y'' (f,), m/s², at y and y' (f,)."""
         q = self.pose(y) if y.any() else self.q
         v = self.units * (self.basis @ rate)
-        return np.asarray(self.basis.T @ (accelerations(self.model, q, v) / self.units))
+        found = accelerations(self.model, 0.0, q, self.frame.velocities(self.model, q) + v)
+        return np.asarray(self.basis.T @ (self.frame.relative(self.model, q, v, found) / self.units))
 
     def slope(self) -> np.ndarray:
         """Return A = ∂y''/∂y (f, f) by differences of second order, for Newton's method."""
@@ -76,10 +79,9 @@ class Tangent:
         return np.asarray(np.sum(parts, axis=0) / h)
 
 
-def accelerations(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Return q'' (n,) at t = 0: the accelerations of Gauss's principle among all that the constraint rows
-    allow."""
-    terms = model.terms(0.0, q, v)
+def accelerations(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Return q'' (n,) at time t (s): of all that the rows allow, the one of Gauss's principle."""
+    terms = model.terms(t, q, v)
     free = _null_space(terms.jacobian)
     bound = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=RANK)[0] if model.m else np.zeros(model.n)
     mass = free.T @ (terms.mass[:, None] * free)
@@ -87,11 +89,36 @@ def accelerations(model: Model, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.asarray(bound + free @ np.linalg.solve(mass, push))
 
 
-def multipliers(model: Model, q: np.ndarray) -> np.ndarray:
-    """Return λ (m,) of least norm at rest, with M q'' + Φ_qᵀ λ = g."""
-    terms, still = model.terms(0.0, q, np.zeros(model.n)), np.zeros(model.n)
-    left = terms.force - terms.mass * accelerations(model, q, still)
+def multipliers(tangent: Tangent) -> np.ndarray:
+    """Return λ (m,) of least norm of a pose at rest in its frame, with M q'' + Φ_qᵀ λ = g."""
+    model, q = tangent.model, tangent.q
+    v = tangent.frame.velocities(model, q)
+    terms = model.terms(0.0, q, v)
+    left = terms.force - terms.mass * accelerations(model, 0.0, q, v)
     return np.asarray(np.linalg.lstsq(terms.jacobian.T, left, rcond=RANK)[0])
+
+
+def unsteady(tangent: Tangent) -> str:
+    """Return the reason why motions near a pose change while the mechanism turns; empty if they do not.
+
+    A displaced pose with a velocity is compared with the same one after the mechanism has turned.
+    """
+    model, frame = tangent.model, tangent.frame
+    if not frame.rate or not tangent.freedoms:
+        return ""
+    try:
+        q = tangent.pose(np.full(tangent.freedoms, tangent.step))
+    except OffConstraints:
+        q = tangent.q
+    now = frame.velocities(model, q)
+    later, rates = frame.turned(model, q, ANGLE), frame.turned_rates(model, now, ANGLE)
+    t = ANGLE / frame.rate
+    phi = np.abs(model.terms(t, later, rates).phi)
+    if phi.max(initial=0.0) > UNCHANGED * max(1.0, model.length):
+        return f"joint {model.row_joint[int(phi.argmax())]!r} does not turn with it"
+    before, after = accelerations(model, 0.0, q, now), accelerations(model, t, later, rates)
+    change = np.abs(frame.turned_rates(model, before, ANGLE) - after).max()
+    return "the loads change while it turns" if change > UNCHANGED * np.abs(before).max() else ""
 
 
 def _null_space(jacobian: np.ndarray) -> np.ndarray:

@@ -137,7 +137,9 @@ def test_a_hinge_without_forces_is_indifferent():
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"driver": [{"joint": "A", "polynomial": [0.0, 1.0]}]}, r"driver\[A\]: moves"),
+        ({"driver": [{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}]}, r"driver\[A\]: moves"),
+        ({"driver": [{"joint": "A", "sine": {"amplitude": 1.0, "frequency": 2.0}}]}, "needed are drivers"),
+        ({"driver": [{"joint": "A", "polynomial": [0.0, 1.0]}]}, "its axis is not parallel to gravity"),
         ({"driver": [{"joint": "A"}]}, "no degree of freedom"),
         ({"body": [{"name": "rod", "position": [ARM, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
     ],

@@ -1,0 +1,140 @@
+"""Steady motions of mechanisms that turn with a driver / closed forms of a pendulum on a spindle and Watt's
+governor."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from mbref import Scene, SceneError, equilibria
+from mbref.cli.commands import main
+
+G, MASS, LENGTH, OWN = 9.81, 1.5, 0.5, 0.02
+
+
+def turning_pendulum(rate: float, axis=(0.0, 0.0, 1.0), **changes) -> Scene:
+    """A ball on an arm of 0.5 m that hangs from a spindle by a hinge about the y axis."""
+    bodies = [
+        {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3},
+        {"name": "ball", "mass": MASS, "inertia": [OWN] * 3, "position": [0.3, 0.0, -0.4]},
+    ]
+    hinge = {"type": "revolute", "anchor": [0.0] * 3}
+    joints = [
+        {**hinge, "name": "A", "bodies": ["ground", "spindle"], "axis": list(axis)},
+        {**hinge, "name": "B", "bodies": ["spindle", "ball"], "axis": [0.0, 1.0, 0.0]},
+    ]
+    driver = [{"joint": "A", "polynomial": [0.0, rate]}]
+    given = {"gravity": (0.0, 0.0, -G), "body": bodies, "joint": joints, "driver": driver}
+    return Scene(name="turning_pendulum", **given | changes)
+
+
+def angle(each) -> float:
+    """The angle of the arm from the vertical below."""
+    x, _, z = each.scene.body[1].position
+    return float(np.arctan2(x, -z))
+
+
+def squares(each) -> np.ndarray:
+    return np.asarray(each.eigenvalues**2)
+
+
+@pytest.mark.parametrize("rate", [3.0, 4.0, 4.8, 6.0, -6.0, 12.0])
+def test_a_pendulum_on_a_spindle_leaves_the_axis_above_the_critical_rate(rate):
+    """I s² = -(m g l cos α - m l² Ω² cos 2α); beside the axis from Ω² = g / l on, cos α = g / (l Ω²)."""
+    found = equilibria(turning_pendulum(rate))
+    beside = G / (LENGTH * rate**2)
+    expected = [0.0, np.pi] + ([np.arccos(beside), -np.arccos(beside)] if beside < 1 else [])
+    assert np.allclose(sorted(abs(angle(each)) for each in found), sorted(map(abs, expected)), atol=1e-10)
+    for each in found:
+        a = angle(each)
+        bend = MASS * G * LENGTH * np.cos(a) - MASS * LENGTH**2 * rate**2 * np.cos(2 * a)
+        exact = -bend / (OWN + MASS * LENGTH**2)
+        assert np.allclose(squares(each), exact, rtol=2e-12), (rate, a)
+        assert each.stability == ("stable" if exact < 0 else "unstable") and each.rate == abs(rate)
+
+
+def test_a_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
+    """Also the scene of the steady motion turns as one body, so that a simulation begins on it."""
+    [each] = [e for e in equilibria(turning_pendulum(6.0)) if e.stability == "stable" and angle(e) > 0]
+    radius = each.scene.body[1].position[0]
+    assert np.allclose(each.reactions["B"][:3], [-MASS * 36.0 * radius, 0.0, MASS * G], atol=1e-9)
+    assert np.allclose(each.scene.body[1].velocity, [0.0, 6.0 * radius, 0.0], atol=1e-12)
+    assert np.allclose([b.angular_velocity for b in each.scene.body], [0.0, 0.0, 6.0], atol=1e-15)
+
+
+def test_coriolis_forces_couple_two_slides_of_a_turning_table():
+    """A ball on two crossed springs on a turning table: roots of (s² + k/m - Ω²)² + 4 Ω² s², stable but for
+    k/m = Ω²; with unequal springs unstable between them."""
+    rate, (along, across) = 3.0, (4.0, 25.0)
+    bodies = [
+        {"name": "table", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3},
+        {"name": "cross", "mass": 1e-9, "inertia": [1e-9] * 3, "position": [0.0] * 3},
+        {"name": "ball", "mass": 1.0, "inertia": [0.02] * 3, "position": [0.0] * 3},
+    ]
+    slide = {"type": "translational", "anchor": [0.0] * 3}
+    joints = [
+        {**slide, "name": "A", "type": "revolute", "bodies": ["ground", "table"], "axis": [0.0, 0.0, 1.0]},
+        {**slide, "name": "X", "bodies": ["table", "cross"], "axis": [1.0, 0.0, 0.0]},
+        {**slide, "name": "Y", "bodies": ["cross", "ball"], "axis": [0.0, 1.0, 0.0]},
+    ]
+    for stiffness, is_stable in (((20.0, 25.0), True), ((along, across), False)):
+        loads = [
+            {"type": "slide_spring", "joint": name, "stiffness": k, "damping": 0.0}
+            for name, k in zip("XY", stiffness, strict=True)
+        ]
+        scene = turning_pendulum(rate, body=bodies, joint=joints, load=loads)
+        [each] = equilibria(scene, starts=1)
+        a, b = (k - rate**2 for k in stiffness)
+        exact = np.sqrt(np.roots([1.0, a + b + 4 * rate**2, a * b]).astype(complex))
+        exact = np.concatenate([exact, -exact])
+        gaps = np.abs(each.eigenvalues[:, None] - exact)
+        assert gaps.min(axis=1).max() < 1e-7 and gaps.min(axis=0).max() < 1e-7
+        assert (each.stability == "stable") is is_stable
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (
+            {
+                "load": [
+                    {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [1.0, 0.0, 0.0]}
+                ]
+            },
+            "loads",
+        ),
+        (
+            {
+                "joint": [
+                    *turning_pendulum(1.0).joint[:2],
+                    {
+                        "name": "C",
+                        "type": "distance",
+                        "bodies": ["ground", "ball"],
+                        "anchors": [[1.0, 1.0, 0.0], [0.3, 0.0, -0.4]],
+                    },
+                ],
+                "body": [
+                    *turning_pendulum(1.0).body,
+                    {"name": "free", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 5.0]},
+                ],
+            },
+            "joint 'C' does not turn with it",
+        ),
+    ],
+)
+def test_motions_that_are_not_steady_are_refused_with_the_cause(change, says):
+    with pytest.raises(SceneError, match=rf"driver\[A\]: .*{says}.*, so the motion is not steady"):
+        equilibria(turning_pendulum(6.0, **change), starts=2)
+
+
+def test_commands_name_a_steady_motion_and_its_rate(tmp_path, capsys):
+    path = str(tmp_path / "my.toml")
+    turning_pendulum(6.0).save(path)
+    assert main(["equilibrium", path, "--starts", "8"]) == 0
+    assert "stable, turns at 6 rad/s" in capsys.readouterr().out
+    assert main(["modes", path, "--starts", "8", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    assert shown["rate"] == 6.0 and shown["stability"] == "stable"
