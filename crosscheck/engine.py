@@ -226,6 +226,19 @@ class Engine(ABC):
         for module in self.modules:
             import_module(module)
 
+    def estimated(self, run: Trajectory, seconds: float) -> Trajectory:
+        """Return a run with the engine's own estimate of its error; the run itself if the engine makes no
+        estimate.
+
+        Parameters
+        ----------
+        run : Trajectory
+            The return value of ``run``.
+        seconds : float
+            CPU time (s) for the estimate.
+        """
+        return run
+
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene from t = 0 and return the states at the sample times.

@@ -69,6 +69,12 @@ class Run:
         return self.metric("error")
 
     @property
+    def estimate(self) -> float:
+        """Return the largest error that the engine itself estimates; NaN if it makes no estimate."""
+        largest = (self.record.get("error_estimate") or {}).get("largest")
+        return math.nan if largest is None else float(largest)
+
+    @property
     def drawn(self) -> tuple[float, float]:
         """Return error and time (s) for logarithmic axes; the error is at least the bound on the truth's own
         error."""

@@ -51,6 +51,7 @@ OPTIONS = {
     "rtol": "relative tolerance of a step",
     BRANCHES: "pairs of a singular position and the branch to take there, from 1: [[2, 2]]",
 }
+SECOND_RUN = "taylor"  # the method of the second runs by which errors are estimated
 TOLERANCES = (1e-3, 1e-5, 1e-7, 1e-9, 1e-10, 1e-11)
 
 
@@ -139,7 +140,7 @@ class Mbref(Engine):
     def prepare(self, families: Sequence[str]) -> None:
         from mbref.simulation.simulate import prepare
 
-        for family in families:
+        for family in dict.fromkeys([*families, SECOND_RUN]):
             prepare(_method(family))
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
@@ -154,6 +155,13 @@ class Mbref(Engine):
 
         code = "generated" if setting.family.endswith(GENERATED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+
+    def estimated(self, run: Trajectory, seconds: float) -> Trajectory:
+        """Return the run with ``error_estimate``, whose warning on a sensitive motion is part of
+        ``message``."""
+        from mbref.motion import Motion
+
+        return run.with_error_estimate(seconds) if isinstance(run, Motion) else run
 
 
 def _methods(scene: Scene) -> Sequence[str]:

@@ -11,6 +11,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from functools import partial
 from threading import Lock, get_ident
 from typing import Any
 
@@ -27,7 +28,10 @@ MOST_IDLE = 8  # idle children: about one for every engine
 COPIES = sys.platform == "linux"
 NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
 EVERY_ENGINE = "*"  # name of the child in which the runs of all engines take turns
+ESTIMATED = 0.1  # fraction of a run's time limit that its error estimate may take
 READY_SECONDS = 600.0  # s for imports and compilation, before the time limit of a run applies
+
+Question = Callable[..., Trajectory]  # a function of `serve` that makes a run
 
 _idle: list[tuple[str, Child]] = []  # idle children with their engines, the latest one at the end
 _lending = Lock()
@@ -47,9 +51,26 @@ def run_isolated(
     of waiting, without imports and compilation. A crash, a hang, an exception or a missing package gives a
     trajectory without states and with outcome CRASHED or TIMED_OUT. Raises LookupError for an unknown engine.
     """
+    return _run_alone(serve.run_once, engine_name, scene, times, setting, time_limit)
+
+
+def run_estimated(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Trajectory:
+    """Run like `run_isolated`, with the engine's own estimate of its error if the engine makes one.
+
+    The estimate may take ESTIMATED of the time limit; a run that took longer has none.
+    """
+    question = partial(serve.run_estimated, seconds=ESTIMATED * time_limit)
+    return _run_alone(question, engine_name, scene, times, setting, time_limit)
+
+
+def _run_alone(
+    question: Question, engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, time_limit: float
+) -> Trajectory:
     _check(engine_name)
     with _in_use(engine_name) as child:
-        run = _observed(child, engine_name, scene, times, setting, time_limit).value
+        run = _observed(child, engine_name, scene, times, setting, time_limit, question=question).value
         if run.outcome is not Outcome.COMPLETED:
             child.kill()
     return run
@@ -164,13 +185,14 @@ def _observed(
     setting: Setting,
     time_limit: float,
     in_copy: bool = False,
+    question: Question = serve.run_once,
 ) -> Observation:
     version = ""
     try:
         if child.ready is None or not in_copy:
             child.ready = _made_ready(child, engine_name, setting.family)
         version, said, _ = child.ready
-        seen = child.call(serve.run_once, (engine_name, scene, times, setting), time_limit, in_copy)
+        seen = child.call(question, (engine_name, scene, times, setting), time_limit, in_copy)
     except ChildFailed as failure:
         outcome, message = failure.outcome, str(failure)
         return Observation(serve.failed(engine_name, version, scene, setting, outcome, message), "", ())

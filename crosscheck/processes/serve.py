@@ -57,6 +57,14 @@ def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting
     return answered(simulator, scene, times, setting)
 
 
+def run_estimated(
+    engine_name: str, scene: Scene, times: np.ndarray, setting: Setting, seconds: float
+) -> Trajectory:
+    """Return `run_once` with the engine's own estimate of its error, made within CPU time (s)."""
+    run = run_once(engine_name, scene, times, setting)
+    return engine(engine_name).estimated(run, seconds) if run.times.size else run
+
+
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:
     """Return the engine's version, the reason why it cannot run the scene or None, and its settings if the
     engine can run the scene."""

@@ -23,7 +23,7 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed, stop_all
-from crosscheck.processes.pool import end_idle, run_isolated
+from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
 from crosscheck.study.scouting import offer
@@ -179,7 +179,7 @@ def key(case: Case) -> str:
 
 def run_case(case: Case) -> Record:
     """Return the raw record of one run, metrics included."""
-    return record_of(case, run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit))
+    return record_of(case, run_estimated(case.engine, case.scene, case.times, case.setting, case.time_limit))
 
 
 def run_in_turn(case: Case) -> Record:

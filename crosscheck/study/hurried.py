@@ -3,7 +3,7 @@ are not started."""
 
 from __future__ import annotations
 
-from crosscheck.processes.pool import run_isolated
+from crosscheck.processes.pool import run_estimated
 from crosscheck.processes.serve import failed
 from crosscheck.study.grid import Case, Record, record_of
 from mbref.trajectory import Outcome, Trajectory
@@ -26,7 +26,7 @@ class Hurried:
         family = case.scene.name, case.engine, case.setting.family
         if family in self._slow:
             return failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)
-        run = run_isolated(case.engine, case.scene, case.times, case.setting, case.time_limit)
+        run = run_estimated(case.engine, case.scene, case.times, case.setting, case.time_limit)
         if run.outcome is Outcome.TIMED_OUT:
             self._slow.add(family)
         return run

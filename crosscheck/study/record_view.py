@@ -23,6 +23,7 @@ PUBLIC = (
     "times",
     "bodies",
     "reactions",
+    "error_estimate",
     "metrics",
     "cost",
 )

@@ -257,9 +257,9 @@ def test_figures_and_no_simulation(blocks, monkeypatch):
 
     for module, name in (
         (crosscheck.study.grid, "study"),
-        (crosscheck.processes.pool, "run_isolated"),
+        (crosscheck.processes.pool, "_run_alone"),
         (mbref.simulation.simulate, "simulate"),
-        (crosscheck.study.grid, "run_isolated"),
+        (crosscheck.study.grid, "run_estimated"),
     ):
         monkeypatch.setattr(module, name, simulated)
     drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw()]

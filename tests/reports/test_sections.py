@@ -58,9 +58,9 @@ def test_every_section_and_a_heading(monkeypatch):
 
     for module, name in (
         (crosscheck.study.grid, "study"),
-        (crosscheck.processes.pool, "run_isolated"),
+        (crosscheck.processes.pool, "_run_alone"),
         (mbref.simulation.simulate, "simulate"),
-        (crosscheck.study.grid, "run_isolated"),
+        (crosscheck.study.grid, "run_estimated"),
     ):
         monkeypatch.setattr(module, name, simulated)
     parts = blocks(groups())

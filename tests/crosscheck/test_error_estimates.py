@@ -1,0 +1,73 @@
+"""Errors that an engine estimates / records of a study, the time limit, engines without estimates."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting, engine
+from crosscheck.processes import serve
+from crosscheck.processes.pool import run_isolated
+from crosscheck.study.grid import Case, run_case
+from crosscheck.study.record_view import public
+from mbref.scene import Body, Revolute, Scene
+from mbref.scenes import SCENES
+from mbref.trajectory import Outcome
+
+SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)
+TIMES = np.linspace(0.0, 0.3, 7)
+LOOSE = Setting("mpi-svd+projection", {"rtol": 1e-4})
+
+
+def test_a_record_of_mbref_has_the_estimate_beside_the_error():
+    record = run_case(Case(SCENE, TIMES, "mbref", LOOSE))
+    found = record["error_estimate"]
+    assert found["largest"] == max(found["error"]) and len(found["error"]) == len(TIMES)
+    assert found["largest"] == pytest.approx(record["metrics"]["error"], rel=1e-3)
+    assert json.loads(json.dumps(public(record)))["error_estimate"]["rtol"] == 1e-4
+
+
+def test_a_run_that_takes_longer_than_the_estimate_may_has_none():
+    run = serve.run_estimated("mbref", SCENE, TIMES, LOOSE, 0.0)
+    found = run.to_record()["error_estimate"]
+    assert found["largest"] is None and "more than 0 s" in found["reason"]
+    assert np.array_equal(run.position, serve.run_once("mbref", SCENE, TIMES, LOOSE).position)
+
+
+def test_runs_that_are_not_of_a_study_have_no_estimate():
+    assert run_isolated("mbref", SCENE, TIMES, LOOSE, 60.0).to_record()["error_estimate"] is None
+
+
+def test_an_engine_without_estimates_gives_its_run(monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    record = run_case(Case(SCENE, TIMES, "fake_engines:FAKE", Setting("a", {"seconds": 0.5})))
+    assert "error_estimate" not in record
+    bare = dataclasses.replace(serve.run_once("mbref", SCENE, TIMES, LOOSE))
+    assert engine("fake_engines:FAKE").estimated(bare, 1.0) is bare
+
+
+def test_a_sensitive_motion_is_reported_in_the_message():
+    """Three rods in a row, released from a horizontal line, are chaotic."""
+    bodies = tuple(
+        Body(name=f"rod{k}", mass=1.0, inertia=(0.02, 0.02, 0.02), position=(0.4 * k + 0.2, 0.0, 0.0))
+        for k in range(3)
+    )
+    joints = tuple(
+        Revolute(
+            name=f"P{k}",
+            bodies=(f"rod{k - 1}" if k else "ground", f"rod{k}"),
+            anchor=(0.4 * k, 0.0, 0.0),
+            axis=(0.0, 0.0, 1.0),
+        )
+        for k in range(3)
+    )
+    rods = Scene(name="rods", gravity=(0.0, -9.81, 0.0), duration=8.0, body=bodies, joint=joints)
+    setting = Setting("taylor", {"rtol": 1e-7})
+    run = serve.run_estimated("mbref", rods, np.linspace(0.0, 8.0, 9), setting, 10.0)
+    assert run.outcome is Outcome.COMPLETED
+    assert run.message.startswith("sensitive motion: error about "), run.message
+    assert serve.run_once("mbref", rods, np.linspace(0.0, 8.0, 9), setting).message == ""
