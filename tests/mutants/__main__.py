@@ -6,122 +6,209 @@ run out of time it is counted apart.  ``--only mbref/taylor`` draws from files o
 ``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
-The tests of a mutant run in one process, the quickest first.  Their limits are CPU time, so that other work
-on the machine does not end them.  Results and the times of tests stay in ``build/mutants.jsonl`` as long as
-the file and its tests are the same, so that an interrupted run goes on where it ended.  Kernels run as plain
-Python, so that none is compiled for a mutant.  Exit status 1 where a mutant survives or runs out of time.
+The test files that name the mutant's function or module run first, then the quickest, until a test fails or
+20 s of CPU time are over; other work on the machine does not end them.  A test that fails without the mutant,
+too, is left out.  Results stay in ``build/mutants.jsonl`` as long as the file and its tests are the same, so
+that an interrupted run goes on where it ended.  Tests of files with kernels run as plain Python, so that no
+kernel is compiled for a mutant.  A mutant that only a test of a stored text sees is counted apart.  Exit
+status 1 where a mutant survives, is seen by a stored text alone or runs out of time.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
+import functools
 import hashlib
 import json
 import os
 import random
-import resource
+import re
 import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
-from crosscheck.engine import installed
+from crosscheck import engine as crosscheck_engine
 from tests.mutants.equivalent import reason
-from tests.mutants.importers import ADAPTERS, PACKAGES, engines, importers
+from tests.mutants.importers import ADAPTERS, PACKAGES, SNAPSHOTS, engines, importers
 from tests.mutants.operators import Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
 COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml", "README.md")
 KEPT = ROOT / "build" / "mutants.jsonl"
+TREE = ROOT / "build" / "mutants" / "tree"
+WORKERS = Path(__file__).with_name("workers.py")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
-EQUIVALENT, UNTESTED = "equivalent", "untested"
-LEAST, FACTOR = 20.0, 4.0  # CPU s that tests may take with a mutant, and multiples of their time without
-LONGEST = 60.0  # CPU s that a test file may take without; others are left out
+BY_TEXT, EQUIVALENT, UNTESTED = "killed by a stored text alone", "equivalent", "untested"
+RENDERED = (
+    "reports/",
+    "crosscheck/study/",
+    "crosscheck/judge/",
+)  # packages whose numbers stand in stored texts
+BUDGET, LIMIT = 20.0, 60.0  # CPU s after which no test begins, and after which a test is ended
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
-JITTED = ("mbref/kernels/",)  # what plain Python does not run
+PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
+WITH_KERNELS = (
+    "mbref/kernels/",
+    "mbref/linear_algebra/",
+    "mbref/equations/",
+    "mbref/formulations/",
+    "mbref/stabilisation/",
+    "mbref/integrators/",
+    "mbref/stepping/",
+    "mbref/taylor/",
+)
+COMPILING = ("mbref/kernels/compilation.py", "mbref/kernels/disk_cache.py")  # plain Python does not run them
 
 
 class Tree:
-    """A copy of the sources, in which mutants are planted; it keeps the CPU times of tests in a file."""
+    """A copy of the sources, in which mutants are planted; processes of its own run the tests.
 
-    def __init__(
-        self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED, kept: Path = KEPT
-    ) -> None:
-        self.place, self._kept = place, kept
-        self._seconds = {r["time of"]: r["seconds"] for r in _records(kept) if "time of" in r}
+    The copy stands always in the same place, since compiled kernels are kept by the path of their source.
+    """
+
+    def __init__(self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED) -> None:
+        self.place, self._planted, self._begun = place, 0, time.time()
+        self._workers: dict[bool, subprocess.Popen[str]] = {}
+        self._seconds: dict[str, float] = {}
+        self._sound: dict[tuple[bool, str], bool] = {}
+        shutil.rmtree(place, ignore_errors=True)
+        place.mkdir(parents=True)
         for name in (name for name in copied if (root / name).exists()):
-            copy = shutil.copytree if (root / name).is_dir() else shutil.copy
+            copy = shutil.copytree if (root / name).is_dir() else shutil.copy2
             copy(root / name, place / name)
 
-    def result(self, mutant: Mutant, tests: Sequence[str]) -> str:
-        """Return whether the tests see a mutant: KILLED, SURVIVED or TIMED_OUT, or UNTESTED where no test
-        passes without it.  The tree is left as it was."""
-        jitted = mutant.file.startswith(JITTED)
-        seconds = {test: self._time(test, jitted) for test in tests}
-        sound = sorted((test for test in tests if seconds[test] <= LONGEST), key=lambda test: seconds[test])
-        if not sound:
-            return UNTESTED
+    def result(self, mutant: Mutant, tests: Sequence[str]) -> tuple[str, str]:
+        """Return whether tests see a mutant, KILLED, BY_TEXT, SURVIVED or TIMED_OUT, and the first test that
+        does.
+
+        A test that fails without the mutant, too, is left out.  The tree is left as it was.
+        """
+        if not tests:
+            return UNTESTED, ""
+        source = (self.place / mutant.file).read_text()
+        plain = is_plain(mutant.file, source)
+        texts = {test: (self.place / test).read_text() for test in tests}
+        result, test = self._seen(mutant, source, ordered(mutant, source, texts, self._seconds), plain)
+        if result == SURVIVED and mutant.file.startswith(RENDERED):
+            result, test = self._seen(mutant, source, SNAPSHOTS, plain)
+            result = BY_TEXT if result == KILLED else SURVIVED  # a text that takes too long sees nothing
+        return result, test
+
+    def _seen(self, mutant: Mutant, source: str, files: Sequence[str], plain: bool) -> tuple[str, str]:
+        """Return KILLED, SURVIVED or TIMED_OUT, and the test that fails."""
+        out: list[str] = []
+        while True:
+            with self._plant(mutant, source):
+                answer = self._ask(plain, files, out)
+            for file, seconds in answer["seconds"].items():
+                self._seconds[file] = max(seconds, self._seconds.get(file, 0.0))
+            if answer["status"] in (0, 5):
+                return SURVIVED, ""
+            test = answer["failed"]
+            if answer["status"] is None:
+                return TIMED_OUT, ""
+            if not test and self._ask(plain, files, out)["status"] not in (0, 5):
+                raise RuntimeError(f"the tests end early without a mutant, too: {' '.join(files)}")
+            if not test or self._is_sound(test, plain):
+                return KILLED, test
+            if "::" in test:
+                out.append(test)
+            else:
+                files = [file for file in files if file != test]
+
+    def _is_sound(self, test: str, plain: bool) -> bool:
+        """Return whether a test passes without a mutant."""
+        if (plain, test) not in self._sound:
+            only = test if "::" in test else ""
+            answer = self._ask(plain, [test.split("::", maxsplit=1)[0]], (), only)
+            self._sound[plain, test] = answer["status"] == 0
+        return self._sound[plain, test]
+
+    @contextmanager
+    def _plant(self, mutant: Mutant, source: str) -> Iterator[None]:
+        """Plant a mutant for the ``with`` block, with a time that the file never had."""
         path = self.place / mutant.file
-        good = path.read_text()
-        path.write_text(mutant.planted(good))
+        before = path.stat()
+        self._planted += 1
+        path.write_text(mutant.planted(source))
+        os.utime(path, (before.st_atime, self._begun + 2 * self._planted))
         try:
-            limit = max(LEAST, FACTOR * sum(seconds[test] for test in sound))
-            status, _ = self._run(sound, jitted, limit)
+            yield
         finally:
-            path.write_text(good)
-        return TIMED_OUT if status is None else SURVIVED if status == 0 else KILLED
+            path.write_text(source)
+            os.utime(path, (before.st_atime, before.st_mtime))
 
-    def _time(self, test: str, jitted: bool) -> float:
-        """The CPU seconds that a test file takes without a mutant; infinite where it fails."""
-        text = f"{test} {jitted} {(self.place / test).read_text()}"
-        name = hashlib.sha256(text.encode()).hexdigest()[:16]
-        if name not in self._seconds:
-            status, seconds = self._run([test], jitted, LONGEST)
-            self._seconds[name] = seconds if status == 0 else float("inf")
-            with self._kept.open("a") as file:
-                record = {"time of": name, "seconds": self._seconds[name], "test": test}
-                print(json.dumps(record), file=file)
-        return self._seconds[name]
-
-    def _run(self, tests: Sequence[str], jitted: bool, limit: float) -> tuple[int | None, float]:
-        """Return the exit status of pytest and its CPU seconds: 0 passed, 1 failed, 2 not even collected; 0
-        where there is no test; None when the time was up."""
-        environment = {
-            **os.environ,
-            "PYTHONPATH": str(self.place),
-            "PYTHONDONTWRITEBYTECODE": "1",
-            "HYPOTHESIS_PROFILE": "first",
-        }
-        if not jitted:
-            environment["NUMBA_DISABLE_JIT"] = "1"
-        command = [sys.executable, "-P", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *tests]
-        begun = _children_seconds()
-        try:
-            done = subprocess.run(
-                command,
+    def _ask(self, plain: bool, files: Sequence[str], out: Sequence[str], only: str = "") -> dict[str, Any]:
+        """Return the answer of a process that runs tests."""
+        if plain not in self._workers:
+            self._workers[plain] = subprocess.Popen(
+                [sys.executable, "-P", str(WORKERS)],
                 cwd=self.place,
-                env=environment,
-                capture_output=True,
+                env={
+                    **os.environ,
+                    "PYTHONPATH": str(self.place),
+                    "HYPOTHESIS_PROFILE": "first",
+                    **({"NUMBA_DISABLE_JIT": "1"} if plain else {}),
+                },
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
                 text=True,
-                timeout=WAITING * limit,
-                check=False,
-                preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 5)),
             )
-        except subprocess.TimeoutExpired:
-            return None, _children_seconds() - begun
-        status = {5: 0, -signal.SIGXCPU: None, -signal.SIGKILL: None}.get(done.returncode, done.returncode)
-        return status, _children_seconds() - begun
+        worker = self._workers[plain]
+        assert worker.stdin and worker.stdout
+        request = {
+            "files": files,
+            "out": out,
+            "only": only,
+            "budget": BUDGET,
+            "limit": LIMIT,
+            "waiting": WAITING * LIMIT,
+        }
+        print(json.dumps(request), file=worker.stdin, flush=True)
+        return json.loads(worker.stdout.readline())
+
+    def close(self) -> None:
+        """End the processes."""
+        for worker in self._workers.values():
+            worker.kill()
+            worker.communicate()
 
 
-def _children_seconds() -> float:
-    used = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return used.ru_utime + used.ru_stime
+def is_plain(file: str, source: str) -> bool:
+    """Return whether the tests of a file run without compilation: where it has kernels."""
+    has_kernels = file.startswith(WITH_KERNELS) or re.search(r"^(from|import) numba\b", source, re.MULTILINE)
+    return bool(has_kernels) and file not in COMPILING
+
+
+def ordered(mutant: Mutant, source: str, tests: Mapping[str, str], seconds: Mapping[str, float]) -> list[str]:
+    """Return the names of test files with these texts.
+
+    Files that name the function or class of a mutant, or its module, come first, and then the quickest.
+    """
+    words = {Path(mutant.file).stem, *around(source, mutant)}
+    places = list(tests)
+
+    def rank(test: str) -> tuple[bool, float, int]:
+        named = any(re.search(rf"\b{word}\b", tests[test]) for word in words)
+        return not named, seconds.get(test, len(tests[test]) / PER_SECOND), places.index(test)
+
+    return sorted(tests, key=rank)
+
+
+def around(source: str, mutant: Mutant) -> list[str]:
+    """Return the names of the functions and classes that contain a mutant."""
+    return [
+        node.name
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and node.lineno <= mutant.line <= (node.end_lineno or 0)
+    ]
 
 
 def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
@@ -142,12 +229,23 @@ def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
 
 
 def _files(only: str) -> Iterator[str]:
-    absent = tuple(f"{ADAPTERS}{name}/" for name in engines() if not installed(name))
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             name = path.relative_to(ROOT).as_posix()
-            if name.startswith(only) and not name.startswith(absent):
+            if name.startswith(only) and not _is_absent(name):
                 yield name
+
+
+@functools.cache
+def installed(engine: str) -> bool:
+    """Return whether an engine is installed."""
+    return crosscheck_engine.installed(engine)
+
+
+def _is_absent(file: str) -> bool:
+    """Return whether a file belongs to the adapter of an engine that is not installed."""
+    folder = file.removeprefix(ADAPTERS).partition("/")[0]
+    return file.startswith(ADAPTERS) and folder in engines() and not installed(folder)
 
 
 def key(mutant: Mutant, tests: Sequence[str]) -> str:
@@ -168,23 +266,21 @@ def _records(path: Path) -> list[dict[str, Any]]:
 def run(chosen: Sequence[Mutant], seconds: float) -> dict[Mutant, str]:
     """Return the result of each mutant; none is begun after that time."""
     found, before, end = {}, known(), time.monotonic() + seconds
-    KEPT.parent.mkdir(exist_ok=True)
-    with ExitStack() as stack:
-        tree: Tree | None = None
+    with closing(Tree(TREE)) as tree:
         for k, mutant in enumerate(chosen, 1):
             tests = importers(mutant.file)
-            name = key(mutant, tests)
+            name, by = key(mutant, tests), ""
             if why := reason(mutant, (ROOT / mutant.file).read_text()):
                 before[name] = EQUIVALENT
             elif name not in before:
                 if time.monotonic() > end:
                     break
-                tree = tree or Tree(Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mutants-"))))
-                before[name] = tree.result(mutant, tests)
+                before[name], by = tree.result(mutant, tests)
                 with KEPT.open("a") as file:
-                    print(json.dumps({"key": name, "result": before[name]}), file=file)
+                    record = {"key": name, "result": before[name], "by": by, "mutant": _line(mutant)}
+                    print(json.dumps(record), file=file)
             found[mutant] = before[name]
-            print(f"{k:3} of {len(chosen)}: {found[mutant]:10} {_line(mutant)}  {why or ''}", flush=True)
+            print(f"{k:3} of {len(chosen)}: {found[mutant]:10} {_line(mutant)}  {why or by}", flush=True)
     return found
 
 
@@ -197,7 +293,11 @@ def score(results: Sequence[str]) -> str:
     """Return the killed mutants of those that change something, and the numbers of the others."""
     real = [result for result in results if result != EQUIVALENT]
     killed = real.count(KILLED)
-    others = [f"{results.count(r)} {r}" for r in (TIMED_OUT, SURVIVED, UNTESTED, EQUIVALENT) if r in results]
+    others = [
+        f"{results.count(r)} {r}"
+        for r in (BY_TEXT, TIMED_OUT, SURVIVED, UNTESTED, EQUIVALENT)
+        if r in results
+    ]
     return ", ".join([f"{killed} of {len(real)} killed ({killed / max(1, len(real)):.0%})", *others])
 
 

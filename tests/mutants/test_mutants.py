@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,7 @@ import pytest
 from tests.mutants import __main__ as runner
 from tests.mutants.equivalent import REASONS
 from tests.mutants.importers import SNAPSHOTS, importers
-from tests.mutants.operators import KINDS, mutants
+from tests.mutants.operators import KINDS, Mutant, mutants
 
 ROOT = Path(__file__).parents[2]
 BY_KIND = {
@@ -85,6 +86,10 @@ def test_no_mutant_is_drawn_of_an_engine_that_is_not_installed(monkeypatch):
 
 
 TINY = {
+    "test_text.py": "from mbref.sums import total\n\n\n"
+    "def test_text():\n    assert str(total(1, 1)) == '2'\n",
+    "test_crash.py": "import os\n\nfrom mbref.sums import total\n\n\n"
+    "def test_crash():\n    if total(1, 1) == 0:\n        os._exit(1)\n",
     "mbref/sums.py": "def total(a, b):\n    return a + b\n\n\n"
     "def wait(n):\n    while n > 0:\n        n = n - 1\n",
     "test_total.py": "from mbref.sums import total\n\n\ndef test_total():\n    assert total(2, 3) == 5\n",
@@ -94,33 +99,70 @@ TINY = {
 }
 
 
+@pytest.fixture(scope="module")
+def tree(tmp_path_factory):
+    """A tree of the tiny sources, whose tests may take 3 s."""
+    folder = tmp_path_factory.mktemp("mutants")
+    for name, text in TINY.items():
+        (folder / "root" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "root" / name).write_text(text)
+    names = [name.partition("/")[0] for name in TINY]
+    with (
+        pytest.MonkeyPatch.context() as patch,
+        closing(runner.Tree(folder / "place", folder / "root", names)) as made,
+    ):
+        patch.setattr(runner, "LIMIT", 3.0)
+        patch.setattr(runner, "SNAPSHOTS", ("test_text.py",))
+        patch.setattr(runner, "RENDERED", ("mbref/",))
+        yield made
+
+
+def planted(new: str) -> Mutant:
+    [found] = [m for m in mutants("mbref/sums.py", TINY["mbref/sums.py"]) if m.new == new]
+    return found
+
+
 @pytest.mark.parametrize(
     ("tests", "new", "expected"),
     [
-        (["test_total.py"], "((a) - (b))", runner.KILLED),
-        (["test_weak.py"], "((a) - (b))", runner.SURVIVED),
-        (["test_weak.py", "test_total.py"], "((a) - (b))", runner.KILLED),
-        (["test_wait.py"], "((n) + (1))", runner.TIMED_OUT),
-        (["test_broken.py"], "((a) - (b))", runner.UNTESTED),
+        (["test_total.py"], "((a) - (b))", (runner.KILLED, "test_total.py::test_total")),
+        (["test_weak.py"], "((a) - (b))", (runner.BY_TEXT, "test_text.py::test_text")),
+        (["test_weak.py"], "2", (runner.SURVIVED, "")),
+        (["test_weak.py", "test_total.py"], "((a) - (b))", (runner.KILLED, "test_total.py::test_total")),
+        (["test_wait.py"], "((n) + (1))", (runner.TIMED_OUT, "")),
+        (["test_broken.py", "test_weak.py"], "2", (runner.SURVIVED, "")),
+        ([], "((a) - (b))", (runner.UNTESTED, "")),
     ],
 )
-def test_results_of_tests_that_see_it_or_not(tmp_path, monkeypatch, tests, new, expected):
+def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
     """A time-out is no kill, and tests that fail without the mutant say nothing."""
-    monkeypatch.setattr(runner, "LEAST", 2.0)
-    monkeypatch.setattr(runner, "FACTOR", 1.0)
-    root, place = tmp_path / "root", tmp_path / "place"
-    for name, text in TINY.items():
-        (root / name).parent.mkdir(parents=True, exist_ok=True)
-        (root / name).write_text(text)
-    place.mkdir()
-    copied = ("mbref", *(name for name in TINY if name.startswith("test")))
-    tree = runner.Tree(place, root, copied, tmp_path / "kept.jsonl")
-    [mutant] = [m for m in mutants("mbref/sums.py", TINY["mbref/sums.py"]) if m.new == new]
-    assert tree.result(mutant, tests) == expected
-    assert (place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left in the tree"
-    again = runner.Tree(place, root, (), tmp_path / "kept.jsonl")
-    monkeypatch.setattr(again, "_run", None)
-    assert all(again._time(test, False) > 0 for test in tests), "times of tests are measured once"
+    assert tree.result(planted(new), tests) == expected
+    assert (tree.place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left"
+
+
+def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():
+    mutant, source = planted("((a) - (b))"), TINY["mbref/sums.py"]
+    tests = ["test_broken.py", "test_wait.py", "test_weak.py", "test_total.py"]
+    seconds = {"test_weak.py": 2.0, "test_total.py": 1.0, "test_broken.py": 0.1, "test_wait.py": 0.3}
+    assert runner.around(source, mutant) == ["total"]
+    texts = {test: TINY[test] for test in tests}
+    assert runner.ordered(mutant, source, texts, seconds) == [
+        "test_wait.py",  # all import the module ``sums``, except the last one
+        "test_total.py",
+        "test_weak.py",
+        "test_broken.py",
+    ]
+
+
+def test_files_with_kernels_run_without_compilation():
+    for file in (
+        "mbref/taylor/series.py",
+        "mbref/equations/loads.py",
+        "crosscheck/engines/compiled/calls.py",
+    ):
+        assert runner.is_plain(file, (ROOT / file).read_text()), file
+    for file in ("mbref/scene.py", "mbref/kernels/disk_cache.py", "crosscheck/study/grid.py"):
+        assert not runner.is_plain(file, (ROOT / file).read_text()), file
 
 
 def test_the_score_counts_no_equivalent_mutant_and_no_time_out():
@@ -132,3 +174,12 @@ def test_reasons_name_lines_that_are_there():
     for (file, line, _), why in REASONS.items():
         assert line in [text.strip() for text in (ROOT / file).read_text().splitlines()], (file, line)
         assert why.endswith("."), (file, line, why)
+
+
+def test_a_crash_is_a_kill_only_where_the_mutant_causes_it(tree):
+    mutant = planted("((a) - (b))")
+    assert tree.result(mutant, ["test_crash.py"]) == (runner.KILLED, "")
+    path = tree.place / "test_crash.py"
+    path.write_text("import os\n\n\ndef test_crash():\n    os._exit(1)\n")
+    with pytest.raises(RuntimeError, match="end early without a mutant, too: test_crash"):
+        tree.result(mutant, [path.name])

@@ -1,0 +1,129 @@
+"""Run tests in forks of one process that has imported the libraries, so that each run begins in 0.2 s.
+
+The process reads requests from its input, one JSON object a line, and answers in one line each.  It imports
+none of the project's packages: each fork imports them anew, with the mutant that stands in the tree.
+
+A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
+of the one test that runs; empty: all), ``budget`` (CPU s after which no test begins), ``limit`` (CPU s of the
+fork) and ``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was
+up), ``failed`` (the id of the test that failed first, or the file that could not be collected) and
+``seconds`` (CPU s by file).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import resource
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import hypothesis
+import numba
+import pydantic
+import pytest
+import rich.progress
+import scipy.integrate
+import scipy.optimize
+import scipy.sparse.linalg
+
+LIBRARIES = (hypothesis, numba, pydantic, rich, scipy)
+OPTIONS = ("-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+CRASHED = 3  # status of a fork that ended without an answer
+
+
+class Session:
+    """A pytest plugin that leaves out tests and stops when the time is up."""
+
+    def __init__(self, request: dict[str, Any]) -> None:
+        self._out, self._only, self._budget = set(request["out"]), request["only"], request["budget"]
+        self.failed = ""
+
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        """Leave out tests."""
+        items[:] = [
+            item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)
+        ]
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """End where the time is up."""
+        if _cpu() > self._budget:
+            pytest.exit("long enough", returncode=5)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Note the first test that fails."""
+        self.failed = self.failed or (report.nodeid if report.failed else "")
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        """Note the first file that cannot be collected."""
+        self.failed = self.failed or (report.nodeid if report.failed else "")
+
+
+def _cpu() -> float:
+    """Return the CPU seconds of this process and of the children that have ended."""
+    return sum(os.times()[:4])
+
+
+def work(request: dict[str, Any], answer: Path) -> None:
+    """Run the tests of a request in this process and write the answer."""
+    resource.setrlimit(resource.RLIMIT_CPU, (int(request["limit"]), int(request["limit"]) + 5))
+    null = os.open(os.devnull, os.O_RDWR)
+    for stream in range(3):
+        os.dup2(null, stream)
+    session, status, seconds = Session(request), 0, {}
+    for file in request["files"]:
+        begun = _cpu()
+        status = int(pytest.main([*OPTIONS, file], plugins=[session]))
+        seconds[file] = _cpu() - begun
+        if status not in (0, 5) or _cpu() > request["budget"]:
+            break
+    answer.write_text(json.dumps({"status": status, "failed": session.failed, "seconds": seconds}))
+
+
+def answer_of(request: dict[str, Any]) -> dict[str, Any]:
+    """Fork, wait for the end or the limit, and return the answer."""
+    with tempfile.TemporaryDirectory() as place:
+        path, end = Path(place) / "answer", time.monotonic() + request["waiting"]
+        sys.stdout.flush()
+        child = os.fork()
+        if not child:
+            os.setpgid(0, 0)
+            try:
+                work(request, path)
+            finally:
+                os._exit(0)
+        status = _wait(child, end)
+        if path.exists():
+            return json.loads(path.read_text())
+    is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
+    return {"status": None if is_late else CRASHED, "failed": "", "seconds": {}}
+
+
+def _wait(child: int, end: float) -> int:
+    """Return the status with which a fork ends; it is killed at the end, and its children in any case."""
+    ended, status = 0, 0
+    while not ended:
+        ended, status = os.waitpid(child, os.WNOHANG)
+        if not ended and time.monotonic() > end:
+            os.killpg(child, signal.SIGKILL)
+            ended, status = os.waitpid(child, 0)
+        time.sleep(0.02)
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(child, signal.SIGKILL)
+    return status
+
+
+def main() -> None:
+    """Answer requests until the input ends."""
+    sys.path.insert(0, os.getcwd())
+    for line in sys.stdin:
+        print(json.dumps(answer_of(json.loads(line))), flush=True)
+
+
+if __name__ == "__main__":
+    main()
