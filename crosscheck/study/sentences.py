@@ -172,8 +172,8 @@ def _less_than_right(groups: Sequence[Judged], name: str) -> str:
     graded = {scene: grade(record) for scene, record in found.items()}
     lost = [scene for scene, verdict in graded.items() if verdict is Grade.FAILED]
     if lost:
-        place = "" if len(groups) == 1 else f" on {listed(lost)}"
-        return f"{title(name)} completes no run{place}: {_end(found[lost[0]])}."
+        ends = [f"{'' if len(groups) == 1 else f' on {scene}'}: {_end(found[scene])}" for scene in lost]
+        return f"{title(name)} completes no run{','.join(ends)}."
     scene = max(found, key=lambda s: error(found[s]))
     place = "" if len(groups) == 1 else f" on {scene}"
     best = f"at best{_of_those_that_end(groups, scene, name)}"

@@ -54,9 +54,15 @@ def fast(groups: Sequence[Judged]) -> str:
         return f"No engine reaches an error of {SAID}, so speeds are not compared."
     never = [n for n in engines_of(groups) if not any(n in cost for cost in costs.values())]
     end = f" {listed(map(title, never))} {'does' if len(never) == 1 else 'do'} not reach it." if never else ""
-    aided = {n for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)}
-    [single, *_] = costs.values()
-    text = _fast_on_one(single, aided) if len(groups) == 1 else _fast_on_several(costs, aided)
+    aided = {
+        (n, g.scene.name) for g in groups for n, (_, r) in g.fastest(LEVEL).items() if is_integrated_here(r)
+    }
+    [(scene, single), *_] = costs.items()
+    text = (
+        _fast_on_one(single, {n for n, place in aided if place == scene})
+        if len(groups) == 1
+        else _fast_on_several(costs, aided)
+    )
     return text + end + _integrated(groups) + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
 
 
@@ -116,7 +122,7 @@ def _whose(name: str, aided: Collection[str]) -> str:
     return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
 
 
-def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection[str]) -> str:
+def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection[tuple[str, str]]) -> str:
     winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
     count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
     first = max(count, key=lambda n: count[n])
@@ -126,7 +132,9 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection
         if winners[scene] == first and len(cost) > 1
     ]
     share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
-    text = f"{_whose(first, aided)} is the fastest to an error of {SAID} on {share} scenes"
+    wins = [scene for scene, name in winners.items() if name == first]
+    by_us = {first} if all((first, scene) in aided for scene in wins) else ()
+    text = f"{_whose(first, by_us)} is the fastest to an error of {SAID} on {share} scenes"
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]

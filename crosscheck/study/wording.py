@@ -16,6 +16,8 @@ def at_most(value: float, bound: float) -> str:
     """Return an error rounded up to two digits, or the truth's own bound if that is larger."""
     if value < bound:
         return f"less than the truth's own bound, {bound:.0e}"
+    if not value:
+        return "0"
     exponent = math.floor(math.log10(value))
     return f"{math.ceil(value / 10.0 ** (exponent - 1)) / 10:.1f}e{exponent}"
 
@@ -48,7 +50,7 @@ def agree(names: Sequence[str]) -> str:
 def seconds(value: float) -> str:
     """Return a time in s, ms or µs."""
     for unit, scale in (("s", 1.0), ("ms", 1e-3)):
-        if value >= scale:
+        if float(f"{value:.3g}") >= scale:
             return f"{value / scale:.3g} {unit}"
     return f"{value * 1e6:.3g} µs"
 

@@ -14,7 +14,7 @@ from crosscheck.study.sentences import breaks, headline, right
 from crosscheck.study.speed_sentences import fast
 from crosscheck.study.verdict import Judged
 from mbref.scene import Body, Scene
-from tests.crosscheck import recomputed
+from tests.crosscheck import recomputed, recomputed_together
 
 REFERENCE = Path(__file__).parents[2] / "reports" / "reference"
 FAMILIES = {
@@ -136,3 +136,22 @@ def test_a_claim_that_the_records_do_not_bear_is_found():
             except AssertionError:
                 seen += 1
         assert seen, (k, change)
+
+
+@pytest.mark.parametrize("seed", range(150))
+def test_sentences_on_several_scenes_together(seed):
+    """Two or three scenes; a third of the engines miss a scene."""
+    draw = random.Random(f"together {seed}")
+    bound, groups, studies = draw.choice((3e-14, 2e-9)), [], {}
+    for k in range(draw.choice((2, 3))):
+        found, _ = study(1000 * seed + k)
+        name = f"block{k}"
+        own = [{**r, "scene": name, "metrics": {**r["metrics"], "error_bound": bound}} for r in found]
+        studies[name] = own
+        truth = {"scene": name, "kind": "reference", "bound": bound, "reason": "", "until": 1.0}
+        groups.append(Judged(SCENE.with_(name=name), truth, own))
+    everything = [r for own in studies.values() for r in own]
+    recomputed_together.headline(headline(groups), studies)
+    recomputed_together.right(right(groups), studies, bound)
+    recomputed_together.fast(fast(groups), studies, ours(everything))
+    recomputed_together.breaks(breaks(groups), studies)

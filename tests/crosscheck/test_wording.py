@@ -18,6 +18,7 @@ def test_lists_of_none_one_and_more():
         (6.04e-9, 1e-14, "6.1e-9"),
         (6.0e-9, 6.0e-9, "6.0e-9"),
         (9.91e-9, 0.0, "10.0e-9"),
+        (0.0, 0.0, "0"),
         (5e-15, 3e-14, "less than the truth's own bound, 3e-14"),
     ],
 )
@@ -35,6 +36,7 @@ def test_one_and_several():
 
 def test_times_and_multiples_at_the_ends_of_their_units():
     assert [wording.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
+    assert [wording.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
     assert [wording.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
     assert (wording.span(2.0, 2.04), wording.span(1.5, 30.0)) == ("2.0 times", "1.5 to 30 times")
 
