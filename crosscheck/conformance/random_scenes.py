@@ -18,12 +18,30 @@ from crosscheck.conformance.moving import consistent
 from crosscheck.conformance.random_mechanisms import random_mechanism, triple
 from crosscheck.judge.constraints import closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
-from mbref.scene import GROUND, Body, Driver, Fixed, Force, Joint, Load, Revolute, Scene, Sine, TorsionSpring
+from mbref.scene import (
+    GROUND,
+    Body,
+    Driver,
+    Factor,
+    Fixed,
+    Force,
+    Joint,
+    JointForce,
+    JointTorque,
+    Load,
+    Revolute,
+    Scene,
+    Sine,
+    SlideSpring,
+    TorsionSpring,
+)
+from mbref.scene_joints import ANGLE, DISPLACEMENT
 
 DURATION = 0.05  # s; in this time bodies of half a metre turn by about 0.1 rad
 # smallest singular value of the normalised constraint rows and driver row; below it the driver hardly moves
 # its joint
 REGULAR = 1e-3
+EVERY = 5  # each fifth mechanism has loads of joints, and loads over time
 FRAME = "frame"  # name of the body that replaces the ground
 NUDGE = 0.1  # m or rad: amplitude of a driver's wave
 
@@ -32,7 +50,8 @@ def mechanism(seed: int) -> Scene:
     """Return a closed-loop mechanism with gravity in a random direction.
 
     Mechanisms of odd seeds have a torsion spring and a driver if a joint accepts them. Mechanisms of even
-    seeds have neither driver nor damping.
+    seeds have neither driver nor damping. Mechanisms of the seeds 4, 9, 14, … have loads of joints, and loads
+    over time.
     """
     rng = np.random.default_rng([seed, 1])
     scene = random_mechanism(seed)
@@ -43,7 +62,61 @@ def mechanism(seed: int) -> Scene:
         duration=DURATION,
         load=(*scene.load, *_torsion(scene, rng)),
     )
+    if seed % EVERY == EVERY - 1:
+        scene = with_loads_of_joints(scene, seed)
     return _driven(scene, rng) if seed % 2 else _undamped(scene)
+
+
+def with_loads_of_joints(scene: Scene, seed: int, switched: bool = False) -> Scene:
+    """Return the scene with a spring, a damper and an actuator for each joint coordinate that takes loads.
+
+    Functions of time multiply the actuators' forces and torques, and all forces and moments of the scene: a
+    polynomial and a sine; where they are ``switched``, also a table of values, from a start to a stop.
+    """
+    rng = np.random.default_rng([seed, 4])
+    loads = [
+        load.model_copy(update={"factor": _factor(rng, switched)})
+        if "factor" in type(load).model_fields
+        else load
+        for load in scene.load
+    ]
+    for joint in scene.joint:
+        sprung = {load.type for load in scene.load if getattr(load, "joint", "") == joint.name}
+        if ANGLE in joint.facts.loaded:
+            stiffness, damping, rest, torque = rng.uniform(
+                (1.0, 0.0, -1.0, -1.0), (9.0, 0.2, 1.0, 1.0)
+            ).tolist()
+            if "torsion_spring" not in sprung:
+                loads.append(
+                    TorsionSpring(joint=joint.name, stiffness=stiffness, damping=damping, natural_angle=rest)
+                )
+            loads.append(JointTorque(joint=joint.name, torque=torque, factor=_factor(rng, switched)))
+        if DISPLACEMENT in joint.facts.loaded:
+            stiffness, damping, rest, force = rng.uniform(
+                (9.0, 0.0, -0.3, -5.0), (60.0, 2.0, 0.3, 5.0)
+            ).tolist()
+            loads.append(
+                SlideSpring(joint=joint.name, stiffness=stiffness, damping=damping, natural_displacement=rest)
+            )
+            loads.append(JointForce(joint=joint.name, force=force, factor=_factor(rng, switched)))
+    return scene.with_(load=tuple(loads))
+
+
+def _factor(rng: np.random.Generator, switched: bool) -> Factor:
+    """Return a random function of time that changes by about 1 within DURATION."""
+    amplitude, frequency, phase, first, slope = rng.uniform(
+        (0.2, 20.0, -3.0, 0.5, -20.0), (1.0, 80.0, 3.0, 1.5, 20.0)
+    ).tolist()
+    given = {
+        "polynomial": (first, slope),
+        "sine": Sine(amplitude=amplitude, frequency=frequency, phase=phase),
+    }
+    if not switched:
+        return Factor(**given)
+    times = DURATION * np.array([0.0, 0.3, 0.5, 0.8, 1.1])
+    table = tuple(zip(times.tolist(), rng.uniform(-1.0, 1.0, times.size).tolist(), strict=True))
+    start, stop = (DURATION * rng.uniform((0.1, 0.6), (0.4, 0.9))).tolist()
+    return Factor(**given, table=table, start=start, stop=stop)
 
 
 def floating(seed: int) -> Scene:

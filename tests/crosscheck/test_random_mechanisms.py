@@ -9,8 +9,13 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from crosscheck.conformance import random_scenes
 from crosscheck.conformance.random_mechanisms import KINDS, PRINCIPLE, Comparison, compare, random_mechanism
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
+from crosscheck.judge.gauss_motion import gauss_motion
+from mbref import simulate
+from mbref.scene_loads import LOAD_TYPES
+from mbref.trajectory import Outcome
 from tests.crosscheck.measured import MARGIN
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
@@ -76,3 +81,46 @@ def test_drawn_states_and_joint_equations():
 def test_same_seed_and_same_scene():
     assert random_mechanism(7) == random_mechanism(7)
     assert random_mechanism(7) != random_mechanism(8)
+
+
+LOADED = range(4, 40, 5)  # seeds of mechanisms with loads of joints and over time
+
+
+def test_every_load_along_joints_and_over_time_is_drawn():
+    scenes = [random_scenes.mechanism(seed) for seed in LOADED]
+    loads = [load for scene in scenes for load in scene.load]
+    assert {load.type for load in loads} == set(LOAD_TYPES)
+    assert {load.type for load in loads if load.over_time} == {
+        "force",
+        "moment",
+        "joint_torque",
+        "joint_force",
+    }
+    pairs = [load.joint for scene in scenes[:1] for load in scene.load if load.acts_on == "joint"]
+    assert len(pairs) > len(set(pairs)), "no joint has two loads"
+    assert all(load.factor.polynomial and load.factor.sine for load in loads if load.over_time)
+    assert not any(load.over_time for seed in range(4) for load in random_scenes.mechanism(seed).load)
+
+
+@pytest.mark.parametrize("seed", LOADED)
+def test_accelerations_with_loads_of_joints_and_over_time(seed):
+    """mbref against Gauss's principle with the judge's equations."""
+    found = compare(random_scenes.mechanism(seed), ())
+    assert found.errors[PRINCIPLE] <= MARGIN * MEASURED[PRINCIPLE] / found.distance
+
+
+@pytest.mark.parametrize("seed", [2, 7])
+def test_motions_with_tables_and_switches(seed):
+    """mbref by two methods against the judge's integration; loads begin and end within the motion."""
+    scene = random_scenes.with_loads_of_joints(random_scenes.mechanism(seed), seed, switched=True)
+    assert all(
+        load.factor.table and load.factor.start and load.factor.stop for load in scene.load if load.over_time
+    )
+    times = np.linspace(0.0, scene.duration, 6)
+    exact = gauss_motion(scene, tuple(times))
+    for method in ("taylor", "mpi-svd+projection"):
+        run = simulate(scene, method, times, rtol=1e-11)
+        assert run.outcome is Outcome.COMPLETED, run.message
+        assert np.abs(run.position - exact.position).max() < 1e-9, method
+    without = simulate(random_scenes.mechanism(seed), "taylor", times)
+    assert np.abs(without.position - exact.position).max() > 1e-4, "the loads do nothing"
