@@ -227,8 +227,7 @@ class Engine(ABC):
             import_module(module)
 
     def estimated(self, run: Trajectory, seconds: float) -> Trajectory:
-        """Return a run with the engine's own estimate of its error; the run itself if the engine makes no
-        estimate.
+        """Return a run with the engine's own estimate of its error.
 
         Parameters
         ----------
@@ -236,6 +235,11 @@ class Engine(ABC):
             The return value of ``run``.
         seconds : float
             CPU time (s) for the estimate.
+
+        Returns
+        -------
+        Trajectory
+            The run itself if the engine makes no estimate, which is the default.
         """
         return run
 
