@@ -226,23 +226,6 @@ class Engine(ABC):
         for module in self.modules:
             import_module(module)
 
-    def estimated(self, run: Trajectory, seconds: float) -> Trajectory:
-        """Return a run with the engine's own estimate of its error.
-
-        Parameters
-        ----------
-        run : Trajectory
-            The return value of ``run``.
-        seconds : float
-            CPU time (s) for the estimate.
-
-        Returns
-        -------
-        Trajectory
-            The run itself if the engine makes no estimate, which is the default.
-        """
-        return run
-
     @abstractmethod
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene from t = 0 and return the states at the sample times.

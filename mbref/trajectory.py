@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -185,6 +186,21 @@ class Trajectory:
             key: None if (array := getattr(self, key)) is None else array[:, b] for key in PER_BODY
         }
         return BodyMotion(name, **rows)
+
+    def with_error_estimate(self, seconds: float = math.inf) -> Trajectory:
+        """Return the trajectory with its engine's own estimate of the error.
+
+        Parameters
+        ----------
+        seconds : float
+            CPU time (s) for the estimate.
+
+        Returns
+        -------
+        Trajectory
+            The trajectory itself if its engine makes no estimate. `Motion`, which mbref returns, has one.
+        """
+        return self
 
     @staticmethod
     def failed(

@@ -156,13 +156,6 @@ class Mbref(Engine):
         code = "generated" if setting.family.endswith(GENERATED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
-    def estimated(self, run: Trajectory, seconds: float) -> Trajectory:
-        """Return the run with ``error_estimate``, whose warning on a sensitive motion is part of
-        ``message``."""
-        from mbref.motion import Motion
-
-        return run.with_error_estimate(seconds) if isinstance(run, Motion) else run
-
 
 def _methods(scene: Scene) -> Sequence[str]:
     """Return the methods that can run a scene: its default method, then the default method with generated

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import Setting
 from crosscheck.processes import serve
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.grid import Case, run_case
@@ -17,6 +16,7 @@ from crosscheck.study.record_view import public
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
+from tests.crosscheck.fake_engines import Fake
 
 SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)
 TIMES = np.linspace(0.0, 0.3, 7)
@@ -46,8 +46,8 @@ def test_an_engine_without_estimates_gives_its_run(monkeypatch):
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     record = run_case(Case(SCENE, TIMES, "fake_engines:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
-    bare = dataclasses.replace(serve.run_once("mbref", SCENE, TIMES, LOOSE))
-    assert engine("fake_engines:FAKE").estimated(bare, 1.0) is bare
+    run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
+    assert run.with_error_estimate(1.0) is run
 
 
 def test_a_sensitive_motion_is_reported_in_the_message():
