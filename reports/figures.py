@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import itertools
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatterSciNotation
 
 from crosscheck.engine import engine_names
 from mbref.drawing import png as mbref_png
@@ -19,6 +21,8 @@ from reports.runs import Curve
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
 DASHES = ("-", "--", ":", "-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
 FAILED = "X"
+EXPONENT = re.compile(r"\^\{(-?\d+)\}")
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STYLE: Any = {
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans", "sans-serif"],
@@ -76,13 +80,30 @@ def legend_below(figure: Figure, axes: Axes, columns: int = 3) -> None:
             figure.legend(handles, labels, loc="outside lower left", ncols=columns, handlelength=3.2)
 
 
+class PlainPowers(LogFormatterSciNotation):
+    """Powers of ten as plain text, such as 10⁻³, without formulas, which take a third of a figure's time."""
+
+    def __call__(self, x: float, pos: int | None = None) -> str:
+        formula = super().__call__(x, pos).replace(r"\times", "×")
+        return re.sub(r"[${}]|\\mathdefault|\^", "", EXPONENT.sub(_raised, formula))
+
+
+def _raised(exponent: re.Match[str]) -> str:
+    return exponent[1].translate(SUPERSCRIPTS)
+
+
 def svg(figure: Figure | str, name: str) -> str:
-    """Return the picture as an SVG element; ``name`` makes its ids unique in a page."""
+    """Return the picture as an SVG element; ``name`` makes its ids unique in a page. The layout is final."""
     if isinstance(figure, str):
         return figure
     out = io.StringIO()
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        if axis.get_scale() == "log":
+            axis.set_major_formatter(PlainPowers())
+            axis.set_minor_formatter(PlainPowers(labelOnlyBase=False))
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name, "svg.id": name}):
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
+    figure.set_layout_engine("none")
     text = out.getvalue()
     return text[text.index("<svg") :]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 import struct
 import zlib
 
@@ -87,3 +88,12 @@ def test_curves_of_an_engine_and_different_looks():
     kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
     assert len(kinds) == 12, kinds
     assert {look["color"] for look in looks.values()} == {figures.colour("mbref")}
+
+
+def test_powers_of_ten_are_plain_text():
+    picture, (axes,) = figures.canvas()
+    axes.plot([1e-7, 1e-3, 1.0], [2.0, 3.0, 5.0])
+    axes.set(xscale="log", yscale="log")
+    labels = re.findall(r">([^<>\n]+)</text>", figures.svg(picture, "powers"))
+    assert {"10⁻⁷", "10⁰", "2×10⁰", "3×10⁰"} <= set(labels), labels
+    assert len(figures.png(picture)) > 1000
