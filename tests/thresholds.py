@@ -90,7 +90,7 @@ page from the constants and their comments. {count}
 | cost | the number changes time, memory or the size of an output only |
 | no | no check of its own |
 
-`tests/mbref/test_thresholds.py` runs the checks.
+`tests/mbref/test_decisions.py` runs the checks.
 
 """
 

@@ -1,6 +1,6 @@
 """Decisions just on both sides of thresholds outside ``mbref.taylor.crossing``, with interpreted kernels.
 
-``test_thresholds.py`` runs them; ``docs/internals/thresholds.md`` lists the thresholds.
+``test_decisions.py`` runs them; ``docs/internals/thresholds.md`` lists the thresholds.
 """
 
 import importlib
@@ -16,13 +16,13 @@ def module_of(key):
     return importlib.import_module(f"mbref.{key.split()[0]}")
 
 
-@pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
+@pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_decisions.py")
 @pytest.mark.parametrize("key", list(CHECKS))
 def test_a_decision_changes_at_its_threshold(key, monkeypatch):
     assert CHECKS[key](monkeypatch), key
 
 
-@pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
+@pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_decisions.py")
 @pytest.mark.parametrize("up", [False, True], ids=["smaller", "larger"])
 @pytest.mark.parametrize("key", list(CHECKS))
 def test_the_check_fails_when_its_threshold_moves(key, up, monkeypatch):

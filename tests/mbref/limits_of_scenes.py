@@ -190,8 +190,8 @@ def _(_):
     found = linearisation.Tangent.__new__(linearisation.Tangent)
     terms = SimpleNamespace(jacobian=np.zeros((0, 6)))
     model = SimpleNamespace(length=2.0, nb=1, n=6, terms=lambda *_: terms)
-    linearisation.Tangent.__init__(found, model, np.zeros(7))
-    return near(found.step, 0.02 * 2.0)
+    linearisation.Tangent.__init__(found, model, np.zeros(7), None)
+    return near(found.step, 0.005 * 2.0)
 
 
 @check("design.linearisation MET")
@@ -202,7 +202,7 @@ def _(monkeypatch):
         monkeypatch.setattr(linearisation, "solve_positions", lambda *_: (np.zeros(7), None))
         monkeypatch.setattr(linearisation, "displaced", lambda *_: None)
         try:
-            linearisation.Tangent(model, np.zeros(7)).pose(np.zeros(6))
+            linearisation.Tangent(model, np.zeros(7), None).pose(np.zeros(6))
         except linearisation.OffConstraints:
             return False
         return True

@@ -1,5 +1,4 @@
-"""Thresholds: a table and a check of each at singular positions, a page and checks of the others, and
-crossings without compiled kernels."""
+"""Thresholds at singular positions: one table, a check of each, and crossings without compiled kernels."""
 
 import os
 import re
@@ -8,12 +7,9 @@ import sys
 from pathlib import Path
 
 from mbref.taylor.crossing import thresholds
-from tests import thresholds as others
 
 NAMES = [name for name in vars(thresholds) if name.isupper()]
 CHECKS = Path(__file__).with_name("interpreted_thresholds.py")
-OTHERS = Path(__file__).with_name("interpreted_limits.py")
-PAGE = others.ROOT / "docs" / "internals" / "thresholds.md"
 CROSSINGS = """
 import warnings
 warnings.simplefilter("error")
@@ -53,27 +49,6 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
     done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS))
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert f"{3 * len(NAMES)} passed" in done.stdout, done.stdout[-500:]
-
-
-def test_each_checked_decision_outside_crossings_changes_at_its_threshold():
-    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", str(OTHERS))
-    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
-    assert f"{3 * len(others.checked())} passed" in done.stdout, done.stdout[-500:]
-
-
-def test_the_page_lists_all_thresholds_with_their_comments():
-    assert PAGE.read_text() == others.page(), "python -m tests.thresholds docs/internals/thresholds.md"
-
-
-def test_a_constant_is_read_with_its_value_and_comment():
-    text = "# reason\nONE, TWO = 1.0, -2\nTHREE = 3  # other\nFOUR = 4\nFIVE = name()  # no number\n"
-    found = list(others.constants("folder/file.py", text))
-    assert [each[:3] for each in found] == [
-        ("folder.file", "ONE", "1.0"),
-        ("folder.file", "TWO", "-2"),
-        ("folder.file", "THREE", "3"),
-    ]
-    assert [each.comment for each in found] == ["reason", "reason", "other"]
 
 
 def test_singular_positions_are_crossed_without_compiled_kernels():
