@@ -51,7 +51,7 @@ def is_valid(make):
 
 
 # --- scenes ---------------------------------------------------------------------------------------------
-@check("scene UNIT_TOLERANCE")
+@check("scene_bodies UNIT_TOLERANCE")
 def _(_):
     turned = lambda off: is_valid(lambda: hinged(orientation=(1.0 + off, 0.0, 0.0, 0.0)))  # noqa: E731
     return flips(turned, 0.98e-6, 1.02e-6)
