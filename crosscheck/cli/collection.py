@@ -17,6 +17,7 @@ from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import with_time
+from crosscheck.study.scouting import shown_name
 from crosscheck.study.timings import with_timings
 from mbref.records import looked_at
 from mbref.scene import Scene
@@ -60,7 +61,7 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
     def plan() -> list[Case]:
         cases, unable = (sweep.quick if is_quick else sweep.whole)(chosen, engines)
         for pair in unable:
-            notice(f"{pair.engine} cannot run {pair.scene.name}: {pair.cannot}")
+            notice(f"{shown_name(pair.engine)} cannot run {pair.scene.name}: {pair.cannot}")
         if not cases:
             raise RequestError("no engine can run these scenes")
         return cases

@@ -15,7 +15,7 @@ from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
 from crosscheck.study.grid import Case, default_cases
-from crosscheck.study.scouting import of_file, scout, settings
+from crosscheck.study.scouting import of_file, scout, settings, shown_name
 from crosscheck.study.sweep import of_few_families
 from mbref.scene import Scene
 from mbref.scene_fields import meant
@@ -218,7 +218,7 @@ def _able(
     for scene, when in zip(scenes, times, strict=True):
         able, unable = default_cases(scene, engines, None, when, time_limit)
         cases += able
-        reasons += [f"{u.engine} cannot run {scene.name}: {u.cannot}" for u in unable]
+        reasons += [f"{shown_name(u.engine)} cannot run {scene.name}: {u.cannot}" for u in unable]
     if not cases:
         raise RequestError(*reasons)
     for reason in reasons:
@@ -231,7 +231,7 @@ def _named(cases: Sequence[Case], families: Sequence[str], notice: Notice) -> li
     chosen = _of_families(cases, families)
     for name in dict.fromkeys(case.engine for case in cases):
         if all(case.engine != name for case in chosen):
-            notice(f"{name} has no setting {' or '.join(families)} here and is left out")
+            notice(f"{shown_name(name)} has no setting {' or '.join(families)} here and is left out")
     return chosen
 
 

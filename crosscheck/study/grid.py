@@ -26,7 +26,7 @@ from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
-from crosscheck.study.scouting import offer
+from crosscheck.study.scouting import offer, shown_name
 from mbref.records import append, stored
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
@@ -217,14 +217,6 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "seed": 0,
         **made_by(),
     }
-
-
-def shown_name(engine_name: str) -> str:
-    """Return the displayed name of an engine: for ``module:attribute`` the name of the object."""
-    try:
-        return engine(engine_name).name if ":" in engine_name else engine_name
-    except Exception:  # the run itself reports the failed import as its outcome
-        return engine_name
 
 
 def _asked(case: Case) -> dict[str, Any]:

@@ -49,7 +49,7 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
             for future in wait(asked, return_when=FIRST_COMPLETED).done:
                 name, scene = pair = asked.pop(future)
                 _found[pair] = future.result()
-                advance(f"{name} {scene.name}")
+                advance(f"{shown_name(name)} {scene.name}")
                 more = [(name, other) for other in left.pop(name, ())]
                 asked |= {threads.submit(_asked, pair): pair for pair in more}
 
@@ -86,3 +86,11 @@ def _asked(pair: tuple[str, Scene]) -> Offer:
     except ChildFailed as failure:
         return Cannot(Owner.ADAPTER, f"its settings are unknown: {failure}")
     return cannot or tuple(found)
+
+
+def shown_name(engine_name: str) -> str:
+    """Return the displayed name of an engine: for ``module:attribute`` the name of the object."""
+    try:
+        return engine(engine_name).name if ":" in engine_name else engine_name
+    except Exception:  # the run itself reports the failed import as its outcome
+        return engine_name

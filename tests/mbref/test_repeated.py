@@ -77,7 +77,7 @@ def test_random_mechanisms_in_a_row_and_alone_agree():
 
 
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
-def test_numbers_that_decide_what_takes_part_are_asked(scenes):
+def test_numbers_that_decide_what_takes_part_are_asked_in_a_row(scenes):
     """In every order, each scene has its own reduction, whichever reductions are known."""
     expected = [alone(scene) for scene in scenes]
     for order in permutations(range(len(scenes))):

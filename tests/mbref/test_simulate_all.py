@@ -150,7 +150,7 @@ def test_random_mechanisms_and_their_variants_agree():
 
 
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
-def test_numbers_that_decide_what_takes_part_are_asked(scenes):
+def test_numbers_that_decide_what_takes_part_are_asked_in_a_batch(scenes):
     for order in permutations(range(len(scenes))):
         agree([scenes[k] for k in order * 2])
 

@@ -98,3 +98,25 @@ def test_explanations_are_of_engines_and_checks_that_exist():
         assert engine.partition(" ")[0] in engine_names(), engine
         assert check in {*FIRST, *PROPERTIES, AGREEMENT}, check
     assert {proof.check for proof in explained.proofs()} == {*FIRST, *PROPERTIES}
+
+
+def test_random_violations_are_counted_by_check_with_the_worst_of_each(tmp_path):
+    """Two checks of one engine: the worst is the largest multiple of its own allowance."""
+    (tmp_path / "conformance").mkdir()
+    tally = Tally(Plan("mujoco", 4))
+    for seed, (check, measured, allowed) in enumerate(
+        (("truth", 2e-3, 1e-3), ("truth", 1e-3, 1e-6), ("closure", 5e-2, 1e-2), ("closure", None, None))
+    ):
+        verdict = Verdict(check, f"drawn_{seed}", "fail", measured, allowed, reason=f"reason {seed}")
+        tally.add({"version": "1.0", "verdicts": [record_of(verdict)]})
+    (tmp_path / "conformance" / "mujoco_drawn.json").write_text(json.dumps(tally.to_record()))
+    [table] = [
+        b
+        for b in conformance.render(stored.verified(tmp_path))
+        if isinstance(b, Table) and b.header[2] == "Times"
+    ]
+    truth, closure = (f"{name}/{PROPERTIES[name].version}" for name in ("truth", "closure"))
+    assert [row[:6] for row in table.rows] == [
+        ("MuJoCo", truth, "2", "drawn_1", "1.0e-03", "1.0e-06"),
+        ("MuJoCo", closure, "2", "drawn_2", "5.0e-02", "1.0e-02"),
+    ]

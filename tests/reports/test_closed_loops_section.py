@@ -1,0 +1,111 @@
+"""The section on closed loops / cells, rows, depths of colour and commands worked out by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.closed_loops import records
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from reports.blocks import Heading, HeatMap, Listing, Table
+from reports.sections import closed_loops
+
+FIRST, SECOND = DIFFICULTIES[:2]
+
+
+def run(engine: str, error: float, family: str = "tuned", scene: str = FIRST.scene, **more: object) -> dict:
+    return {
+        "key": f"{engine} {family} {error} {scene}",
+        "scene": scene,
+        "engine": engine,
+        "version": f"{engine} 1",
+        "family": family,
+        "asked": {"engine": engine, "options": {"step": 1e-3}, "end": 1.0, "samples": 21},
+        "time_limit": records.TIME_LIMIT,
+        "outcome": "COMPLETED",
+        "message": "",
+        "t_end": 1.0,
+        "metrics": {"error": error},
+        "cost": {"seconds": 0.5},
+        **more,
+    }
+
+
+def refusal(engine: str, scene: str = FIRST.scene) -> dict:
+    found = {"outcome": records.REFUSED, "message": "no hinge", "owner": "missing in the engine"}
+    return {**run(engine, 0.0, scene=scene), **found, "metrics": {}}
+
+
+@pytest.fixture(scope="module")
+def section() -> list:
+    """mbref is right, MuJoCo wrong by default, Exudyn ends early, Pinocchio refuses and has one run
+    elsewhere."""
+    ended = {"outcome": "NOT_CONVERGED", "t_end": 0.25, "message": "no step", "metrics": {}}
+    return closed_loops.render(
+        [
+            run("mbref", 1e-12, "taylor"),
+            run("mujoco", 1e-7),
+            run("mujoco", 0.5, "defaults"),
+            run("exudyn", 0.0, "defaults", **ended),
+            refusal("pinocchio"),
+            run("pinocchio", 3e-5, scene=SECOND.scene),
+        ]
+    )
+
+
+def maps(section: list) -> tuple[HeatMap, HeatMap]:
+    best, defaults = (block for block in section if isinstance(block, HeatMap))
+    return best, defaults
+
+
+def test_cells_at_the_best_settings(section):
+    best, _ = maps(section)
+    first = {name: (row[0].text, row[0].kind) for name, row in best.rows.items()}
+    assert first == {
+        "mbref": ("✓ 1e-12", "kept"),
+        "mujoco": ("≈ 1e-07", "kept"),
+        "pinocchio": ("–", ""),
+        "exudyn": ("! ended", "ended"),
+    }
+    assert list(best.columns) == [column.heading for column in DIFFICULTIES]
+    assert [cell.text for cell in best.rows["mbref"][1:]] == ["○"] * (len(DIFFICULTIES) - 1)
+    assert best.rows["pinocchio"][1].text == "≈ 3e-05"
+
+
+def test_rows_at_the_defaults_are_the_engines_that_have_a_run_of_them(section):
+    """mbref has no defaults, and Pinocchio refuses one scene and has a tuned run of another."""
+    _, defaults = maps(section)
+    assert {name: row[0].text for name, row in defaults.rows.items()} == {
+        "mujoco": "✗ 0.5",
+        "exudyn": "! ended",
+    }
+    assert defaults.rows["mujoco"][0].kind == "false"
+
+
+def test_depth_of_a_cell_is_its_digits_over_fourteen(section):
+    best, defaults = maps(section)
+    depths = {name: row[0].depth for name, row in best.rows.items()}
+    assert depths["mbref"] == pytest.approx(12 / 14) and depths["mujoco"] == pytest.approx(7 / 14)
+    assert depths["exudyn"] == 0.0 and defaults.rows["mujoco"][0].depth == pytest.approx(0.30103 / 14)
+    [[exact]] = (row[:1] for row in maps(closed_loops.render([run("mbref", 0.0)]))[0].rows.values())
+    assert exact.depth == 1.0
+
+
+def test_each_engine_has_its_version_its_runs_and_their_commands(section):
+    place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "mujoco")
+    table, text, commands = section[place + 1 : place + 4]
+    assert isinstance(table, Table) and table.caption == "Version mujoco 1."
+    assert [row[:2] for row in table.rows] == [(FIRST.heading, "≈ 1e-07"), (FIRST.heading, "✗ 0.5")]
+    assert table.rows[0][2].startswith("tuned (step 0.001): largest error 1e-07, 0.5 s")
+    assert text.text.startswith("Commands of the best runs")
+    assert isinstance(commands, Listing) and "--engine mujoco" in commands.text
+    assert len(commands.text.splitlines()) == 1 and "tuned" in commands.text, "one command a mechanism"
+    place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "pinocchio")
+    rows = section[place + 1].rows
+    assert rows[0][2] == "refused: no hinge (missing in the engine)" and len(rows) == 2
+    assert len(section[place + 3].text.splitlines()) == 1, "a refusal has no command"
+
+
+def test_mechanisms_are_listed_with_their_ends(section):
+    [table] = [b for b in section if isinstance(b, Table) and b.header[0] == "Column"]
+    assert [row[0] for row in table.rows] == [column.heading for column in DIFFICULTIES]
+    assert [float(row[2]) for row in table.rows] == [column.end for column in DIFFICULTIES]
