@@ -1,8 +1,8 @@
 """The paper's mechanisms as equations of one degree of freedom, I θ'' + ½ I' θ'² = Q, derived by hand.
 
 Each is a function of the signature that mbref's integrators take, with y = (θ, θ'), θ the crank's angle and
-I' = dI/dθ; ``memory.numbers`` holds its numbers.  Driven mechanisms need no equation but their poses in
-closed form, which the kernels ``…_poses`` write: position and rotation matrix (12 numbers) of every body.
+I' = dI/dθ; ``memory.numbers`` holds its numbers.  Driven mechanisms need no equation of motion. The kernels
+``…_poses`` write their poses in closed form: position and rotation matrix (12 numbers) of every body.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ AS_MBREF = {**OPTIONS, "cache": False}  # how mbref's kernels are compiled
 
 
 class ByHand(NamedTuple):
-    """The numbers of a scene, its equation where it is free, its poses where it is driven."""
+    """The numbers of a scene, with its equation of motion if the scene is free, or its poses if it is
+    driven."""
 
     numbers: Callable[[Scene], list[float]]
     equation: Callable | None
@@ -50,7 +51,7 @@ def swing_numbers(scene: Scene) -> list[float]:
 
 @njit(**AS_MBREF)
 def planar(t, y, y_rate, memory):
-    """Slider-crank in a plane; phi the rod's angle, s = dphi/dθ and c its derivative."""
+    """Slider-crank in a plane; phi is the rod's angle, s = dphi/dθ, and c is the derivative of s."""
     p = memory.numbers
     a, b, crank, rod, spin = p[0], p[1], p[2], p[3], p[4]
     slider, torque, first, weight = p[5], p[6], p[7], p[8]

@@ -1,9 +1,9 @@
 """The certified tables, made again: `python benchmarks/certified.py [--add NAME=SECONDS …] [NAME …]`.
 
-Without names all tables are made again and compared with those that are kept; a difference above the bound of
-a table is told.  ``--add`` makes a table of a built-in scene or of a random mechanism, random_N, from 0 to
-SECONDS.  No table is edited: with ``--supersede`` one that differs, or that is of other times, is replaced by
-the next version, which names the hash of the one before.
+Without names all tables are made again and compared with the stored tables; a difference above the bound of a
+table is reported.  ``--add`` makes a table of a built-in scene or of a random mechanism, random_N, from 0 to
+SECONDS.  No table is edited: with ``--supersede`` a table that differs, or has other times, is replaced by
+the next version, which names the hash of the previous version.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ def main() -> None:
 
 
 def row(name: str, times: np.ndarray, digits: int, kept: dict[str, Any] | None, supersede: bool) -> None:
-    """Print a table's row; write the table where there is none, or where it differs and is to be replaced."""
+    """Print the row of a table; write the table if it is missing, or if it differs and is to be replaced."""
     began = time.process_time()
     try:
         made = certify.certified(find_certifiable(name), times, digits)
@@ -59,13 +59,13 @@ def row(name: str, times: np.ndarray, digits: int, kept: dict[str, Any] | None, 
 
 
 def write(name: str, table: dict[str, Any]) -> None:
-    """Keep a table with its hash."""
+    """Store a table with its hash."""
     text = json.dumps(table | {"hash": certify.digest(table)}, indent=1, ensure_ascii=False)
     (certify.FOLDER / f"{name}.json").write_text(text + "\n", encoding="utf-8")
 
 
 def compared(made: dict[str, Any], kept: dict[str, Any] | None) -> str:
-    """Whether a table agrees with the kept one to its digits."""
+    """Return whether a table agrees with the stored table to its digits."""
     from flint import arb
 
     if kept is None:

@@ -2,9 +2,10 @@
 
 ``python benchmarks/copies.py [--records FILE] [--engine NAME …] [SCENE …]``: each engine runs the copies at
 its setting of least error (as `least_errors.py` finds it), resuming from FILE.  The table has the largest
-difference from the original's motion moved likewise, and beside it the engine's own least: how far rounding
-carries the motion when the scene's numbers are shaken in their last digit.  Its status is 1 where a copy
-differs by more than twice the least asked of every engine, and by more than ten times its own.
+difference from the original's motion, moved like the copy. A further column has the difference that rounding
+causes: the scene's numbers are changed in their last digit.  The exit status is 1 if a copy differs by more
+than twice the least difference that every engine may have, and by more than ten times the difference that
+rounding causes.
 """
 
 import sys
@@ -32,7 +33,7 @@ ROUNDING = 10  # times the difference of three shaken scenes: allowed to a copy 
 
 
 def main() -> int:
-    """Run and print; returns 1 where a copy moves otherwise."""
+    """Run the copies and print the table; return 1 if a copy moves in another way than the original."""
     scenes, found, path = asked_for(__doc__)
     columns = {**COPIES, **SHAKEN}
     places = [(least, name, relation) for least in found for name in columns for relation in columns[name]]
@@ -62,7 +63,7 @@ def case(scene: Scene, least: LeastError, relation: Relation) -> Case:
 
 
 def copied(scene: Scene, least: LeastError, relation: Relation) -> Scene:
-    """The scene changed as the relation says, which every scene here can be."""
+    """Return the scene changed by the relation, which applies to every scene of this benchmark."""
     copy = relation.change(scene, Trajectory.from_record(scene.name, least.best))
     assert isinstance(copy, Scene), copy
     return copy
@@ -78,7 +79,7 @@ def difference(scene: Scene, least: LeastError, relation: Relation, record: Reco
 
 
 def is_alike(row: dict[str, float]) -> bool:
-    """Whether the copies differ by no more than engines are allowed, or by rounding."""
+    """Return whether the copies differ by no more than an engine is allowed, or than rounding causes."""
     allowed = max(2 * FLOOR, ROUNDING * row["shaken"])
     return all(np.isfinite(row[name]) and row[name] <= allowed for name in COPIES)
 

@@ -1,9 +1,10 @@
-"""Default method: from how many bodies on the sparse method costs less than `taylor`, on both chains.
+"""Default method: the number of bodies from which on the sparse method costs less than `taylor`, on both
+chains.
 
     python benchmarks/default_method.py [LOOPS …]
 
 Milliseconds of stepping (medians of REPEATS interleaved runs) and errors against the exact motion, up to END:
-the sparse method ends at the first singular position.  ``mbref.method.MOST_BODIES`` follows from it.
+the sparse method ends at the first singular position.  ``mbref.method.MOST_BODIES`` follows from the result.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@
 
 The first table is of CPU time of simulations one after another in this process: construction of a run,
 stepping, and the rest, which is samples and the trajectory; the least of REPEATS rounds, in which scenes take
-turns.  The second is of the same simulations together, as an ensemble gives them to a process.  The third is
-of wall time of whole ensembles after the processes have started, with the passing of scenes and trajectories
-between them; the median of as many rounds.
+turns.  The second number is the time of these simulations in one batch, as an ensemble gives them to a
+process.  The third number is the wall time of whole ensembles after the processes have started, including the
+transfer of scenes and trajectories between processes; it is a median over rounds.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def _show_parts(scenes: Mapping[str, Sequence[Scene]]) -> None:
 
 
 def _show_together(scenes: Mapping[str, Sequence[Scene]]) -> None:
-    """Milliseconds of a simulation together with others in one process: all, and stepping alone."""
+    """Print milliseconds of a simulation in a batch: of everything, and of stepping alone."""
     rounds = [{name: _together(each) for name, each in scenes.items()} for _ in range(REPEATS)]
     heads = ("stepping", "all", "a second")
     print(f"{'ms a simulation, together':32}" + "".join(f"{head:>14}" for head in heads))

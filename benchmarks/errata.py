@@ -1,8 +1,9 @@
 """How far published reference values are from the reference, digit by digit: `python benchmarks/errata.py`.
 
-Where a certified table reaches the time of the values, ours are the table's; else they are formulation A's in
-extended precision.  "Ours agree" tells in how many digits formulations A and B, in extended precision both,
-agree with ours, "published agrees" in how many the printed value does.
+If a certified table reaches the time of the values, our values are read from the table; if not, they are
+computed by formulation A in extended precision.  "Ours agree" is the number of digits in which formulations A
+and B, both in extended precision, agree with our values; "published agrees" is the number of digits in which
+the printed value agrees.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ KEPT = ("position", "orientation", "velocity", "angular_velocity")
 
 
 def agreement(a: float, b: float) -> float:
-    """Decimal digits in which two numbers agree; at most those of a double."""
+    """Return the number of decimal digits in which two numbers agree, at most the digits of a double."""
     return min(16.0, -math.log10(abs(a - b) / abs(b))) if a != b else 16.0
 
 
@@ -41,7 +42,7 @@ def main() -> None:
 
 
 def rows(problem: Published) -> list[str]:
-    """The table of one problem, and which motions it rests on."""
+    """Return the table of one problem, and the motions from which the table was computed."""
     scene, times = find_scene(problem.scene), problem.times()
     motions = {name: f(scene, times, EXTENDED, seconds=SECONDS) for name, f in FORMULATIONS.items()}
     table = certified(problem)
@@ -60,7 +61,7 @@ def rows(problem: Published) -> list[str]:
 
 
 def basis(table: dict[str, Any] | None, motions: dict[str, Motion]) -> str:
-    """One paragraph: where ours come from, and which formulation ended before."""
+    """Return a paragraph on the origin of our values, and on the formulation that ended before."""
     said = ["Ours: formulation A in extended precision."]
     if table is not None:
         version, bounds = table["version"], (table["bound"], table["rate_bound"])
@@ -73,7 +74,7 @@ def basis(table: dict[str, Any] | None, motions: dict[str, Motion]) -> str:
 
 
 def certified(problem: Published) -> dict[str, Any] | None:
-    """The certified table of a problem's scene, if it reaches the time of the printed values."""
+    """Return the certified table of a problem's scene if the table reaches the time of the printed values."""
     path = certify.FOLDER / f"{problem.scene}.json"
     table: dict[str, Any] = json.loads(path.read_text())
     return table if table["times"][-1] == problem.time else None

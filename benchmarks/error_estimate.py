@@ -2,8 +2,8 @@
 
 ``python benchmarks/error_estimate.py [COUNT]``, by default 500 random mechanisms. Truth is crosscheck's: a
 closed form or a reference with a bound. Samples beyond the end of the truth are left out. A run counts as
-underestimated where its true error, less the truth's bound, is more than ten times the estimate. It counts as
-overestimated where the estimate is more than a hundred times the true error and the bound together.
+underestimated if its true error minus the bound on the truth is more than ten times the estimate. A run
+counts as overestimated if the estimate is more than a hundred times the sum of the true error and the bound.
 """
 
 import contextlib
@@ -51,12 +51,12 @@ class Case:
 
     @property
     def is_under(self) -> bool:
-        """Whether the estimate is less than a tenth of the true error."""
+        """Return whether the estimate is less than a tenth of the true error."""
         return not self.true - self.bound <= UNDER * self.estimate
 
     @property
     def is_over(self) -> bool:
-        """Whether the estimate is more than a hundred times the true error."""
+        """Return whether the estimate is more than a hundred times the true error."""
         return self.estimate > OVER * (self.true + self.bound)
 
 
@@ -65,7 +65,7 @@ def main(count: int) -> None:
     console = Console(width=110)
     jobs = [*sensitive_jobs(), *built_in_jobs(), *random_jobs(count)]
     cases: list[Case] = []
-    with contextlib.suppress(KeyboardInterrupt):  # then the runs so far are printed
+    with contextlib.suppress(KeyboardInterrupt):  # after an interrupt the finished runs are printed
         for job in track(jobs, console=Console(stderr=True)):
             cases += run(*job)
     console.print(table(cases))
@@ -91,7 +91,7 @@ Job = tuple[str, Scene, list[tuple[str, float]]]  # group, scene, methods and to
 
 
 def random_jobs(count: int) -> Iterator[Job]:
-    """Random mechanisms, each by two methods and tolerances drawn by its seed."""
+    """Return jobs of random mechanisms, each with two methods and tolerances chosen by its seed."""
     for seed in range(count):
         random = np.random.default_rng([seed, 1])
         others = [METHODS[0], str(random.choice(METHODS[1:]))]
@@ -217,7 +217,7 @@ def ball_pendulums() -> Scene:
 
 
 def spring_pendulum() -> Scene:
-    """A rod on a hinge, and a second body that a spring holds to its end."""
+    """Return a rod on a hinge, with a second body connected to its end by a spring."""
     chain = pendulums(1, 3.0)
     weight = bar("weight", (0.9, 0.1, 0.0), (1.1, 0.1, 0.0), 0.5)
     spring = Spring(

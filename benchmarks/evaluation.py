@@ -2,8 +2,8 @@
 
     python benchmarks/evaluation.py [SCENE …]
 
-Process CPU time, medians of REPEATS interleaved repeats of many evaluations; mbref's in its compiled loop,
-the engines' called from Python.
+Process CPU time, medians of REPEATS interleaved repeats of many evaluations; evaluations of mbref run in its
+compiled loop, evaluations of engines are called from Python.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def main(names: Sequence[str]) -> None:
 
 
 def _in_turns(calls: dict[tuple[str, str], Callable[[], float]]) -> dict[tuple[str, str], list[float]]:
-    """REPEATS rounds of every call, after one that warms up."""
+    """Run REPEATS rounds of every call, after a warm-up round."""
     rounds: dict[tuple[str, str], list[float]] = {key: [] for key in calls}
     for call in calls.values():
         call()
@@ -64,14 +64,15 @@ def _in_turns(calls: dict[tuple[str, str], Callable[[], float]]) -> dict[tuple[s
 
 
 def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
-    """Every formulation's accelerations without stabilisation; NaN seconds where it fails."""
+    """Return the time of the accelerations by every formulation without stabilisation; NaN if a formulation
+    fails."""
     for formulation in FORMULATIONS:
         run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
         yield formulation, functools.partial(_timed, run)
 
 
 def _timed(run: Run) -> float:
-    """Seconds of one evaluation; NaN where it fails."""
+    """Return the seconds of one evaluation; NaN if the evaluation fails."""
     loop = run.memory.loop
     y, y_rate = loop.y[: loop.clock.y_size], loop.y_rate[: loop.clock.y_size]
     began = time.process_time()

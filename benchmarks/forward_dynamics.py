@@ -1,8 +1,8 @@
 """One call of an engine's forward dynamics at the start of a scene, from Python: microseconds.
 
 MuJoCo's ``mj_forward`` and Pinocchio's ``constraintDynamics``, with the defaults and with the tuned settings
-of their adapters.  Exudyn offers no accelerations of a state; beside the calls stands what one Newton
-iteration of its trapezoidal rule costs, a run's seconds divided by its iterations.
+of their adapters.  Exudyn offers no accelerations of a state; the table has the cost of one Newton iteration
+of its trapezoidal rule instead: a run's seconds divided by its iterations.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ Timed = Callable[[], float]  # process CPU seconds of one call
 
 
 def timed_calls(scene: Scene) -> Iterator[tuple[str, Timed]]:
-    """(name of the call, a function that times it) of every engine that is installed."""
+    """Return (name of a call, function that times the call) for every installed engine."""
     for name, calls in (("mujoco", _mujoco), ("pinocchio", _pinocchio), ("exudyn", _exudyn)):
         try:
             engine(name).version()

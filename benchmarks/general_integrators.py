@@ -1,7 +1,8 @@
 """General-purpose integrators on mbref's own compiled right-hand side: SciPy's, SUNDIALS CVODE and IDA.
 
-The equations are those of a scene in all coordinates, accelerations by ALF, nothing stabilised; what differs
-from mbref is the integrator, called from Python.  IDA is given the residual y' - f(t, y).
+The integrators solve the equations of a scene in all coordinates, with accelerations by ALF and without
+stabilisation. Only the integrator, which is called from Python, differs from mbref.  IDA is given the
+residual y' - f(t, y).
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ MOST_STEPS = 10**6
 LONGEST = 10.0  # s of CPU time after which a run is given up: Radau creeps past singular positions
 Solution = tuple[
     np.ndarray, str, int
-]  # states (k, n) reached, why it ended (empty: at the end), factorisations
+]  # reached states (k, n), reason of an early end (empty if complete), number of factorisations
 
 
 @entry(INT(FLOAT, VECTOR, VECTOR, MEMORY))
@@ -67,7 +68,7 @@ class RightHandSide:
         return rate
 
     def motion(self, times: np.ndarray, states: np.ndarray) -> dict[str, np.ndarray]:
-        """Poses, velocities and accelerations of the states (k, n), as a Trajectory names them."""
+        """Return poses, velocities and accelerations of the states (k, n), by the names of a Trajectory."""
         nb, n = self.run.model.nb, 6 * self.run.model.nb
         accelerations = np.zeros((len(states), n))
         for k, (t, y) in enumerate(zip(times, states, strict=True)):
@@ -80,7 +81,8 @@ class RightHandSide:
 
 
 class GeneralIntegrator(Engine):
-    """A library of integrators; families are its methods, the one option is ``rtol``."""
+    """A library of integrators as an engine; families of settings are its methods, the only option is
+    ``rtol``."""
 
     families: tuple[str, ...]
 
@@ -125,7 +127,7 @@ class GeneralIntegrator(Engine):
 
     @abstractmethod
     def solve(self, family: str, f: RightHandSide, times: np.ndarray, rtol: float) -> Solution:
-        """The states at the times, as far as they were reached."""
+        """Return the states at the times that were reached."""
 
 
 class SciPy(GeneralIntegrator):

@@ -1,7 +1,8 @@
-"""The settings of a family in a comparison of speeds, and which families miss a level of error.
+"""The settings of a family in a comparison of speeds, and the families that miss a level of error.
 
-A grid of half decades, so that no family drops out because it ends just short of a level; MuJoCo's closures
-at several rates, because stiff ones make integration dear; no shortest step but near singular positions.
+The grid has half decades, so that no family drops out because it ends just short of a level. MuJoCo's
+closures have several rates, because stiff closures make integration expensive. Only scenes with singular
+positions have a shortest step.
 """
 
 from __future__ import annotations
@@ -19,10 +20,13 @@ from mbref.simulation.simulate import simulate
 COARSEST, FINEST = -3.0, -12.0  # decades of a relative tolerance
 BETAS = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  # 1/s, beside the engine's own
 SCANS = (1e-6, 1e-10)  # relative tolerances at which rates of closures are compared
-SHORTER = (1.0, 0.25)  # shortest steps of compiled families at singular positions, of the engine's own
-ORDER = 8  # of the integrator at which errors are reduced to costs there
+SHORTER = (
+    1.0,
+    0.25,
+)  # shortest steps of compiled families at singular positions / shortest step of the engine's own family
+ORDER = 8  # order of the integrator by which errors are converted to costs at singular positions
 SHORTEST = 1e-9  # step over the duration, where no position is singular
-NEAR = 30.0  # an error so many times a level misses it by little
+NEAR = 30.0  # error / level of error: a smaller ratio misses the level by little
 
 
 def half_decades() -> list[float]:
@@ -32,14 +36,15 @@ def half_decades() -> list[float]:
 
 
 def passes_singular_position(scene: Scene) -> bool:
-    """Whether the motion goes through a singular position, as mbref's projection counts them."""
+    """Return whether the motion passes a singular position, as counted by mbref's projection."""
     return "singular positions passed" in simulate(scene, times=[scene.duration]).message
 
 
 def refined(
     settings: Sequence[Setting], scene: Scene, singular: bool, score: Callable[[Setting], float]
 ) -> Iterator[Setting]:
-    """Settings by tolerance in half decades, others as they are; coarse to fine in each family.
+    """Return settings by tolerance in half decades, and all other settings unchanged; coarse to fine in each
+    family.
 
     ``score`` is the cost of a run at one error, by which the rates of closures are chosen.
     """
@@ -56,7 +61,8 @@ def refined(
 def _variants(
     setting: Setting, scene: Scene, singular: bool, score: Callable[[Setting], float]
 ) -> Iterator[Setting]:
-    """The shortest steps and rates of closures at which a family is swept over the tolerances."""
+    """Return the shortest steps and the rates of closures with which a family is swept over the
+    tolerances."""
     steps = [setting if singular else _without_shortest_step(setting, scene.duration)]
     if singular and setting.family.endswith(COMPILED):
         steps = [_with(setting, min_step=setting.options["min_step"] * factor) for factor in SHORTER]
@@ -74,7 +80,8 @@ def cost_at_one_error(seconds: float, error: float) -> float:
 
 
 def misses(rows: Sequence[dict[str, Any]], levels: Sequence[float]) -> Iterator[str]:
-    """Of each engine's best family at a level, a sentence where it misses the next one, and by how much.
+    """Return a sentence for each engine whose best family at a level misses the next level, with the ratio of
+    error to level.
 
     ``rows`` have an engine, a family, the costs at the levels and the least error with its seconds.
     """

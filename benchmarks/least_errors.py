@@ -1,8 +1,8 @@
 """Least error of every engine on every built-in scene, with its setting and cost.
 
 ``python benchmarks/least_errors.py [--records FILE] [--engine NAME …] [SCENE …]``: runs the finest settings
-of every family, resumes from FILE and prints the table that the report opens with; its exit status is 1 where
-an engine has no completed run within FLOOR of the truth.
+of every family, resumes from FILE and prints the table that the report opens with; its exit status is 1 if an
+engine has no completed run within FLOOR of the truth.
 """
 
 import argparse
@@ -31,8 +31,8 @@ def main() -> int:
 
 
 def asked_for(about: str) -> tuple[dict[str, Scene], list[LeastError], str | None]:
-    """The scenes that the command line asks for, by name, the least errors of the engines on them, and the
-    file of their records."""
+    """Return the scenes of the command line by name, the least errors of the engines on these scenes, and the
+    file of the records."""
     parser = argparse.ArgumentParser(description=about)
     parser.add_argument("scene", nargs="*", default=list(SCENES), metavar="SCENE")
     parser.add_argument("--engine", action="append", metavar="NAME")

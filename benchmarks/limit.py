@@ -1,8 +1,8 @@
 """The limit: the cost of a mechanism whose one equation of motion is derived by hand.
 
 Free scenes: the equation of ``by_hand``, compiled, by mbref's own DOP853 and step control at the tolerances
-of mbref.  Driven scenes: their poses in closed form at the sample times, which is all that a perfect method
-would have to compute.
+of mbref.  For driven scenes the limit is the cost of their poses in closed form at the sample times, which a
+perfect method must compute at least.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ STEPS, REJECTED, EVALUATIONS = range(3)
 
 
 class Stepping(NamedTuple):
-    """The stepping loop as the integrator reads it: the last steps, and the share of the tolerance, 1."""
+    """Numbers of the stepping loop that the integrator reads: the last steps, and the factor 1 on the
+    tolerance."""
 
     clock: Clock
 
 
 class Counting(NamedTuple):
-    """The counts as the step control reads them."""
+    """Counts that the step control reads."""
 
     counts: Counts
 
@@ -67,7 +68,8 @@ class OneDegreeOfFreedom(NamedTuple):
 
 @functools.cache
 def compiled(rates: Callable) -> Callable:
-    """``repeat`` for an equation: mbref's DOP853 and step control compiled into one piece with it."""
+    """Return ``repeat`` for an equation: mbref's DOP853 and step control, compiled together with the
+    equation."""
     integrator = INTEGRATORS["dop853"]
     step, propose = (njit(**AS_MBREF)(kernel.function) for kernel in (integrator.step, integrator.propose))
 
@@ -200,7 +202,7 @@ def _integrated(
 
 
 def _closed_form(scene: Scene, thetas: np.ndarray, path: Path) -> Cost:
-    """The cost of the poses; they are compared with the truth's path first."""
+    """Return the cost of the poses, which are first compared with the path of the truth."""
     by_hand = BY_HAND[scene.name]
     numbers, poses = np.array(by_hand.numbers(scene)), np.zeros((len(thetas), 12 * len(scene.body)))
     by_hand.poses(thetas, numbers, poses)

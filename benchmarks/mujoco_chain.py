@@ -1,9 +1,11 @@
-"""The chain of four-bars as MuJoCo would have it written by hand: hinges in the plane and one loop each.
+"""The chain of four-bars as an expert would write it for MuJoCo: hinges in the plane, and one closure for
+each loop.
 
 The generic mapping of a scene has three dimensions and universal joints; this is the least that MuJoCo needs.
-The compliance of closures is scaled down, so that Newton's method meets them in one or two iterations; their
-errors decay by feedback of 1/s; unused parts of MuJoCo are switched off.  Other numbers of iterations and of
-steps of the line search, scales, rates of feedback and solvers were found to be dearer.
+The compliance of closures is scaled down, so that Newton's method satisfies the closures in one or two
+iterations. Closure errors decay by feedback at a rate of 1/s. Unused parts of MuJoCo are switched off.  Other
+numbers of iterations and of line-search steps, other scales, rates of feedback and solvers were found to be
+more expensive.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ MOST_STEPS = 10**6
 
 
 class Solver(NamedTuple):
-    """How MuJoCo meets closures: their compliance times ``scale``, iterations, steps of the line search."""
+    """Settings by which MuJoCo satisfies closures: factor ``scale`` on their compliance, iterations, steps of
+    the line search."""
 
     scale: float
     iterations: int
@@ -36,7 +39,8 @@ FASTEST, EXACT = Solver(1e-4, 1, 1), Solver(1e-8, 2, 4)
 
 
 def xml(loops: int, step: float) -> str:
-    """The model: every upright carries the bar to its right, whose end is connected to the next upright."""
+    """Return the model: every upright carries the bar to its right, whose end is connected to the next
+    upright."""
     inertial = (
         '<inertial pos="{}" mass="1" diaginertia="0.0833333333333333 0.0833333333333333 0.0833333333333333"/>'
     )
@@ -91,7 +95,8 @@ class Chain:
         return np.concatenate([data.xipos[1::2], data.xipos[2::2]])
 
     def run(self, steps: int) -> tuple[float, np.ndarray]:
-        """Process CPU seconds of so many steps by MuJoCo's own RK4, and the centres (nb, 3) after them."""
+        """Return the process CPU seconds of a number of steps by MuJoCo's own RK4, and the centres (nb, 3)
+        after these steps."""
         data = self.start()
         began = time.process_time()
         self.mujoco.mj_step(self.model, data, nstep=steps)

@@ -14,7 +14,7 @@ from rich.table import Table
 from crosscheck.conformance.random_mechanisms import PRINCIPLE, Comparison, compare, random_mechanism
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
-EXPECTED = 1e-6  # above, the distance to singularity has to explain it
+EXPECTED = 1e-6  # larger differences must be explained by a small distance to singularity
 
 
 def main(count: int) -> None:

@@ -1,4 +1,5 @@
-"""Cost and bounds of references of built-in scenes and random mechanisms, and tighter runs beside them.
+"""Cost and bounds of reference solutions of built-in scenes and random mechanisms, compared with more
+accurate runs.
 
     python benchmarks/references.py [NAME …] [--random 200] [--duration 0.5] [--seconds 60] [--tight 120]
                                     [--records F]
@@ -83,7 +84,7 @@ def main() -> None:
 
 
 def line(scene: Scene, duration: float, seconds: float, tight: float, records: str | None) -> Line:
-    """Print one scene's line, made or as it was kept in a file of records."""
+    """Print the line of one scene, computed now or read from a file of records."""
     made_of = [cache.version(), cache.canonical(scene), duration, seconds, DIGITS, TOLERANCE]
     key = hashlib.sha256(repr(made_of).encode()).hexdigest()
     found = opened(records).get(key)
@@ -95,7 +96,7 @@ def line(scene: Scene, duration: float, seconds: float, tight: float, records: s
 
 
 def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Line:
-    """The numbers of one scene; None where there is none."""
+    """Return the numbers of one scene; None if the scene has no reference."""
     times = np.linspace(0.0, duration, SAMPLES)
     motions = one, _, other = runs(scene, times, seconds)
     found, reason = judged(scene, times, *motions)
@@ -122,7 +123,8 @@ def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Lin
 
 
 def _tighter(scene: Scene, times: np.ndarray, seconds: float) -> Motion | None:
-    """Formulation A in more digits; None where it is not asked for, or a closed form tells more."""
+    """Return the motion by formulation A in more digits; None if it is not requested, or if a closed form is
+    known."""
     if not seconds or closed_form(scene) is not None:
         return None
     motion = natural_motion(
@@ -146,7 +148,8 @@ def _error(scene: Scene, found: Reference) -> np.ndarray:
 
 
 def _compared(errors: Any, found: Reference) -> dict[str, Any] | None:
-    """The largest of some errors, the largest part of the bound that one is, and until when (s)."""
+    """Return the largest of some errors, the largest ratio of an error to its bound, and the time (s) up to
+    which errors are known."""
     if not len(errors):
         return None
     k = len(errors)
@@ -160,7 +163,7 @@ def largest(values: Any) -> float:
 
 
 def text(found: Line) -> str:
-    """One row of the table."""
+    """Return one row of the table."""
     by, other, seconds = found["by"], found["by"][-1], [f"{s:.2f}" for s in found["seconds"]]
     if by == ["B", "B", "A"]:
         seconds = [seconds[2], seconds[1], seconds[0]]
@@ -179,7 +182,7 @@ def _cell(compared: dict[str, Any] | None) -> str:
 
 
 def with_torsion_spring(scene: Scene) -> Scene:
-    """The scene with a torsion spring on its first joint that takes one; the other loads it has."""
+    """Return the scene with a torsion spring on the first joint that can have one."""
     for joint in scene.joint:
         if joint.facts.takes_torsion_spring:
             spring = TorsionSpring(joint=joint.name, stiffness=5.0, damping=0.1, natural_angle=0.3)
@@ -210,7 +213,7 @@ def summary(found: list[Line], duration: float) -> list[str]:
 
 
 def _counted(found: list[Line], what: str) -> str:
-    """How many there are of each type, the most frequent first."""
+    """Return the number of entries of each type, the most frequent type first."""
     total = sum((Counter(f[what]) for f in found), Counter())
     return ", ".join(f"{count} {kind.replace('_', ' ')}" for kind, count in total.most_common())
 

@@ -1,10 +1,10 @@
-"""Cost against the number of loops: mbref by size and dense, MuJoCo and Pinocchio, on both chains.
+"""Cost over the number of loops of mbref's sparse and dense methods, MuJoCo and Pinocchio, on both chains.
 
     python benchmarks/scaling.py [LOOPS …]
 
 Process CPU time of the stepping, medians of REPEATS rounds in which all take turns; the error, against the
 scene's truth and relative to a link, stands beside every time.  The first tables, of 20 and 200 loops, have
-the cost of an error, the others milliseconds per step at STEPS steps or a few more.
+the cost of an error; all other tables have milliseconds per step, for STEPS steps or a few more.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ REPEATS, STEPS = 5, 100
 METHOD = "alf-dual+projection"
 FAMILIES = {"four_bar_chain": (parallelogram, -1.0), "slider_crank_chain": (crankshaft, 30.0)}
 DENSE_METHOD = "mpi-qr+projection"  # the cheapest of the dense formulations that bear redundant rows
-DENSE_LOOPS = {"four_bar_chain": 20, "slider_crank_chain": 5}  # most that dense factors bear here
+DENSE_LOOPS = {"four_bar_chain": 20, "slider_crank_chain": 5}  # largest number of loops for dense factors
 SPATIAL_LOOPS = 20  # most for the engines' own mapping of the scene
 RTOLS = (1e-2, 1e-4, 1e-6, 1e-8, 1e-10)
 MUJOCO_RTOLS = (1e-2, 1e-3, 3e-4, 1e-4, 1e-6, 1e-7, 3e-8, 1e-8, 3e-9)
@@ -49,7 +49,7 @@ Attempt = Callable[[], tuple[float, int, float]]  # seconds, steps, error
 
 @dataclass
 class Rival:
-    """A competitor on one scene: how it is run once, and what its rounds gave."""
+    """A competitor on one scene: the function that runs it once, and the results of its rounds."""
 
     name: str
     attempt: Attempt
@@ -58,7 +58,7 @@ class Rival:
     error: float = math.nan
 
     def run(self) -> None:
-        """One more round."""
+        """Run one more round."""
         seconds, self.steps, self.error = self.attempt()
         self.seconds.append(seconds)
 
@@ -86,7 +86,7 @@ def of_rk4(scene: Scene, truth: np.ndarray, method: str) -> list[Attempt]:
 
 
 def of_engine(scene: Scene, truth: np.ndarray, name: str, family: str, steps: int) -> Attempt:
-    """By an engine as crosscheck maps the scene to it, in three dimensions."""
+    """Return the competitor that runs the scene in an engine by crosscheck's adapter, in three dimensions."""
     setting = Setting(family, {"step": scene.duration / steps})
 
     def attempt() -> tuple[float, int, float]:
@@ -119,7 +119,7 @@ def of_chain_dop853(scene: Scene, truth: np.ndarray, loops: int, rtol: float) ->
 
 
 def rivals(chain: str, loops: int) -> list[Rival]:
-    """Those that can be had at this size in bearable time."""
+    """Return the competitors that can run at this size in acceptable time."""
     scene = find_scene(f"{chain}[{loops}]")
     truth, step = end_of(scene), scene.duration / STEPS
     found = [
@@ -138,7 +138,7 @@ def rivals(chain: str, loops: int) -> list[Rival]:
 
 
 def in_turns(competitors: Sequence[Rival]) -> None:
-    """All run once untimed, then REPEATS times in turns."""
+    """Run all competitors once untimed, then REPEATS times in turns."""
     for rival in competitors:
         rival.attempt()
     for _ in range(REPEATS):

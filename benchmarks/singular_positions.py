@@ -5,9 +5,10 @@
 Sweeps: light and cart_poles (inertias of 1e-11 … 1e-4 kg m²), turning (parallelograms that turn back before
 the flat position), gaps (slider-cranks whose rod is longer than the crank by 1e-1 … 1e-12 m), driven (rhombi
 and five-bars from random angles), starts (the same just before the flat position), heavy (the equal
-slider-crank with a flywheel).  Turnings that rounding of the joints' places may hide behind a gap are counted
-apart where they do not complete.  A false success is COMPLETED with an error against the scene's truth, which
-shares no code with mbref, above max(1e3 rtol, 1e-6); cart-poles are judged by their energy.
+slider-crank with a flywheel).  Turning points that rounding of the joints' positions may hide behind a gap
+are counted separately if their runs do not complete.  A false success is COMPLETED with an error against the
+scene's truth, which shares no code with mbref, above max(1e3 rtol, 1e-6); cart-poles are judged by their
+energy.
 """
 
 from __future__ import annotations
@@ -60,17 +61,18 @@ def cart_poles(count: int) -> Iterator[tuple[Scene, float]]:
 
 
 def turning(count: int) -> Iterator[tuple[Scene, float]]:
-    """Parallelograms let go so far below the flat position, which they reach again after half a swing."""
+    """Return parallelograms released at a given distance below the flat position, which they reach again
+    after half a swing."""
     for k, distance in enumerate(np.geomspace(1e-1, 1e-8, max(2, count // 2))):
         for make in (four_bar_gravity, five_bar_gravity):
             yield make(-distance, f"turning{k}"), 1.5
 
 
 def turning_is_determined(scene: Scene) -> bool:
-    """Whether rounding of the joints' places cannot hide where a parallelogram turns back.
+    """Return whether rounding of the joints' positions cannot hide the turning point of a parallelogram.
 
-    Links of length l whose sides differ by Δ = AB + AD - BC - CD come no nearer to the flat position than
-    √(4 Δ / l) rad before they go over to another branch; they turn back as far from it as they began.
+    Links of length l whose sides differ by Δ = AB + AD - BC - CD come no nearer to the flat position than √(4
+    Δ / l) rad before they change to another branch; they turn back at the distance at which they began.
     """
     a, b, c, d = (np.array(next(j.anchor for j in scene.joint if j.name == name)) for name in "ABCD")
     unit = lambda one, other: (one - other) / np.linalg.norm(one - other)  # noqa: E731

@@ -3,11 +3,11 @@
     python benchmarks/speed.py [SCENE …] [--only ENGINE …] [--out FILE.json] [--plot FILE.png]
 
 Every setting of every family is run once in a child process, coarse to fine, until it takes too long; then
-all that count take turns in REPEATS rounds of this process, brief ones several times a round, so that their
-code is warm.  Times are process CPU seconds of the stepping, medians, by one BLAS thread; errors are against
-the scene's truth; the cost at an error is read off the family's curve (settings: ``grids``).  Families of an
-engine are of its own integrators, or integrated by crosscheck in Python, or in compiled code; the table says
-which.
+all useful settings take turns in REPEATS rounds of this process, short runs several times in each round, so
+that their code is warm.  Times are process CPU seconds of the stepping, medians, by one BLAS thread; errors
+are against the scene's truth; the cost at an error is interpolated on the curve of the family (settings:
+``grids``). A family of settings uses the engine's own integrator, or crosscheck's integrator in Python, or in
+compiled code; the table states which.
 """
 
 from __future__ import annotations
@@ -59,16 +59,19 @@ PAPER = (
 )
 SAMPLES = 11  # few, because adaptive integrators end a step at every sample time
 REPEATS = 5
-LONG, TOO_LONG = 0.7, 2.0  # s; such runs are not repeated; of their family nothing finer is tried
+LONG, TOO_LONG = (
+    0.7,
+    2.0,
+)  # s; runs longer than LONG are not repeated; after a run longer than TOO_LONG no finer setting is tried
 BRIEF, MOST_TIMES = 5e-3, 10  # s; shorter runs are repeated within a round, for so long, and so often
 TIME_LIMIT = 60.0  # s of a run; an engine can hang
-NEAR = 1.5  # a family so much dearer than its engine's best after one round may still be the best
-ENOUGH = 1e-10  # an error at which a family's finer settings are of no interest
+NEAR = 1.5  # cost / cost of the engine's best family after one round: a smaller ratio may still be the best
+ENOUGH = 1e-10  # error below which finer settings of a family are not run
 
 
 @dataclass
 class Run:
-    """One setting on one scene: how it ended, its error, its counts, and its seconds in all rounds."""
+    """One setting on one scene: outcome, error, counts, and seconds in all rounds."""
 
     engine: str
     family: str
@@ -80,7 +83,8 @@ class Run:
 
     @property
     def median(self) -> float:
-        """Seconds of stepping; of the first run where it was too long to be repeated."""
+        """Return the median seconds of stepping; the seconds of the first run if it was too long to be
+        repeated."""
         return median(self.seconds) if self.seconds else self.cost["seconds"]
 
 
@@ -93,14 +97,15 @@ OPPONENTS = {  # engines and kinds of integrators
     "generated code": (("casadi", "heyoka"), ()),
     "limit": ((LIMIT_NAME,), ()),
 }
-OURSELVES: dict[str, Callable[[str], bool]] = {  # of the families' names
+OURSELVES: dict[str, Callable[[str], bool]] = {  # groups of mbref's families, by a test of their names
     "series": lambda family: family.startswith(SERIES),
     "other methods": lambda family: not family.startswith(SERIES),
 }
 
 
 def competitors(only: Sequence[str] = ()) -> list[str]:
-    """All, or those named ``only``, whose packages are installed; says which are not."""
+    """Return all engines, or the engines named ``only``, whose packages are installed; print the missing
+    ones."""
     found = []
     for name in (*ENGINES, *OTHERS):
         if only and engine(name).name not in only:
@@ -113,7 +118,7 @@ def competitors(only: Sequence[str] = ()) -> list[str]:
 
 
 def measured(scene: Scene, names: Sequence[str]) -> list[Run]:
-    """Every run of the scene, those worth it timed in turns."""
+    """Return every run of the scene; useful runs are timed in turns."""
     times = np.linspace(0.0, scene.duration, SAMPLES)
     able = [name for name in names if engine(name).cannot(scene) is None]
     singular = passes_singular_position(scene)
@@ -132,7 +137,7 @@ def measured(scene: Scene, names: Sequence[str]) -> list[Run]:
 
 
 def _sweep(name: str, scene: Scene, times: np.ndarray, singular: bool) -> Iterator[Run]:
-    """One run of each setting, coarse to fine, of each family."""
+    """Yield one run of each setting of each family, coarse to fine."""
     finished = set()
 
     def score(setting: Setting) -> float:
@@ -156,7 +161,7 @@ def _part(setting: Setting) -> tuple[Any, ...]:
 
 
 def _once(name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Run:
-    """One run in a process of its own."""
+    """Return one run in a separate process."""
     trajectory = run_isolated(name, scene, times, setting, TIME_LIMIT)
     error = measure(scene, trajectory, truth_for(scene))["error"]
     error, cost = math.inf if error is None else error, asdict(trajectory.cost)
@@ -170,8 +175,8 @@ def _times(run: Run) -> int:
 
 
 def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
-    """Runs that give the cost at a level: of mbref in every family, of an engine in the best ones of every
-    kind of integrator."""
+    """Return the runs that give the cost at a level: of mbref in every family, of an engine in the best
+    families of every kind of integrator."""
     own = curves[run.engine, run.family]
     if run.cost["seconds"] > LONG or not any(run in _around(own, level) for level in ERROR_LEVELS):
         return False
@@ -188,7 +193,7 @@ def _is_worth_timing(run: Run, curves: dict[Curve, list[Run]]) -> bool:
 
 
 def _around(runs: Sequence[Run], level: float) -> list[Run]:
-    """The completed runs just below and just above an error; none where it is not reached."""
+    """Return the completed runs just below and just above an error; no runs if the error is not reached."""
     done = sorted((run for run in runs if _is_usable(run)), key=lambda run: run.error)
     below = [run for run in done if run.error <= level]
     return [*below[-1:], *done[len(below) : len(below) + 1]] if below else []
@@ -199,7 +204,7 @@ def _is_usable(run: Run) -> bool:
 
 
 def _costs(runs: Sequence[Run]) -> list[float]:
-    """Seconds at each level of error; infinite where it is not reached."""
+    """Return the seconds at each level of error; infinite if the level is not reached."""
     done = [run for run in runs if _is_usable(run)]
     seconds, errors = [run.median for run in done], [run.error for run in done]
     found = [cost_at_error(seconds, errors, level) for level in ERROR_LEVELS]
@@ -207,7 +212,8 @@ def _costs(runs: Sequence[Run]) -> list[float]:
 
 
 def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
-    """One a curve: seconds per simulated second at each level, and the cheapest run that reaches it."""
+    """Return one row for each curve: seconds per simulated second at each level, and the cheapest run that
+    reaches the level."""
     curves: dict[Curve, list[Run]] = {}
     for run in runs:
         curves.setdefault((run.engine, run.family), []).append(run)
@@ -224,7 +230,7 @@ def rows(scene: Scene, runs: Sequence[Run]) -> list[dict[str, Any]]:
 
 
 def _least(runs: Sequence[Run], scene: Scene) -> tuple[float, float]:
-    """The least error of completed runs, and its seconds per simulated second."""
+    """Return the least error of completed runs, and its seconds per simulated second."""
     done = [(run.error, run.median / scene.duration) for run in runs if _is_usable(run)]
     return min(done, default=(math.inf, math.inf))
 
@@ -235,7 +241,8 @@ def _cheapest(runs: Sequence[Run], level: float) -> Run | None:
 
 
 def chosen(table: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Every family of mbref, and of every other engine and kind of integrator the best at each level."""
+    """Return every family of mbref, and the best family at each level of every other engine and kind of
+    integrator."""
     kept = []
     for row in table:
         kind = _kind(row)
@@ -252,7 +259,7 @@ def _kind(row: dict[str, Any]) -> tuple[str, str]:
 
 
 def _integrator(name: str, family: str) -> str:
-    """Whose integrator a family has."""
+    """Return the owner of a family's integrator."""
     if name not in ENGINES or family not in engine(name).integrated_here:
         return OWN
     return COMPILED_HERE if family.endswith(COMPILED) else "crosscheck's, in Python"
@@ -279,7 +286,7 @@ def show(console: Console, scene: Scene, table: Sequence[dict[str, Any]]) -> Non
 
 
 def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> None:
-    """mbref's series and its other methods, against the best of the others."""
+    """Return a comparison of mbref's series and other methods with the best engines."""
     shown = Table(title="The best of others, as a multiple of mbref's best, at errors of …")
     shown.add_column("scene", no_wrap=True)
     shown.add_column("mbref by", no_wrap=True)
@@ -298,7 +305,7 @@ def summary(console: Console, tables: dict[str, Sequence[dict[str, Any]]]) -> No
 def _of(
     table: Sequence[dict[str, Any]], names: Sequence[str], kinds: Sequence[str] = ()
 ) -> list[dict[str, Any]]:
-    """Rows of these engines, and of these kinds of integrators where any are named."""
+    """Return the rows of these engines, and of these kinds of integrators if kinds are named."""
     return [row for row in table if row["engine"] in names and (not kinds or _kind(row)[1] in kinds)]
 
 

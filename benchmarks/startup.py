@@ -2,10 +2,10 @@
 
     python benchmarks/startup.py [METHOD …]
 
-Each figure is of fresh processes: process CPU seconds from the start of the interpreter, children of the
-compiler included.  Cold starts have an empty cache folder of their own, warm ones the same folder again.
-Python keeps the bytecode of modules, as it does unless PYTHONDONTWRITEBYTECODE is set.  Of ``mbref run`` the
-first line says after how many seconds, of a clock, the result of a cold start is printed.
+Each number is measured in fresh processes: process CPU seconds from the start of the interpreter, children of
+the compiler included.  A cold start has an empty cache folder; a warm start uses the folder of a cold start
+again. Python keeps the bytecode of modules, as it does unless PYTHONDONTWRITEBYTECODE is set.  Of ``mbref
+run`` the first line says after how many seconds, of a clock, the result of a cold start is printed.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from statistics import median
 from crosscheck.engine import engine
 from mbref.scenes import SCENES
 
-WARM = 3  # processes of each warm figure
+WARM = 3  # number of processes for each warm number
 SCENE = "spatial_slider_crank"
 COMMAND = ("mbref", "run", "four_bar_gravity")
 IMPORTS = (
@@ -64,7 +64,7 @@ def main(methods: Sequence[str]) -> None:
 
 
 def _command() -> None:
-    """The command's first result from nothing, and its CPU time with kernels in the cache."""
+    """Return the CPU time of a command's first result with an empty cache, and with kernels in the cache."""
     with tempfile.TemporaryDirectory() as folder:
         place = {**os.environ, "NUMBA_CACHE_DIR": folder}
         began = time.perf_counter()

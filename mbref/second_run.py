@@ -2,7 +2,7 @@
 
 The second run integrates by `taylor` at a tolerance near rounding. Every number of its scene is changed by up
 to two units in the last place. So the difference also contains the rounding of the scene's numbers and of the
-start, magnified as the motion magnifies it.
+start, magnified by the motion.
 """
 
 from __future__ import annotations

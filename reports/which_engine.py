@@ -168,7 +168,7 @@ def _answers(group: Judged) -> Iterator[str]:
         f"`{name}` over {_end_time(group):g} s: {_count(len(group.scene.body), 'body', 'bodies')}, "
         f"{_count(counts.degrees_of_freedom, 'degree', 'degrees')} of freedom, "
         f"{_count(counts.redundant, 'redundant row', 'redundant rows')}. "
-        f"`crosscheck compare '{name}'` repeats it.{_known(group)}\n"
+        f"`crosscheck compare '{name}'` repeats these runs.{_known(group)}\n"
     )
     yield f"| engine | fastest run within {SAID} | time | error | least error | library defaults |"
     yield "|---|---|--:|--:|--:|---|"

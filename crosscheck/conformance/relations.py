@@ -135,8 +135,8 @@ class Isometry:
 def with_pushes(
     to: Trajectory, motion: Trajectory, linear: Mapped, angular: Mapped, force: Mapped, moment: Mapped
 ) -> Trajectory:
-    """Return the motion ``to`` with the mapped accelerations and reactions of another motion; None if the
-    motion lacks them."""
+    """Return the motion ``to`` with accelerations and reactions of another motion, mapped by functions; None
+    in place of arrays that the other motion lacks."""
     return replace(
         to,
         acceleration=None if motion.acceleration is None else linear(motion.acceleration),

@@ -114,9 +114,9 @@ def _middle_moment(inertia: Sequence[float] | Sequence[Sequence[float]]) -> floa
 def fastest_rate(scene: Scene, coarse: Callable[[float], Trajectory], counts: Sequence[int] = SCOUT) -> float:
     """Return the fastest angular velocity (rad/s) in a coarse run, or `stated_rate` if that is larger.
 
-    ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to
-    try in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next.
-    The result is at most SCOUT_TURN in a step of the largest count.
+    ``coarse(step)`` runs the scene with steps of that length (s).  ``counts`` are the numbers of steps to try
+    in turn: a run that fails, or turns by more than SCOUT_TURN in a step, is repeated with the next. The
+    result is at most the rate at which a body turns by SCOUT_TURN in a step of the largest count.
     """
     for steps in counts:
         run = coarse(scene.duration / steps)

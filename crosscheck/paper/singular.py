@@ -55,9 +55,9 @@ def fold_residual(theta: float, turned: float) -> float:
     """Return the largest residual (m or rad) of the driven rhombus if it leaves θ₂ = theta (0 or π) along the
     fold.
 
-    The crank has been driven by ``turned`` (rad) further.  At π the coupler turns with the crank about A and
-    the rocker rests; at 0 crank and rocker lie on the ground and on B = D only coupler and rocker could
-    turn, so that the crank rests and its driver is violated.
+    The crank has turned by the angle ``turned`` (rad) from this position.  At π the coupler turns with the
+    crank about A and the rocker rests; at 0 crank and rocker lie on the ground and on B = D only coupler and
+    rocker could turn, so that the crank rests and its driver is violated.
     """
     theta0 = math.pi if theta else math.pi / 2
     scene = four_bar(theta0)

@@ -91,8 +91,8 @@ def drawn(record: Record, seconds: float) -> tuple[float, float]:
 
 
 def error_text(record: Record) -> str:
-    """Return the error as text: ``< 3e-12`` if it is below the bound on the truth's error, – without an error
-    and for a run that ended at its start."""
+    """Return the error as text: ``< 3e-12`` if it is below the bound on the truth's error, and a dash for a
+    run without error or a run that ended at its start."""
     value, bound = error(record), error_bound(record)
     if not math.isfinite(value) or never_moved(record):
         return "–"

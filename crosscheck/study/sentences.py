@@ -146,7 +146,7 @@ def _no_bad_defaults(groups: Sequence[Judged]) -> str:
     """Return the sentence on the defaults if none is known to fail or to be wrong."""
     found = _worst(groups, Judged.defaults)
     if not found:
-        return "No setting is a library's default."
+        return "No run used a library's default settings."
     unjudged = [name for name, verdict in found.items() if verdict is Grade.UNJUDGED]
     if unjudged:
         owners = listed(map(title, unjudged))

@@ -60,9 +60,10 @@ class _Reshaped(Packs):
 def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assembled:
     """Return the scene with given distances (m) between pairs of joints on a link and with closed loops.
 
-    The points of a link move as little as possible to get its lengths. Then the bodies move, by the least
-    mass-weighted displacement, until every joint is satisfied. Masses, inertias and velocities are unchanged.
-    Raises SceneError for joints that share no link, or if the loops cannot be closed with these lengths.
+    The points of a link move as little as possible to get its lengths. After that the bodies move, by the
+    least mass-weighted displacement, until every joint is satisfied. Masses, inertias and velocities are
+    unchanged. Raises SceneError for joints that share no link, or if the loops cannot be closed with these
+    lengths.
     """
     pairs = {pair: _shared(scene, *pair) for pair in lengths}
     shifts = _shifts(scene, lengths, pairs)

@@ -236,7 +236,8 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 
 
 def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
-    """Return the pose near a start without accelerations, by Levenberg's method; None if there is none."""
+    """Return the pose near a start without accelerations, by Levenberg's method; None if no such pose is
+    found."""
     freedoms, damping = tangent.freedoms, 0.0
     off = tangent.accelerations(*_rest(tangent))
     for _ in range(MOST_STEPS):

@@ -79,7 +79,8 @@ def still(scene: Scene, view: View | None = None, width: float = Form().width) -
 def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
     """Return the motion as animated SVG, in real time if its duration is 4 to 12 s.
 
-    It shows every n-th sample, at most 120 of them.  Raises ValueError if the trajectory has no sample.
+    The animation shows every n-th sample, at most 120 samples.  Raises ValueError if the trajectory has no
+    sample.
     """
     _check([motion])
     panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)

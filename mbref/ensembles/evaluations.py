@@ -22,7 +22,8 @@ class Evaluations:
         self._parameters = Parameters(parameters_of(model.memory.values, packs.data, packs))
 
     def terms(self, places: np.ndarray, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Return the terms of c scenes, given by index, at k states each, with blocks (c, k, m, 12).
+        """Return the terms of c scenes, given by index, at k states each; the Jacobian is given by blocks (c,
+        k, m, 12): m rows, columns of two bodies.
 
         Arguments are times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
         """

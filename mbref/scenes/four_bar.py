@@ -62,10 +62,8 @@ def parallelogram(theta0: float, name: str) -> Scene:
 
 
 def two_rhombi(apart: float, angle: float = 0.3) -> Scene:
-    """Return, under gravity, a rhombus whose rocker is the crank of a second one with its frame turned by an
-    angle (rad).
-
-    Both pass their flat positions within one step.
+    """Return, under gravity, a rhombus whose rocker is the crank of a second rhombus with its frame turned by
+    an angle (rad). Both rhombi pass their flat positions within one step.
     """
     first = parallelogram(angle, "two_rhombi")
     x, y = LENGTH * math.cos(apart), LENGTH * math.sin(apart)

@@ -35,9 +35,9 @@ def compare_with_default(run: Run, ended: int) -> int:
     """Return the status of a run after comparing its samples with the default method.
 
     ``ended`` is the status before the comparison. The result is LEFT_MOTION if the distance at a sample
-    exceeds the allowed one; samples then end there. It is UNDECIDED if the run was DONE and the default
-    method does not continue, otherwise ``ended``. Runs that cannot leave their motion, and runs without a
-    sample, are not compared.
+    exceeds the allowed one; samples then end there. The result is UNDECIDED if the run was DONE and the
+    default method does not continue; otherwise the result is ``ended``. Runs that cannot leave their motion,
+    and runs without a sample, are not compared.
     """
     clock = run.memory.loop.clock
     if not (clock.sample and may_leave(run) and run.limits.compared):

@@ -224,7 +224,7 @@ def test_defaults_that_nothing_judges():
     assert breaks([group(unjudged, kind="", reason="two ways", bound=None)]) == (
         "The defaults of MuJoCo and Exudyn complete; without a truth it is unknown whether they are right."
     )
-    assert breaks([group([record("mbref", "own", 1e-12)])]) == "No setting is a library's default."
+    assert breaks([group([record("mbref", "own", 1e-12)])]) == "No run used a library's default settings."
 
 
 def test_a_best_setting_beside_one_that_ran_out_of_time():

@@ -1,8 +1,8 @@
 """MuJoCo's families of settings, and the sweep over their accuracies for a scene.
 
 The hardest closures that MuJoCo's documentation allows have a softness of 1e-4 of the inverse mass; MuJoCo's
-default closures are ten times as soft.  The family of settings ``stiff`` loses an order of convergence. But
-its closure errors are smaller after singular positions, which amplify closure errors.
+default closures are ten times as soft.  The family of settings ``stiff`` loses an order of convergence. After
+singular positions, which amplify closure errors, the closure errors of ``stiff`` are smaller.
 """
 
 from __future__ import annotations

@@ -27,8 +27,7 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
-# digits of a step's tolerance beyond the requested digits; the larger number if the smaller number does not
-# suffice
+# digits of a step's tolerance beyond the requested digits: first try, and second try if the first one fails
 SPARE = (6, 12)
 POSES = 101  # number of poses along a motion at which the rank is checked
 METHODS = {

@@ -32,7 +32,7 @@ NEAR_END = 0.7  # fraction of a panel; a singular position after this fraction i
 BEYOND = (
     0.35  # half lengths: largest distance of a singular position from the end of a panel that steps across it
 )
-LEAST_LOST = 1e6  # rounding units that a step across a singular position may lose without a second attempt
+LEAST_LOST = 1e6  # rounding units: larger losses of a step across a singular position cause a second attempt
 MOST_LOST = 1e-7  # largest error of a step across a singular position, before closures are corrected
 SEVERAL = 3  # failed panels across a singular position before a step across it is tried
 
