@@ -79,8 +79,7 @@ def still(scene: Scene, view: View | None = None, width: float = Form().width) -
 def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
     """Return the motion as animated SVG, in real time if its duration is 4 to 12 s.
 
-    The animation shows every n-th sample, at most 120 samples.  Raises ValueError if the trajectory has no
-    sample.
+    The animation shows every n-th of the samples, at most 120.  Raises ValueError if there is no sample.
     """
     _check([motion])
     panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)

@@ -67,8 +67,8 @@ class SingularPosition(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """Whether velocities at a singular position belong to a branch to second order, and to one branch
-    only."""
+    """Test result: whether velocities at a singular position belong to a branch to second order, and to one
+    branch only."""
 
     fits: bool
     is_simple: bool
@@ -87,8 +87,8 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
     """Return the branches at a singular position, q (7 nb,) at t (s), which a motion passes with velocities v
     (n,).
 
-    If drivers exist, they determine a branch's velocities. Otherwise all branches have the kinetic energy of
-    v.
+    If drivers exist, they determine a branch's velocities. Without drivers all branches have the kinetic
+    energy of v.
     """
     found = second_order(model, t, q, v)
     freedoms = found.kernel.shape[1]

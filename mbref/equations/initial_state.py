@@ -24,7 +24,7 @@ GROSS = 0.05  # violation / scene's length, or violation / given velocities, abo
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
-# weight of open velocities relative to given ones, and number of compensating iterations
+# weight of open velocities / weight of given velocities; number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
 # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 MET = 1e-13

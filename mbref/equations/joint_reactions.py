@@ -22,7 +22,7 @@ from mbref.kernels.scene_layout import ANGLE
 from mbref.scene import Scene
 
 MOST_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
-OPEN = 1e-6  # singular value of unit rows / largest one, below which a combination of rows vanishes
+OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes
 SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
 

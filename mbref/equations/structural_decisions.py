@@ -22,8 +22,8 @@ from mbref.equations.static_constraints import MOST, ROUNDING, SMALL, Asked, are
 
 
 class Answers(NamedTuple):
-    """Properties of s scenes: the deciding ones (s, …), including the active entries of each round of states,
-    (s, rounds, m, 12), and the acting rows and columns (s, rounds, m + n)."""
+    """Properties of s scenes: the deciding properties (s, …), including the active entries of each round of
+    states, (s, rounds, m, 12), and the acting rows and columns (s, rounds, m + n)."""
 
     decisive: np.ndarray
     entries: np.ndarray

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 SPREAD = 0.5  # radius of gyration / body length; 0.58 for a slender rod about its end
-SMALLEST = 1e-9  # length / largest length; shorter ones are rounding
+SMALLEST = 1e-9  # length / largest length; shorter lengths are rounding
 
 
 def metric(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:

@@ -21,7 +21,7 @@ from mbref.linear_algebra.orthogonal_factorisations import equilibrate
 
 ABOUT = About(
     title="Lagrange multipliers, the augmented matrix",
-    meaning="Lagrange multipliers with the accelerations by LU; no redundant rows",
+    meaning="accelerations and Lagrange multipliers together, by LU; fails on redundant rows",
     formula=(
         r"\begin{pmatrix} M & \Phi_q^T \\ \Phi_q & 0 \end{pmatrix} \begin{pmatrix} \ddot q \\ \lambda "
         r"\end{pmatrix} = \begin{pmatrix} g \\ \gamma \end{pmatrix}"

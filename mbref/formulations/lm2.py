@@ -18,7 +18,7 @@ from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, gr
 
 ABOUT = About(
     title="Lagrange multipliers, the Schur complement",
-    meaning="multipliers first, by Cholesky; cheap; no redundant rows",
+    meaning="Lagrange multipliers first, by Cholesky; cheap; fails on redundant rows",
     formula=(
         r"(\Phi_q M^{-1} \Phi_q^T)\, \lambda = \Phi_q M^{-1} g - \gamma, \qquad \ddot q = M^{-1} (g - "
         r"\Phi_q^T \lambda)"

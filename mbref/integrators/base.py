@@ -17,9 +17,9 @@ class Integrator:
     up to 1; a fixed-step method returns 0), or minus the status of an evaluation that failed.
 
     ``propose(h, suggested, ratio, y, y', memory) -> next step`` chooses the length of the next attempt after
-    the last attempt, of length h, is judged; ``suggested`` is h before the sample times cut it.  Accepted
-    (ratio from 0 to 1): y and y' are the new state and its rates.  After a rejected attempt y and y' are the
-    old state and its rates.  Before the first step h is 0.
+    the last attempt, of length h, is judged; ``suggested`` is h before sample times limited the step.
+    Accepted (ratio from 0 to 1): y and y' are the new state and its rates.  After a rejected attempt y and y'
+    are the old state and its rates.  Before the first step h is 0.
 
     ``schema`` declares the integrator's own memory, in ``Memory.integrator``.  The states since step
     ``clock.restart`` are one smooth piece: at its first step y changed its meaning or jumped.  An option

@@ -73,7 +73,7 @@ class Loads(NamedTuple):
     force: Annotated[Matrix, "l", 3]  # N, or the moment in N m; along a joint coordinate the first number
     point_first: Annotated[Matrix, "l", 3]
     point_second: Annotated[Matrix, "l", 3]
-    axis: Annotated[Matrix, "l", 3]  # of a joint, in the first body, with x and y across it
+    axis: Annotated[Matrix, "l", 3]  # joint axis in the first body's frame; x and y are perpendicular to it
     x_first: Annotated[Matrix, "l", 3]
     y_first: Annotated[Matrix, "l", 3]
     x_second: Annotated[Matrix, "l", 3]  # x_first at t = 0, in the second body

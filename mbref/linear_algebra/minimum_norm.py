@@ -208,13 +208,14 @@ def find_least_multipliers(factor, force, multipliers):
 
 @entry(INT(VECTOR, VECTOR, FACTOR))
 def factorise_once(numbers, inverse_root, factor):
-    """Factorise S + I/α for Python; returns 0 if it is not positive definite."""
+    """Factorise S + I/α, called from Python; return 0 if S + I/α is not positive definite."""
     return 1 if regularised_factor(factor, numbers, inverse_root, ALPHA) else 0
 
 
 @entry(FLOAT(VECTOR, FACTOR))
 def iterate_once(target, factor):
-    """Run one iteration on ``target`` for Python; return the size of its change. The residual is updated."""
+    """Run one iteration of the minimum-norm solver on ``target``, called from Python; return the size of the
+    change of ``target``. The residual is updated."""
     size = iterate(factor, target)
     subtract_product(factor, factor.change, factor.residual)
     return size
@@ -222,7 +223,7 @@ def iterate_once(target, factor):
 
 @entry(INT(VECTOR, FACTOR))
 def solve_once(b, factor):
-    """Replace b by (S + I/α)⁻¹ b, for Python."""
+    """Replace b by (S + I/α)⁻¹ b; called from Python."""
     solve(factor, b)
     return OK
 

@@ -1,5 +1,5 @@
 """Chart whose vector y contains the entries in ``Memory.active``: all coordinates and velocities, or the
-active ones.
+active coordinates and velocities.
 
 y = (r, Euler parameters; r', ω'), body by body.
 """

@@ -29,7 +29,7 @@ from mbref.stabilisation.base import Stabilisation
 ALPHA = 1e10  # penalty of the iteration
 REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of a single correction
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # squared pivot above which a row counts as independent
-DEPENDENT = 3e-3  # pivot below which a row clearly depends on others
+DEPENDENT = 3e-3  # pivot below which a row clearly depends on other rows
 CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
 MOST_ITERATIONS = 10  # largest number of Newton steps of a correction
@@ -224,8 +224,8 @@ def accept(t, y, memory):
 def rates(t, y, y_rate, memory):
     """Compute y' by the rows that were independent at the start of the step.
 
-    Rows depend on others only if the constraints are satisfied. A stage of a step violates them slightly. At
-    such a stage a dependent row contradicts the other rows, so the dependent row is left out.
+    Rows depend on other rows only if the constraints are satisfied. A stage of a step violates them slightly.
+    At such a stage a dependent row contradicts the other rows, so the dependent row is left out.
     """
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
@@ -242,7 +242,8 @@ def rates(t, y, y_rate, memory):
 
 @kernel
 def depend_on_others(memory):
-    """Return whether rows clearly depended on others, as many as ever, at the last projected state.
+    """Return whether as many rows as at any state before clearly depended on other rows at the last projected
+    state.
 
     Near a singular position more rows seem dependent. For a motion that may have started at a singular
     position, the number is unknown.

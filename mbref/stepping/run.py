@@ -186,7 +186,7 @@ class Run:
         sizes["watched_rows"] = pivots if watched else 0
         sizes["watched_entries"] = factor.d.size if watched else 0
         sizes["watched_numbers"] = factor.l.size if watched else 0
-        # otherwise their multipliers are computed last
+        # with resting rows, multipliers of static rows are computed at samples only
         static = no_static_rows() if data.resting.size else factor.static
         at_every_state = factor._replace(static=static)
         equations = model.equations(

@@ -149,7 +149,7 @@ def pivot_at_pose(memory):
 
 @kernel
 def remember_watch(memory):
-    """Save the pivots and the gradient at the end of an accepted step, at which the next one begins."""
+    """Save the pivots and the gradient at the end of an accepted step, at which the next step begins."""
     watch = memory.watch
     watch.past_pivot = watch.smallest_pivot
     watch.nearest = min(watch.nearest, relative_pivot(watch))

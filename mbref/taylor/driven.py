@@ -43,7 +43,7 @@ from mbref.taylor.stepping import (
 PREDICTOR_TOLERANCE = 3e-7  # tolerance of the last terms, away from singular positions
 ACCURATE_TOLERANCE = 1e-13  # tolerance of high-accuracy steps
 MIN_PREDICTOR_RATIO = 0.25  # predictor step / crossing step: a shorter one is not taken
-# order of the series unless another one is requested; least order that crosses
+# default order of the series; least order that crosses a singular position
 PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = 16, 12
 
 
@@ -130,8 +130,8 @@ def take_predictor_step(memory):
 def longest_predictor_step(memory):
     """Return the longest predictor step (s), and save the order of the series that it evaluates.
 
-    Its last two terms are as large as the tolerance. Near a singular position terms of high order are
-    rounding, which grows with the order, so that fewer terms allow a longer step.
+    The last two terms of the series are then as large as the tolerance. Near a singular position terms of
+    high order are rounding, which grows with the order, so that fewer terms allow a longer step.
     """
     step, control, full = memory.step, memory.run.control, memory.mode.order
     best, step.used_order, largest = 0.0, full, log(control.largest_step)
@@ -150,9 +150,10 @@ def longest_predictor_step(memory):
 
 @kernel
 def attempt_predictor_step(h, last, memory):
-    """Correct the end of a predictor step of h seconds, judge it and expand there.
+    """Correct the end of a predictor step of h seconds, judge the step, and expand the series at its end.
 
-    Return OK, SINGULAR_AHEAD if it contains a singular position or ends near one, or the failure status.
+    Return OK, SINGULAR_AHEAD if the step contains a singular position or ends near a singular position, or
+    the failure status.
     """
     status = expand_at(h, last, memory)
     if status != OK:

@@ -75,7 +75,7 @@ def as_expression(polynomial: Polynomial) -> Expression:
 
 
 class Elimination:
-    """Variables expressed by others, by Gauss–Jordan elimination of linear equations.
+    """Variables expressed by other variables, by Gauss–Jordan elimination of linear equations.
 
     ``may_go(variable, others)`` returns whether an equation with ``others`` further variables may eliminate a
     variable. Elimination of a variable increases the number of products in other equations.

@@ -57,11 +57,11 @@ class Solver(NamedTuple):
     null_space: Annotated[Matrix, "nz", "lanes"]  # Tᵀ, a row for each independent variable
     momentum: Annotated[Matrix, "nz", "lanes"]  # Tᵀ M
     reduced: Annotated[Matrix, "nz", "nz"]  # Tᵀ M T
-    # force that remains at a variable after the motion due to one right-hand side
+    # residual force f - M q'' of each variable (rows), for each right-hand side (lanes)
     forces: Annotated[Matrix, "nz", "lanes"]
     response: Annotated[
         Matrix, "lanes", "lanes"
-    ]  # row: the lanes that one number of the right-hand side moves
+    ]  # row k: change of all lanes for a unit entry k of the right-hand side
     rhs: Annotated[Vector, "lanes"]
     phi: Annotated[Vector, "lanes"]  # in the lanes of the multipliers
     change: Annotated[Vector, "lanes"]  # the last correction
@@ -132,7 +132,7 @@ class Progress(NamedTuple):
     rests_near: int = 0  # 1 if the motion started at rest near a singular position and is still near
     # distance from singular positions, relative to the distance at which a long crossing may end
     clearance: float = 0.0
-    is_clear: int = 0  # 1 if a long crossing has ended
+    is_clear: int = 0  # 1 if the distance from a singular position is large enough to end a long crossing
 
 
 class SeriesKernels(NamedTuple):
@@ -154,7 +154,7 @@ class SceneCode(NamedTuple):
 
     rank: int = 0
     expand: int = 0  # computes all orders
-    expand_by_power: int = 0  # computes the orders without multipliers, for one degree of freedom in motion
+    expand_by_power: int = 0  # address: orders without multipliers, for one degree of freedom in motion
     factorise: int = 0  # computes pivots and response
     violation: int = 0  # computes Φ
     close: int = 0  # removes Φ

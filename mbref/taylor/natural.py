@@ -82,7 +82,7 @@ class NaturalCoordinates:
         self.orientations = Orientations(model, axes, self._moving[:, 3:], self.direction_vectors)
         self.angles: dict[
             int, tuple[int, float]
-        ] = {}  # primitive of an angle → its row, and its factor there
+        ] = {}  # primitive of an angle → its row, and its factor in this row
         self.rows = self._rows()
         gone = self.eliminate.expressed
         kept = (v for v in range(len(self.direction_vectors)) if v not in gone and v not in self.given)

@@ -24,7 +24,8 @@ class PoseMaps(NamedTuple):
 
 
 class Rows(NamedTuple):
-    """Constraint rows Φ: products of two lanes (each product twice), linear terms and constants."""
+    """Constraint rows Φ: products of two variables or prescribed functions (each product twice), linear terms
+    and constants."""
 
     row: Annotated[Indices, "twofold"]
     lane: Annotated[Indices, "twofold"]
@@ -87,7 +88,8 @@ class Springs(NamedTuple):
 
 
 class Torsions(NamedTuple):
-    """Angles of joints: two directions across the axis on the first body, one on the second."""
+    """Angles of joints: two directions across the axis on the first body, one direction on the second
+    body."""
 
     constant: Annotated[Matrix, "torsions", 9]
     form: Annotated[Matrix, "9*torsions", "nz"]

@@ -84,8 +84,8 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
 
 
 def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in
-    it."""
+    """Return the constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in the
+    tableau."""
     linear = np.full((nr + 1, lanes), 0.0, rows.constant.dtype)
     of_variables = rows.linear_lane < nz
     places = rows.linear_row[of_variables], rows.linear_lane[of_variables]
@@ -95,7 +95,7 @@ def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.n
 
 
 def _columns(entries: Sequence[tuple[float, ...]], indices: int) -> list[np.ndarray]:
-    """Return columns of a table, the first ones of indices and the last of numbers."""
+    """Return columns of a table: columns of indices first, then a column of numbers."""
     columns = list(zip(*entries, strict=True)) if entries else [()] * (indices + 1)
     return [*(np.array(column, np.int64) for column in columns[:-1]), array_of(columns[-1])]
 

@@ -60,7 +60,8 @@ def put_sums(k, memory):
 
 @inlined
 def add_to_later_sums(k, last, memory):
-    """Add the products of the factors of order k + 1 and of earlier ones to the sums up to the last order."""
+    """Add the products of the factors of order k + 1 and of earlier orders to the sums up to the last
+    order."""
     series, start = memory.series, memory.polynomials.products.start
     left, right, sums, slots = series.left, series.right, series.sums, series.left.shape[1]
     lanes = sums.shape[1]

@@ -315,7 +315,7 @@ class SeriesStepper:
         return status
 
     def _record(self, crossed: list[Passed]) -> Passed | None:
-        """Add the crossings of the last step, up to and with a requested branch; return that one or None."""
+        """Add the crossings of the last step up to a requested branch; return the latter crossing or None."""
         for passed in self.recorded():
             taken = self._asked(len(self.run.crossings) + len(crossed) + 1)
             crossed.append(passed._replace(taken=taken))

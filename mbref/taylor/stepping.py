@@ -108,7 +108,7 @@ def next_length(h, regular, memory):
     """Return the length (s) of the attempt after an attempt of h seconds.
 
     The step ends clearly after the singular position that the attempt approached or crossed, if the terms of
-    the series that are not rounding allow it. If not, the step ends before the position.
+    the series above rounding allow this length. If not, the step ends before the position.
     """
     step = memory.step
     near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * step.start_pivot

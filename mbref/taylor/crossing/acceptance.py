@@ -1,4 +1,5 @@
-"""Acceptance of a step that comes near a singular position or crosses one, and the tolerance of such steps.
+"""Acceptance of a step that comes near a singular position or crosses a singular position, and the tolerance
+of such steps.
 
 - If two branches are separated by a gap g, the series of one side continues straight to the other side.
 Beyond the gap it violates the rows by at least g.  A step near a singular position is therefore as

@@ -1,10 +1,11 @@
-"""Detection of singular positions: the decision whether a step of free or driven motion contains one.
+"""Detection of singular positions: the decision whether a step of free or driven motion contains a singular
+position.
 
 If rows, variables and signs of the pivots are equal at both ends, pivots have vanished twice or never; two
-zeros need a distance that is long compared with the pivots. Otherwise the determinant of the gradients
-decides (``determinants``). The sign of the determinant is unchanged if branches of several loops cross at
-once, or after two crossings. So the determinant is also evaluated at its minimum if pivots change their
-signs, and at the place where a linearly falling least pivot vanishes.
+zeros need a distance that is long compared with the pivots. For all other steps the determinant of the
+gradients decides (``determinants``). The sign of the determinant is unchanged if branches of several loops
+cross at once, or after two crossings. So the determinant is also evaluated at its minimum if pivots change
+their signs, and at the place where a linearly falling least pivot vanishes.
 """
 
 from __future__ import annotations
@@ -186,7 +187,8 @@ def dips_to_zero(h, pivot, memory):
 
 @kernel
 def end_logarithms(memory):
-    """Return the logarithms of the determinant at the ends of a step: the smaller and the larger one."""
+    """Return the logarithms of the determinant at the ends of a step: the smaller and the larger
+    logarithm."""
     save_start_determinant(memory)
     _, behind = gradient_determinant_at_end(memory)
     before = log_determinant_at_start(memory)

@@ -145,8 +145,8 @@ def rates_oppose(memory):
     """Return whether the motion, without drivers, has the direction of the minors' null vector at one end of
     the step only.
 
-    This happens if branches cross, because the minors are smooth and vanish at the crossing, however far the
-    null vector turns in the step.
+    The direction differs at both ends if branches cross, because the minors are smooth and vanish at the
+    crossing, however far the null vector turns in the step.
     """
     solver, past, terms, before, after = memory.solver, memory.series.past, memory.series.terms, 0.0, 0.0
     for i in range(solver.pivot_columns.shape[0]):

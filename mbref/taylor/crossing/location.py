@@ -30,8 +30,8 @@ NEGATIVE = -1e300  # stands for the logarithm of a negative determinant
 def find_crossings(h, memory):
     """Return the times (s, from its start) of one or two singular positions in a step of h seconds.
 
-    The second time is negative if there is one position.  The determinant vanishes at a singular position,
-    and changes its sign unless branches of several loops cross at once.
+    The second time is negative if the step contains only one singular position.  The determinant vanishes at
+    a singular position, and changes its sign unless branches of several loops cross at once.
     """
     save_start_determinant(memory)
     change = sign_change(h, memory)
@@ -162,7 +162,8 @@ def time_of_minimum(h, sections, memory):
 
 @kernel
 def logarithm_at(h, memory):
-    """Return the logarithm of the determinant at a time h (s) of the step; NEGATIVE for a negative one."""
+    """Return the logarithm of the determinant at a time h (s) of the step; NEGATIVE for a negative
+    determinant."""
     evaluate_series(h, memory)
     negative, size = gradient_determinant(memory.state, memory)
     return NEGATIVE if negative else size

@@ -95,7 +95,7 @@ def restore_step_start(memory):
 
 @kernel
 def take_crossing_steps(memory):
-    """Take a few high-accuracy steps until one crosses; return whether a step crossed and the motion is
+    """Take a few high-accuracy steps until a step crosses; return whether a step crossed and the motion is
     determined."""
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     crossings, is_free = counts.crossings, freedoms(memory) > 0

@@ -81,9 +81,9 @@ def rests_near(memory):
 @kernel
 def is_turned(memory):
     """Return whether rounding changes the direction of a motion that started at rest near a singular position
-    and is still near it. A rounding error of a row moves the state by (error / p) with the least pivot p.
-    This changes the direction of the motion, which gains a fraction √p of its speed over a distance p. Rows
-    of loops with equal dimensions may have no rounding error.
+    and is still near it. A rounding error of a row moves the state by (error / p) with the least pivot p. The
+    error also changes the direction of the motion, which gains a fraction √p of its speed over a distance p.
+    Rows of loops with equal dimensions may have no rounding error.
     """
     progress, pivot = memory.progress, least_pivot(memory)
     progress.rests_near = progress.rests_near and pivot < REST_PIVOT

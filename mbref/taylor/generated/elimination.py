@@ -214,7 +214,7 @@ class Elimination:
         return self._sum(motion, *parts)
 
     def _force(self, i: int, rows: list[Row]) -> Row:
-        """Return the force that is left at a variable by the inertia of all others."""
+        """Return the force that the inertia of all other variables leaves at a variable."""
         mass = self._taylor.polynomials.inertia.mass[i]
         parts = [self._times(constant([-mass[j]] * WIDTH), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
         return self._sum(self._one(i), *parts)

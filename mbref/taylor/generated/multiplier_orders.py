@@ -80,8 +80,8 @@ class MultiplierOrders(Orders):
         return parts
 
     def _respond(self, place: ir.Value, sums: Vectors) -> Vectors:
-        """Return the row of terms two orders later, by the response to the sums and to functions
-        prescribed."""
+        """Return the coefficients two orders later, by the response to the sums and to prescribed
+        functions."""
         write, ahead = self._write, self._write.plus(place, 2 * self._lanes)
         write.store(sums, self._sums, 0)
         numbers = [write.number(self._sums, e) for e in range(self._equations)]

@@ -31,7 +31,8 @@ COUNTS = 1  # number of integer arguments: the last order of multipliers
 
 
 class Factors(NamedTuple):
-    """Both factors of a slot's products that a row of terms gives, the left one times the weight."""
+    """Both factors of the products of a slot, from the coefficients of one order; the left factor includes
+    the weight."""
 
     left: ir.Value
     right: ir.Value
@@ -60,15 +61,16 @@ class Orders(ABC):
     def _order(
         self, k: ir.Value, row: Vectors, factors: dict[int, Factors], inner: Sums, is_second: bool = False
     ) -> Vectors:
-        """Write order k + 2 of the variables, from the row of terms before, its factors, and the sums of
-        products of earlier ones; the second order of a pair lacks two more products."""
+        """Generate code for order k + 2 of the variables, from the coefficients of the previous order, their
+        factors, and the sums of products of earlier orders; the second order of a pair lacks two more
+        products."""
 
     def _factors(self, k: ir.Value, row: Vectors) -> dict[int, Factors]:
         """Return the factors of order k by the places of their slots, kept for later orders."""
         return self._factors_of_products(k, row)
 
     def _repeat(self, row: Vectors) -> None:
-        """Write all orders except the first, from the row of terms before."""
+        """Generate code for all orders except the first, from the coefficients of the previous order."""
         write = self._write
         pairs, alone = write.halved(self._last)
         row = write.repeat(
@@ -80,7 +82,7 @@ class Orders(ABC):
         )
 
     def _pair(self, k: ir.Value, row: Vectors) -> Vectors:
-        """Write orders k and k + 1, from the row of terms before."""
+        """Generate code for orders k and k + 1 from the coefficients of the previous order."""
         factors, following = self._factors(k, row), self._write.plus(k, 1)
         products, ahead = self._inner(k, factors)
         row = self._order(k, row, factors, products)
