@@ -1,4 +1,4 @@
-"""The matrix of closed loops / grades by hand, records that supersede others, the committed page."""
+"""The table of closed loops / grades by hand, records that supersede others, the committed page."""
 
 from __future__ import annotations
 
