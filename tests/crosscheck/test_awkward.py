@@ -14,7 +14,7 @@ from crosscheck.judge.truth import closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
 
 SECONDS = 200.0
-QUICK = ("gimbal", "stiff_chain", "rccc", "rounded_platform", "pushed_dead_centre")
+QUICK = ("rccc", "rounded_platform", "pushed_dead_centre")
 ENDING = ("locking", "phased_crank")  # before their duration, in a dead centre
 LARGE = ("chain_of_twenty", "tumbling_chain")  # of which thirty digits take minutes
 SHORTER = {"stiff_chain": 0.3, "stiff_dampers": 0.2, "rounded_door": 0.5}  # s
@@ -56,7 +56,7 @@ def test_awkward_mechanism_is_within_its_bound(kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("kind", sorted(set(AWKWARD) - set(LARGE)))
 def test_every_awkward_mechanism_is_within_its_bound(kind, seed):
     assert_bounded(kind, seed)

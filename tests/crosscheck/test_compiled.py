@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -67,7 +68,12 @@ COORDINATES = {  # scene: joint coordinates of its tree, and of the scene in its
     "bricard": (6, 6),
     "h_frame": (2, 1),
 }
+SLOW = ("heavy_top", "andrews_squeezer")  # scenes whose truth takes long
 TURNED, APART, ALONE = 1.3e-8, 2.3e-8, 1.1e-9  # m or rad
+
+
+def _named(scenes: Iterable[str]) -> list[Any]:
+    return [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in scenes]
 
 
 def integrate(
@@ -187,7 +193,7 @@ def apart(first: Trajectory, second: Trajectory) -> float:
     return max(float((abs(a - b) / np.maximum(1.0, abs(b))).max()) for a, b in pairs)
 
 
-@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("name", _named(SMOOTH))
 def test_mujoco_compiled_and_truth(name: str) -> None:
     pytest.importorskip("mujoco")
     rtol, beta, measured = SMOOTH[name]
@@ -390,7 +396,7 @@ def pinocchio() -> Engine:
     return engine("pinocchio")
 
 
-@pytest.mark.parametrize("name", PINOCCHIO)
+@pytest.mark.parametrize("name", _named(PINOCCHIO))
 def test_pinocchio_compiled_and_truth(pinocchio: Engine, name: str) -> None:
     rtol, shortest, measured = PINOCCHIO[name]
     scene = SCENES[name]()

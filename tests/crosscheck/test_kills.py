@@ -9,7 +9,7 @@ import pytest
 from tests import kills
 
 WHOLE = (200, 20)  # runs, kills
-FEW = {"parents": (60, 4), "children": (12, 2), "workers": (12, 2)}
+FEW = {"parents": (30, 2), "children": (6, 1), "workers": (6, 1)}
 MOST_REPEATED = (
     3  # runs under way when a parent is killed: two threads, and one whose record is being written
 )

@@ -14,7 +14,7 @@ from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene, TorsionSpring
 
 SECONDS = 200.0
-QUICK = ("stiff_spring", "fast_driver", "rounded_redundancy", "planes")
+QUICK = ("stiff_spring", "rounded_redundancy", "planes")
 SHORTER = {"near_singular": 0.5, "whip": 0.25, "point_masses": 0.5}  # s
 CROSSING = ("two_crossings",)  # where rounding decides, and more digits move another mechanism
 

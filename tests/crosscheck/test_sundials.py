@@ -128,6 +128,7 @@ def test_a_row_that_only_seemed_redundant_at_the_start_is_told() -> None:
     assert run.outcome is Outcome.VIOLATION, f"{run.outcome.label}: {run.message}"
 
 
+@pytest.mark.slow
 def test_rows_chosen_at_the_start_and_a_full_turn() -> None:
     """Of the redundant planar mechanism; one choice, or its replacements, must serve in every position."""
     scene = SCENES["planar_slider_crank"]()

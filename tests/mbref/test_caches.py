@@ -174,11 +174,18 @@ def kept(cache: Path, pattern: str) -> list[Path]:
     return sorted(cache.rglob(pattern))
 
 
+# each damage costs several new processes that compile
+DAMAGES = (
+    lambda data: data[: len(data) // 2],
+    pytest.param(lambda data: b"\0" * len(data), marks=pytest.mark.slow),
+)
+
+
 @pytest.mark.parametrize(
     ("script", "pattern", "says"),
     [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SMALL_KERNEL, "*.nbi", "7.0\n"), (SCENE, "*.code", "True\n")],
 )
-@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
+@pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):
     cache = tmp_path / "cache"
     assert ran(script, tmp_path, cache)[0] == says
@@ -244,7 +251,7 @@ def test_a_helper_compiled_for_a_foreign_type_leaves_the_cache_readable(tmp_path
     assert ran(own, tmp_path / "second", tmp_path / "cache")[0] == "0\n"
 
 
-@pytest.mark.parametrize("damage", [lambda data: data[: len(data) // 2], lambda data: b"\0" * len(data)])
+@pytest.mark.parametrize("damage", DAMAGES)
 def test_damage_to_every_file_of_the_cache_costs_time_alone(damage, tmp_path: Path):
     """Checksums too: kernels without one are compiled again."""
     cache = tmp_path / "cache"

@@ -100,6 +100,7 @@ def test_drivers_of_a_chain_and_their_phases():
     assert np.abs(run.angular_velocity[:, 1, 2] - rate).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_body_that_spins_fast():
     """Pivots that had fallen to a twentieth magnified rounding: 3000 rad of phase were off by 6e-7."""
     scene = SCENES["heavy_top"]().with_(duration=4.0)

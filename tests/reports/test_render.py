@@ -6,6 +6,7 @@ import html
 import json
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -104,6 +105,20 @@ def few(scenes, engines) -> sweeps.Sweep:
 
 @pytest.fixture
 def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
+    _use_fakes(monkeypatch)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A quick report of the fake engine; tests that write into it copy it."""
+    out = tmp_path_factory.mktemp("made")
+    with pytest.MonkeyPatch.context() as patch:
+        _use_fakes(patch)
+        assert program.main(["--quick", "--out", str(out)]) == 0
+    return out
+
+
+def _use_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(collection, "find_engines", lambda names, notice: [FAKE])
     monkeypatch.setattr(sweeps, "quick", few)
     monkeypatch.setattr(sweeps, "QUICK_LONG", LONG)
@@ -126,8 +141,8 @@ def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
     assert "written" in capsys.readouterr().err
 
 
-def test_pasted_commands_of_a_page_and_the_same_errors(tmp_path, of_fakes, capsys, monkeypatch):
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+def test_pasted_commands_of_a_page_and_the_same_errors(made, of_fakes, tmp_path, capsys, monkeypatch):
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     page = (tmp_path / "index.html").read_text()
     commands = [html.unescape(c) for c in re.findall(r'<pre class="command">([^<]*)</pre>', page)]
     [group] = stored.groups(tmp_path)
@@ -142,8 +157,8 @@ def test_pasted_commands_of_a_page_and_the_same_errors(tmp_path, of_fakes, capsy
     assert not errors, f"no command for {errors}"
 
 
-def test_rendering_again_and_nothing_is_run(tmp_path, of_fakes, capsys, monkeypatch):
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
+def test_rendering_again_and_nothing_is_run(made, tmp_path, of_fakes, capsys, monkeypatch):
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     first = (tmp_path / "index.html").read_text()
     monkeypatch.setattr(collection, "comparison", None)
     assert program.main(["--render", str(tmp_path)]) == 0
