@@ -14,6 +14,7 @@ from crosscheck.cli.certifying import certify
 from crosscheck.cli.closed_loops import closed_loops
 from crosscheck.cli.comparing import compare, tune
 from crosscheck.cli.judging import judge, write_reference
+from crosscheck.cli.modes import modes
 from crosscheck.cli.parser import parser
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import (
@@ -168,6 +169,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "verify": _verify,
     "findings": _findings,
     "closed-loops": closed_loops,
+    "modes": modes,
     "report": _report,
     "paper": _paper,
     "diff": _diff,

@@ -63,6 +63,7 @@ def parser() -> argparse.ArgumentParser:
         _add_verify,
         _add_findings,
         _add_closed_loops,
+        _add_modes,
         _add_report,
         _add_paper,
         _add_diff,
@@ -249,6 +250,24 @@ def _add_closed_loops(commands: Commands) -> None:
     parser.add_argument(
         "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"
     )
+
+
+def _add_modes(commands: Commands) -> None:
+    about = (
+        "compare equilibria, steady motions and the eigenvalues of small motions: the judge's own equations, "
+        "mbref, and engines; without a scene show the stored table of mechanisms with closed forms"
+    )
+    parser = _add(commands, "modes", about, "crosscheck modes my.toml --engine mujoco --engine exudyn")
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help="a built-in name or a .toml file")
+    parser.add_argument(
+        "--engine", action="append", metavar="E", help="ask this engine only; may repeat; default: installed"
+    )
+    parser.add_argument(
+        "--starts", type=whole, default=16, metavar="N", help="poses to search from (default: %(default)s)"
+    )
+    parser.add_argument("--run", action="store_true", help="measure the stored table again, or engines of it")
+    parser.add_argument("--page", metavar="FILE", help="also write the table as a page in Markdown")
+    parser.add_argument("--json", action="store_true", help="print one JSON value and nothing else")
 
 
 def _add_report(commands: Commands) -> None:

@@ -157,6 +157,21 @@ class Mbref(Engine):
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
 
 
+def search(scene: Scene) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Return positions (nb, 3), orientations (nb, 4) and eigenvalues (1/s) of the poses that `mbref
+    equilibrium` finds."""
+    from mbref.design.equilibrium import equilibria
+
+    return [
+        (
+            np.array([body.position for body in each.scene.body]),
+            np.array([body.orientation for body in each.scene.body]),
+            each.eigenvalues,
+        )
+        for each in equilibria(scene)
+    ]
+
+
 def _methods(scene: Scene) -> Sequence[str]:
     """Return the methods that can run a scene: its default method, then the default method with generated
     code, then all other methods."""

@@ -18,12 +18,14 @@ from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.exudyn.dynamic import Motion, integrate, step_count
 from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines.exudyn.joints import SUPPORTS
+from crosscheck.engines.exudyn.model import build
 from crosscheck.engines.exudyn.reactions import reactions
 from crosscheck.engines.exudyn.static import drive
 from crosscheck.engines.fixed_steps import unended_piece
 from crosscheck.engines.written import Written
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
+from crosscheck.linearising import Linearising
 from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
@@ -46,10 +48,11 @@ FAMILIES = {
 OPTIONS = {"step": "largest time step, s"}
 
 
-class Exudyn(Engine):
+class Exudyn(Linearising, Engine):
     """The Exudyn engine; its one option ``step`` (s) is the largest time step."""
 
     name = "exudyn"
+    linearises_by = "ComputeODE2Eigenvalues"
     package = "exudyn"
     supports = SUPPORTS
     families, options, integrated_here = FAMILIES, OPTIONS, ("tuned",)
@@ -99,6 +102,15 @@ class Exudyn(Engine):
         integration.numberOfSteps = step_count(scene.duration, float(setting.options["step"]))
         kind = DYNAMIC[setting.family](exu, settings, bool(scene.counts().redundant or scene.driver))
         return "; ".join([*statements, f"mbs.SolveDynamic(settings, solverType={kind!r})"])
+
+    def own_eigenvalues(self, scene: Scene) -> np.ndarray:
+        """Return the eigenvalues of mass, damping and stiffness projected into the null space of the
+        constraints' Jacobian."""
+        exu = _exudyn()
+        with _warnings(exu):
+            system = build(exu, scene, forces=True).mbs
+            found, _ = system.ComputeODE2Eigenvalues(computeComplexEigenvalues=True, useAbsoluteValues=False)
+        return np.asarray(found)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         exu = _exudyn()

@@ -17,7 +17,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.driver_motion import fastest_rate, motion, stated_rate
 from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.mujoco import compiled_run, original
+from crosscheck.engines.mujoco import compiled_run, linearised, original
 from crosscheck.engines.mujoco.families import (
     ADAPTIVE,
     COMPILED,
@@ -44,13 +44,12 @@ from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Outcome, Trajectory
 
-# rad; a driver moves by at most this in one adaptive step, since closures may change branch within larger
-# ones
+# rad; largest motion of a driver in an adaptive step, since closures may change branch within larger ones
 TURN_PER_STEP = 0.25
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 
 
-class MuJoCo(Engine):
+class MuJoCo(linearised.Linearised, Engine):
     """MuJoCo 4."""
 
     name = "mujoco"

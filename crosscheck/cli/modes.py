@@ -1,0 +1,62 @@
+"""`crosscheck modes`: equilibria, steady motions and eigenvalues by the judge, mbref and engines."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from crosscheck.cli import request
+from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
+from crosscheck.cli.scene_request import find_scenes
+from crosscheck.engine import all_engines
+from crosscheck.small_motions import document, records
+from crosscheck.small_motions.records import Record
+
+# engines whose accelerations at a pose are asked for, if they are installed
+ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
+
+
+def modes(arguments: argparse.Namespace) -> int:
+    """Measure a scene, or show the stored records of mechanisms with closed forms."""
+    engines = _engines(arguments.engine)
+    if arguments.scene:
+        (scene,) = find_scenes([arguments.scene], notice=notice)
+        found = records.measured(scene, engines, starts=arguments.starts, progress=notice)
+    else:
+        if arguments.run:
+            records.write(records.merged(records.of_mechanisms(engines, notice), records.read()))
+        found = records.read()
+    if arguments.page:
+        Path(arguments.page).write_text(document.page(found), encoding="utf-8")
+        notice(f"written: {arguments.page}")
+    if arguments.json:
+        print_json(found)
+    else:
+        _show(console(), found)
+    return COMPLETED if found else OTHERWISE
+
+
+def _engines(named: Sequence[str] | None) -> list[str]:
+    if named:
+        return request.find_engines(named, notice)
+    here = all_engines()
+    return [name for name in ENGINES if name in here]
+
+
+def _show(out: Console, found: Sequence[Record]) -> None:
+    if not found:
+        out.print("The judge's search finds no equilibrium and no steady motion; --starts tries more.")
+    for record in found:
+        listed = ", ".join(document.written(*s) for s in record["eigenvalues"])
+        out.print(f"{record['scene']}: {document.heading(record)}", soft_wrap=True)
+        out.print(f"  s = {listed} 1/s", soft_wrap=True)
+        out.print(f"  {document.search(record)}".replace("`", ""), soft_wrap=True)
+        table = Table("method", "error of the eigenvalues", box=SIMPLE)
+        for name, value in document.rows(record):
+            table.add_row(name, value)
+        out.print(table)

@@ -1,0 +1,190 @@
+"""Search for steady poses: Newton's method with damping on joint coordinates, from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judge.arithmetic import doubles
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.deadline import ask
+from crosscheck.judge.small_motions.equations import STEP, Balance, NotSteady, Small, in_doubles
+from crosscheck.judge.small_motions.turning import turning
+from crosscheck.judge.tolerances import NEXT_TO_SINGULAR
+from mbref import rotations
+from mbref.scene import Scene, SceneError
+
+STARTS = 16  # number of poses from which a steady pose is searched
+SEED = 20  # of the random starts
+NEAR, FAR = 0.5, 3.0  # rad or lengths; sizes of the displacements of the starts
+ITERATIONS = 60  # of Newton's method from a start
+MOST_DAMPED = 1e6  # damping / squared stiffness at which a search ends
+LONGEST = 0.4  # rad or lengths; longest Newton step
+BALANCED = 1e-10  # unbalanced force / largest force at the starts, of a pose in double precision
+REFINED = 1e-15  # the same after refinement in long doubles
+REFINEMENTS = 6
+SAME = 1e-6  # rad or lengths; distance below which two poses count as one
+STILL = 1e-6  # part of the largest eigenvalue below which a real part or an eigenvalue counts as zero
+UNSTEADY = 1e-8  # change of the matrices / largest entry after a rotation; above, the motion is not steady
+ROTATED = 1.0  # rad; rotation after which the matrices are compared
+SMALLEST = 4e-16  # relative uncertainty of eigenvalues of matrices in double precision
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A steady pose by the judge: rest, or relative rest in a mechanism that turns with its driver.
+
+    Attributes
+    ----------
+    position, orientation : ndarray, shape (nb, 3) and (nb, 4)
+        Poses of the bodies; unit quaternions (w, x, y, z).
+    eigenvalues : ndarray, shape (2f,), complex
+        Exponents s, 1/s, slowest first.
+    uncertainty : float
+        Change of the eigenvalues / largest eigenvalue with twice the increment of the differences.
+    balance, state, small
+        The equations, the state (n,) of them, and the matrices of small motions.
+    """
+
+    position: np.ndarray
+    orientation: np.ndarray
+    eigenvalues: np.ndarray
+    uncertainty: float
+    balance: Balance
+    state: np.ndarray
+    small: Small
+
+    @property
+    def stability(self) -> str:
+        """``stable``, ``unstable`` or ``indifferent``, by the largest real part of the eigenvalues."""
+        size = float(np.abs(self.eigenvalues).max(initial=0.0))
+        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL * size:
+            return "indifferent"
+        return "unstable" if self.eigenvalues.real.max() > STILL * size else "stable"
+
+
+def steady_poses(scene: Scene, starts: int = STARTS) -> list[Steady]:
+    """Return the steady poses that are found from several starts, the scene's own pose first.
+
+    Raises
+    ------
+    SceneError
+        If the scene has no small motions: a body has no mass, a load varies, drivers move otherwise than by
+        one constant rotation, or there is no degree of freedom.
+    """
+    motion = turning(scene)
+    balance = Balance(scene, motion)
+    try:
+        first = balance.start()
+    except NotSteady as reason:
+        raise SceneError([f"{scene.name}: {reason}"]) from None
+    if balance.basis(balance.at(first[None])).shape[1] == 0:
+        raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
+    quick = in_doubles(balance)
+    poses = list(_starts(quick, doubles(first), starts))
+    scale = _scale(quick, poses)
+    found: list[Steady] = []
+    for pose in poses:
+        settled = _settled(quick, pose, scale)
+        if settled is None or any(_is_same(quick, settled, other) for other in found):
+            continue
+        if (each := _steady(balance, settled, scale)) is not None:
+            found.append(each)
+    return found
+
+
+def _scale(balance: Balance, poses: list[np.ndarray]) -> float:
+    """Return the largest force (J) along a unit joint coordinate at some poses."""
+    forces = [np.abs(balance.forces(balance.at(y[None]))[0] * balance.sizes).max() for y in poses]
+    return max(forces, default=0.0)
+
+
+def _starts(balance: Balance, first: np.ndarray, count: int) -> Iterator[np.ndarray]:
+    """Yield the first pose, and random displacements of it with closed loops, with a fixed seed."""
+    rng = np.random.default_rng(SEED)
+    yield first
+    for k in range(1, count):
+        ask()
+        size = (NEAR, FAR)[k % 2]
+        step = size * balance.sizes * rng.uniform(-1, 1, balance.equations.nv)
+        try:
+            yield balance.steady(balance.closed(balance.moved(first, step[None])[0]))
+        except NotSteady:
+            continue
+
+
+def _settled(balance: Balance, y: np.ndarray, scale: float) -> np.ndarray | None:
+    """Return the steady pose near a start by damped Newton steps; None if there is none."""
+    damping, off = 0.0, balance.unbalanced(y)
+    for _ in range(ITERATIONS):
+        ask()
+        if np.linalg.norm(off) <= BALANCED * scale:
+            return y
+        basis = balance.basis(balance.at(y[None]))
+        slope = basis.T @ balance.stiffness(y, basis, STEP / 100, order=2)
+        weight = damping * float(np.linalg.norm(slope)) ** 2 + np.finfo(float).tiny
+        step = np.linalg.solve(slope.T @ slope + weight * np.eye(len(off)), slope.T @ off)
+        step /= max(1.0, float(np.linalg.norm(step)) / LONGEST)
+        try:
+            moved = balance.steady(balance.closed(balance.moved(y, (basis @ step)[None])[0]))
+            after = balance.unbalanced(moved)
+        except (NotSteady, np.linalg.LinAlgError):
+            moved, after = y, off
+        if len(after) != len(off) or not np.linalg.norm(after) < np.linalg.norm(off):
+            damping = max(10 * damping, 1e-3)
+            if damping > MOST_DAMPED:
+                return None
+            continue
+        y, off, damping = moved, after, damping / 10
+    return None
+
+
+def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
+    """Return the pose refined in long doubles, with its small motions; None if it is not steady or is
+    singular."""
+    y = balance.arithmetic.array(y)
+    for _ in range(REFINEMENTS):
+        y = balance.steady(balance.closed(y))
+        basis = balance.basis(balance.at(y[None]))
+        off = basis.T @ balance.forces(balance.at(y[None]))[0]
+        if np.abs(doubles(off)).max() <= REFINED * scale:
+            break
+        slope = doubles(basis.T @ balance.stiffness(y, basis, STEP))
+        step = basis @ np.linalg.lstsq(slope, doubles(off), rcond=None)[0]
+        y = balance.moved(y, step[None])[0]
+    y = balance.steady(balance.closed(y))
+    small, coarse = balance.small(y), balance.small(y, 2 * STEP)
+    eigenvalues = small.eigenvalues()
+    size = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
+    change = float(np.abs(coarse.eigenvalues() - eigenvalues).max()) / size
+    if balance.conditioning(y) < NEXT_TO_SINGULAR or (balance.motion.rate and not _stays(balance, y, small)):
+        return None
+    return Steady(*balance.poses(y), eigenvalues, max(change, SMALLEST), balance, y, small)
+
+
+def _stays(balance: Balance, y: np.ndarray, small: Small) -> bool:
+    """Return whether the small motions are equal after the mechanism has turned by an angle."""
+    later, n = y.copy(), balance.equations.tree.scalars
+    rates = y[balance.equations.ends[2] :]
+    later[:n] = later[:n] + ROTATED / balance.motion.rate * rates[:n]
+    other, basis = balance.at(later[None]), balance.arithmetic.array(small.basis)
+    mass = balance.equations.loads.mass_matrix(other.placed, other.coordinates)[0]
+    parts = mass @ basis, balance.damping(later, basis, STEP), balance.stiffness(later, basis, STEP)
+    found = [doubles(basis.T @ part) for part in parts]
+    rate, heavy = balance.motion.rate, float(np.abs(small.mass).max())
+    scales = heavy, heavy * rate, max(heavy * rate**2, float(np.abs(small.stiffness).max()))
+    pairs = zip(found, (small.mass, small.damping, small.stiffness), scales, strict=True)
+    change = max(np.abs(now - before).max() / scale for now, before, scale in pairs)
+    off = np.abs(doubles(basis.T @ balance.forces(other)[0])).max()
+    return bool(max(change, off / (heavy * rate**2)) < UNSTEADY)
+
+
+def _is_same(balance: Balance, pose: np.ndarray, other: Steady) -> bool:
+    """Return whether two poses are one, also if they differ by a rotation of the whole mechanism."""
+    position, orientation = balance.poses(pose)
+    length = scene_length(balance.scene)
+    apart = np.abs(position - other.position).max() / length
+    angle = float(rotations.angle_between(orientation, other.orientation).max())
+    return bool(max(apart, angle) < SAME)

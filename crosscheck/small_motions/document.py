@@ -1,0 +1,145 @@
+"""Small motions of engines as a page of the documentation, from stored records."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from crosscheck.small_motions.mechanisms import MECHANISMS
+from crosscheck.small_motions.records import Record
+
+HEAD = """# Small motions in engines
+
+This page helps to decide which eigenvalues to trust. It compares eigenvalues of small motions about
+equilibria and steady motions with closed forms. The eigenvalues are of the judge, of `mbref modes`, of the
+functions with which engines linearise, and of the engines' accelerations, by differences that crosscheck
+takes. An error is the largest one over all eigenvalues and poses, relative to the largest eigenvalue.
+
+```sh
+crosscheck modes my.toml                                  # a mechanism of your own
+crosscheck modes                                          # this table, from stored records
+crosscheck modes --run --page docs/small-motions.md       # measure again, and write this page
+```
+"""
+NOTES = """## How to read it
+
+- **judge**: Lagrange multipliers and joint coordinates of a spanning tree in long doubles,
+  `crosscheck/judge/small_motions`. Nothing of mbref's equations is called. It searches equilibria by
+  damped Newton steps from 16 random starts.
+- **mbref modes**: natural frequencies and damping of [`mbref modes`](equilibrium.md), by differences of
+  accelerations along the tangent. `mbref equilibrium` finds every pose of these tables by its own search,
+  unless the table says that it does not.
+- **ComputeODE2Eigenvalues** (Exudyn): projects mass, damping and stiffness into the null space of the
+  constraints. The change of the constraint forces with the pose, which is the stiffness of a pendulum in
+  Cartesian coordinates, is not part of its stiffness matrix. So it gives zero for a pendulum under
+  gravity. It is right where reactions do not turn with the bodies, as on slides.
+- **mjd_transitionFD** (MuJoCo): central differences of one step of 1e-4 s by its Euler integrator, whose
+  error is of first order for dampers. Loops are closed softly, as hard as MuJoCo allows: `solref` 2e-4 s,
+  `solimp` 0.9999. With the default `solimp` of 0.9 errors on loops are 0.02 to 0.1. The eigenvalues nearest
+  to the exact ones count; the others are decays of the soft closures.
+- **accelerations**: central differences of order 4, with an increment of 2e-3 rad or lengths. Right
+  accelerations at displaced poses give about 1e-11.
+- Functions that linearise are not asked about steady motions.
+"""
+FOUR_BAR = """## The four-bar with a diagonal spring
+
+The IFToMM benchmark "Fourbar linkage with diagonal spring" prints the angle of its equilibrium, 2.23433101898
+rad. With a natural length of √2 m the equilibrium is at 2.23433101902 rad, 4e-11 rad from the printed one.
+Its printed eigenvalues were not available to us. So the truth is a closed form of the crank's angle φ:
+I s² + c d'(φ)² s + V''(φ) = 0 with I = 5/3 kg m², d = 2 cos(φ/2), V = 2 m g sin φ + k (d - √2)²/2. A test
+evaluates it with 30 digits (`tests/crosscheck/test_small_motions.py`).
+"""
+
+
+def page(records: Sequence[Record]) -> str:
+    """Return the page in Markdown."""
+    parts = [HEAD, *_table(records), "", *_refusals(records), "", NOTES, "## The mechanisms\n"]
+    for mechanism in MECHANISMS:
+        parts += [f"**{mechanism.name}**: {mechanism.about}.\n"]
+        parts += [_pose(record) for record in records if record["scene"] == mechanism.name]
+        parts += [""]
+    return "\n".join([*parts, FOUR_BAR])
+
+
+def _table(records: Sequence[Record]) -> Iterator[str]:
+    """Yield the table of the largest error of each method over the poses of each mechanism."""
+    cells: dict[str, dict[str, list[float | None]]] = {}
+    for record in records:
+        errors = {"judge": record["error"], "mbref modes": record["mbref_error"]}
+        errors |= {_method(each): each["error"] for each in record["results"] if each["way"]}
+        for name, value in errors.items():
+            cells.setdefault(name, {}).setdefault(record["scene"], []).append(value)
+    yield "| method | " + " | ".join(mechanism.name for mechanism in MECHANISMS) + " |"
+    yield "| --- |" + " --: |" * len(MECHANISMS)
+    first = ["judge", "mbref modes"]
+    for name in [*first, *sorted(set(cells) - set(first))]:
+        row = cells[name]
+        yield f"| {name} | " + " | ".join(_largest(row.get(m.name, [])) for m in MECHANISMS) + " |"
+
+
+def _largest(values: Sequence[float | None]) -> str:
+    known = [value for value in values if value is not None]
+    return size(max(known)) if known else "–"
+
+
+def _refusals(records: Sequence[Record]) -> Iterator[str]:
+    """Yield a line for each reason why an engine has no eigenvalues."""
+    found = {
+        (record["scene"], each["engine"], each["reason"]): None
+        for record in records
+        for each in record["results"]
+        if each["reason"]
+    }
+    yield from (f"- {name} without {scene}: {reason}." for scene, name, reason in sorted(found))
+
+
+def _pose(record: Record) -> str:
+    listed = ", ".join(written(*s) for s in record["eigenvalues"])
+    return f"- {heading(record)}: s = {listed} 1/s. {search(record)}"
+
+
+def _method(result: Record) -> str:
+    return f"{result['engine']} {result['version']}, {result['way']}"
+
+
+def heading(record: Record) -> str:
+    """Return the kind of a pose and its stability."""
+    kind = f"Steady motion at {record['rate']:g} rad/s" if record["rate"] else "Equilibrium"
+    return f"{kind}, {record['stability']}"
+
+
+def search(record: Record) -> str:
+    """Return a sentence on mbref's own search."""
+    if record["mbref_distance"] is None:
+        return "The search of `mbref equilibrium` does not find this pose."
+    apart = size(record["mbref_distance"])
+    return f"`mbref equilibrium` finds this pose, {apart} lengths or rad from the judge's."
+
+
+def rows(record: Record) -> Iterator[tuple[str, str]]:
+    """Yield each method and its error, the judge first."""
+    if record["error"] is None:
+        yield "judge (reference)", f"± {record['uncertainty']:.0e}"
+    else:
+        yield "judge", size(record["error"])
+    if record["mbref_error"] is not None:
+        yield "mbref modes", size(record["mbref_error"])
+    for each in record["results"]:
+        yield (
+            _method(each).removesuffix(", "),
+            each["reason"] if each["error"] is None else size(each["error"]),
+        )
+
+
+def size(value: float) -> str:
+    """Return an error with one digit; less than rounding as a bound."""
+    return "< 1e-15" if value < 1e-15 else f"{value:.0e}"
+
+
+def written(real: float, imaginary: float) -> str:
+    """Return a complex number with ten digits, without parts of rounding size."""
+    scale = 1e-12 * max(abs(real), abs(imaginary))
+    real, imaginary = (0.0 if abs(x) <= scale else x for x in (real, imaginary))
+    if imaginary == 0.0:
+        return f"{real:.10g}"
+    sign = "-" if imaginary < 0 else "+"
+    return f"{real:.10g} {sign} {abs(imaginary):.10g} i" if real else f"{sign}{abs(imaginary):.10g} i"

@@ -1,0 +1,199 @@
+"""The judge's equilibria, steady motions and eigenvalues / closed forms; engines about the judge's poses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.engine import engine
+from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.small_motions.equilibria import steady_poses
+from crosscheck.judge.small_motions.turning import turning
+from crosscheck.linearising import Linearising
+from crosscheck.small_motions import document, records
+from crosscheck.small_motions.compare import ACCELERATIONS, at_pose, by_accelerations, error, of_engine
+from crosscheck.small_motions.mechanisms import (
+    DAMPER,
+    DIAGONAL,
+    MECHANISMS,
+    SPRING,
+    damped_slides,
+    governor,
+    pendulum,
+    spring_four_bar,
+    turning_pendulum,
+)
+from mbref.scene import SceneError
+
+ROOT = Path(__file__).parents[2]
+KNOWN = {mechanism.name: mechanism for mechanism in MECHANISMS}
+
+
+@pytest.fixture(scope="module", params=list(KNOWN))
+def judged(request):
+    mechanism = KNOWN[request.param]
+    return mechanism, steady_poses(mechanism.make(), starts=10)
+
+
+def test_the_judge_finds_the_eigenvalues_of_closed_forms(judged):
+    """To 1e-13, and to fifty times the uncertainty that it states."""
+    mechanism, found = judged
+    for exact in mechanism.known():
+        errors = [error(each.eigenvalues, np.array(exact)) for each in found]
+        best = int(np.argmin(errors))
+        assert errors[best] < 1e-13, (mechanism.name, exact, errors[best])
+        assert errors[best] <= 50 * found[best].uncertainty
+        assert found[best].uncertainty < 1e-11
+        unstable = max(s.real for s in exact) > 1e-9
+        assert found[best].stability == ("unstable" if unstable else "stable")
+
+
+def test_poses_are_balanced_and_eigenvalues_come_in_conjugate_pairs(judged):
+    _, found = judged
+    for each in found:
+        assert np.abs(each.balance.unbalanced(each.state).astype(float)).max() < 1e-13
+        assert error(each.eigenvalues, each.eigenvalues.conj()) < 1e-14
+        mass = each.small.mass
+        assert np.allclose(mass, mass.T, rtol=1e-14) and np.linalg.eigvalsh(mass)[0] > 0
+
+
+def test_stiffness_is_symmetric_at_rest_and_damping_without_rotation():
+    [each] = steady_poses(damped_slides(), starts=1)
+    assert np.allclose(each.small.stiffness, each.small.stiffness.T, rtol=1e-13)
+    assert np.linalg.eigvalsh(each.small.damping)[0] > 0
+
+
+def test_the_four_bar_with_a_diagonal_spring_to_thirty_digits():
+    """I s² + c d'² s + V'' = 0 by python-flint; the IFToMM benchmark prints the angle, 4e-11 from it."""
+    flint = pytest.importorskip("flint")
+    flint.ctx.dps = 30
+    angle, two, gravity = flint.arb("2.2343"), flint.arb(2), flint.arb("9.81")
+    for _ in range(8):
+        half = angle / 2
+        stretch = 2 * half.cos() - two.sqrt()
+        slope = 2 * gravity * angle.cos() - SPRING * stretch * half.sin()
+        bend = -2 * gravity * angle.sin() + SPRING * (half.sin() ** 2 - stretch * half.cos() / 2)
+        angle = (angle - slope / bend).mid()
+    assert float(angle) == pytest.approx(2.23433101898, abs=5e-11)
+    assert float(abs(slope)) < 1e-27
+    half = angle / 2
+    stretch = 2 * half.cos() - two.sqrt()
+    bend = -2 * gravity * angle.sin() + SPRING * (half.sin() ** 2 - stretch * half.cos() / 2)
+    damping, inertia = DAMPER * half.sin() ** 2, flint.arb(5) / 3
+    real = -damping / (2 * inertia)
+    imaginary = (bend / inertia - real**2).sqrt()
+    exact = np.array([complex(float(real), float(imaginary)), complex(float(real), -float(imaginary))])
+    [known] = KNOWN["spring_four_bar"].known()
+    assert error(np.array(known), exact) < 1e-15
+    found = [each for each in steady_poses(spring_four_bar()) if error(each.eigenvalues, exact) < 1e-3]
+    crank = found[0].position[0]
+    assert np.arctan2(crank[2], crank[0]) == pytest.approx(float(angle), abs=1e-14)
+    assert error(found[0].eigenvalues, exact) < 4e-15 and pytest.approx(2**0.5, rel=1e-16) == DIAGONAL
+
+
+def test_a_steady_motion_is_a_motion():
+    """The judge's integration from the judge's steady pose keeps the mechanism's shape."""
+    [each] = [e for e in steady_poses(governor(), starts=1) if e.stability == "stable"]
+    scene = at_pose(each.balance, each.state)
+    moved = gauss_motion(scene, (0.0, 0.2))
+    radius = np.linalg.norm(moved.position[:, 1, :2], axis=1)
+    assert radius[1] == pytest.approx(radius[0], rel=1e-8)
+    assert moved.position[1, 3, 2] == pytest.approx(each.position[3, 2], abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
+def test_accelerations_of_engines_give_the_eigenvalues(name):
+    pytest.importorskip({"pinocchio": "pinocchio"}.get(name, name))
+    for scene in (pendulum(), turning_pendulum()):
+        each = steady_poses(scene, starts=1)[0]
+        found = by_accelerations(engine(name), each)
+        assert found.eigenvalues is not None, found.reason
+        assert error(found.eigenvalues, each.eigenvalues) < 1e-9
+
+
+def test_a_wrong_acceleration_is_seen():
+    """The eigenvalues of a scene with another gravity differ by the root of the gravities."""
+    heavy = pendulum().with_(gravity=(0.0, 0.0, -9.81 * 1.0001))
+    each, other = steady_poses(pendulum(), starts=1)[0], steady_poses(heavy, starts=1)[0]
+    assert error(other.eigenvalues, each.eigenvalues) == pytest.approx(5e-5, rel=1e-3)
+
+
+def test_functions_of_engines_that_linearise():
+    """MuJoCo's differences are right to 1e-6; Exudyn's function leaves out how constraint forces turn."""
+    pytest.importorskip("mujoco")
+    [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
+    scene = at_pose(below.balance, below.state)
+    [slides] = steady_poses(damped_slides(), starts=1)
+    mujoco = engine("mujoco")
+    assert isinstance(mujoco, Linearising) and not isinstance(engine("pinocchio"), Linearising)
+    assert error(mujoco.own_eigenvalues(scene), below.eigenvalues) < 1e-6
+    assert error(mujoco.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-4
+    pytest.importorskip("exudyn")
+    exudyn = engine("exudyn")
+    assert isinstance(exudyn, Linearising)
+    assert np.abs(exudyn.own_eigenvalues(scene)).max() < 1e-6
+    assert error(exudyn.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-6
+
+
+def test_engines_are_asked_for_their_function_at_rest_and_for_accelerations():
+    pytest.importorskip("exudyn")
+    [slides] = steady_poses(damped_slides(), starts=1)
+    ways = [each.way for each in of_engine(engine("exudyn"), damped_slides(), slides)]
+    assert ways == ["ComputeODE2Eigenvalues", ACCELERATIONS]
+    turning_one = steady_poses(turning_pendulum(), starts=1)[0]
+    assert [each.way for each in of_engine(engine("exudyn"), turning_pendulum(), turning_one)] == [
+        ACCELERATIONS
+    ]
+    [refused] = of_engine(engine("pinocchio"), damped_slides(), slides)
+    assert refused.eigenvalues is None and "slide_spring" in refused.reason
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"driver": [{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}]}, "small motions need drivers"),
+        ({"driver": [{"joint": "A", "polynomial": [0.0, 1.0]}]}, "not along gravity"),
+        ({"driver": [{"joint": "A"}]}, "no degree of freedom"),
+        ({"body": [{"name": "rod", "position": [0.7, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
+    ],
+)
+def test_scenes_without_small_motions_are_refused(change, says):
+    with pytest.raises(SceneError, match=says):
+        steady_poses(pendulum().with_(**change), starts=1)
+
+
+def test_a_rotation_that_the_loads_do_not_follow_is_not_steady():
+    load = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [0.0, 0.1, 0.0]}
+    assert turning(turning_pendulum()).rate == 6.0 and len(steady_poses(turning_pendulum(), starts=2)) > 0
+    pushed = {**load, "force": [0.1, 0.0, 0.0]}
+    assert steady_poses(turning_pendulum().with_(load=[pushed]), starts=4) == []
+
+
+def test_the_page_shows_the_stored_records():
+    path = ROOT / "docs" / "small-motions.md"
+    stored = records.read()
+    assert path.read_text() == document.page(stored), (
+        "crosscheck modes --page docs/small-motions.md renews it"
+    )
+    assert {record["scene"] for record in stored} == set(KNOWN)
+    for record in stored:
+        assert record["error"] < 1e-13
+        assert (
+            record["mbref_distance"] is None or max(record["mbref_error"], record["mbref_distance"]) < 1e-11
+        )
+
+
+def test_a_command_compares_a_scene_and_shows_the_table(tmp_path, capsys):
+    path = str(tmp_path / "my.toml")
+    pendulum().save(path)
+    assert main(["modes", path, "--engine", "mujoco", "--starts", "3"]) == 0
+    shown = capsys.readouterr().out
+    assert "Equilibrium, stable" in shown and "mjd_transitionFD" in shown and "judge (reference)" in shown
+    assert main(["modes", path, "--engine", "mujoco", "--starts", "1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)[0]["mbref_error"] < 1e-11
+    assert main(["modes"]) == 0
+    assert "governor: Steady motion at 10 rad/s, stable" in capsys.readouterr().out
