@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import shlex
 from collections.abc import Sequence
+from pathlib import Path
 
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.free_fall import falls_freely
@@ -12,6 +14,7 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, is_completed
 from crosscheck.study.tuning import closure_gap
 from crosscheck.study.verdict import Grade, Judged, grade
+from mbref.scene import Scene
 
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
 SHUT = 1e-12  # fraction of the scene's length; smaller gaps are rounding errors
@@ -39,8 +42,21 @@ def _one(group: Judged, record: Record) -> str:
     said = "has no known error" if found is Grade.UNJUDGED else f"is {found}"
     advice = ""
     if found in (Grade.INACCURATE, Grade.WRONG):
-        advice = " `crosscheck tune` finds the solref and the time step for an error or a gap."
+        advice = f" `{_tuning(record, scene, gap)}` finds a solref and a time step that are ten times better."
     return f"{start} {said}{': ' if parts else ''}{', and '.join(parts)}.{advice}"
+
+
+def _tuning(record: Record, scene: Scene, gap: float) -> str:
+    """Return the command that finds settings with a tenth of the gap, or of the error if no closure opens."""
+    settings = record["settings"]
+    path = Path(settings["file"])
+    shown = path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
+    goal = ["--error", f"{record['metrics']['error'] / 10:.0e}"]
+    if SHUT * scene_length(scene) < gap < math.inf:
+        goal = ["--closure", f"{gap * 1e3 / 10:.1g}mm"]
+    return shlex.join(
+        ["crosscheck", "tune", "mujoco", str(shown), *shlex.split(settings.get("import", "")), *goal]
+    )
 
 
 def _bodies(metrics: dict[str, float], length: float) -> str:

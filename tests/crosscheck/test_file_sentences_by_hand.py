@@ -26,7 +26,7 @@ def said(error: float | None, gap: float, turned: float = 0.0, **changes: Any) -
         "outcome": "COMPLETED",
         "t_end": 1.0,
         "message": "",
-        "settings": {"step": 0.002, "integrator": "Euler"},
+        "settings": {"step": 0.002, "integrator": "Euler", "file": FILE, "import": "--hold 'left hip'"},
         "metrics": metrics,
         **changes,
     }
@@ -36,14 +36,20 @@ def said(error: float | None, gap: float, turned: float = 0.0, **changes: Any) -
 
 
 START = "leg at its own settings (time step 0.002 s, Euler)"
-ADVICE = " `crosscheck tune` finds the solref and the time step for an error or a gap."
+FILE = "/robots/leg.xml"
+TUNE = f" `crosscheck tune mujoco {FILE} --hold 'left hip'"
+BETTER = "finds a solref and a time step that are ten times better."
 
 
 def test_lengths_are_of_the_scene_and_in_millimetres():
     off = "bodies are off by up to 80 mm and 0.05 rad, and its closures open by up to 4 mm."
-    assert said(2e-2, 1e-3, 0.05) == f"{START} is wrong: {off}{ADVICE}"
+    assert said(2e-2, 1e-3, 0.05) == f"{START} is wrong: {off}{TUNE} --closure 0.4mm` {BETTER}"
     off = "bodies are off by up to 8 mm and 0.0012 rad, and its closures open by up to 0.4 mm."
-    assert said(2e-3, 1e-4, 0.0012) == f"{START} is inaccurate: {off}{ADVICE}"
+    assert said(2e-3, 1e-4, 0.0012) == f"{START} is inaccurate: {off}{TUNE} --closure 0.04mm` {BETTER}"
+
+
+def test_a_file_without_closures_is_tuned_for_an_error():
+    assert f"{TUNE} --error 2e-04` {BETTER}" in said(2e-3, 1e-14)
 
 
 def test_gaps_of_rounding_and_accurate_files_need_no_advice():
