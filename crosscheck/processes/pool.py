@@ -36,7 +36,7 @@ Question = Callable[..., Trajectory]  # a function of `serve` that makes a run
 _idle: list[tuple[str, Child]] = []  # idle children with their engines, the latest one at the end
 _lending = Lock()
 _preparing: dict[str, Lock] = {}  # keyed by engine
-_starting: dict[int, Child] = {}  # children that are being prepared, keyed by thread
+_starting: dict[int, tuple[str, Child]] = {}  # engine or family, and its child in preparation, by thread
 _prepared: set[tuple[str, str | None]] = (
     set()
 )  # engine and family of settings that a child has prepared; None for a question
@@ -139,7 +139,7 @@ def ask(engine_name: str, question: Callable[..., Any], about: tuple[Any, ...], 
     Raises ChildFailed if that fails, LookupError for an unknown engine.
     """
     _check(engine_name)
-    with _in_use(engine_name) as child, _starts(child), _alone_at_first(engine_name):
+    with _in_use(engine_name) as child, _starts(engine_name, child), _alone_at_first(engine_name):
         return child.call(question, (engine_name, *about), time_limit).value
 
 
@@ -201,7 +201,7 @@ def _observed(
 
 def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
     """Return the engine's version after preparing the engine."""
-    with _starts(child), _alone_at_first(engine_name, family):
+    with _starts(f"{engine_name} {family}", child), _alone_at_first(engine_name, family):
         return child.call(serve.get_ready, (engine_name, [family]), READY_SECONDS)
 
 
@@ -221,9 +221,9 @@ def _alone_at_first(engine_name: str, family: str | None = None) -> Iterator[Non
 
 
 @contextmanager
-def _starts(child: Child) -> Iterator[None]:
-    """Count a child as starting while the ``with`` block runs."""
-    _starting[get_ident()] = child
+def _starts(what: str, child: Child) -> Iterator[None]:
+    """Count a child as starting under a name while the ``with`` block runs."""
+    _starting[get_ident()] = what, child
     try:
         yield
     finally:
@@ -231,8 +231,11 @@ def _starts(child: Child) -> Iterator[None]:
 
 
 def starting() -> dict[int, str]:
-    """Return, for each thread that waits for a starting engine, the last line that the engine printed."""
-    return {thread: child.last_printed() or "starting" for thread, child in _starting.copy().items()}
+    """Return, for each thread that waits for a starting engine, the last line that the engine printed, or
+    that it starts."""
+    return {
+        thread: child.last_printed() or f"{what} starts" for thread, (what, child) in _starting.copy().items()
+    }
 
 
 @contextmanager
