@@ -4,7 +4,7 @@ fit."""
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +51,7 @@ class Difference:
     exact: Columns
     scale: Mapping[str, float]
     later: Callable[[np.ndarray], Columns]
+    begin: float = 0.0  # s; first time at which ``later`` is known
 
     def size(self, predicted: Columns) -> float:
         """Return the root mean square of recorded minus predicted columns, each relative to its scale."""
@@ -90,17 +91,18 @@ def with_signs(recorded: Columns, predicted: Columns) -> Columns:
 
 
 def ranked(
-    difference: Difference, more: Iterator[tuple[str, int, Columns]], noise: float
+    difference: Difference, causes: Iterable[tuple[str, int, Columns]], noise: float
 ) -> list[Explanation]:
-    """Return the best explanations: first the simplest of those that fit nearly equally well, then all others
-    by fit.
+    """Return the best of some causes: first the simplest of those that fit nearly equally well, then all
+    others by fit.
 
-    ``noise`` is the size of a difference that means nothing.
+    A cause is a sentence, the number of fitted parameters and the columns that it predicts. ``noise`` is the
+    size of a difference that means nothing.
     """
     before = difference.size({})
     found = [
         Explanation(sentence, difference.size(columns) / before, complexity)
-        for sentence, complexity, columns in itertools.chain(simple(difference), more)
+        for sentence, complexity, columns in causes
     ]
     found = [e for e in found if e.remains < 0.5]
     if not found:
@@ -174,8 +176,8 @@ def _shifts(d: Difference) -> Iterator[tuple[str, int, Columns]]:
 
 
 def _later(d: Difference, shift: float) -> Columns:
-    inside = (d.times - shift >= 0) & (d.times - shift <= d.times[-1])
-    moved = d.later(np.clip(d.times - shift, 0.0, d.times[-1]))
+    inside = (d.times - shift >= d.begin) & (d.times - shift <= d.times[-1])
+    moved = d.later(np.clip(d.times - shift, d.begin, d.times[-1]))
     return {n: np.where(inside, moved[n], d.recorded[n]) for n in d.recorded}
 
 

@@ -15,13 +15,16 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.recorded.changed_scenes import changed
 from crosscheck.recorded.columns import kind_of, scales, values
 from crosscheck.recorded.exact import Exact, exact
-from crosscheck.recorded.explanations import Difference, Explanation, ranked, with_signs
+from crosscheck.recorded.explanations import Difference, Explanation, ranked, simple, with_signs
+from crosscheck.recorded.pairs_of_explanations import pairs
 from crosscheck.recorded.reading import Recording, read
 from mbref.scene import Scene, SceneError
 
 BEGINS = 0.01  # fraction of the largest error at which an error is said to begin
 DENSE = 400  # number of further times at which the exact motion is computed, for shifts in time
-TRIED = 20.0  # CPU seconds for the simulation of changed scenes
+TRIED = 20.0  # CPU seconds for the simulation of changed scenes, and for pairs of causes
+EXACT = 1e-5  # fraction of the difference: changed scenes are tried if simpler causes leave more
+EXPLAINED = 1e-3  # fraction of the difference: pairs of causes are tried if single causes leave more
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,21 @@ def _judged(scene: Scene, recording: Recording, found: Exact) -> Judgement:
         exact_columns = {n: right[n] for n in recorded}
         difference = Difference(times, recorded, exact_columns, scale, later)
         noise = float(np.sqrt(np.mean([(e.bound / scale[e.name]) ** 2 for e in errors])))
-        explanations = ranked(difference, changed(scene, difference, TRIED), noise)
+        explanations = _explanations(scene, difference, noise)
     return Judgement(errors, tuple(explanations), float(times[-1]), found.reason)
+
+
+def _explanations(scene: Scene, difference: Difference, noise: float) -> list[Explanation]:
+    """Return the best explanations: changed scenes and pairs of causes are tried if simpler causes leave too
+    much."""
+    causes, noisy = list(simple(difference)), 3 * noise / difference.size({})
+    found = ranked(difference, causes, noise)
+    if not found or found[0].remains > max(EXACT, noisy):
+        causes += changed(scene, difference, TRIED)
+        found = ranked(difference, causes, noise)
+    if not found or found[0].remains > max(EXPLAINED, noisy):
+        found = ranked(difference, [*causes, *pairs(difference, causes, TRIED)], noise)
+    return found
 
 
 def _column(name: str, error: np.ndarray, times: np.ndarray, bound: np.ndarray, digit: float) -> ColumnError:

@@ -147,6 +147,39 @@ def test_the_planted_difference_is_the_first_explanation(name, table):
     assert found.explanations[0].remains < 1e-3
 
 
+PAIRS = {
+    "millimetres and degrees": (
+        lambda t: of_kind(of_kind(t, "position", 1e3), "angle", 180 / np.pi),
+        ("all columns of position: in mm, not m", "all columns of angle: in degrees, not rad"),
+    ),
+    "order and shift": (
+        lambda t: turned(shifted(t), lambda q: q[:, [1, 2, 3, 0]]),
+        ("all columns of orientation: quaternions in the order x, y, z, w", "all columns: later by 0.0125 s"),
+    ),
+    "millimetres and point": (
+        lambda t: of_kind(another_point(t), "position", 1e3),
+        ("all columns of position: in mm, not m", "lower: a point at (100, -200, 50) m"),
+    ),
+    "sign and axes": (
+        lambda t: {
+            **t,
+            "lower.position.y": t["lower.position.z"],
+            "lower.position.z": t["lower.position.y"],
+            "A.angle": -t["A.angle"],
+        },
+        ("A.angle: of opposite sign", "lower.position: x, y, z hold x, z, y"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_two_planted_differences_are_the_first_explanation(name, table):
+    plant, says = PAIRS[name]
+    (first, *_) = judge_motion(SCENE, plant(table)).explanations
+    assert all(sentence in first.sentence for sentence in says), first.sentence
+    assert first.remains < 1e-3
+
+
 def test_errors_begin_where_the_motions_part(table):
     late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.5)}
     column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
