@@ -13,6 +13,7 @@ from rich.text import Text
 
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.engine import Engine, Setting, engine
+from crosscheck.judge.mobility import mobility
 from crosscheck.setting import ORIGIN
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
@@ -166,7 +167,7 @@ def _print_verdict(console: Console, said: Verdict) -> None:
 
 
 def _counts(group: Judged) -> str:
-    counts = group.scene.counts()
+    counts = mobility(group.scene)
     return (
         f"bodies: {len(group.scene.body)}, degrees of freedom: {counts.degrees_of_freedom}, constraint "
         f"rows: {counts.rows}, of which redundant: {counts.redundant}"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judge.metrics import cost_at_error, error_series
+from crosscheck.judge.mobility import mobility
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.grid import Record
 from crosscheck.study.least_errors import LeastError, least_errors
@@ -64,7 +65,7 @@ class Judged:
     @property
     def redundant(self) -> int:
         """Return the number of constraint rows at the start that depend on other rows."""
-        return self.scene.counts().redundant
+        return mobility(self.scene).redundant
 
     @property
     def comparable(self) -> Sequence[Record]:

@@ -1,0 +1,40 @@
+"""Rows, redundant rows and degrees of freedom / mbref's counts, and scenes worked out by hand."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.judge.mobility import mobility
+from mbref.scene import GROUND, Body, Distance, Revolute, Scene
+from mbref.scenes import SCENES
+from tests.coupled_scenes import coupled_loops, gear_pair, pendulum, screw
+
+NAMES = ("planar_slider_crank", "four_bar", "bennett", "sarrus", "five_bar_gravity", "andrews_squeezer")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_built_in_scenes_have_the_counts_of_mbref(name):
+    scene = SCENES[name]()
+    counts, found = scene.counts(), mobility(scene)
+    assert found == (counts.rows, counts.redundant, counts.degrees_of_freedom)
+
+
+@pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
+def test_couplings_are_rows_and_armatures_are_none(make):
+    """mbref's hidden rotors add six coordinates and six rows each, and no freedom."""
+    scene = make()
+    counts, found = scene.counts(), mobility(scene)
+    rotors = sum(bool(joint.armature) for joint in scene.joint if hasattr(joint, "armature"))
+    assert found.degrees_of_freedom == counts.degrees_of_freedom and found.redundant == counts.redundant
+    assert found.rows == counts.rows - 6 * rotors
+
+
+def test_a_free_body_a_pendulum_and_a_held_boom():
+    body = Body(name="rod", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
+    free = Scene(name="free", body=[body])
+    hinge = Revolute(name="A", bodies=(GROUND, "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))
+    rope = Distance(name="rope", bodies=(GROUND, "rod"), anchors=((0.0, 0.0, 1.0), (1.0, 0.0, 0.0)))
+    assert mobility(free) == (0, 0, 6)
+    assert mobility(free.with_(joint=[hinge])) == (5, 0, 1)
+    assert mobility(free.with_(joint=[hinge, rope])) == (6, 0, 0)
+    assert mobility(free.with_(joint=[hinge, hinge.model_copy(update={"name": "B"})])) == (10, 5, 1)
