@@ -180,6 +180,11 @@ class Format(Protocol):
         """Return the scene as the text of a file, with the features that the format lacks."""
 
 
+def numbered(number: int, one: str, many: str) -> str:
+    """Return a number with the word for one thing or for several, such as ``3 sensors``."""
+    return f"{number} {one if number == 1 else many}"
+
+
 def read(path: str | Path, options: ImportOptions | None = None) -> Imported:
     """Return the scene in a file, by the format of its suffix; raises the errors of ``Format.read``."""
     return _found(path, "reads").read(Path(path), options or ImportOptions())

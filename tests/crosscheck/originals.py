@@ -14,6 +14,7 @@ from mbref import rotations
 OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "REFSAFE", "ACTUATION")
 NO_SOFTNESS = -1e-300  # stiffness and damping of closures: reference accelerations are those of exact joints
 RTOL, RANK = 1e-13, 1e-9  # of the integrations; of the rank of rows
+ROUNDED = 1e-10  # m or rad: a shorter row is of two points on one body, or on bodies fixed together
 LEAST = 1e-4  # m: a shorter way is of a structure whose loops leave no motion
 
 
@@ -64,7 +65,9 @@ def _accelerations(model, data) -> np.ndarray:
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     held = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
-    rows = data.efc_J[: data.nefc * model.nv].reshape(data.nefc, model.nv)[held]
+    rows = data.efc_J[: data.nefc * model.nv].reshape(data.nefc, model.nv)
+    held &= np.linalg.norm(rows, axis=1) > ROUNDED
+    rows = rows[held]
     root = np.linalg.cholesky(mass)
     free = np.linalg.solve(mass, data.qfrc_passive + data.qfrc_actuator - data.qfrc_bias)
     weighted = np.linalg.solve(root, rows.T).T

@@ -120,7 +120,8 @@ def mjcf_tree(random) -> tuple[str, list[str], list[str]]:
 
 
 def _springs(random) -> str:
-    return str(random.choice(["", "", 'stiffness="2" springref="0.3"', 'damping="0.4"', 'armature="0.1"']))
+    own = ["", "", 'stiffness="2" springref="0.3" ref="0.1"', 'damping="0.4"', 'armature="0.1" ref="-0.2"']
+    return str(random.choice(own))
 
 
 def posed(text: str, random) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -137,7 +138,7 @@ def local(data, body: int, point: np.ndarray) -> np.ndarray:
 
 
 def mjcf(seed: int) -> File:
-    """A random MJCF file: a tree, and site connects, welds, locks, couplings, springs and armature."""
+    """A random MJCF file: a tree, and connects, welds, locks, couplings, tendons, springs and rotors."""
     random = np.random.default_rng(seed)
     tree, bodies, hinges = mjcf_tree(random)
     inside = '<compiler angle="radian"/><option gravity="0.3 -1 -9.81"/>'
@@ -167,13 +168,25 @@ def mjcf(seed: int) -> File:
     without: list[str] = []
     if len(hinges) > 1 and random.uniform() < 0.3:
         equalities += f'<joint name="gear" joint1="{hinges[0]}" joint2="{hinges[1]}" polycoef="0 2 0 0 0"/>'
+    more = ""
+    if len(hinges) > 2 and random.uniform() < 0.3:
+        ends = "".join(
+            f'<joint joint="{name}" coef="{float(random.uniform(0.5, 2))!r}"/>' for name in hinges[-2:]
+        )
+        more += f'<tendon><fixed name="rope">{ends}</fixed></tendon>'
+        offset = float(random.uniform(-0.2, 0.2))
+        equalities += f'<tendon name="held" tendon1="rope" polycoef="{offset!r} 0 0 0 0"/>'
+    if hinges and random.uniform() < 0.4:
+        gear, rotor, brake = random.uniform(0.1, 2.0, 3).tolist()
+        motor = f'joint="{hinges[-1]}" gear="{gear!r}" armature="{rotor!r}" damping="{brake!r}"'
+        more += f"<actuator><motor {motor}/></actuator>"
     for name, text in sites.items():
         if name == "world":
             tree += text
         else:
             at = tree.index(">", tree.index(f'<body name="{name}"')) + 1
             tree = tree[:at] + text + tree[at:]
-    text = f"<mujoco>{inside}<worldbody>{tree}</worldbody><equality>{equalities}</equality></mujoco>"
+    text = f"<mujoco>{inside}<worldbody>{tree}</worldbody><equality>{equalities}</equality>{more}</mujoco>"
     return File(text, ".xml", ImportOptions(without=without))
 
 

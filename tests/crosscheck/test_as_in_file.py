@@ -237,7 +237,7 @@ def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path
     path = tmp_path / "robot.xml"
     path.write_text(FOUR_BAR)
     find_scenes([str(path)], TILTED, said.append)
-    assert any("left out: 1 actuators" in sentence for sentence in said)
+    assert any("left out: 1 actuator:" in sentence for sentence in said)
     assert any("closure 'C' was open by" in sentence for sentence in said)
     path.write_text(FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"'))
     with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):

@@ -146,7 +146,7 @@ def test_parts_without_a_counterpart_are_told():
     assert "2 actuators: only motors with a control value in the keyframe act" in told and any(
         "softness of equalities" in sentence for sentence in told
     )
-    assert "1 limits of joints" in formats.read(MODELS / "slider_crank.xml").left_out
+    assert "1 limit of a joint" in formats.read(MODELS / "slider_crank.xml").left_out
     exported = FORMAT.write(find_scene("planar_slider_crank")).left_out
     assert exported[0] == "load[0] (moment on crank): apply it by mjData.xfrc_applied"
     assert FORMAT.write(find_scene("four_bar")).left_out[0].startswith("driver of A: ")
@@ -165,8 +165,8 @@ def changed(tmp_path, old: str, new: str) -> Path:
     ("old", "new", "says"),
     [
         ('anchor="0.7 0 0"/>', 'anchor="0.7 0 0" active="false"/>', "'C' is not active"),
-        ("</worldbody>", '<site name="mark"/></worldbody>', "1 sites without a joint"),
-        ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensors"),
+        ("</worldbody>", '<site name="mark"/></worldbody>', "1 site without a joint"),
+        ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensor"),
     ],
 )
 def test_parts_that_do_not_change_the_motion_are_listed(old, new, says, tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.engines.sdf.reading import FORMAT
 from crosscheck.judge.constraints import closure, inertia_matrices, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank
@@ -43,9 +44,10 @@ def random_frame(random):
     return random.normal(size=3) * 0.3, rotations.to_matrix(q / np.linalg.norm(q))
 
 
-def written(scene, random) -> str:
-    """A scene as SDF: random frames of the model, of links, of joints and of inertias."""
+def written(scene, random, nested: bool = False) -> str:
+    """A scene as SDF: random frames of the model, of links, of joints, of inertias and of an outer model."""
     model, world = random_frame(random), (np.zeros(3), np.eye(3))
+    outer = random_frame(random) if nested else world
     frame, text = {}, ""
     for body in scene.body:
         frame[body.name] = random_frame(random)
@@ -81,10 +83,10 @@ def written(scene, random) -> str:
             f"<child>{second}</child>{pose_text(base, at, more)}{axes}</joint>"
         )
     gravity = " ".join(map(repr, scene.gravity))
-    return (
-        f'<sdf version="1.9"><world name="w"><gravity>{gravity}</gravity><model name="m">'
-        f"{pose_text(world, model)}{text}</model></world></sdf>"
-    )
+    text = f'<model name="m">{pose_text(outer, model)}{text}</model>'
+    if nested:
+        text = f'<model name="outer">{pose_text(world, outer)}{text}</model>'
+    return f'<sdf version="1.9"><world name="w"><gravity>{gravity}</gravity>{text}</world></sdf>'
 
 
 def at_rest(scene):
@@ -98,11 +100,9 @@ def read(tmp_path, text: str, **options):
     return FORMAT.read(path, ImportOptions(**options))
 
 
-@pytest.mark.parametrize("name", LOOPS)
-def test_a_scene_comes_back_from_frames_of_all_kinds(name, tmp_path):
-    scene, random = at_rest(SCENES[name]()), np.random.default_rng(len(name))
-    for _ in range(3):
-        found = read(tmp_path, written(scene, random)).scene
+def comes_back(scene, random, tmp_path) -> None:
+    for nested in (False, True):
+        found = read(tmp_path, written(scene, random, nested)).scene
         assert [j.type for j in found.joint] == [j.type for j in scene.joint]
         for ours, theirs in zip(scene.body, found.body, strict=True):
             assert np.allclose(ours.position, theirs.position, atol=1e-12)
@@ -111,6 +111,32 @@ def test_a_scene_comes_back_from_frames_of_all_kinds(name, tmp_path):
         assert rank(found) == rank(scene)
         assert np.abs(gauss(found) - gauss(scene)).max() < 1e-9 * np.abs(gauss(scene)).max()
         assert max(np.abs(r).max() for r in closure(found, 0.0, *initial_poses(found)).values()) < 1e-12
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_a_scene_comes_back_from_frames_of_all_kinds(name, tmp_path):
+    comes_back(at_rest(SCENES[name]()), np.random.default_rng(len(name)), tmp_path)
+
+
+def random_scene(seed: int):
+    """A random mechanism of the joints of SDF, without loads."""
+    scene = at_rest(random_mechanism(seed))
+    joints = [
+        joint.model_copy(update={"armature": 0.0} if getattr(joint, "armature", 0.0) else {})
+        for joint in scene.joint
+        if joint.type in NAMES
+    ]
+    return scene.with_(joint=joints, load=(), driver=(), coupling=(), gravity=(0.5, 1.0, -9.0))
+
+
+@pytest.mark.parametrize(
+    "seeds", [range(5), pytest.param(range(5, 105), marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_random_mechanisms_come_back(seeds, tmp_path):
+    scenes = [random_scene(seed) for seed in seeds]
+    for seed, scene in zip(seeds, scenes, strict=True):
+        comes_back(scene, np.random.default_rng(seed), tmp_path)
+    assert sum(len(scene.joint) > 2 for scene in scenes) > len(scenes) / 2
 
 
 LINK = """<link name="{name}"><pose>{pose}</pose><inertial><pose>{centre} 0 0 0</pose><mass>0.5</mass>
@@ -228,7 +254,7 @@ def test_faulty_files_are_refused_by_name(text, says, tmp_path):
 def test_parts_without_effect_are_listed_and_others_left_out_on_request(tmp_path):
     more = "<limit><lower>-1</lower></limit><dynamics><friction>1</friction></dynamics>"
     found = read(tmp_path, pair(more=more), without=["friction"])
-    assert any("1 limits of joints" in part for part in found.left_out)
+    assert any("1 limit of a joint" in part for part in found.left_out)
     assert any("--without friction" in part for part in found.left_out)
     with pytest.raises(SceneError, match="an SDF file gives the poses"):
         read(tmp_path, pair(), keyframe="home")

@@ -15,7 +15,7 @@ from mbref.design.placed import placed
 from mbref.equations.diagnosis import counts
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.scene import Body, Driver, Revolute, Scene, SceneError, TorsionSpring
+from mbref.scene import Body, Driver, Revolute, Scene, SceneError, TorsionSpring, Translational
 from mbref.scenes import find_scene
 
 SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
@@ -160,6 +160,38 @@ def test_exchanges_of_many_joints_end_the_redundancy_of_all_loops(loops: int):
     after = counts(at.with_(joint=[_as(j, swap[j.name]) if j.name in swap else j for j in at.joint]))
     assert counts(at).redundant == loops and after.redundant == 0
     assert after.degrees_of_freedom == counts(at).degrees_of_freedom
+
+
+def straight_line_linkage(side: str, x: float) -> tuple[list[Body], list]:
+    """A bar of 1 m with its middle on a crank of 0.5 m and its foot on the line x: its head moves along y."""
+    c, s = 0.8, 0.6
+    turn, back = ((0.948683298050514, 0.0, 0.0, k * 0.316227766016838) for k in (1, -1))
+    numbers = {"mass": 1.0, "inertia": (0.01, 0.1, 0.1)}
+    crank, bar, foot = (f"{name} {side}" for name in ("crank", "bar", "foot"))
+    bodies = [
+        Body(name=crank, position=(x + c / 4, s / 4, 0.0), orientation=turn, **numbers),
+        Body(name=bar, position=(x + c / 2, s / 2, 0.0), orientation=back, **numbers),
+        Body(name=foot, position=(x + c, 0.0, 0.0), **numbers),
+    ]
+    hinges = {"A": ("ground", crank, 0.0, 0.0), "B": (crank, bar, c / 2, s / 2), "C": (bar, foot, c, 0.0)}
+    joints = [
+        Revolute(name=f"{name} {side}", bodies=(a, b), anchor=(x + u, v, 0.0), axis=(0.0, 0.0, 1.0))
+        for name, (a, b, u, v) in hinges.items()
+    ]
+    rail = {"bodies": ("ground", foot), "anchor": (x + c, 0.0, 0.0), "axis": (1.0, 0.0, 0.0)}
+    return bodies, [*joints, Translational(name=f"D {side}", **rail)]
+
+
+def test_one_joint_in_each_loop_ends_the_redundancy_of_two_linkages():
+    pairs = [straight_line_linkage("left", 0.0), straight_line_linkage("right", 3.0)]
+    scene = Scene(name="two", body=[b for p in pairs for b in p[0]], joint=[j for p in pairs for j in p[1]])
+    assert (counts(scene).redundant, counts(scene).degrees_of_freedom) == (6, 2)
+    found = exchanges(scene)
+    assert found
+    for swap in found:
+        kept = [j for j in scene.joint if swap.get(j.name) != "removed"]
+        after = counts(scene.with_(joint=[_as(j, swap[j.name]) if j.name in swap else j for j in kept]))
+        assert (after.redundant, after.degrees_of_freedom) == (0, 2), swap
 
 
 def test_redundancy_within_the_plane_is_not_removed_by_exchanges():

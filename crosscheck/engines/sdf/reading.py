@@ -15,7 +15,7 @@ from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_o
 from crosscheck.engines.sdf.flattening import STATIC, flattened
 from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, Pose, numbers, pose_of
 from mbref import rotations
-from mbref.formats import Imported, ImportOptions
+from mbref.formats import Imported, ImportOptions, numbered
 from mbref.scene import (
     GROUND,
     Body,
@@ -45,7 +45,14 @@ TYPES: dict[str, Any] = {
     "revolute2": Universal,
     "screw": Cylindrical,
 }
-UNUSED = {"plugin": "plugins", "actor": "actors", "light": "lights", "gripper": "grippers"}
+UNUSED = {
+    "plugin": ("plugin", "plugins"),
+    "actor": ("actor", "actors"),
+    "light": ("light", "lights"),
+    "gripper": ("gripper", "grippers"),
+    "collision": ("shape that could touch others", "shapes that could touch others"),
+    "sensor": ("sensor", "sensors"),
+}
 
 
 def read(path: Path, options: ImportOptions) -> Imported:
@@ -79,11 +86,11 @@ def read(path: Path, options: ImportOptions) -> Imported:
 def _unused(root: ET.Element) -> Iterator[str]:
     """Return sentences on parts that a scene cannot contain and that do not change a motion without
     contacts."""
-    counts = {name: len(list(root.iter(tag))) for tag, name in UNUSED.items()}
-    counts["limits of joints"] = sum(limit.find("lower") is not None for limit in root.iter("limit"))
-    counts["shapes that could touch others"] = len(list(root.iter("collision")))
-    counts["sensors"] = len(list(root.iter("sensor")))
-    yield from (f"{count} {what}" for what, count in counts.items() if count)
+    counts = [(len(list(root.iter(tag))), *names) for tag, names in UNUSED.items()]
+    limits = sum(limit.find("lower") is not None for limit in root.iter("limit"))
+    for count in (*counts, (limits, "limit of a joint", "limits of joints")):
+        if count[0]:
+            yield numbered(*count)
 
 
 @dataclass

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbref.formats import numbered
 from mbref.scene import SceneError
 
 KINDS = {  # kinds of parts that change the motion → their description
@@ -98,24 +99,30 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     """Return sentences about parts that a scene cannot describe and that do not change the motion."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
-    counts = {
-        "contact pairs": model.npair,
-        "plugins": model.nplugin,
-        "motion-capture bodies, which are fixed at their pose": model.nmocap,
-        "geoms that could touch others": touching if touching > 1 else 0,
-        "sensors": model.nsensor,
-        "sites without a joint": model.nsite - len(_holding_sites(mujoco, model)),
-        "limits of tendons": int(np.sum(model.tendon_limited != 0)),
-        "limits of joints": int(np.sum(model.jnt_limited != 0)),
-    }
+    counts = (
+        (model.npair, "contact pair", "contact pairs"),
+        (model.nplugin, "plugin", "plugins"),
+        (
+            model.nmocap,
+            "motion-capture body, fixed at its pose",
+            "motion-capture bodies, fixed at their poses",
+        ),
+        (touching if touching > 1 else 0, "", "geoms that could touch others"),
+        (model.nsensor, "sensor", "sensors"),
+        (model.nsite - len(_holding_sites(mujoco, model)), "site without a joint", "sites without a joint"),
+        (int(np.sum(model.tendon_limited != 0)), "limit of a tendon", "limits of tendons"),
+        (int(np.sum(model.jnt_limited != 0)), "limit of a joint", "limits of joints"),
+    )
     if model.nu:
-        kinds = f"{model.nu} actuators{f', {servos} of them servos' if servos else ''}"
+        kinds = (
+            f"{numbered(model.nu, 'actuator', 'actuators')}{f', {servos} of them servos' if servos else ''}"
+        )
         yield f"{kinds}: only motors with a control value in the keyframe act"
-    yield from (f"{number} {what}" for what, number in counts.items() if number)
+    yield from (numbered(*count) for count in counts if count[0])
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"
     if model.nkey:
-        yield f"{model.nkey} keyframes: --keyframe NAME begins at one"
+        yield f"{numbered(model.nkey, 'keyframe', 'keyframes')}: --keyframe NAME begins at one"
 
 
 def _holding_sites(mujoco: Any, model: Any) -> set[int]:
