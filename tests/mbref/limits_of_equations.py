@@ -24,8 +24,7 @@ from mbref.linear_algebra import clear_rank, minimum_norm
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene
 from mbref.stabilisation import projection
 from mbref.taylor import orientations
-from tests.mbref.interpreted_thresholds import flips
-from tests.mbref.threshold_checks import check, near
+from tests.mbref.threshold_checks import check, flips, near
 
 
 def pendulum(rate=0.0):

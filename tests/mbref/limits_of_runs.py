@@ -13,8 +13,7 @@ from mbref.stepping import control, loop, pace, ranks, singular_crossing, singul
 from mbref.stepping.loop import CREEPING, PAUSED
 from mbref.taylor import correction, driven, expressions, series, solver, stepper, stepping
 from mbref.taylor.mode import HIGH_ACCURACY
-from tests.mbref.interpreted_thresholds import flips, memory
-from tests.mbref.threshold_checks import check, near
+from tests.mbref.threshold_checks import check, flips, memory, near
 
 
 # --- stepping -------------------------------------------------------------------------------------------

@@ -16,8 +16,7 @@ from mbref.simulation import comparison, outcome, start_run, trial
 from mbref.stepping.limits import Limits
 from mbref.stepping.ranks import Ranks
 from mbref.taylor import driven, mode, sample_completion, stepper
-from tests.mbref.interpreted_thresholds import flips, memory
-from tests.mbref.threshold_checks import check, near
+from tests.mbref.threshold_checks import check, flips, memory, near
 
 
 def bar(**given):

@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 
 from mbref.taylor.crossing import thresholds
+from tests.mbref import interpreted_thresholds
 
 NAMES = [name for name in vars(thresholds) if name.isupper()]
-CHECKS = Path(__file__).with_name("interpreted_thresholds.py")
+CHECKS = Path(interpreted_thresholds.__file__)
 CROSSINGS = """
 import warnings
 warnings.simplefilter("error")
