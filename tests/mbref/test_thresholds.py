@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from mbref.taylor.crossing import thresholds
-from tests.mbref import interpreted_thresholds
+from tests.mbref import interpreted_crossings, interpreted_thresholds
 
 NAMES = [name for name in vars(thresholds) if name.isupper()]
 CHECKS = Path(interpreted_thresholds.__file__)
@@ -50,6 +50,12 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
     done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", str(CHECKS))
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert f"{3 * len(NAMES)} passed" in done.stdout, done.stdout[-500:]
+
+
+def test_parts_of_crossings_do_what_they_say():
+    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", interpreted_crossings.__file__)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
+    assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-500:]
 
 
 def test_singular_positions_are_crossed_without_compiled_kernels():

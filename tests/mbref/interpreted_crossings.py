@@ -1,0 +1,266 @@
+"""Parts of the treatment of singular positions on small memories with known results, run interpreted by
+``test_thresholds.py``."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from mbref.equations.branches import Passed
+from mbref.kernels.compilation import PLAIN
+from mbref.kernels.layout import OK
+from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
+from mbref.stepping.singular_start import Leaving
+from mbref.taylor.crossing import (
+    departure,
+    determinants,
+    location,
+    long_crossing,
+    rounding_pole,
+    short_crossing,
+    start,
+    uniqueness,
+)
+from mbref.taylor.crossing.thresholds import DEPARTURE
+from tests.mbref.threshold_checks import memory
+
+pytestmark = pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
+
+
+# --- determinants and location --------------------------------------------------------------------------
+@pytest.mark.parametrize(("before", "after"), [(0.5, -0.5), (-0.5, 0.5), (0.5, 0.5), (-0.5, -0.5)])
+def test_rates_oppose_where_the_motion_reverses_relative_to_the_null_vector(before, after):
+    state = memory()
+    state.series.past[1, 0], state.series.terms[1, 0] = before, after
+    assert determinants.rates_oppose(state) == (before * after < 0.0)
+
+
+def as_determinant(monkeypatch, value, end):
+    """Have the determinant be a function of time in a step of a length; return the times of evaluations."""
+    times = []
+    monkeypatch.setattr(location, "evaluate_series", lambda h, _: times.append(h))
+
+    def found(number):
+        return number < 0.0, math.log(max(abs(number), 1e-300))
+
+    monkeypatch.setattr(location, "gradient_determinant", lambda *_: found(value(times[-1])))
+    monkeypatch.setattr(location, "save_start_determinant", lambda _: None)
+    monkeypatch.setattr(location, "gradient_determinant_at_end", lambda _: found(value(end)))
+    monkeypatch.setattr(location, "log_determinant_at_start", lambda _: math.log(abs(value(0.0))))
+    return times
+
+
+@pytest.mark.parametrize("end", [0.01, 1.0, 30.0])
+def test_a_sign_change_is_located_in_steps_of_any_length(monkeypatch, end):
+    times = as_determinant(monkeypatch, lambda h: math.cos(1.2 * math.pi * h / end), end)
+    root = end / 2.4
+    assert location.sign_change(end, memory()) == pytest.approx(root, rel=1e-12)
+    assert len(times) < 12, "interpolation ends when it has converged"
+    assert location.bisect(0.0, end, 0.0, memory()) == pytest.approx(root, rel=1e-12)
+    assert location.find_crossings(end, memory()) == (pytest.approx(root, rel=1e-12), -1.0)
+
+
+@pytest.mark.parametrize("end", [0.01, 1.0, 30.0])
+def test_two_sign_changes_are_located_in_steps_of_any_length(monkeypatch, end):
+    as_determinant(monkeypatch, lambda h: (h / end - 0.4) * (h / end - 0.7), end)
+    state = memory()
+    assert location.count_crossings(end, state) == 2
+    assert state.step.first_crossing == pytest.approx(0.4 * end, rel=1e-10)
+    assert state.step.second_crossing == pytest.approx(0.7 * end, rel=1e-10)
+
+
+def test_interpolation_is_exact_for_the_inverse_of_a_parabola():
+    """x = (y² + 2 y + 3) / 10 has the value 0.3 at y = 0."""
+    place = lambda y: (y * y + 2.0 * y + 3.0) / 10.0  # noqa: E731
+    found = location.interpolated(place(-0.5), -0.5, place(1.0), 1.0, place(2.0), 2.0)
+    assert found == pytest.approx(0.3, rel=1e-14)
+    assert location.interpolated(0.0, -1.0, 1.0, 3.0, 1.0, 3.0) == pytest.approx(0.25)
+
+
+# --- rounding pole --------------------------------------------------------------------------------------
+def with_pole(distance=0.1, size=1e-17):
+    """A series near a singular position whose variable 0 has a pole at a distance (s)."""
+    state = memory(start_pivot=1e-3)
+    for k in range(31):
+        state.series.past[k, 0] = size / distance**k
+        state.series.past[k, 1] = 0.3**k
+    return state
+
+
+def test_a_pole_is_found_where_the_last_coefficients_are_its_own():
+    assert rounding_pole.time_of_pole(with_pole()) == pytest.approx(0.1)
+    assert rounding_pole.time_of_pole(with_pole(distance=-0.1)) == pytest.approx(-0.1)
+    for order in (22, 21):
+        state = with_pole()
+        state.series.past[order] = 0.0
+        assert rounding_pole.time_of_pole(state) == 0.0, order
+    assert rounding_pole.time_of_pole(with_pole(size=1e-3)) == 0.0, "no rounding explains such a gap"
+
+
+def test_a_series_without_its_pole_is_the_series_of_the_motion():
+    state = with_pole()
+    rounding_pole.remove_pole(0.1, state)
+    assert np.abs(state.series.past[:20, 0]).max() < 1e-15
+    assert state.series.past[:20, 1] == pytest.approx(0.3 ** np.arange(20), abs=1e-11)
+    assert state.step.time_to_pole == 0.1 and state.step.used_order == state.step.last_order <= 19
+
+
+# --- uniqueness -----------------------------------------------------------------------------------------
+def test_kinetic_energy_is_a_quadratic_form_of_the_rates():
+    state = memory()
+    state.polynomials.inertia.mass = np.array([[2.0, 0.5], [0.5, 3.0]])
+    rates = np.zeros((2, 8))
+    rates[1, :2] = 1.0, -2.0
+    assert uniqueness.kinetic_energy(rates, state) == pytest.approx(2.0 - 2.0 + 12.0)
+
+
+def test_a_motion_keeps_moving_down_to_a_fiftieth_of_its_energy(monkeypatch):
+    monkeypatch.setattr(uniqueness, "turns_back", lambda *_: False)
+    assert uniqueness.keeps_moving(0.02, 1.0, memory())
+    assert not uniqueness.keeps_moving(0.0199, 1.0, memory())
+    assert not uniqueness.keeps_moving(0.0, 0.0, memory())
+    monkeypatch.setattr(uniqueness, "turns_back", lambda *_: True)
+    assert not uniqueness.keeps_moving(1.0, 1.0, memory())
+    resting = memory()
+    resting.series.past[1] = 0.0
+    assert uniqueness.keeps_moving(1.0, 1.0, resting), "a motion from rest has no direction to reverse"
+
+
+# --- crossings ------------------------------------------------------------------------------------------
+def ended(monkeypatch, status, agrees=True, rank=1):
+    """Status after a crossing, whether a perturbed run was made, and the memory."""
+    state, made = memory(rank=rank), []
+    state.crossing_result = None
+    state.run.loop.times = np.array([0.0, 1.0, 2.5])
+    state.run.equations.system.counts.factorisations = 0
+    for name in ("save_state", "restore_state", "set_regular"):
+        monkeypatch.setattr(long_crossing, name, lambda *_: None)
+    monkeypatch.setattr(long_crossing, "perturbed_run_agrees", lambda *_: made.append(1) or agrees)
+    state.run.control.rtol = 1e-9
+    return long_crossing.end_crossing.function(status, state), bool(made), state
+
+
+def test_a_long_crossing_is_confirmed_by_a_perturbed_run(monkeypatch):
+    for status in (PAUSED, DONE):
+        assert ended(monkeypatch, status)[:2] == (status, True)
+        assert ended(monkeypatch, status, agrees=False)[:2] == (UNDECIDED, True)
+        assert ended(monkeypatch, status, agrees=False, rank=2)[:2] == (status, False), "drivers determine it"
+        assert ended(monkeypatch, status)[2].progress.end == 2.5
+    assert ended(monkeypatch, TOO_MANY_STEPS)[:2] == (TOO_MANY_STEPS, False)
+    assert ended(monkeypatch, OK + 1)[:2] == (UNDECIDED, False)
+
+
+def test_regular_steps_follow_when_the_distance_grows_beyond_a_limit():
+    for before, pivot, clear in ((0.0, 0.2, 1), (0.0, 0.05, 0), (3.0, 0.2, 0), (2.0, 0.2, 1)):
+        state = memory(pivot=pivot)
+        state.progress.clearance = before
+        long_crossing.judge_clearance(state)
+        assert state.progress.is_clear == clear, (before, pivot)
+    state = memory(pivot=0.2)
+    state.run.loop.clock.attempt_end = 0.1
+    long_crossing.judge_clearance(state)
+    assert not state.progress.is_clear, "the attempt that met the position ended later"
+
+
+def test_a_crossing_is_recorded_with_its_time_and_state(monkeypatch):
+    state = memory(first_crossing=0.25, second_crossing=0.5, time=3.0)
+    state.progress.recorded = 0
+    state.run.state.coordinates = np.zeros(7)
+    state.crossings = SimpleNamespace(
+        time=np.zeros(2), coordinates=np.zeros((2, 7)), velocities=np.zeros((2, 1))
+    )
+
+    def put(h, memory_of_run):
+        memory_of_run.run.state.coordinates[:], memory_of_run.run.state.velocities[:] = h, 10.0 * h
+
+    monkeypatch.setattr(short_crossing, "put_state_at", put)
+    short_crossing.record_crossings(state)
+    assert state.progress.recorded == 2
+    assert state.crossings.time == pytest.approx([2.25, 2.5])
+    assert state.crossings.coordinates[:, 0] == pytest.approx([0.25, 0.5])
+    assert state.crossings.velocities[:, 0] == pytest.approx([2.5, 5.0])
+
+
+@pytest.mark.parametrize("crosses", [True, False])
+def test_a_short_crossing_that_fails_is_undone(monkeypatch, crosses):
+    state, restored = memory(time=1.0), []
+    state.progress.recorded, state.crossings = 0, SimpleNamespace(time=np.zeros(16))
+    state.kernels = SimpleNamespace(expand=lambda *_: OK)
+    for name in ("save_step_start", "return_to_start", "set_high_accuracy", "set_regular"):
+        monkeypatch.setattr(short_crossing, name, lambda _: None)
+    monkeypatch.setattr(short_crossing, "restore_step_start", lambda _: restored.append(1))
+
+    def steps(memory_of_run):
+        memory_of_run.run.loop.clock.time = 2.0
+        memory_of_run.run.equations.system.counts.steps += 3
+        return crosses
+
+    monkeypatch.setattr(short_crossing, "take_crossing_steps", steps)
+    state.run.loop.clock.sample = 0
+    assert short_crossing.cross_briefly(state) == crosses
+    clock, counts = state.run.loop.clock, state.run.equations.system.counts
+    assert (clock.time, counts.steps, bool(restored)) == ((2.0, 4, False) if crosses else (1.0, 1, True))
+
+
+# --- start and departure --------------------------------------------------------------------------------
+def test_a_motion_from_rest_is_no_longer_near_once_its_pivot_has_grown():
+    state = memory(pivot=1e-3, correction=1.0)
+    assert not start.is_turned(state) and not state.progress.rests_near
+    state = memory(pivot=1e-6, correction=1.0)
+    assert start.is_turned(state) and state.progress.rests_near
+
+
+def leaving(monkeypatch, times):
+    """A departure, its clock, and what it continues from."""
+    clock, taken = SimpleNamespace(sample=0, time=0.0), []
+    run = SimpleNamespace(
+        times=np.array(times),
+        model=SimpleNamespace(data=SimpleNamespace(lengths=np.ones(1))),
+        memory=SimpleNamespace(loop=SimpleNamespace(clock=clock)),
+    )
+    taylor = SimpleNamespace(progress=SimpleNamespace(completed=9))
+    found = departure.Departure(run, taylor, None, None)
+    found._come_from = lambda *given: taken.append(given) or PAUSED
+    found._misses, found._put_samples_before = lambda *_: False, lambda *_: None
+    monkeypatch.setattr(departure, "displaced", lambda q, x: q[:6] + x)
+    return found, clock, taken
+
+
+def test_a_branch_is_entered_behind_the_crossing_and_before_the_next_sample(monkeypatch):
+    velocities = np.array([[1.0, 0, 0, 0, 0, 0], [0.0, 2.0, 0, 0, 0, 0]])
+    passed = Passed(1.0, np.zeros(7), velocities[0], 2)
+    crossing = SimpleNamespace(time=1.0, coordinates=np.zeros(7), velocities=velocities, taken=2)
+    monkeypatch.setattr(departure, "singular_position", lambda *_: crossing)
+    found, clock, taken = leaving(monkeypatch, [0.0, 1.0, 5.0])
+    assert found.along_branch(passed) == PAUSED
+    _, direction, ahead, (q, v) = taken[0]
+    assert clock.sample == 2 == found._taylor.progress.completed
+    assert direction is v and list(v) == list(velocities[1])
+    assert ahead == pytest.approx(DEPARTURE / 2.0) and q == pytest.approx(ahead * velocities[1])
+    found, _, taken = leaving(monkeypatch, [0.0, 1.0, 1.0 + 1e-4])
+    found.along_branch(passed)
+    assert taken[0][2] == pytest.approx(0.5e-4)
+    found, _, taken = leaving(monkeypatch, [0.0, 1.0])
+    found.along_branch(passed)
+    assert taken[0][2] == pytest.approx(DEPARTURE / 2.0), "no sample follows"
+
+
+def test_a_start_at_rest_is_left_along_its_acceleration(monkeypatch):
+    acceleration = np.array([0.0, 4.0, 0, 0, 0, 0])
+    found, _, taken = leaving(monkeypatch, [0.0, 1.0])
+    assert found.from_start(Leaving(np.zeros(7), np.zeros(6), acceleration)) == PAUSED
+    passed, _, ahead, (q, v) = taken[0]
+    assert passed.time == 0.0 and passed.taken == 1
+    assert ahead == pytest.approx(math.sqrt(DEPARTURE / 2.0))
+    assert q == pytest.approx(0.5 * ahead**2 * acceleration) and v == pytest.approx(ahead * acceleration)
+    assert q[1] == pytest.approx(DEPARTURE)
+
+
+def test_a_start_in_motion_that_its_series_misses_is_undecided(monkeypatch):
+    moving = Leaving(np.zeros(7), np.array([2.0, 0, 0, 0, 0, 0]), np.zeros(6))
+    found, _, taken = leaving(monkeypatch, [0.0, 1e-4])
+    assert found.from_start(moving) == PAUSED
+    assert taken[0][2] == pytest.approx(0.5e-4), "at most half of the run"
+    found._misses = lambda *_: True
+    assert found.from_start(moving) == UNDECIDED
