@@ -77,7 +77,7 @@ def test_panels_of_ill_conditioned_equations_settle_in_their_noise():
     assert 0 < differences(scene, a, b).max() < 1e-14
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [pytest.param(0, marks=pytest.mark.slow), 1])
 def test_a_mechanism_that_locks_has_a_reference_until_then(seed):
     scene = awkward("locking", seed)
     times = np.linspace(0.0, scene.duration, 61)

@@ -102,6 +102,7 @@ def test_door_closer_closes(tmp_path):
     assert len(angles) == 21 and angles == sorted(angles) and angles[-1] > 40, angles
 
 
+@pytest.mark.slow
 def test_tolerances_and_first_order_theory_agree(tmp_path):
     printed = example("03_tolerances.py", tmp_path)
     rows = re.findall(r"deviation (\S+) m  \(first order: (\S+) m\)", printed)

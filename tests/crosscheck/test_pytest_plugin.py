@@ -94,6 +94,7 @@ def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
     assert "closure" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_shrinking_and_what_still_fails():
     """A scene gets smaller only as long as the check fails; a sound engine's stays as it is."""
     scene = moving_probes()["spring load"]

@@ -171,6 +171,7 @@ def test_panels_of_stiff_motions_are_as_long_as_the_motion_is_smooth():
     assert differences(scene, natural_motion(scene, times, EXTENDED, seconds=SECONDS), motion).max() < 1e-15
 
 
+@pytest.mark.slow
 def test_where_one_formulation_is_slow_the_other_bounds_itself(monkeypatch):
     scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 9)
 

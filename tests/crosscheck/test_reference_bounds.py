@@ -105,6 +105,7 @@ def test_a_position_at_which_other_rows_are_independent_is_not_leapt_over():
     assert 0 < differences(scene, a, b).max() < 1e-16
 
 
+@pytest.mark.slow
 def test_both_formulations_pass_a_singular_position_without_redundant_rows():
     scene, times = drawn(100, "J2"), np.linspace(0.0, 0.5, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
