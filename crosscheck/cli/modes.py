@@ -35,7 +35,7 @@ def modes(arguments: argparse.Namespace) -> int:
         Path(arguments.page).write_text(document.page(found), encoding="utf-8")
         notice(f"written: {arguments.page}")
     if arguments.json:
-        print_json(found)
+        print_json([{"poses": found}])
     else:
         _show(console(), found)
     return COMPLETED if found else OTHERWISE

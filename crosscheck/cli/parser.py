@@ -267,7 +267,7 @@ def _add_modes(commands: Commands) -> None:
     )
     parser.add_argument("--run", action="store_true", help="measure the stored table again, or engines of it")
     parser.add_argument("--page", metavar="FILE", help="also write the table as a page in Markdown")
-    parser.add_argument("--json", action="store_true", help="print one JSON value and nothing else")
+    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
 def _add_report(commands: Commands) -> None:

@@ -88,7 +88,7 @@ def test_the_four_bar_with_a_diagonal_spring_to_thirty_digits():
     imaginary = (bend / inertia - real**2).sqrt()
     exact = np.array([complex(float(real), float(imaginary)), complex(float(real), -float(imaginary))])
     [known] = KNOWN["spring_four_bar"].known()
-    assert error(np.array(known), exact) < 1e-15
+    assert error(np.array(known), exact) < 4e-15
     found = [each for each in steady_poses(spring_four_bar()) if error(each.eigenvalues, exact) < 1e-3]
     crank = found[0].position[0]
     assert np.arctan2(crank[2], crank[0]) == pytest.approx(float(angle), abs=1e-14)
@@ -194,6 +194,6 @@ def test_a_command_compares_a_scene_and_shows_the_table(tmp_path, capsys):
     shown = capsys.readouterr().out
     assert "Equilibrium, stable" in shown and "mjd_transitionFD" in shown and "judge (reference)" in shown
     assert main(["modes", path, "--engine", "mujoco", "--starts", "1", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)[0]["mbref_error"] < 1e-11
+    assert json.loads(capsys.readouterr().out)["poses"][0]["mbref_error"] < 1e-11
     assert main(["modes"]) == 0
     assert "governor: Steady motion at 10 rad/s, stable" in capsys.readouterr().out

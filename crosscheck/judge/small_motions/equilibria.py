@@ -126,6 +126,8 @@ def _settled(balance: Balance, y: np.ndarray, scale: float) -> np.ndarray | None
         slope = basis.T @ balance.stiffness(y, basis, STEP / 100, order=2)
         weight = damping * float(np.linalg.norm(slope)) ** 2 + np.finfo(float).tiny
         step = np.linalg.solve(slope.T @ slope + weight * np.eye(len(off)), slope.T @ off)
+        if not step.any():  # the stiffness vanishes: follow the force
+            step = off * LONGEST / np.linalg.norm(off)
         step /= max(1.0, float(np.linalg.norm(step)) / LONGEST)
         try:
             moved = balance.steady(balance.closed(balance.moved(y, (basis @ step)[None])[0]))
