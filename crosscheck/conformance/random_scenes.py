@@ -107,16 +107,13 @@ def _factor(rng: np.random.Generator, switched: bool) -> Factor:
     amplitude, frequency, phase, first, slope = rng.uniform(
         (0.2, 20.0, -3.0, 0.5, -20.0), (1.0, 80.0, 3.0, 1.5, 20.0)
     ).tolist()
-    given = {
-        "polynomial": (first, slope),
-        "sine": Sine(amplitude=amplitude, frequency=frequency, phase=phase),
-    }
+    line, wave = (first, slope), Sine(amplitude=amplitude, frequency=frequency, phase=phase)
     if not switched:
-        return Factor(**given)
+        return Factor(polynomial=line, sine=wave)
     times = DURATION * np.array([0.0, 0.3, 0.5, 0.8, 1.1])
     table = tuple(zip(times.tolist(), rng.uniform(-1.0, 1.0, times.size).tolist(), strict=True))
     start, stop = (DURATION * rng.uniform((0.1, 0.6), (0.4, 0.9))).tolist()
-    return Factor(**given, table=table, start=start, stop=stop)
+    return Factor(polynomial=line, sine=wave, table=table, start=start, stop=stop)
 
 
 def floating(seed: int) -> Scene:

@@ -21,10 +21,9 @@ from crosscheck.judge.deadline import given_up
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
-from crosscheck.processes import pool
+from crosscheck.processes import pool, serve
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import end_idle, run_estimated
-from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
 from crosscheck.study.scouting import offer, shown_name
 from mbref.records import append, stored
@@ -198,7 +197,8 @@ def run_in_turn(case: Case) -> Record:
 
 def run_here(case: Case) -> Record:
     """Run a case in the calling process, without time limit and without protection against crashes."""
-    return record_of(case, run_once(case.engine, case.scene, case.times, case.setting))
+    seconds = pool.ESTIMATED * case.time_limit
+    return record_of(case, serve.run_estimated(case.engine, case.scene, case.times, case.setting, seconds))
 
 
 def record_of(case: Case, trajectory: Trajectory) -> Record:

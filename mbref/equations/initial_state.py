@@ -83,7 +83,7 @@ def _alone(model: Model, t: float = 0.0) -> Alike:
         mass=model.mass[None],
         length=np.array([model.length]),
         bodies=[model.bodies],
-        terms=lambda places, q, v: model.along(np.full(1, t), q, v),
+        terms=lambda places, q, v: model.along(np.full(len(q), t), q, v),
         model_of=lambda place: model,
     )
 

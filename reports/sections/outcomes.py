@@ -32,7 +32,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     runs = scene_runs.runs
     caption = f"All {len(runs)} runs: outcome, end time, and error up to the end."
     rows = [_row(run, scene_runs.varied_settings(run)) for run in runs]
-    header = HEADER
+    header: tuple[str, ...] = HEADER
     if any(math.isfinite(run.estimate) for run in runs):
         place = HEADER.index("Error") + 1
         header = (*HEADER[:place], ESTIMATE, *HEADER[place:])
