@@ -21,9 +21,10 @@ from crosscheck.judge.deadline import given_up
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import Truth, truth_for
-from crosscheck.processes import pool, serve
+from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import end_idle, run_estimated
+from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
 from crosscheck.study.scouting import offer, shown_name
 from mbref.records import append, stored
@@ -196,9 +197,8 @@ def run_in_turn(case: Case) -> Record:
 
 
 def run_here(case: Case) -> Record:
-    """Run a case in the calling process, without time limit and without protection against crashes."""
-    seconds = pool.ESTIMATED * case.time_limit
-    return record_of(case, serve.run_estimated(case.engine, case.scene, case.times, case.setting, seconds))
+    """Run a case in the calling process, without time limit, error estimate or protection from crashes."""
+    return record_of(case, run_once(case.engine, case.scene, case.times, case.setting))
 
 
 def record_of(case: Case, trajectory: Trajectory) -> Record:
