@@ -107,13 +107,12 @@ def _unknown(model: Any, j: int, stiff: bool, damped: bool) -> Iterator[Part]:
 
 def _plastic(model: Any) -> Iterator[Part]:
     """Return the springs that yield, without their stiffness in the model."""
-    for what, stiffness, limit, name_of in (
-        ("joint", model.jnt_stiffness, model.jnt_springyield, lambda k: joint_name(model, k)),
-        ("tendon", model.tendon_stiffness, model.tendon_springyield, lambda k: repr(model.tendon(k).name)),
-    ):
-        for k in np.flatnonzero(limit):
-            yield Part("springs", f"plastic spring of {what} {name_of(int(k))}")
-            stiffness[k] = 0
+    for k in np.flatnonzero(model.jnt_springyield):
+        yield Part("springs", f"plastic spring of joint {joint_name(model, int(k))}")
+        model.jnt_stiffness[k] = 0
+    for k in np.flatnonzero(model.tendon_springyield):
+        yield Part("springs", f"plastic spring of tendon {model.tendon(int(k)).name!r}")
+        model.tendon_stiffness[k] = 0
 
 
 def _dofs(model: Any, j: int) -> slice:
