@@ -92,9 +92,9 @@ def test_energy_of_constant_loads_of_joints_is_balanced():
 
 
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
-def test_engines_move_loads_of_joints(name):
-    check("mujoco", PROBES[name], 1e-12)
-    check("exudyn", PROBES[name], 1e-10)
+@pytest.mark.parametrize(("of", "within"), [("mujoco", 1e-12), ("exudyn", 1e-10), ("pinocchio", 1e-10)])
+def test_engines_move_loads_of_joints(of, within, name):
+    check(of, PROBES[name], within)
 
 
 SMOOTH = ("slide_spring load", "joint_torque load", "joint_force load", "polynomial loads over time")

@@ -148,7 +148,7 @@ def test_engines_are_asked_for_their_function_at_rest_and_for_accelerations():
     assert [each.way for each in of_engine(engine("exudyn"), turning_pendulum(), turning_one)] == [
         ACCELERATIONS
     ]
-    [refused] = of_engine(engine("pinocchio"), damped_slides(), slides)
+    [refused] = of_engine(engine("sundials"), damped_slides(), slides)
     assert refused.eigenvalues is None and "slide_spring" in refused.reason
 
 

@@ -140,7 +140,7 @@ class _PinocchioSimulation:
         self.driven = [(mechanism.q_of_v[i], self.nq + i, driver) for i, driver in mechanism.driven]
         self.free = np.setdiff1d(np.arange(self.model.nv), [i for i, _ in mechanism.driven])
         self.frames = [mechanism.frame(k) for k in range(len(mechanism.tree.links))]
-        self.still = self.loads.fixed and not self.loads.torsion and not self.driven
+        self.still = self.loads.fixed and not self.loads.joint_springs and not self.driven
         self.y = np.concatenate([mechanism.q0, mechanism.v0])
         self._configure(setting)
 

@@ -64,8 +64,8 @@ class CompiledRun:
             self._library.add_drive(
                 self._address, _pointer(drive), ctypes.c_int64(len(polynomial)), _pointer(polynomial)
             )
-        for iq, iv, load in loads.torsion:
-            twist = np.array([iq, iv, load.stiffness, load.natural_angle, load.damping], dtype=float)
+        for iq, iv, spring in loads.joint_springs:
+            twist = np.array([iq, iv, spring.stiffness, spring.natural, spring.damping], dtype=float)
             self._library.add_twist(self._address, _pointer(twist))
         joints = zip(mechanism.motions, list(model.joints)[1:], strict=True)
         places = [joint.idx_q + QUATERNION[m.kind] for m, joint in joints if m.kind in QUATERNION]

@@ -27,7 +27,8 @@ from crosscheck.engines.spanning_tree import (
     Tree,
     spanning_tree,
 )
-from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring
+from mbref.scene import LOAD_TYPES, Force, JointLoad, Moment, Scene, Spring
+from mbref.scene_loads import Action
 
 SUPPORTS = Supports(
     joints=(
@@ -41,7 +42,7 @@ SUPPORTS = Supports(
         "distance",
     ),
     drivers=("angle", "displacement"),
-    loads=("moment", "force", "spring", "torsion_spring"),
+    loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),  # refused by the engine with a reason
     armatures=("angle", "displacement"),
 )
@@ -150,8 +151,9 @@ class _PointForce:
 class Loads:
     """Generalised forces of a scene's loads, and of its driven coordinates with large armatures.
 
-    Constant loads (a moment on a body that turns about one direction) are evaluated once. All other loads are
-    converted to joint torques by Pinocchio's function for static torques, on a model without gravity.
+    Constant loads (along a joint, or a moment on a body that turns about one direction) are evaluated once.
+    All other loads are converted to joint torques by Pinocchio's function for static torques, on a model
+    without gravity.
     """
 
     def __init__(self, mechanism: Mechanism):
@@ -164,7 +166,7 @@ class Loads:
         self.moments: list[tuple[int, np.ndarray]] = []
         self.forces: list[_PointForce] = []
         self.springs: list[tuple[Spring, list[tuple[int, Any]]]] = []
-        self.torsion: list[tuple[int, int, TorsionSpring]] = []
+        self.joint_springs: list[tuple[int, int, Action]] = []  # indices of q and v
         self.evaluated: list[Any] = []  # loads whose torques depend on the position
         maps = twist_maps(mechanism.tree)
         for load in mechanism.scene.load:
@@ -189,9 +191,11 @@ class Loads:
             self.evaluated.append(load)
             pairs = zip(load.bodies, load.points, strict=True)
             self.springs.append((load, [self._point(scene.body_index(b), p) for b, p in pairs]))
-        elif isinstance(load, TorsionSpring):
-            i = mechanism.tree.coordinate(scene, load.joint)
-            self.torsion.append((mechanism.q_of_v[i], i, load))
+        elif isinstance(load, JointLoad):
+            i, action = mechanism.tree.coordinate(scene, load.joint, load.coordinate), load.action
+            self.constant[i] += action.amount
+            if action.stiffness or action.damping:
+                self.joint_springs.append((mechanism.q_of_v[i], i, action))
 
     def _point(self, body: int, point: Any) -> tuple[int, Any]:
         joint, _ = self.mechanism.frame(self.mechanism.tree.link_of(body))
@@ -200,8 +204,8 @@ class Loads:
     def torques(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Return generalised forces (nv,) at time t (s), configuration q and velocity v."""
         tau = self.constant.copy()
-        for iq, iv, load in self.torsion:
-            tau[iv] -= load.stiffness * (q[iq] - load.natural_angle) + load.damping * v[iv]
+        for iq, iv, spring in self.joint_springs:
+            tau[iv] -= spring.stiffness * (q[iq] - spring.natural) + spring.damping * v[iv]
         if not self.fixed:
             tau -= self.pin.computeStaticTorque(self.model, self.data, q, self._external(q, v))
         for i, driver in self.mechanism.driven:
