@@ -14,6 +14,7 @@ from typing import Any, Protocol
 from mbref.scene import Scene
 
 GROUP = "mbref.formats"
+REMEDIES = {".xacro": "; write a URDF with `xacro FILE > robot.urdf`"}  # by endings that no format reads
 
 
 @dataclass(frozen=True)
@@ -221,4 +222,5 @@ def _found(path: str | Path, does: str) -> Format:
         if ending in getattr(item, does):
             return item
     known = ", ".join(sorted(end for item in formats for end in getattr(item, does))) or "none installed"
-    raise ValueError(f"{path}: no format {does} {ending or 'a name without an ending'}; known: {known}")
+    what = f"no format {does} {ending or 'a name without an ending'}; known: {known}"
+    raise ValueError(f"{path}: {what}{REMEDIES.get(ending, '')}")

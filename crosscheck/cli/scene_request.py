@@ -55,7 +55,7 @@ def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
 
     Raises SceneError with line numbers if the initial velocities of its file contradict its joints.
     """
-    if formats.is_readable(name):
+    if formats.is_readable(name) or _is_xml(name):
         return _imported(name, reading, notice)
     scene = held(find_scene(name), reading.hold)
     if name not in SCENES and Path(name).exists():
@@ -64,6 +64,12 @@ def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
         except SceneError as error:
             raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
     return scene
+
+
+def _is_xml(name: str) -> bool:
+    """Return whether a name is of a file that begins like XML, which no scene file does."""
+    path = Path(name)
+    return path.is_file() and path.read_bytes()[:64].lstrip().startswith(b"<")
 
 
 def _imported(name: str, reading: ImportOptions, notice: Notice) -> Scene:

@@ -244,3 +244,11 @@ def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path
         find_scenes([str(path)])
     with pytest.raises(RequestError, match=r"none\.xml"):
         find_scenes([str(tmp_path / "none.xml")])
+
+
+def test_a_file_that_needs_xacro_is_refused_with_the_command(tmp_path):
+    (tmp_path / "robot.urdf.xacro").write_text("<robot name='r'/>")
+    with pytest.raises(
+        RequestError, match="no format reads .xacro; known: .*; write a URDF with `xacro FILE"
+    ):
+        find_scenes([str(tmp_path / "robot.urdf.xacro")])
