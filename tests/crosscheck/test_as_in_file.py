@@ -237,7 +237,7 @@ def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path
     path = tmp_path / "robot.xml"
     path.write_text(FOUR_BAR)
     find_scenes([str(path)], TILTED, said.append)
-    assert any("left out: 1 actuator:" in sentence for sentence in said)
+    assert any("left out: 1 actuator (1 servo):" in sentence for sentence in said)
     assert any("closure 'C' was open by" in sentence for sentence in said)
     path.write_text(FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"'))
     with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):
@@ -249,6 +249,6 @@ def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path
 def test_a_file_that_needs_xacro_is_refused_with_the_command(tmp_path):
     (tmp_path / "robot.urdf.xacro").write_text("<robot name='r'/>")
     with pytest.raises(
-        RequestError, match="no format reads .xacro; known: .*; write a URDF with `xacro FILE"
+        RequestError, match=r"no format reads .xacro; known: .*; write a URDF with `xacro FILE"
     ):
         find_scenes([str(tmp_path / "robot.urdf.xacro")])

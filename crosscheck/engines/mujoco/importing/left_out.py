@@ -114,9 +114,8 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
         (int(np.sum(model.jnt_limited != 0)), "limit of a joint", "limits of joints"),
     )
     if model.nu:
-        kinds = (
-            f"{numbered(model.nu, 'actuator', 'actuators')}{f', {servos} of them servos' if servos else ''}"
-        )
+        among = f" ({numbered(servos, 'servo', 'servos')})" if servos else ""
+        kinds = numbered(model.nu, "actuator", "actuators") + among
         yield f"{kinds}: only motors with a control value in the keyframe act"
     yield from (numbered(*count) for count in counts if count[0])
     if model.neq:
