@@ -21,7 +21,7 @@ from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import checked_run, finish_run
 from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
-# order of the Taylor series of the second run; other runs use at most 22 at tolerances down to 1e-13
+# order of the Taylor series of the second run; other runs use at most order 22 at tolerances above 1e-13
 ORDER = 24
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # relative tolerances of the second run
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance

@@ -123,7 +123,7 @@ def _check_times(times: Sequence[float]) -> None:
 
 class Choice(NamedTuple):
     """Selection of settings: ``families`` of settings (None: all) or one ``setting``, at the tolerance
-    ``rtol`` (None: the sweep over tolerances). ``is_quick`` selects few families."""
+    ``rtol`` (None: the sweep over tolerances). ``is_quick`` selects a few families of settings."""
 
     families: Sequence[str] | None = None
     setting: Setting | None = None

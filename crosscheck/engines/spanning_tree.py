@@ -260,8 +260,8 @@ def _cut_open(nodes: list[Link], kept: list[_Edge], cut: list[tuple[_Edge, bool]
 
 
 def _depth_first(nodes: list[Link], edges: list[_Edge], closures: list[Closure], bodies: int) -> Tree:
-    """Number the nodes depth first from the ground; a part without connection to the ground begins with a
-    free link."""
+    """Number the nodes depth first from the ground; a part of the mechanism without connection to the ground
+    begins with a free link."""
     number: dict[int, int] = {GROUND_LINK: GROUND_LINK}
     links: list[Link] = []
 

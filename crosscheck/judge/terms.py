@@ -41,7 +41,8 @@ class Terms(NamedTuple):
 
 
 class Variant(NamedTuple):
-    """Terms of which one is changed: the part of an engine that computes this term, and the change."""
+    """Terms of the equations of motion of which one is changed, with the part of an engine that computes this
+    term, and the change."""
 
     part: str
     change: str

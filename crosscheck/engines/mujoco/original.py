@@ -128,7 +128,7 @@ def run(scene: Scene, times: np.ndarray, setting: Setting, version: str) -> Traj
     import mujoco
 
     if "file" not in setting.options:
-        raise ValueError(f"family {setting.family!r} needs the option file")
+        raise ValueError(f"settings of the family {setting.family!r} need the option 'file'")
     start = time.process_time()
     original = _Original(mujoco, setting)
     labels = {"engine": "mujoco", "version": version, "method": setting.family, "settings": original.settings}

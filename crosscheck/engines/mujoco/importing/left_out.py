@@ -121,7 +121,7 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"
     if model.nkey:
-        yield f"{numbered(model.nkey, 'keyframe', 'keyframes')}: --keyframe NAME begins at one"
+        yield f"{numbered(model.nkey, 'keyframe', 'keyframes')}: --keyframe NAME begins the motion at a keyframe"
 
 
 def _holding_sites(mujoco: Any, model: Any) -> set[int]:
