@@ -113,7 +113,8 @@ def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 
 class Loads:
     """The loads of a scene on the links of its tree, at the motion that ``motion`` returns.
 
-    Moments are constant in world axes, so that a scene without other loads asks for one motion only.
+    A moment that does not change with time is constant in world axes. If a scene has no other loads,
+    ``motion`` is called once, when this object is made.
     """
 
     def __init__(self, scene: Scene, tree: Tree, motion: Callable[[], LinkMotion]):

@@ -121,7 +121,8 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"
     if model.nkey:
-        yield f"{numbered(model.nkey, 'keyframe', 'keyframes')}: --keyframe NAME begins the motion at a keyframe"
+        keyframes = numbered(model.nkey, "keyframe", "keyframes")
+        yield f"{keyframes}: --keyframe NAME begins the motion at a keyframe"
 
 
 def _holding_sites(mujoco: Any, model: Any) -> set[int]:
