@@ -36,6 +36,26 @@ def test_rates_oppose_where_the_motion_reverses_relative_to_the_null_vector(befo
     assert determinants.rates_oppose(state) == (before * after < 0.0)
 
 
+@pytest.mark.parametrize(
+    ("rows", "chosen", "expected"), [(1, 1, True), (1, 2, True), (3, 1, True), (3, 2, False)]
+)
+def test_one_null_vector_needs_equal_rows_at_both_ends(rows, chosen, expected):
+    """Of redundant rows others may have been chosen; with two degrees of freedom there are two vectors."""
+    state = memory()
+    state.solver.pivot_rows, state.partition.partition_id = np.arange(rows), chosen
+    assert determinants.has_one_null_vector(state) == expected
+    assert not determinants.has_one_null_vector(memory(variables=3))
+
+
+@pytest.mark.parametrize("along", [0.3, -0.3])
+@pytest.mark.parametrize("parity", [0, 1])
+@pytest.mark.parametrize("pivot", [0.5, -0.5])
+def test_minors_oppose_by_the_signs_of_motion_partition_and_pivots(along, parity, pivot):
+    state = memory(pivot=pivot)
+    state.partition.parity = parity
+    assert determinants.minors_oppose(along, state) == (along * pivot * (1 - 2 * parity) < 0.0)
+
+
 def as_determinant(monkeypatch, value, end):
     """Have the determinant be a function of time in a step of a length; return the times of evaluations."""
     times = []
