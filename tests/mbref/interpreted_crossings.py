@@ -90,6 +90,14 @@ def test_two_sign_changes_are_located_in_steps_of_any_length(monkeypatch, end):
     assert state.step.second_crossing == pytest.approx(0.7 * end, rel=1e-10)
 
 
+@pytest.mark.parametrize("end", [0.01, 30.0])
+def test_two_sign_changes_are_told_apart_from_a_fraction_of_the_step_on(monkeypatch, end):
+    for apart, second in ((0.9e-5, False), (1.1e-5, True)):
+        as_determinant(monkeypatch, lambda h, apart=apart: 1e3 * ((h / end - 0.5) ** 2 - apart**2), end)
+        monkeypatch.setattr(location, "time_of_minimum", lambda *_: 0.5 * end)
+        assert (location.find_pair(end, memory())[1] >= 0.0) == second, apart
+
+
 def test_interpolation_is_exact_for_the_inverse_of_a_parabola():
     """x = (y² + 2 y + 3) / 10 has the value 0.3 at y = 0."""
     place = lambda y: (y * y + 2.0 * y + 3.0) / 10.0  # noqa: E731
