@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference kinds picture docs site bench clean drawn paper
+.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference kinds ladders picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -90,6 +90,13 @@ kinds: $(VENV)/ready ## the page on choosing an engine, with its records, anew, 
 	rm -rf build/kinds && $(BIN)/crosscheck report --quick $(KINDS) --out build/kinds
 	$(BIN)/python -m reports.which_engine --keep build/kinds
 	$(BIN)/python -m reports.which_engine docs/which-engine.md
+
+LADDERS := build/stability
+
+ladders: $(VENV)/ready ## mbref's methods on mechanisms that become difficult, with records, anew, into reports/stability/
+	$(BIN)/crosscheck report --section stability --engine mbref --out $(LADDERS)
+	$(BIN)/python -m reports.ladders $(LADDERS) reports/stability
+	$(BIN)/crosscheck report --section stability --render reports/stability
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 	$(BIN)/python -m reports --picture reports/rendered/passage.svg

@@ -23,6 +23,7 @@ PAPER, STABILITY, CLOSED_LOOPS = "paper", "stability", "closed_loops"
 OWN = (STABILITY, CLOSED_LOOPS, PAPER)  # sections with runs of their own
 TITLES: dict[tuple[str, ...], str] = {  # titles of pages of one section
     (PAPER,): "Stabilisation methods for redundant constraints",
+    (STABILITY,): "Methods on mechanisms that become difficult",
     (CLOSED_LOOPS,): "Engines on closed loops, compared with the true motion",
 }
 
@@ -41,8 +42,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         return _render(Path(arguments.render), arguments.section or NAMES)
     is_quick, out = arguments.depth == "quick", Path(arguments.out)
     names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, *OWN))
-    if set(names) <= set(OWN) and (arguments.scene or arguments.engine):
-        given = "scenes" if arguments.scene else "engines"
+    given = "scenes" if arguments.scene else "engines" if arguments.engine and names != [STABILITY] else ""
+    if set(names) <= set(OWN) and given:
         _notice(f"--section {names[0]}: has {given} of its own; leave them out, or ask for another section")
         return 2
     try:
@@ -105,7 +106,7 @@ def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Bl
         groups = by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
         blocks += sections.blocks(groups, names, stored.verified(out))
     if STABILITY in names:
-        blocks += stability.render(collection.stability_ladders(out, _notice))
+        blocks += stability.render(collection.stability_ladders(out, wanted.engines, _notice))
     if CLOSED_LOOPS in names:
         blocks += closed_loops.render(collection.closed_loops())
     if PAPER in names:

@@ -23,7 +23,6 @@ from mbref.records import looked_at
 from mbref.scene import Scene
 
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
-LADDERS = "stability.jsonl"
 REPEATS = 3  # timed runs of each setting; the settings take turns
 Notice = Callable[[str], None]  # takes one sentence for the user
 
@@ -74,10 +73,11 @@ def closed_loops() -> list[Record]:
     return read()
 
 
-def stability_ladders(out: Path, notice: Notice) -> list[Record]:
-    """Return the records of the stability ladders, which are stored in ``out``/stability.jsonl."""
+def stability_ladders(out: Path, engines: Sequence[str] | None, notice: Notice) -> list[Record]:
+    """Return the records of the stability ladders, which are stored in ``out``/stability.jsonl: of mbref's
+    methods, and of the named engines (None: the default ones) that have a family for them."""
     out.mkdir(parents=True, exist_ok=True)
-    return stability.run(out / LADDERS, find_engines(None, notice))
+    return stability.run(out / stability.FILE, find_engines(engines, notice))
 
 
 def stored_ladders(out: Path) -> list[Record]:
@@ -85,9 +85,9 @@ def stored_ladders(out: Path) -> list[Record]:
 
     Raises FileNotFoundError if the folder has none.
     """
-    if not (out / LADDERS).exists():
-        raise FileNotFoundError(f"{out}: has no {LADDERS} of a report")
-    return list(looked_at(out / LADDERS).values())
+    if not (out / stability.FILE).exists():
+        raise FileNotFoundError(f"{out}: has no {stability.FILE} of a report")
+    return list(looked_at(out / stability.FILE).values())
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:

@@ -24,6 +24,7 @@ from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.links import CRANK_RATE
 from mbref.scenes.planar_slider_crank import slider_crank
 
+FILE = "stability.jsonl"  # name of the file of records in a report's folder
 RTOL = 1e-9
 MOST_STEPS = 200_000  # allowed steps of a run for every 30 s of its time limit
 SAMPLES = 21

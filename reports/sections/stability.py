@@ -35,13 +35,13 @@ HOW = (
     "m left the motion, t out of time, x crashed, n not finite. Empty cells were not run."
 )
 WHEN = (
-    "Only taylor, the default, follows a motion across singular positions with all digits, and ends "
-    "UNDECIDED where double precision cannot decide the branch; projection ends at the singular position, "
-    "because it watches the rank. All other methods run on by their own rules: some cross with fewer digits, "
-    "some fail there, and a run that ends on another branch has the outcome LEFT_MOTION."
+    "taylor, the default, follows a motion across singular positions, and ends UNDECIDED where double "
+    "precision cannot decide the branch; projection ends at the singular position, because it watches the "
+    "rank. The other methods run on by their own rules: some cross, with all digits or with fewer, some fail "
+    "there, and a run that ends on another branch has the outcome LEFT_MOTION."
 )
 
-SERIES = "taylor"
+SERIES = "taylor"  # the default method
 Runs = Mapping[Curve, Mapping[float, Record]]  # by engine and family, by difficulty
 
 
@@ -106,12 +106,16 @@ def _results(counts: Mapping[Curve, Count]) -> list[str]:
         return []
     best = max(others, key=lambda curve: others[curve].right)
     worst = max(others, key=lambda curve: others[curve].false)
-    rungs = sum(others[best])
+    wrong = (
+        f"{_name(worst)} completes wrong motions most often ({others[worst].false} of {sum(others[worst])})"
+        if others[worst].false
+        else "none completes a wrong motion"
+    )
     return [
         f"Of {sum(first)} runs by taylor {first.right} are right, {first.ended} ended early, and "
         f"{first.false} completed with a wrong motion.",
-        f"Of the others, {_name(best)} is right most often ({others[best].right} of {rungs} runs), and "
-        f"{_name(worst)} completes wrong motions most often ({others[worst].false} of {sum(others[worst])}).",
+        f"Of the others, {_name(best)} is right most often "
+        f"({others[best].right} of {sum(others[best])} runs), and {wrong}.",
     ]
 
 

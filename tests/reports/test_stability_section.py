@@ -67,6 +67,14 @@ def test_counts_tell_right_ended_and_false():
     )
 
 
+def test_the_second_sentence_says_where_no_method_is_wrong():
+    records = [record("gap", 1e-1, 1e-9), record("gap", 1e-1, 1e-9, family="mpi-svd+none")]
+    sentences = [b.text for b in section.render(records) if isinstance(b, Text)]
+    assert sentences[1] == (
+        "Of the others, mpi-svd+none is right most often (1 of 1 runs), and none completes a wrong motion."
+    )
+
+
 def test_stored_ladders_are_rendered_without_a_run(tmp_path, capsys):
     assert program.main(["--section", "stability", "--render", str(tmp_path)]) == 2
     assert "stability.jsonl" in capsys.readouterr().err

@@ -1,0 +1,29 @@
+"""Keep the records of stability ladders without their motions, to be committed.
+
+``python -m reports.ladders build/stability reports/stability`` writes them to another folder; `make ladders`
+runs the ladders before, and renders them afterwards.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from crosscheck.study.stability import FILE
+from mbref.records import looked_at, strict_json
+
+# fields of a record that the section shows, and its origin
+KEPT = ("schema", "key", "scene", "engine", "version", "family", "outcome", "message", "t_end", "metrics")
+ORIGIN = ("asked", "time_limit", "versions", "commit", "date")
+
+
+def keep(source: Path, folder: Path) -> None:
+    """Write the records of a folder to another one, in the order of rungs, without motions and costs."""
+    folder.mkdir(parents=True, exist_ok=True)
+    records = sorted(looked_at(source / FILE).values(), key=lambda r: (r["scene"], r["engine"], r["family"]))
+    lines = (strict_json({name: record[name] for name in (*KEPT, *ORIGIN)}) for record in records)
+    (folder / FILE).write_text("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    keep(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -1,0 +1,41 @@
+"""The committed stability ladders: their text / their records, rendered again; a record for every run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli.collection import stored_ladders
+from crosscheck.study import stability
+from reports import __main__ as program
+from reports import ladders, render
+from reports.sections import stability as section
+
+FOLDER = Path(__file__).parents[2] / "reports" / "stability"
+
+
+@pytest.fixture(scope="module")
+def records():
+    return stored_ladders(FOLDER)
+
+
+def test_text_is_rendered_from_the_records(records):
+    text = render.markdown(section.render(records), program.TITLES[program.STABILITY,])
+    kept = (FOLDER / "report.md").read_text()
+    assert text == kept, "crosscheck report --section stability --render reports/stability renews it"
+
+
+def test_every_method_has_a_run_on_every_rung_of_one_commit(records):
+    found = {(record["scene"], record["family"]) for record in records if record["engine"] == stability.MBREF}
+    missing = {(scene.name, method) for scene in stability.scenes() for method in stability.METHODS} - found
+    assert not missing, missing
+    [commit] = {record["commit"] for record in records}
+    assert "+" not in commit, f"made from a clean checkout: {commit}"
+    assert (FOLDER / stability.FILE).stat().st_size < 3e6
+
+
+def test_records_are_kept_without_their_motions(tmp_path):
+    ladders.keep(FOLDER, tmp_path)
+    assert (tmp_path / stability.FILE).read_text() == (FOLDER / stability.FILE).read_text()
+    assert not any("bodies" in record for record in stored_ladders(tmp_path))
