@@ -94,6 +94,27 @@ def test_coriolis_forces_couple_two_slides_of_a_turning_table():
         assert (each.stability == "stable") is is_stable
 
 
+def test_a_body_on_a_ball_joint_has_the_roots_of_eulers_equations():
+    """Torque-free rotation about a principal axis, seen from the turning spindle: s = ± i Ω and
+    s² = -Ω² (C - A) (C - B) / (A B); the angle about the axis is free."""
+    rate, (a, b, c) = 5.0, (0.02, 0.03, 0.045)
+    bodies = [
+        {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 1.0]},
+        {"name": "body", "mass": 1.0, "inertia": [a, b, c], "position": [0.0] * 3},
+    ]
+    joints = [
+        turning_pendulum(rate).joint[0],
+        {"name": "B", "type": "spherical", "bodies": ["spindle", "body"], "anchor": [0.0] * 3},
+    ]
+    scene = turning_pendulum(rate, body=bodies, joint=joints, gravity=(0.0, 0.0, 0.0))
+    [each] = equilibria(scene, starts=1)
+    slow = rate * np.sqrt((c - a) * (c - b) / (a * b))
+    exact = np.array([1j * rate, -1j * rate, 1j * slow, -1j * slow])
+    gaps = np.abs(each.eigenvalues[:, None] - exact)
+    assert gaps.min(axis=0).max() < 1e-10 and each.stability == "indifferent"
+    assert np.sort(np.abs(each.eigenvalues))[:2].max() < 1e-4
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
