@@ -21,6 +21,7 @@ from mbref.scenes import find_scene
 if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium
 
+PUSHING = ("moment", "force", "joint_torque", "joint_force")  # loads that do not change with the pose
 LIMITS = "Other equilibria may exist: the search begins at the scene's pose and follows the constraints."
 
 
@@ -75,8 +76,10 @@ def _found(options: argparse.Namespace) -> list[Equilibrium]:
     warn(scene)
     found = equilibria(scene, options.starts)
     if not found:
+        pushing = [f"load[{k}] ({load.type})" for k, load in enumerate(scene.load) if load.type in PUSHING]
+        cause = f"perhaps {' and '.join(pushing)} moves it at every pose; " * bool(pushing)
         raise ValueError(
-            f"{scene.name}: no equilibrium is found from {options.starts} starts; --starts tries more"
+            f"{scene.name}: no equilibrium is found from {options.starts} starts; {cause}--starts tries more"
         )
     if options.number is not None and not 1 <= options.number <= len(found):
         raise ValueError(f"--number: must be from 1 to {len(found)}, got {options.number}")

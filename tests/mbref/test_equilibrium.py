@@ -176,3 +176,11 @@ def test_commands_print_poses_modes_and_a_picture(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out)["stability"] == "stable"
     assert main(["equilibrium", path, "--starts", "2", "--number", "9"]) == 2
     assert "--number: must be from 1 to" in capsys.readouterr().err
+
+
+def test_a_load_that_pushes_at_every_pose_is_named(tmp_path, capsys):
+    path = str(tmp_path / "pushed.toml")
+    pendulum(load=[{"type": "moment", "body": "rod", "moment": [0.0, 0.0, 20.0]}]).save(path)
+    assert main(["equilibrium", path, "--starts", "2"]) == 2
+    said = capsys.readouterr().err
+    assert "no equilibrium is found from 2 starts; perhaps load[0] (moment) moves it at every pose" in said
