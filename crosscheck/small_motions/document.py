@@ -23,11 +23,11 @@ crosscheck modes --run --page docs/small-motions.md       # measure again, and w
 NOTES = """## How to read it
 
 - **judge**: Lagrange multipliers and joint coordinates of a spanning tree in long doubles,
-  `crosscheck/judge/small_motions`. Nothing of mbref's equations is called. It searches equilibria by
-  damped Newton steps from 16 random starts.
+  `crosscheck/judge/small_motions`. Nothing of mbref's equations is called. It searches equilibria by damped
+  Newton steps, from poses along the constraints and from random poses, also of other assemblies.
 - **mbref modes**: natural frequencies and damping of [`mbref modes`](equilibrium.md), by differences of
-  accelerations along the tangent. `mbref equilibrium` finds every pose of these tables by its own search,
-  unless the table says that it does not.
+  accelerations along the tangent. The search of `mbref equilibrium` follows the constraints from the scene's
+  pose. So it may miss poses of other assemblies; the list of mechanisms says which.
 - **ComputeODE2Eigenvalues** (Exudyn): projects mass, damping and stiffness into the null space of the
   constraints. The change of the constraint forces with the pose, which is the stiffness of a pendulum in
   Cartesian coordinates, is not part of its stiffness matrix. So it gives zero for a pendulum under

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.judge.arithmetic import doubles
-from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.constraints import closure, scene_length
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.small_motions.equations import STEP, Balance, NotSteady, Small, in_doubles
 from crosscheck.judge.small_motions.turning import turning
@@ -21,10 +21,12 @@ SEED = 20  # of the random starts
 NEAR, FAR = 0.5, 3.0  # rad or lengths; sizes of the displacements of the starts
 ITERATIONS = 60  # of Newton's method from a start
 MOST_DAMPED = 1e6  # damping / squared stiffness at which a search ends
+STRIDE, STRIDES = 0.4, 6  # rad or lengths, and number of starts along the constraints in each direction
 LONGEST = 0.4  # rad or lengths; longest Newton step
 BALANCED = 1e-10  # unbalanced force / largest force at the starts, of a pose in double precision
 REFINED = 1e-15  # the same after refinement in long doubles
 REFINEMENTS = 6
+ASSEMBLED = 1e-8  # largest residual of a joint, m or rad
 SAME = 1e-6  # rad or lengths; distance below which two poses count as one
 STILL = 1e-6  # part of the largest eigenvalue below which a real part or an eigenvalue counts as zero
 UNSTEADY = 1e-8  # change of the matrices / largest entry after a rotation; above, the motion is not steady
@@ -102,9 +104,14 @@ def _scale(balance: Balance, poses: list[np.ndarray]) -> float:
 
 
 def _starts(balance: Balance, first: np.ndarray, count: int) -> Iterator[np.ndarray]:
-    """Yield the first pose, and random displacements of it with closed loops, with a fixed seed."""
+    """Yield the first pose, poses along the constraints from it, and random displacements with closed
+    loops, with a fixed seed."""
     rng = np.random.default_rng(SEED)
     yield first
+    if count > 1:
+        direction = rng.uniform(-1, 1, balance.equations.nv)
+        yield from _along(balance, first, direction)
+        yield from _along(balance, first, -direction)
     for k in range(1, count):
         ask()
         size = (NEAR, FAR)[k % 2]
@@ -113,6 +120,22 @@ def _starts(balance: Balance, first: np.ndarray, count: int) -> Iterator[np.ndar
             yield balance.steady(balance.closed(balance.moved(first, step[None])[0]))
         except NotSteady:
             continue
+
+
+def _along(balance: Balance, y: np.ndarray, direction: np.ndarray) -> Iterator[np.ndarray]:
+    """Yield poses along the constraints that follow a direction (nv,), in units of ``sizes``."""
+    for _ in range(STRIDES):
+        ask()
+        basis = balance.basis(balance.at(y[None])) / balance.sizes[:, None]
+        ahead = basis @ np.linalg.lstsq(basis, direction, rcond=None)[0]
+        direction = ahead / (np.linalg.norm(ahead) or 1.0)
+        try:
+            y = balance.steady(
+                balance.closed(balance.moved(y, (STRIDE * balance.sizes * direction)[None])[0])
+            )
+        except NotSteady:
+            return
+        yield y
 
 
 def _settled(balance: Balance, y: np.ndarray, scale: float) -> np.ndarray | None:
@@ -157,6 +180,8 @@ def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
         step = basis @ np.linalg.lstsq(slope, doubles(off), rcond=None)[0]
         y = balance.moved(y, step[None])[0]
     y = balance.steady(balance.closed(y))
+    if not _is_assembled(balance, y):
+        return None
     small, coarse = balance.small(y), balance.small(y, 2 * STEP)
     eigenvalues = small.eigenvalues()
     size = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
@@ -164,6 +189,13 @@ def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
     if balance.conditioning(y) < NEXT_TO_SINGULAR or (balance.motion.rate and not _stays(balance, y, small)):
         return None
     return Steady(*balance.poses(y), eigenvalues, max(change, SMALLEST), balance, y, small)
+
+
+def _is_assembled(balance: Balance, y: np.ndarray) -> bool:
+    """Return whether joints hold at a state: closures of perpendicular directions admit bodies that are
+    turned by half a turn."""
+    rows = closure(balance.scene, 0.0, *balance.poses(y)).values()
+    return max((float(np.abs(each).max(initial=0.0)) for each in rows), default=0.0) < ASSEMBLED
 
 
 def _stays(balance: Balance, y: np.ndarray, small: Small) -> bool:
