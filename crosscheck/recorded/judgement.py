@@ -29,8 +29,8 @@ EXPLAINED = 1e-3  # fraction of the difference: pairs of causes are tried if sin
 
 @dataclass(frozen=True)
 class ColumnError:
-    """Largest error of a column, the bound below which an error means nothing, and the time (s) at which it
-    begins."""
+    """Largest error of a column, the bound below which an error means nothing, and the time (s) at
+    which the error first exceeds the part BEGINS of the largest error (None within the bound)."""
 
     name: str
     largest: float

@@ -422,7 +422,7 @@ def test_tuning_and_the_cheapest_setting(capsys, still):
             {"metrics": {"error": 1e-9, "error_bound": 1e-7}},
             "The truth is known to 1e-07, so no run can be seen",
         ),
-        ({"metrics": {"error": None}}, "No error is known, because the motion has no truth"),
+        ({"metrics": {"error": None}}, "No error is known, because no truth of this motion is known"),
         ({"metrics": {"error": 1e-9}, "outcome": "NOT_FINITE"}, "no run completes"),
     ],
 )

@@ -70,8 +70,8 @@ class _ExtrapolatedRuns:
     def approach(self, times: np.ndarray, ending: Ending) -> Samples | None:
         """Take the samples up to the window around the first failure; returns the nodes before it.
 
-        The result is None if the samples before the window are too few for the nodes: then the failure is not
-        due to a singular position.
+        The result is None if fewer samples than nodes of interpolation lie before the window: such an early
+        failure is not taken for a singular position.
         """
         while True:
             start = ending.t - BEFORE * self.step
