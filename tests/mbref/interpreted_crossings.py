@@ -292,3 +292,23 @@ def test_a_start_in_motion_that_its_series_misses_is_undecided(monkeypatch):
     assert taken[0][2] == pytest.approx(0.5e-4), "at most half of the run"
     found._misses = lambda *_: True
     assert found.from_start(moving) == UNDECIDED
+
+
+def test_a_state_behind_a_crossing_is_corrected_by_its_series_there(monkeypatch):
+    """A series that misses the crossing by 0.1 in x and by 0.2 in the velocity of z, at each evaluation."""
+    state = SimpleNamespace(coordinates=np.zeros(7), velocities=np.zeros(6))
+    found = departure.Departure(SimpleNamespace(memory=SimpleNamespace(state=state)), None, lambda: OK, None)
+    crossing, velocities = np.array([1.0, 2, 3, 1, 0, 0, 0]), np.array([0.0, 0, 4, 0, 0, 0])
+    place, rate = np.array([0.1, 0, 0, 0, 0, 0, 0]), np.array([0.0, 0, 0.2, 0, 0, 0])
+
+    def state_at(ahead):
+        off = ahead < 0.0
+        return state.coordinates + off * (place - 0.5), state.velocities + off * (rate - 4.0)
+
+    found._state_at = state_at
+    monkeypatch.setattr(departure, "displacement", lambda there, wanted: wanted - there)
+    monkeypatch.setattr(departure, "displaced", lambda q, change: q + change)
+    moved = crossing + 0.5, velocities + 4.0
+    assert found._corrected(Passed(0.0, crossing, velocities, 1), velocities, 0.5, moved) == OK
+    assert state.coordinates == pytest.approx(crossing + 0.5 - place)
+    assert state.velocities == pytest.approx(velocities + 4.0 - rate)
