@@ -32,7 +32,7 @@ class Mechanism:
 def pendulum() -> Scene:
     """Return a rod that hangs from a hinge to the ground."""
     rod = {"name": "rod", "mass": ROD, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
-    return Scene(name="pendulum", gravity=DOWN, body=[rod], joint=[_hinge("A", "ground", "rod", (0.0,) * 3)])
+    return _scene(name="pendulum", gravity=DOWN, body=[rod], joint=[_hinge("A", "ground", "rod", (0.0,) * 3)])
 
 
 def _pendulum() -> Known:
@@ -48,7 +48,7 @@ def double_pendulum() -> Scene:
         {**rod, "name": "lower", "position": [1.5, 0.0, 0.0]},
     ]
     joints = [_hinge("A", "ground", "upper", (0.0,) * 3), _hinge("B", "upper", "lower", (1.0, 0.0, 0.0))]
-    return Scene(name="double_pendulum", gravity=DOWN, body=bodies, joint=joints)
+    return _scene(name="double_pendulum", gravity=DOWN, body=bodies, joint=joints)
 
 
 def _double_pendulum() -> Known:
@@ -77,7 +77,7 @@ def damped_slides() -> Scene:
         {"type": "slide_spring", "joint": "A", "stiffness": 50.0, "damping": 3.0},
         {"type": "slide_spring", "joint": "B", "stiffness": 30.0, "damping": 0.4},
     ]
-    return Scene(name="damped_slides", body=bodies, joint=joints, load=loads)
+    return _scene(name="damped_slides", body=bodies, joint=joints, load=loads)
 
 
 def _damped_slides() -> Known:
@@ -115,7 +115,7 @@ def spring_four_bar() -> Scene:
         "natural_length": DIAGONAL,
     }
     joints = [_hinge(name, *place) for name, place in places.items()]
-    return Scene(name="spring_four_bar", gravity=DOWN, body=bodies, joint=joints, load=[spring])
+    return _scene(name="spring_four_bar", gravity=DOWN, body=bodies, joint=joints, load=[spring])
 
 
 def _spring_four_bar() -> Known:
@@ -136,11 +136,12 @@ def _spring_four_bar() -> Known:
 
 
 def _parallelogram() -> Known:
-    scene = find_scene("four_bar_gravity")
-    links, length = scene.body, 0.5
-    weight = G * length * (links[0].mass / 2 + links[1].mass + links[2].mass / 2)
-    turning = sum(b.inertia[2] + b.mass * length**2 / 4 for b in (links[0], links[2]))
-    rate = sqrt(weight / (turning + links[1].mass * length**2))
+    scene, length = find_scene("four_bar_gravity"), 0.5
+    mass = [float(body.mass or 0.0) for body in scene.body]
+    spin = [float(np.ravel(body.inertia or 0.0)[-1]) for body in scene.body]
+    weight = G * length * (mass[0] / 2 + mass[1] + mass[2] / 2)
+    turning = sum(spin[k] + mass[k] * length**2 / 4 for k in (0, 2))
+    rate = sqrt(weight / (turning + mass[1] * length**2))
     return [(1j * rate, -1j * rate), (-rate, rate)]
 
 
@@ -151,7 +152,7 @@ def turning_pendulum() -> Scene:
     """Return a ball on an arm that hangs from a spindle, which turns about the vertical."""
     shaft = {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3}
     ball = {"name": "ball", "mass": 1.5, "inertia": [0.02] * 3, "position": [0.3, 0.0, -0.4]}
-    return Scene(
+    return _scene(
         name="turning_pendulum",
         gravity=DOWN,
         body=[shaft, ball],
@@ -201,7 +202,7 @@ def governor() -> Scene:
         ),
     ]
     driver = [{"joint": "A", "polynomial": [0.0, RATE + 4.0]}]
-    return Scene(name="governor", gravity=DOWN, body=bodies, joint=joints, driver=driver)
+    return _scene(name="governor", gravity=DOWN, body=bodies, joint=joints, driver=driver)
 
 
 def _governor() -> Known:
@@ -215,6 +216,10 @@ def _governor() -> Known:
     bend = 2 * (BALL + SLEEVE) * G * LINK * cosine - 2 * BALL * LINK**2 * rate**2 * cos(2 * angle)
     inertia = 2 * (0.01 + BALL * LINK**2) + 4 * SLEEVE * LINK**2 * sin(angle) ** 2
     return [_roots_of_squares([-bend / inertia])]
+
+
+def _scene(**parts: Any) -> Scene:
+    return Scene(**parts)
 
 
 def _roots_of_squares(squares: Sequence[float] | np.ndarray) -> tuple[complex, ...]:

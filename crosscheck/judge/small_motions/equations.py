@@ -175,7 +175,8 @@ class Balance:
         basis = self.basis(at)
         mass = self.equations.loads.mass_matrix(at.placed, at.coordinates)[0]
         parts = mass @ basis, self.damping(y, basis, h), self.stiffness(y, basis, h)
-        return Small(*(doubles(basis.T @ part) for part in parts), doubles(basis))
+        first, second, third = (doubles(basis.T @ part) for part in parts)
+        return Small(first, second, third, doubles(basis))
 
     def poses(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return positions (nb, 3) and unit quaternions (nb, 4) of the bodies at a state."""
