@@ -45,10 +45,10 @@ def _repeated(call: Callable[[], object]) -> float:
 def _mujoco(scene: Scene) -> Iterator[tuple[str, Timed]]:
     import mujoco
 
-    from crosscheck.engines.mujoco.adapter import _MujocoSimulation
+    from crosscheck.engines.mujoco.simulation import Simulation
 
     for family in ("defaults", "tuned"):
-        run = _MujocoSimulation(scene, _coarsest("mujoco", scene, family))
+        run = Simulation(scene, _coarsest("mujoco", scene, family))
 
         def call(run=run) -> float:
             with run.installed():
@@ -58,10 +58,10 @@ def _mujoco(scene: Scene) -> Iterator[tuple[str, Timed]]:
 
 
 def _pinocchio(scene: Scene) -> Iterator[tuple[str, Timed]]:
-    from crosscheck.engines.pinocchio.adapter import _PinocchioSimulation
+    from crosscheck.engines.pinocchio.simulation import Simulation
 
     for family in ("defaults", "tuned"):
-        run = _PinocchioSimulation(scene, _coarsest("pinocchio", scene, family))
+        run = Simulation(scene, _coarsest("pinocchio", scene, family))
         q, v = run.split(0.0, run.y)
         torques = run.loads.constant if run.still else run.loads.torques(0.0, q, v)
         arguments = run.model, run.data, q, v, torques, run.closures, run.closure_data, run.solver

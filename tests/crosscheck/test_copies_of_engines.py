@@ -27,13 +27,22 @@ WAYS = {  # engine and setting; its own steps are short enough that errors are b
     "dart balls": ("dart", Setting("balls", {"step": 1e-3, "erp": 0.5})),
     "dart terms": ("dart", Setting("terms", TERMS)),
     "bullet defaults": ("bullet", Setting("defaults", {"step": 1e-3, "iterations": 50})),
+    "exudyn trapezoidal": ("exudyn", Setting("trapezoidal", {"step": 1e-3})),
+    "simbody merson": ("simbody", Setting("merson", {"accuracy": 1e-8})),
+    "sundials ggl": ("sundials", Setting("ggl", {"rtol": 1e-8})),
+    "newton lox": ("newton", Setting("lox", {"step": 1e-3, "alpha": 0.01})),
 }
+SLOW = ("newton lox",)  # compiles kernels for minutes
 MODULES = {
     "drake": "pydrake",
     "dart": "dartpy",
     "bullet": "pybullet",
     "mujoco": "mujoco",
     "pinocchio": "pinocchio",
+    "exudyn": "exudyn",
+    "simbody": "opensim",
+    "sundials": "sksundae",
+    "newton": "newton",
 }
 WORSE = 4.0  # times the original's error: another cut changes the error's constant, not its order
 FLOOR = 1e-8  # rounding over a run, and what remains of Newton's method
@@ -71,7 +80,9 @@ def own_error(way: str) -> float:
     return off(way, *four_bar())
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize(
+    "way", [pytest.param(way, marks=pytest.mark.slow if way in SLOW else ()) for way in WAYS]
+)
 @pytest.mark.parametrize("copy", COPIES)
 def test_a_copy_moves_as_the_original(way: str, copy: str) -> None:
     pytest.importorskip(MODULES[WAYS[way][0]])

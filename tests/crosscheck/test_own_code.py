@@ -33,13 +33,13 @@ MODEL = (
 )
 def test_mjcf_makes_the_options_of_a_run(family, options):
     mujoco = pytest.importorskip("mujoco")
-    from crosscheck.engines.mujoco.adapter import _MujocoSimulation
+    from crosscheck.engines.mujoco.simulation import Simulation
 
     xml, _, python = engine("mujoco").own_code(SCENE, Setting(family, options)).partition(" and in Python: ")
     model = mujoco.MjModel.from_xml_string(MODEL.format(xml))
     before = model.body_invweight0.copy(), model.dof_invweight0.copy()
     exec(python, {"model": model})
-    own = _MujocoSimulation(SCENE, Setting(family, options)).model
+    own = Simulation(SCENE, Setting(family, options)).model
     for name in ("timestep", "integrator", "jacobian", "iterations", "tolerance", "disableflags", "solver"):
         assert getattr(model.opt, name) == getattr(own.opt, name), name
     assert np.allclose(model.eq_solref[0], own.eq_solref[0]) and np.allclose(
@@ -77,12 +77,12 @@ class _Solving:
 
 def test_python_makes_the_settings_of_pinocchio():
     pinocchio = pytest.importorskip("pinocchio")
-    from crosscheck.engines.pinocchio.adapter import _PinocchioSimulation
+    from crosscheck.engines.pinocchio.simulation import Simulation
 
     for family in ("defaults", "proximal", "baumgarte"):
         asked = Setting(family, {"step": 2e-4})
-        own = _PinocchioSimulation(SCENE, asked)
-        closures = list(_PinocchioSimulation(SCENE, Setting("proximal", {"step": 2e-4})).mechanism.closures)
+        own = Simulation(SCENE, asked)
+        closures = list(Simulation(SCENE, Setting("proximal", {"step": 2e-4})).mechanism.closures)
         names: dict[str, Any] = {"pinocchio": pinocchio, "closures": closures}
         exec(engine("pinocchio").own_code(SCENE, asked), names)
         for field in ("absolute_accuracy", "mu", "max_iter"):

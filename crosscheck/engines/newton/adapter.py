@@ -82,8 +82,14 @@ class Newton(Engine):
         }
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether a family serves a scene: SolverMuJoCo needs the package mujoco-warp."""
-        return family in FAMILIES and (family != solvers.MUJOCO or find_spec("mujoco_warp") is not None)
+        """Return whether a family serves a scene.
+
+        SolverMuJoCo needs the package mujoco-warp. PADMM and DVI stop with an error where no joint constrains
+        a body.
+        """
+        lacking = family == solvers.MUJOCO and find_spec("mujoco_warp") is None
+        unbound = family in solvers.BOUND and not scene.joint
+        return family in FAMILIES and not lacking and not unbound
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""

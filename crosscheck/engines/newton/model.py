@@ -43,13 +43,13 @@ def imported() -> tuple[Any, Any]:
 
 
 class Mechanism:
-    """A scene in Newton: the ``model``, and its ``state``, which begins at t = 0."""
+    """A scene in Newton: the ``model`` of the ``builder``, and its ``state``, which begins at t = 0."""
 
     def __init__(self, scene: Scene, tree: Tree):
         self.warp, self.newton = imported()
         self.scene, self.tree = scene, tree
         self.offsets = np.array([link.offset for link in tree.links])
-        builder = self.newton.ModelBuilder(gravity=scene.gravity)
+        self.builder = builder = self.newton.ModelBuilder(gravity=scene.gravity)
         for link in tree.links:
             builder.add_link(
                 xform=self._frame(link.position),

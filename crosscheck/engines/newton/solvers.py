@@ -32,6 +32,8 @@ ALPHAS = {  # of the families of Kamino
     DEFAULTS: DEFAULT_ALPHA,
 }
 
+BOUND = (f"padmm{MOREAU}", f"dvi{MOREAU}", "dvi", DEFAULTS)  # these need a constraint
+
 
 def make(newton: Any, model: Any, setting: Setting) -> Any:
     """Return the solver of a setting for a model."""
