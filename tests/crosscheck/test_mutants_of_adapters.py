@@ -92,11 +92,7 @@ DEFECTS = {  # engine: file, text, the text with a defect; each text occurs once
         ("model", "- plant.CalcGravityGeneralizedForces", "+ plant.CalcGravityGeneralizedForces"),
         ("model", "CalcJacobianSpatialVelocity(*of)[ANGULAR_FIRST]", "CalcJacobianSpatialVelocity(*of)"),
         ("model", "np.eye(3) - np.outer(c, c)", "np.eye(3) + np.outer(c, c)"),
-        (
-            "model",
-            "[*left.translational(), *left.rotational()]",
-            "[*left.rotational(), *left.translational()]",
-        ),
+        ("model", "i = piece.inertia / piece.mass", "i = piece.inertia"),
     ],
     "dart": [
         (
@@ -104,7 +100,7 @@ DEFECTS = {  # engine: file, text, the text with a defect; each text occurs once
             "node.getLinearAcceleration(), node.getAngularAcceleration()",
             "node.getAngularAcceleration(), node.getLinearAcceleration()",
         ),
-        ("model", "getCoriolisAndGravityForces()[order]", "getCoriolisAndGravityForces()"),
+        ("model", "positions[at.single] = q[at.single_q]", "positions[at.single] = -q[at.single_q]"),
         ("model", "self._place(piece.anchor - piece.origin)", "self._place(piece.origin - piece.anchor)"),
     ],
     "dart's steps": [
@@ -112,7 +108,7 @@ DEFECTS = {  # engine: file, text, the text with a defect; each text occurs once
         (
             "adapter",
             "node.addExtForce(force, np.zeros(3), False, True)",
-            "node.addExtForce(force, np.zeros(3), True, True)",
+            "node.addExtForce(force, np.zeros(3), False, False)",
         ),
         (
             "model",

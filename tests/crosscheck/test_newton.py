@@ -65,6 +65,12 @@ def test_refusals_name_the_owner_and_the_part():
     assert newton.cannot(scene) is None and newton.rounding == 2.0**-23
 
 
+def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
+    served = {family for family in FAMILIES if engine("newton").serves(pushed(), family)}
+    assert "defaults" not in served and {"lox", "xpbd"} <= served, served
+    assert engine("newton").serves(chain(), "defaults")
+
+
 def test_settings_are_coarse_to_fine_and_have_their_options():
     found = engine("newton").settings(SCENES["bennett"]())
     for family in {s.family for s in found}:
