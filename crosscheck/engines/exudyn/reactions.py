@@ -46,7 +46,7 @@ def reactions(
 
 
 def _push(
-    scene: Scene, wrench: np.ndarray, joint: Joint, kind: str, turn: np.ndarray, size: np.ndarray
+    scene: Scene, wrench: np.ndarray, joint: Joint, kind: str | None, turn: np.ndarray, size: np.ndarray
 ) -> None:
     """Add a force or torque of ``size`` (k,) along a joint's axis on the first body to wrenches (k, 6)."""
     axis = _turn(scene, joint.bodies[0], turn) @ unit(joint.directions[0])

@@ -108,11 +108,12 @@ class _World:
     def __init__(self, mechanism: Mechanism, setting: Setting):
         self.mechanism = mechanism
         self.loads = Loads(mechanism.scene, mechanism.tree, self.motion)
-        model, make = mechanism.model, lambda: solvers.make(mechanism.newton, mechanism.model, setting)
+        newton, model = mechanism.newton, mechanism.model
         self.control, self.after = model.control(), model.state()
         # a first step of another solver compiles the kernels before the timed run
-        make().step(model.state(), model.state(), self.control, None, setting.options["step"])
-        self.solver = make()
+        first = solvers.make(newton, model, setting)
+        first.step(model.state(), model.state(), self.control, None, setting.options["step"])
+        self.solver = solvers.make(newton, model, setting)
 
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s) from time t."""

@@ -79,7 +79,8 @@ class Mechanism:
             builder.add_articulation(joints)
 
     def _close(self, builder: Any, closure: Closure) -> None:
-        links, chain = closure.links, ()
+        links = closure.links
+        chain: tuple[Mobility, ...] = ()
         if closure.kind == "point":
             chain = (Mobility(BALL_JOINT, np.zeros(3)),)
         elif closure.kind != "weld":
