@@ -8,6 +8,7 @@ from __future__ import annotations
 import functools
 import importlib
 import sys
+import textwrap
 import types
 from importlib.util import find_spec
 from pathlib import Path
@@ -193,4 +194,8 @@ def test_a_defect_of_an_adapter_is_seen(way, file, text, defect, monkeypatch):
 def test_the_example_of_the_documentation_is_the_adapter_of_bullet():
     page = (FOLDER.parents[1] / "docs" / "verify-your-engine.md").read_text()
     (example,) = [block for block in page.split("```python\n")[1:] if "stepSimulation" in block]
-    assert example.partition("```")[0] in (FOLDER / "bullet" / "adapter.py").read_text()
+    source = textwrap.dedent((FOLDER / "bullet" / "adapter.py").read_text().partition("class _World")[2])
+    methods = [part.strip() for part in example.partition("```")[0].split("\n\n") if part.strip()]
+    assert len(methods) == 2
+    for method in methods:
+        assert textwrap.indent(method, "    ") in source
