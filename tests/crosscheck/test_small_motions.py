@@ -196,6 +196,13 @@ def test_poses_on_the_branch_are_found_and_bodies_turned_by_half_a_turn_are_not(
             assert np.abs(rows).max(initial=0.0) < 1e-8
 
 
+def test_the_sense_of_a_steady_rotation_is_of_the_second_body():
+    scene = turning_pendulum()
+    backwards = scene.joint[0].model_copy(update={"bodies": ("spindle", "ground")})
+    assert np.allclose(turning(scene).spin, [0.0, 0.0, 6.0])
+    assert np.allclose(turning(scene.with_(joint=[backwards, scene.joint[1]])).spin, [0.0, 0.0, -6.0])
+
+
 def test_a_rotation_that_the_loads_do_not_follow_is_not_steady():
     load = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [0.0, 0.1, 0.0]}
     assert turning(turning_pendulum()).rate == 6.0 and len(steady_poses(turning_pendulum(), starts=2)) > 0
