@@ -148,10 +148,10 @@ def _rates(paper: int, runs: Named, what: str) -> Figure:
     return Figure(f"paper-figure-{paper}", caption, partial(plot_rates, runs))
 
 
-def _along_axis(run: Run, vectors: np.ndarray) -> np.ndarray:
+def _along_axis(vectors: np.ndarray) -> np.ndarray:
     """Return the crank's component (k,) about its axis: z in the plane, y in space, whichever is larger on
     average."""
-    axis = int(np.argmax(np.abs(vectors[:, 0]).mean(axis=0)))
+    axis = int(np.argmax(np.abs(vectors[:, 0]).sum(axis=0)))
     return vectors[:, 0, axis]
 
 
@@ -161,7 +161,7 @@ def plot_rates(runs: Named) -> Drawing:
     for i, (name, run) in enumerate(runs.items()):
         motion: Trajectory = run.trajectory
         look: figures.Look = {"color": figures.COLOURS[i], "linestyle": figures.DASHES[i]}
-        rates = _along_axis(run, motion.angular_velocity)
+        rates = _along_axis(motion.angular_velocity)
         axes.plot(motion.times, rates, label=name, linewidth=2.4 - 0.6 * i, **look)
         if not run.completed:
             axes.plot(motion.times[-1], rates[-1], figures.FAILED, color=look["color"], markersize=8)

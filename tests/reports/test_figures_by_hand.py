@@ -11,7 +11,17 @@ from mbref.scene import Body, Revolute, Scene
 from mbref.trajectory import Outcome, Trajectory
 from reports.blocks import Figure, Matrix, Plot, Table, Text
 from reports.runs import Run, SceneRuns
-from reports.sections import accelerations, energy, least_errors, outcomes, speed, summary, verdict, violation
+from reports.sections import (
+    accelerations,
+    energy,
+    least_errors,
+    outcomes,
+    paper_figures,
+    speed,
+    summary,
+    verdict,
+    violation,
+)
 
 BLOCK = Body(name="b", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
 SCENE = Scene(name="block", body=(BLOCK,), gravity=(0.0, 0.0, 0.0), duration=1.0)
@@ -269,3 +279,9 @@ def test_initial_accelerations_of_a_body_at_rest():
     table = of(Table, accelerations.render(SceneRuns(SCENE, [Run({**run.record, "bodies": bodies})])))
     [(engine, family, off)] = table.rows
     assert (engine, family) == ("a", "x") and float(off) > 0
+
+
+def test_the_crank_s_component_about_its_axis_of_a_run_with_and_without_samples():
+    turning = np.array([[[0.0, -3.0, 1.0]], [[0.0, 2.0, 1.0]]])
+    assert paper_figures._along_axis(turning).tolist() == [-3.0, 2.0]
+    assert paper_figures._along_axis(np.zeros((0, 1, 3))).shape == (0,), "a run without a sample"
