@@ -13,6 +13,7 @@ from crosscheck.cli.commands import main
 from crosscheck.engine import Cannot, Owner, engine
 from crosscheck.judge.constraints import closure
 from crosscheck.judge.gauss_motion import gauss_motion
+from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.small_motions.equilibria import steady_poses
 from crosscheck.judge.small_motions.turning import turning
 from crosscheck.linearising import Linearising
@@ -194,6 +195,19 @@ def test_poses_on_the_branch_are_found_and_bodies_turned_by_half_a_turn_are_not(
     for each in found:
         for rows in closure(scene, 0.0, each.position, each.orientation).values():
             assert np.abs(rows).max(initial=0.0) < 1e-8
+
+
+def test_differences_of_accelerations_include_dampers():
+    [slides] = steady_poses(damped_slides(), starts=1)
+    found = by_accelerations(engine("mujoco"), slides)
+    assert found.eigenvalues is not None and error(found.eigenvalues, slides.eigenvalues) < 1e-9
+
+
+def test_a_scene_at_an_equilibrium_begins_without_accelerations():
+    """Its torsion spring keeps its torque: the natural angle counts from the new pose."""
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 0.0, "natural_angle": 0.3}
+    [each, *_] = steady_poses(pendulum().with_(load=[spring]), starts=2)
+    assert np.abs(gauss(at_pose(each.balance, each.state))).max() < 1e-9
 
 
 def test_the_sense_of_a_steady_rotation_is_of_the_second_body():
