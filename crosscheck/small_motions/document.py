@@ -31,7 +31,8 @@ NOTES = """## How to read it
 - **ComputeODE2Eigenvalues** (Exudyn): projects mass, damping and stiffness into the null space of the
   constraints. The change of the constraint forces with the pose, which is the stiffness of a pendulum in
   Cartesian coordinates, is not part of its stiffness matrix. So it gives zero for a pendulum under
-  gravity. It is right where reactions do not turn with the bodies, as on slides.
+  gravity ([finding](findings.md#exudyn-eigenvalues-of-pendulum)). It is right where reactions do not turn
+  with the bodies, as on slides.
 - **mjd_transitionFD** (MuJoCo): central differences of one step of 1e-4 s by its Euler integrator, whose
   error is of first order for dampers. Loops are closed softly, as hard as MuJoCo allows: `solref` 2e-4 s,
   `solimp` 0.9999. With the default `solimp` of 0.9 errors on loops are 0.02 to 0.1. The eigenvalues nearest
