@@ -84,7 +84,7 @@ paper: $(VENV)/ready ## the committed page on the paper with its records, anew, 
 	rm -rf build/paper && $(BIN)/crosscheck paper --out build/paper
 	rm -rf $(PAPER) && mv build/paper $(PAPER)
 
-KINDS := planar_slider_crank_equal flyball_governor
+KINDS := bennett 'slider_crank_chain[4]' planar_slider_crank_equal flyball_governor
 
 kinds: $(VENV)/ready ## the page on choosing an engine, with its records, anew, into docs/ and reports/kinds/
 	rm -rf build/kinds && $(BIN)/crosscheck report --quick $(KINDS) --out build/kinds

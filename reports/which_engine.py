@@ -1,8 +1,8 @@
 """The page "Which engine, which settings, for my mechanism?", from committed records.
 
 ``python -m reports.which_engine docs/which-engine.md`` writes it anew, without a path it prints the page.
-``python -m reports.which_engine --keep REPORT`` keeps the records of a report as records of further kinds;
-`make kinds` does both.
+``python -m reports.which_engine --keep REPORT`` keeps the records of a report as records of further kinds,
+beside the stored records of other scenes. `make kinds` does both.
 """
 
 from __future__ import annotations
@@ -45,9 +45,8 @@ crosscheck tune mujoco my.toml     # the cheapest settings of one engine
 Times are CPU time of stepping, of one machine; compare them within a table only. `crosscheck list settings`
 explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
 crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the
-errors of more engines on more kinds (redundant spatial loops, long runs, couplings). [Compare
-engines](compare.md#verdicts) explains errors and grades, and the [support table](engines.md#support) has the
-joints and loads of each engine.
+errors of more engines on more kinds (long runs, couplings). [Compare engines](compare.md#verdicts) explains
+errors and grades, and the [support table](engines.md#support) has the joints and loads of each engine.
 """
 
 
@@ -69,6 +68,16 @@ KINDS = (
         "A spatial loop without redundant rows",
         "Axes have several directions, and `mbref diagnose` reports no redundant row.",
         ("spatial_slider_crank",),
+    ),
+    Kind(
+        "A spatial loop with redundant rows",
+        "Axes have several directions, and `mbref diagnose` reports redundant rows.",
+        ("bennett",),
+    ),
+    Kind(
+        "A chain of loops",
+        "Loops follow one another, as in an engine with cylinders in line; each adds bodies and rows.",
+        ("slider_crank_chain[4]",),
     ),
     Kind(
         "Drivers prescribe the whole motion",
@@ -293,7 +302,9 @@ def _write(path: Path, records: Sequence[Record]) -> None:
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["--keep"]:
-        keep(groups(Path(sys.argv[2])), KINDS_FOLDER)
+        new = groups(Path(sys.argv[2]))
+        names = {group.scene.name for group in new}
+        keep([*new, *(old for old in groups(KINDS_FOLDER) if old.scene.name not in names)], KINDS_FOLDER)
     elif sys.argv[1:]:
         Path(sys.argv[1]).write_text(page())
     else:
