@@ -88,10 +88,9 @@ class Balance:
         y[begin:] = self.arithmetic.zeros(self.equations.nv)
         if self.motion.rate == 0.0:
             return y
-        columns = self.at(y[None]).placed.columns[0, :-1]
         placed = self.at(y[None]).placed
         wanted = self.motion.twists(doubles(placed.position[0, :-1])).ravel()
-        twists = np.swapaxes(columns, 1, 2).reshape(-1, self.equations.nv)
+        twists = np.swapaxes(placed.columns[0, :-1], 1, 2).reshape(-1, self.equations.nv)
         for _ in range(3):
             left = doubles(wanted - twists @ y[begin:])
             y[begin:] = y[begin:] + np.linalg.lstsq(doubles(twists), left, rcond=RANK)[0]
