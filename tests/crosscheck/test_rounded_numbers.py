@@ -79,14 +79,16 @@ def test_engines_read_rounded_numbers_like_the_judge(name):
     assert found.errors["mujoco"] < 1e-7 / found.distance, "1e-6 of a rounded number would show"
 
 
-def test_a_loop_that_needs_equal_lengths_is_undecided_where_rounding_ends_them():
-    """Three parallel cranks: with 8 digits they are no longer parallel, which leaves no motion."""
-    run = simulate(turned("five_bar_gravity", 8), "taylor", [0.0, 0.01])
-    assert run.outcome is Outcome.UNDECIDED
-    assert "give the axes and points of the joints with 12 digits" in run.message
-    whole, digits = (simulate(turned("five_bar_gravity", d), "taylor", [0.0, 0.01]) for d in (None, 12))
-    assert digits.outcome is whole.outcome is Outcome.COMPLETED
-    assert np.abs(digits.position - whole.position).max() < 1e-10
+def test_a_loop_that_needs_equal_lengths_and_rounded_numbers():
+    """Three parallel cranks: with 7 digits they are no longer parallel, which locks them; with 9 digits the
+    rank is uncertain; with 12 digits they move."""
+    runs = {d: simulate(turned("five_bar_gravity", d), "taylor", [0.0, 0.01]) for d in (7, 9, 12, None)}
+    outcomes = [run.outcome for run in runs.values()]
+    assert outcomes == [Outcome.COMPLETED, Outcome.UNDECIDED, Outcome.COMPLETED, Outcome.COMPLETED]
+    assert np.abs(np.diff(runs[7].position, axis=0)).max() < 1e-15
+    assert "give the axes and points of the joints with 12 digits" in runs[9].message
+    assert np.abs(np.diff(runs[12].position, axis=0)).max() > 1e-4
+    assert np.abs(runs[12].position - runs[None].position).max() < 1e-10
 
 
 def test_a_mechanism_that_rounding_locks_is_diagnosed(monkeypatch):
