@@ -41,7 +41,7 @@ def make(newton: Any, model: Any, setting: Setting) -> Any:
     if family == MUJOCO:
         with warnings.catch_warnings():  # Newton 1.8 asks for MuJoCo 3.17, and runs with MuJoCo 4.0
             warnings.filterwarnings("ignore", "MuJoCo dependency version mismatch")
-            warnings.filterwarnings("ignore", "set_const_fixed is deprecated")
+            warnings.filterwarnings("ignore", r"set_const_\w+ is deprecated")
             return solvers.SolverMuJoCo(model)
     if family == "xpbd":
         return solvers.SolverXPBD(model)
