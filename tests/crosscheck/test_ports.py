@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib.util import find_spec
+from typing import Any
 
 import numpy as np
 import pytest
 
+from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.findings.finding import FOLDER
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import error_series
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
+from mbref import rotations
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
+from tests.coupled_scenes import EVERY as COUPLED
 from tests.crosscheck.measured import MARGIN
 
 MODULES = {"mjx": "mujoco.mjx", "warp": "mujoco_warp"}
 IN_C = 8.2e-9  # error of MuJoCo in C over 0.05 s at a step of 1 ms
 LOOP = {"mjx": 6.1e-6, "warp": 1.4e-7}  # MJX leaves J' v out of the closures; Warp rounds to single precision
+# largest error / effect of a body's loads, couplings and armatures: a lost part leaves an error of 1, a wrong
+# ratio of a coupling its relative error; single precision and the stiffness of couplings leave 3e-5
+PART = 1e-3
 
 
 def is_installed(module: str) -> bool:
@@ -47,3 +57,63 @@ def test_a_port_and_mujoco_in_c(name: str) -> None:
         assert run.outcome is Outcome.COMPLETED, run.message
         off = float(error_series(scene, run, exact).max())
         assert off < MARGIN * measured, f"{simulator}: {off:.1e} from the truth"
+
+
+def side_by_side(scenes: Mapping[str, Scene]) -> Scene:
+    """All scenes in one, so that a port compiles once; parts have the scene's name before their own."""
+    parts: dict[str, list] = {"body": [], "joint": [], "coupling": [], "load": []}
+    for name, scene in scenes.items():
+
+        def renamed(value: Any, name: str = name) -> Any:
+            return value if value == "ground" else f"{name} {value}"
+
+        for kind, found in parts.items():
+            for part in getattr(scene, kind):
+                fields = part.model_dump(exclude_none=True)
+                for field in {"name", "body", "joint"} & set(fields):
+                    fields[field] = renamed(fields[field])
+                for field in {"bodies", "joints"} & set(fields):
+                    fields[field] = [renamed(value) for value in fields[field]]
+                found.append(fields)
+    return Scene(name="side_by_side", gravity=(1.0, -8.0, -5.0), duration=0.1, **parts)
+
+
+def bare(scene: Scene) -> Scene:
+    """The scene without loads, couplings and armatures."""
+    joints = [
+        joint.model_copy(update={"armature": 0.0}) if getattr(joint, "armature", 0) else joint
+        for joint in scene.joint
+    ]
+    return scene.with_(load=(), coupling=(), joint=joints)
+
+
+def at_the_end(scene: Scene, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (nb, 3) and orientations (nb, 4) at the last time, by the reference."""
+    motion = natural_motion(scene, times, EXTENDED, seconds=100.0)
+    assert not motion.reason, motion.reason
+    return doubles(motion.position)[-1], doubles(motion.orientation)[-1]
+
+
+def apart(one: tuple[np.ndarray, np.ndarray], other: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    """The larger of distance (m) and angle (rad) of each body's poses in two motions."""
+    return np.maximum(np.abs(one[0] - other[0]).max(axis=1), rotations.angle_between(one[1], other[1]))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["mujoco", *MODULES])
+def test_ports_move_loads_couplings_and_armatures(name: str) -> None:
+    """Every body's error is small beside the effect of its loads, couplings and armatures on it."""
+    if not is_installed(MODULES.get(name, name)):
+        pytest.skip(f"{name} is not installed")
+    probes = {probe.name: probe for kind, probe in feature_scenes().items() if kind.endswith(" load")}
+    scene = side_by_side(probes | {make.__name__: make() for make in COUPLED})
+    times = np.array([0.0, scene.duration])
+    run = engine(name).run(scene, times, Setting("stock", {"step": 1e-3}))
+    assert run.outcome is Outcome.COMPLETED, run.message
+    exact = at_the_end(scene, times)
+    effect, off = (
+        apart(at_the_end(bare(scene), times), exact),
+        apart((run.position[-1], run.orientation[-1]), exact),
+    )
+    for body, wrong, by_parts in zip(scene.body, off, effect, strict=True):
+        assert wrong < PART * by_parts, f"{body.name}: {wrong:.1e} of {by_parts:.1e}"

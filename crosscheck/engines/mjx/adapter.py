@@ -68,8 +68,12 @@ class _World:
         self.model = mjx.put_model(ported.model)
         self.data = mjx.put_data(ported.model, ported.data)
 
+        def once(model: Any, now: Any) -> Any:
+            # MJX 3.17 makes 64-bit integers of some 32-bit indices of tendons, which a loop of JAX refuses
+            return jax.tree.map(lambda old, new: new.astype(old.dtype), now, mjx.step(model, now))
+
         def stepped(model: Any, data: Any, count: Any) -> Any:
-            return jax.lax.fori_loop(0, count, lambda _, now: mjx.step(model, now), data)
+            return jax.lax.fori_loop(0, count, lambda _, now: once(model, now), data)
 
         self.stepped = jax.jit(stepped)
         self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
