@@ -9,6 +9,7 @@ import pytest
 
 from crosscheck.closed_loops.mechanisms import FOLDER
 from crosscheck.engine import Owner, Setting, engine
+from crosscheck.engines.newton import solvers
 from crosscheck.engines.newton.adapter import JOINTS
 from crosscheck.engines.newton.model import Mechanism
 from crosscheck.engines.newton.solvers import ALPHAS, FAMILIES
@@ -24,7 +25,9 @@ from mbref.trajectory import Outcome
 
 INSTALLED = pytest.mark.skipif(find_spec("newton") is None, reason="newton is not installed")
 STEP = 1e-3  # s
-HALF = {"padmm, moreau": 4.0, "lox, moreau": 4.0, "dvi": 2.0}  # error over the error of half the step
+# orders from 4 to 1 ms; the measured orders are 1.9 and 1.2. Finer steps of PADMM, and all steps of LOX with
+# the integrator Moreau (1.4e-4 to 6e-5), reach the tolerance of the iterations, where an error has no order.
+ORDERS = {"padmm, moreau": 2.0, "dvi": 1.0}
 # largest errors measured on the four-bar over 0.2 s at this step
 ERRORS = {
     "padmm, moreau": 6.3e-5,
@@ -34,7 +37,7 @@ ERRORS = {
     "lox": 7.5e-5,
     "defaults": 3.7e-4,
     "mujoco": 6.5e-5,
-    "xpbd": 3.5e-3,
+    "xpbd": 8.4e-3,
     "semi-implicit": 7.8e-3,
 }
 MARGIN = 1.5
@@ -88,10 +91,25 @@ def test_solvers_move_a_four_bar_as_measured(family):
 
 @INSTALLED
 @pytest.mark.slow
-@pytest.mark.parametrize("family", HALF)
+@pytest.mark.parametrize("family", ORDERS)
 def test_orders_of_kaminos_integrators(family):
     """Moreau's is of second order, Euler's of first."""
-    assert off(family, 2e-3) / off(family) == pytest.approx(HALF[family], rel=0.25)
+    lengths = np.array([4e-3, 2e-3, 1e-3])
+    order, _ = np.polyfit(np.log(lengths), np.log([off(family, h) for h in lengths]), 1)
+    assert order == pytest.approx(ORDERS[family], abs=0.3)
+
+
+@INSTALLED
+@pytest.mark.slow
+def test_xpbd_comes_closer_with_finer_steps_where_both_relaxations_are_equal(monkeypatch):
+    """Unequal factors, the defaults, act as larger moments of inertia; equal factors have order 1."""
+    assert off("xpbd", 5e-4) > off("xpbd", 2e-3)
+
+    def equal(newton, model, setting):
+        return newton.solvers.SolverXPBD(model, joint_linear_relaxation=0.4, joint_angular_relaxation=0.4)
+
+    monkeypatch.setattr(solvers, "make", equal)
+    assert off("xpbd", 2e-3) / off("xpbd", 5e-4) == pytest.approx(4.0, rel=0.25)
 
 
 @INSTALLED
