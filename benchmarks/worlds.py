@@ -72,7 +72,7 @@ def newton(scene: Scene, worlds: int) -> Run:
 
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
     builder = mechanism.newton.ModelBuilder(gravity=scene.gravity)
-    builder.replicate(mechanism.builder, world_count=worlds)
+    builder.replicate(mechanism.builder, copy_count=worlds)
     model = builder.finalize(device="cpu", skip_validation_joints=True, skip_validation_inertia=True)
     states, control = [model.state(), model.state()], model.control()
     solvers.make(mechanism.newton, model, KAMINO).step(*states, control, None, STEP)  # compiles
