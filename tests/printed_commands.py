@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from tests.transcripts import commands as shown
@@ -13,10 +13,13 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def commands(page: Path) -> Iterator[list[str]]:
-    """Yield the words of each command in a page's shell, console and text blocks, without comments."""
+KINDS = ("", "sh", "console", "text")
+
+
+def commands(page: Path, kinds: Sequence[str] = KINDS) -> Iterator[list[str]]:
+    """Yield the words of each command in a page's blocks of some kinds, without comments."""
     for kind, block in re.findall(r"^```(.*?)\n(.*?)^```$", page.read_text(), re.S | re.M):
-        if kind not in ("", "sh", "console", "text"):
+        if kind not in kinds:
             continue
         lines = shown(block) if kind == "console" else block.replace("\\\n", " ").splitlines()
         for line in lines:

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from mbref.scenes import SCENES
-from tests.printed_commands import FOUND, ROOT
+from tests.printed_commands import FOUND, ROOT, commands
 
 SHORT = ("compare", "run", "list", "certify", "reference", "tune", "report")  # commands of minutes at most
 REPEATED = (
@@ -38,10 +38,14 @@ def run(words: list[str], folder: Path) -> None:
     assert ran.returncode == 0, f"{' '.join(words)}: {ran.stdout[-1000:]}{ran.stderr[-1000:]}"
 
 
-@pytest.mark.parametrize("page", ["README.md", slow("docs/methods.md"), slow("docs/records.md")])
+PARTS = [f"docs/methods/{path.name}" for path in sorted((ROOT / "docs/methods").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", ["README.md", *map(slow, ["docs/methods.md", "docs/records.md", *PARTS])])
 def test_printed_commands_of_mbref_run(page, tmp_path):
-    for found, words in FOUND:
-        if found == page and words[0] == "mbref":
+    """Blocks with outputs are compared in test_transcripts.py."""
+    for words in commands(ROOT / page, ("sh",)):
+        if words[0] == "mbref":
             run(words, tmp_path)
 
 
