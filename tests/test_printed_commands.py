@@ -41,9 +41,27 @@ def run(words: list[str], folder: Path) -> None:
 PARTS = [f"docs/methods/{path.name}" for path in sorted((ROOT / "docs/methods").glob("*.md"))]
 
 
-@pytest.mark.parametrize("page", ["README.md", *map(slow, ["docs/methods.md", "docs/records.md", *PARTS])])
+OWN = {  # my.toml of a page, else the template of `mbref new`
+    "docs/equilibrium.md": "flyball_governor",
+    "docs/outputs.md": "spatial_slider_crank_driven",
+}
+OTHERS = [
+    "docs/methods.md",
+    "docs/records.md",
+    "docs/error-estimate.md",
+    "docs/which-engine.md",
+    *OWN,
+    *PARTS,
+]
+
+
+@pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])
 def test_printed_commands_of_mbref_run(page, tmp_path):
     """Blocks with outputs are compared in test_transcripts.py."""
+    if page in OWN:
+        SCENES[OWN[page]]().save(tmp_path / "my.toml")
+    elif page != "README.md":
+        run(["mbref", "new", "my.toml"], tmp_path)
     for words in commands(ROOT / page, ("sh",)):
         if words[0] == "mbref":
             run(words, tmp_path)
