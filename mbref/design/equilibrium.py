@@ -248,7 +248,7 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
         except OffConstraints:
             return None
         weight = damping * float(np.linalg.norm(slope)) ** 2 + 1e-300
-        step = -np.linalg.solve(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off)
+        step = -np.linalg.lstsq(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off, rcond=None)[0]
         size = float(np.linalg.norm(step)) / (LONGEST * tangent.model.length)
         moved = _moved(tangent, step / max(1.0, size))
         after = off if moved is None else moved.accelerations(*_rest(moved))

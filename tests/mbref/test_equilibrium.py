@@ -184,3 +184,9 @@ def test_a_load_that_pushes_at_every_pose_is_named(tmp_path, capsys):
     assert main(["equilibrium", path, "--starts", "2"]) == 2
     said = capsys.readouterr().err
     assert "no equilibrium is found from 2 starts; perhaps load[0] (moment) moves it at every pose" in said
+
+
+def test_a_top_that_may_turn_about_its_own_axis_rests_above_and_below_its_tip():
+    """No force resists this rotation, so that the stiffness matrix is singular at each equilibrium."""
+    heights = [each.scene.body[0].position[2] for each in equilibria(find_scene("heavy_top"))]
+    assert {round(height, 9) for height in heights} == {1.0, -1.0}
