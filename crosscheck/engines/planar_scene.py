@@ -30,8 +30,8 @@ AT_REST = 1e-12  # velocity out of the plane / velocity in the plane; smaller ra
 
 
 def planar_scene(scene: Scene) -> Scene:
-    """Return the scene with the fewest coordinates in its plane; the scene itself if no other form has fewer
-    coordinates."""
+    """Return the form of a planar scene that has the fewest coordinates: the given scene, or the scene with
+    hinges instead of other joints."""
     normals = [joint.directions[0] for joint in scene.joint if isinstance(joint, Revolute)]
     if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
         return scene

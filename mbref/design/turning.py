@@ -53,7 +53,7 @@ class Turning(NamedTuple):
 
     def turned(self, model: Model, q: np.ndarray, angle: float) -> np.ndarray:
         """Return the coordinates (7 nb,) after a rotation of the mechanism by an angle (rad)."""
-        half = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * self.spin / self.rate])
+        half = self._rotation(angle)
         found, count = q.reshape(model.nb, 7).copy(), len(model.scene.body)
         found[:count, :3] = self.point + rotations.rotate(half, found[:count, :3] - self.point)
         found[:count, 3:] = rotations.multiply(half, found[:count, 3:])
@@ -61,10 +61,13 @@ class Turning(NamedTuple):
 
     def turned_rates(self, model: Model, v: np.ndarray, angle: float) -> np.ndarray:
         """Return velocities or accelerations (n,) after a rotation; angular ones are along body axes."""
-        half = np.concatenate([[np.cos(angle / 2)], np.sin(angle / 2) * self.spin / self.rate])
         found, count = v.reshape(model.nb, 6).copy(), len(model.scene.body)
-        found[:count, :3] = rotations.rotate(half, found[:count, :3])
+        found[:count, :3] = rotations.rotate(self._rotation(angle), found[:count, :3])
         return found.ravel()
+
+    def _rotation(self, angle: float) -> np.ndarray:
+        """Return the unit quaternion (4,) of a rotation by an angle (rad) about the axis."""
+        return rotations.from_vector(angle * self.spin / self.rate)
 
     def bodies(self, scene: Scene) -> list[Body]:
         """Return the bodies of a scene with the velocities of the turning mechanism; without ones at rest."""

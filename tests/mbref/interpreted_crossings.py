@@ -40,7 +40,7 @@ def test_rates_oppose_where_the_motion_reverses_relative_to_the_null_vector(befo
     ("rows", "chosen", "expected"), [(1, 1, True), (1, 2, True), (3, 1, True), (3, 2, False)]
 )
 def test_one_null_vector_needs_equal_rows_at_both_ends(rows, chosen, expected):
-    """Of redundant rows others may have been chosen; with two degrees of freedom there are two vectors."""
+    """Two states may keep different ones of their redundant rows; two degrees of freedom have two vectors."""
     state = memory()
     state.solver.pivot_rows, state.partition.partition_id = np.arange(rows), chosen
     assert determinants.has_one_null_vector(state) == expected
@@ -57,7 +57,8 @@ def test_minors_oppose_by_the_signs_of_motion_partition_and_pivots(along, parity
 
 
 def as_determinant(monkeypatch, value, end):
-    """Have the determinant be a function of time in a step of a length; return the times of evaluations."""
+    """Replace the determinant by a function of time in a step that ends at ``end``; return the times of
+    evaluations."""
     times = []
     monkeypatch.setattr(location, "evaluate_series", lambda h, _: times.append(h))
 

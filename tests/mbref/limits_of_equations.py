@@ -1,6 +1,5 @@
 """Checks of thresholds of the equations, linear algebra, formulations, integrators and the projection."""
 
-import contextlib
 import math
 from types import SimpleNamespace
 
@@ -24,7 +23,7 @@ from mbref.linear_algebra import clear_rank, minimum_norm
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene
 from mbref.stabilisation import projection
 from mbref.taylor import orientations
-from tests.mbref.threshold_checks import check, flips, near
+from tests.mbref.threshold_checks import check, first_arguments, flips, near
 
 
 def pendulum(rate=0.0):
@@ -484,16 +483,7 @@ def _(monkeypatch):
 
 def number_of_states(monkeypatch, module, call):
     """The number of random states for which a function asks."""
-    asked = []
-
-    def states(_, count, __):
-        asked.append(count)
-        raise InterruptedError
-
-    monkeypatch.setattr(module, "random_states", states)
-    with contextlib.suppress(InterruptedError):
-        call()
-    return asked[0]
+    return first_arguments(monkeypatch, module, "random_states", call)[1]
 
 
 @check("equations.active_coordinates STATES")

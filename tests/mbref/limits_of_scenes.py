@@ -1,6 +1,5 @@
 """Checks of thresholds of scenes, of their design, and of the tolerances and sizes that a method chooses."""
 
-import contextlib
 import math
 from types import SimpleNamespace
 
@@ -16,7 +15,7 @@ from mbref.simulation import comparison, outcome, start_run, trial
 from mbref.stepping.limits import Limits
 from mbref.stepping.ranks import Ranks
 from mbref.taylor import driven, mode, sample_completion, stepper
-from tests.mbref.threshold_checks import check, flips, memory, near
+from tests.mbref.threshold_checks import check, first_arguments, flips, memory, near
 
 
 def bar(**given):
@@ -335,16 +334,7 @@ def _(_):
 
 def limits_of(monkeypatch, module, call):
     """The limits of the run that a function makes."""
-    given = []
-
-    def started(_, __, ___, limits):
-        given.append(limits)
-        raise InterruptedError
-
-    monkeypatch.setattr(module, "start_run", started)
-    with contextlib.suppress(InterruptedError):
-        call()
-    return given[0]
+    return first_arguments(monkeypatch, module, "start_run", call)[3]
 
 
 @check("simulation.comparison TOLERANCE")

@@ -65,8 +65,9 @@ def test_a_hinge_of_a_steady_motion_carries_weight_and_centripetal_force():
 
 
 def test_coriolis_forces_couple_two_slides_of_a_turning_table():
-    """A ball on two crossed springs on a turning table: roots of (s² + k/m - Ω²)² + 4 Ω² s², stable but for
-    k/m = Ω²; with unequal springs unstable between them."""
+    """A ball on two crossed springs on a turning table: the eigenvalues are roots of
+    (s² + k/m - Ω²)² + 4 Ω² s². Equal springs give a stable motion unless k/m = Ω². Unequal springs give an
+    unstable motion if Ω² lies between their values of k/m."""
     rate, (along, across) = 3.0, (4.0, 25.0)
     bodies = [
         {"name": "table", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0] * 3},

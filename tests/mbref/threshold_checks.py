@@ -4,6 +4,7 @@ A key is a module of mbref and a constant.  Each check has its numbers written o
 10 % (a count: by one) fails its check.
 """
 
+import contextlib
 import math
 from types import SimpleNamespace
 
@@ -34,6 +35,20 @@ def near(value, expected):
 def flips(decision, below, above):
     """Whether a decision is True at one number and False at another."""
     return bool(decision(below)) and not decision(above)
+
+
+def first_arguments(monkeypatch, module, name, call):
+    """The arguments with which ``call()`` first calls a function of a module; the call ends there."""
+    given = []
+
+    def noted(*arguments):
+        given.append(arguments)
+        raise InterruptedError
+
+    monkeypatch.setattr(module, name, noted)
+    with contextlib.suppress(InterruptedError):
+        call()
+    return given[0]
 
 
 def memory(variables=2, rank=1, kind=HIGH_ACCURACY, **numbers):

@@ -63,19 +63,19 @@ def raised(function: Callable[..., Any]) -> set[str]:
 
 def of_function(name: str, function: Callable[..., Any]) -> Iterator[str]:
     """Yield the faults of a function's docstring."""
-    told = sections(inspect.getdoc(function) or "")
+    parts = sections(inspect.getdoc(function) or "")
     signature = inspect.signature(function)
     wanted = [p for p in signature.parameters if p not in ("self", "cls")]
-    given = entries(told.get("Parameters", []))
+    given = entries(parts.get("Parameters", []))
     yield from (f"{name}: parameter {p} is not described" for p in wanted if not given.get(p))
     yield from (f"{name}: no parameter {p}" for p in given if p not in wanted)
     result = str(signature.return_annotation)
     title = "Yields" if result.startswith(("Iterator", "Generator")) else "Returns"
-    if result != "None" and not any(told.get(title, [])):
+    if result != "None" and not any(parts.get(title, [])):
         yield f"{name}: no section {title}"
-    described = {error for entry in entries(told.get("Raises", [])) for error in entry.split()}
+    described = {error for entry in entries(parts.get("Raises", [])) for error in entry.split()}
     yield from (f"{name}: raises {error}" for error in sorted(raised(function) - described))
-    yield from without_shape(name, [*told.get("Parameters", []), *told.get(title, [])])
+    yield from without_shape(name, [*parts.get("Parameters", []), *parts.get(title, [])])
 
 
 def without_shape(name: str, lines: list[str]) -> Iterator[str]:
@@ -86,11 +86,11 @@ def without_shape(name: str, lines: list[str]) -> Iterator[str]:
 
 def of_class(name: str, cls: type) -> Iterator[str]:
     """Yield the faults of the docstrings of a class, of its attributes and of its public methods."""
-    told = sections(inspect.getdoc(cls) or "")
-    given = entries(told.get("Attributes", []))
+    parts = sections(inspect.getdoc(cls) or "")
+    given = entries(parts.get("Attributes", []))
     own = [key for key in vars(cls).get("__annotations__", {}) if not key.startswith("_")]
     yield from (f"{name}: attribute {key} is not described" for key in own if not given.get(key))
-    yield from without_shape(name, told.get("Attributes", []))
+    yield from without_shape(name, parts.get("Attributes", []))
     for key, member in vars(cls).items():
         if key.startswith(("_", "model_")):
             continue
