@@ -24,6 +24,8 @@ from typing import Any, NamedTuple
 
 import psutil
 
+from crosscheck.processes import fork_server
+from crosscheck.processes.fork_server import Forked
 from mbref.trajectory import Outcome
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -65,14 +67,7 @@ class Child:
         self._printed = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - closed by `close`
         self._channel, theirs = Pipe()
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
-                stdin=theirs.fileno(),
-                stdout=self._printed,
-                stderr=subprocess.STDOUT,
-                env=_environment(),
-                start_new_session=True,
-            )
+            self._process = _started(theirs.fileno(), self._printed.fileno())
         _alive.add(self)
 
     @property
@@ -199,6 +194,22 @@ def stop_all() -> None:
     """Kill every child of this process; running calls fail."""
     for child in tuple(_alive):
         child.kill()
+
+
+def _started(channel: int, printed: int) -> Forked | subprocess.Popen[bytes]:
+    """Return a new process that reads its calls from a file descriptor and prints to another."""
+    environment = _environment()
+    if fork_server.AVAILABLE:
+        with contextlib.suppress(EOFError, OSError):  # the server has ended
+            return fork_server.forked(channel, printed, environment)
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "crosscheck.processes.serve"],
+        stdin=channel,
+        stdout=printed,
+        stderr=subprocess.STDOUT,
+        env=environment,
+        start_new_session=True,
+    )
 
 
 def _environment() -> dict[str, str]:

@@ -1,14 +1,13 @@
 """Runs in child processes with a time limit; every run returns a Trajectory, whatever the engine does.
 
-Starting a child takes seconds, so a child serves successive runs of one engine. A run that does not complete
-ends its child, and the next run gets a new one.
+An engine's imports and compilation take up to seconds, so a child serves successive runs of one engine. A run
+that does not complete ends its child, and the next run gets a new one.
 """
 
 from __future__ import annotations
 
 import atexit
 import os
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from functools import partial
@@ -18,14 +17,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Setting, engine_names
-from crosscheck.processes import serve
+from crosscheck.processes import fork_server, serve
 from crosscheck.processes.child import Child, ChildFailed, Observation
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 MOST_IDLE = 8  # idle children: about one for every engine
-# on other systems a forked process may lack threads of the system's libraries
-COPIES = sys.platform == "linux"
 NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
 EVERY_ENGINE = "*"  # name of the child in which the runs of all engines take turns
 ESTIMATED = 0.1  # fraction of a run's time limit that its error estimate may take
@@ -105,7 +102,7 @@ def observe(
     process is new, or a copy of a process that has only prepared the engine.
     """
     _check(engine_name)
-    if COPIES:
+    if fork_server.AVAILABLE:
         return _observed_in_copy(engine_name, scene, times, setting, time_limit)
     with closing(Child()) as child:
         return _observed(child, engine_name, scene, times, setting, time_limit)
@@ -149,13 +146,14 @@ def time_interleaved(
     """Return CPU seconds of stepping for speed comparisons: for every job a list of ``repeats`` times.
 
     The jobs (engine name, setting) take turns in one child process after a warm-up round, so that all jobs
-    see the same machine. The same child times the next scene. A run that does not complete has NaN.
+    see the same machine. An idle child of the first job's engine is used, since mbref's child has loaded
+    kernels. The same child times the next scene. A run that does not complete has NaN.
     ``time_limit`` (s) is for all jobs together. Raises ChildFailed if the child gives no result, LookupError
     for an unknown engine.
     """
     for engine_name, _ in jobs:
         _check(engine_name)
-    with _in_use(EVERY_ENGINE) as child:
+    with _in_use(EVERY_ENGINE, instead=jobs[0][0]) as child:
         return child.call(serve.run_interleaved, (scene, times, list(jobs), repeats), time_limit).value
 
 
@@ -239,17 +237,23 @@ def starting() -> dict[int, str]:
 
 
 @contextmanager
-def _in_use(engine_name: str) -> Iterator[Child]:
-    """Return an idle child of the engine, or a new one."""
-    with _lending:
-        known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
-        if known:
-            _idle.remove(known[-1])
-    child = known[-1][1] if known else Child()
+def _in_use(engine_name: str, instead: str = NO_ENGINE) -> Iterator[Child]:
+    """Return an idle child of the engine, or of the engine ``instead``, or a new child."""
+    child = _idle_child(engine_name) or (_idle_child(instead) if instead else None) or Child()
     try:
         yield child
     finally:
         _put_back(engine_name, child)
+
+
+def _idle_child(engine_name: str) -> Child | None:
+    """Return the engine's latest idle child, which is then in use; None if there is none."""
+    with _lending:
+        known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
+        if not known:
+            return None
+        _idle.remove(known[-1])
+        return known[-1][1]
 
 
 def _put_back(engine_name: str, child: Child) -> None:

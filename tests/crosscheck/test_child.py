@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 import threading
 import time
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from crosscheck.processes import fork_server
 from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
 
@@ -42,6 +44,34 @@ def test_silent_call_after_one_that_printed_much(child: Child):
 
     child.call(converse, ("word " * 40,), 60.0)
     assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
+
+
+def test_child_has_the_present_environment(monkeypatch: pytest.MonkeyPatch):
+    for value in ("first", "second"):
+        monkeypatch.setenv("CROSSCHECK_PROBE", value)
+        with closing(Child()) as made:
+            assert made.call(os.getenv, ("CROSSCHECK_PROBE",), 60.0).value == value
+            assert made.call(os.getenv, ("OMP_NUM_THREADS",), 60.0).value == "1"
+
+
+@pytest.mark.skipif(not fork_server.AVAILABLE, reason="children are no forks on this system")
+def test_child_starts_after_the_end_of_the_fork_server(monkeypatch: pytest.MonkeyPatch):
+    with closing(Child()) as made:
+        assert made.call(operator.add, (2, 3), 60.0).value == 5
+        (server,) = fork_server._servers
+        server.process.kill()
+        server.process.wait()
+        assert made.call(operator.add, (3, 3), 60.0).value == 6, "a fork does not need the server"
+    with closing(Child()) as made:
+        assert made.call(operator.add, (2, 5), 60.0).value == 7
+        assert fork_server._servers != [server]
+
+    def ended(*arguments: object) -> None:
+        raise EOFError
+
+    monkeypatch.setattr(fork_server, "forked", ended)
+    with closing(Child()) as made:
+        assert made.call(operator.add, (2, 6), 60.0).value == 8
 
 
 def test_failed_call_and_its_child(child: Child):

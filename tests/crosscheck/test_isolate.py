@@ -19,6 +19,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import (
+    ask,
     capabilities,
     end_idle,
     observe,
@@ -313,6 +314,9 @@ def test_stop_all_ends_running_children(tmp_path: Path):
 
 def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
     log = tmp_path / "log"
+    from fake_engines import converse
+
+    _, served = ask("fake_engines:RECORDER", converse, (), 60.0)
     jobs = [
         ("fake_engines:RECORDER", Setting("a", {"seconds": 0.5})),
         ("fake_engines:RECORDER", Setting("b", {"seconds": 0.7, "outcome": "NOT_CONVERGED"})),
@@ -325,6 +329,7 @@ def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
     assert order == ("a", "b") * 3, order
     assert len(set(processes)) == 1, f"one process for all, got {set(processes)}"
     assert int(processes[0]) != os.getpid()
+    assert int(processes[0]) == served, "the child that has imported the first job's engine is used again"
     time_interleaved(still(str(log)), TIMES, jobs, repeats=1, time_limit=60.0)
     assert log.read_text().splitlines()[-1].split()[1] == processes[0], (
         "the process times the next scene, too"

@@ -1,0 +1,180 @@
+"""A fork server: a process that has imported what every child process needs. Children are its forks.
+
+The imports take about a second of CPU time, a fork takes milliseconds. The server is a program of its own,
+because a fork of this process might lack threads that hold locks.
+
+``python -m crosscheck.processes.fork_server`` has a socket to its parent as standard input. The parent sends
+the environment of a child, whose PYTHONPATH is its module search path, and three file descriptors: standard
+input and output of the child, and a pipe for its process id and its exit status.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import gc
+import importlib
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Mapping
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from threading import Lock
+from typing import Any, NamedTuple
+
+from crosscheck.engine import BUILT_IN, OPTIONAL, engine
+from crosscheck.processes import serve
+
+# on other systems a forked process may lack threads of the system's libraries
+AVAILABLE = sys.platform == "linux"
+Environment = Mapping[str, str]
+
+
+class Server(NamedTuple):
+    """The process of the server, and the socket to it."""
+
+    process: subprocess.Popen[bytes]
+    requests: Connection[Any, Any]
+
+
+class Forked:
+    """A fork of the server, with the methods of `subprocess.Popen` that `Child` calls."""
+
+    def __init__(self, news: Connection[Any, Any]) -> None:
+        self.pid = int(news.recv())
+        self._news, self._reading = news, Lock()
+        self._status: int | None = None
+
+    def poll(self) -> int | None:
+        """Return the exit status, the negative number of the signal that ended the process, or None while it
+        runs."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0)
+        return self._status
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Return the exit status as `poll`; raises subprocess.TimeoutExpired after ``timeout`` (s)."""
+        with self._reading:
+            if self._status is None:
+                if not self._news.poll(timeout):
+                    raise subprocess.TimeoutExpired("crosscheck.processes.serve", timeout or 0.0)
+                self._status = self._received()
+            return self._status
+
+    def _received(self) -> int:
+        with self._news:
+            try:
+                return int(self._news.recv())
+            except EOFError:  # the process that waits for the fork was killed
+                return -signal.SIGKILL
+
+
+_asking = Lock()
+_servers: list[Server] = []  # at most one
+os.register_at_fork(after_in_child=_servers.clear)  # the server belongs to the process that started it
+
+
+def forked(channel: int, printed: int, environment: Environment) -> Forked:
+    """Return a new fork, which calls `serve.main` with the file descriptors of its input and its output.
+
+    Raises EOFError or OSError if the server has ended.
+    """
+    news, theirs = Pipe(duplex=False)
+    with theirs, _asking:
+        requests = _running(environment).requests
+        requests.send(dict(environment))
+        with socket.socket(fileno=os.dup(requests.fileno())) as sending:
+            socket.send_fds(sending, [b"."], [channel, printed, theirs.fileno()])
+    return Forked(news)
+
+
+def _running(environment: Environment) -> Server:
+    """Return the server, which starts at the first call and after its end."""
+    if not _servers or _servers[0].process.poll() is not None:
+        _servers[:] = [_started(environment)]
+    return _servers[0]
+
+
+def _started(environment: Environment) -> Server:
+    """Start a server. It prints nothing: if the imports fail, a child that is no fork prints the error."""
+    ours, theirs = Pipe()
+    command = [sys.executable, "-P", "-m", "crosscheck.processes.fork_server"]
+    nothing = subprocess.DEVNULL
+    with theirs:
+        return Server(
+            subprocess.Popen(
+                command,
+                stdin=theirs.fileno(),
+                stdout=nothing,
+                stderr=nothing,
+                env=environment,
+                start_new_session=True,
+            ),
+            ours,
+        )
+
+
+@atexit.register
+def _end() -> None:
+    for server in _servers:
+        server.process.kill()
+        server.process.wait()
+
+
+def main() -> None:
+    """Fork a child for each request until the parent closes the connection."""
+    for name in (*BUILT_IN, *OPTIONAL):
+        engine(name)  # imports the adapter, not the engine's package
+    gc.freeze()
+    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that ended processes are removed at once
+    requests: Connection[Any, Any] = Connection(os.dup(0))
+    try:
+        while not _is_child(requests):
+            pass
+    except EOFError:
+        return
+    serve.main()
+
+
+def _is_child(requests: Connection[Any, Any]) -> bool:
+    """Wait for a request and fork; return True in the fork. Raises EOFError if the parent has ended."""
+    environment = requests.recv()
+    with socket.socket(fileno=os.dup(requests.fileno())) as receiving:
+        _, descriptors, _, _ = socket.recv_fds(receiving, 1, 3)
+    if os.fork():
+        for descriptor in descriptors:
+            os.close(descriptor)
+        return False
+    requests.close()
+    _keep(*descriptors)
+    os.environ.clear()
+    os.environ.update(environment)
+    sys.path[:] = environment["PYTHONPATH"].split(os.pathsep)
+    importlib.invalidate_caches()
+    return True
+
+
+def _keep(channel: int, printed: int, news: int) -> None:
+    """Fork once more and return in the fork; this process reports the exit status of the fork and ends."""
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    with Connection(news, readable=False) as reports:
+        if worker := os.fork():
+            os.close(channel)
+            os.close(printed)
+            _, status = os.waitpid(worker, 0)
+            with contextlib.suppress(BrokenPipeError):  # the parent has ended
+                reports.send(os.waitstatus_to_exitcode(status))
+            os._exit(0)
+        os.setsid()
+        reports.send(os.getpid())
+    for descriptor, replaced in ((channel, (0,)), (printed, (1, 2))):
+        for number in replaced:
+            os.dup2(descriptor, number)
+        os.close(descriptor)
+
+
+if __name__ == "__main__":
+    main()
