@@ -60,19 +60,33 @@ def cases(
 ) -> tuple[list[Case], list[Unable]]:
     """Return the finest setting of every family of the engines on each scene, and the refusals.
 
-    A setting that ran out of time by the file's records is left out, so that the next coarser one follows.
+    A setting is left out that ran out of time by the file's records, or would by the CPU time of a run with a
+    longer step, so that the next coarser one follows.
     """
-    slow = {record["key"] for record in read(path) if record["outcome"] == Outcome.TIMED_OUT.label}
+    stored = read(path)
     wanted: list[Case] = []
     unable: list[Unable] = []
     for column in columns:
         scene = column.make()
         times = np.linspace(0.0, column.end, SAMPLES)
         found, refused = default_cases(scene, engines, families, times, TIME_LIMIT)
-        ended = [case for case in found if key(case) not in slow]
+        ended = [case for case in found if not any(_is_too_long(case, record) for record in stored)]
         wanted += {(case.engine, case.setting.family): case for case in ended}.values()  # the finest stays
         unable += refused
     return wanted, unable
+
+
+def _is_too_long(case: Case, record: Record) -> bool:
+    """Return whether a case ends after TIME_LIMIT by the record of its run, or by the record of a run with a
+    longer step: the CPU time is inversely proportional to the step."""
+    if record["key"] == key(case):
+        return record["outcome"] == Outcome.TIMED_OUT.label
+    names = (case.engine, case.scene.name, case.setting.family)
+    is_other = names != (record["engine"], record["scene"], record.get("family"))
+    if is_other or record["outcome"] != Outcome.COMPLETED.label:
+        return False
+    step, longer = case.setting.options.get("step", 0.0), record["asked"]["options"].get("step", 0.0)
+    return 0.0 < step < longer and record["cost"]["seconds"] * longer / step > TIME_LIMIT
 
 
 def measure(

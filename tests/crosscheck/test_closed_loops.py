@@ -134,6 +134,13 @@ def test_measuring_stores_each_run_and_resumes(tmp_path, monkeypatch) -> None:
     records.write([run(None, outcome="TIMED_OUT", key=key(wanted[0]))], path)
     coarser, _ = records.cases(["mujoco"], ["tuned"], path, [column])
     assert coarser[0].setting.options["step"] > wanted[0].setting.options["step"]
+    finest, step = wanted[0].setting.options["step"], coarser[0].setting.options["step"]
+    for seconds, expected in ((1.01, step), (0.99, finest)):
+        cost = {"seconds": seconds * records.TIME_LIMIT * finest / step}
+        asked = {"options": {"step": step}}
+        records.write([run(1e-3, scene=column.scene, asked=asked, cost=cost, key="coarser")], path)
+        [[case], _] = records.cases(["mujoco"], ["tuned"], path, [column])
+        assert case.setting.options["step"] == expected, "the time of a finer run by the coarser run"
     path.unlink()
     assert [case.setting.family for case in wanted] == ["tuned"] and not unable
     refused = Unable(column.make().with_(name="another"), "mujoco", Cannot(Owner.ENGINE, "no hinge"))
