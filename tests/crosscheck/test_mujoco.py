@@ -5,11 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import psutil
 import pytest
 
 from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
+from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD, INTEGRATED_HERE, NEWTON
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import order_of_convergence, violation_series
@@ -209,3 +211,14 @@ def test_rows_that_come_and_go_and_their_drivers():
     scene = mechanism(11)
     run = ENGINE.run(scene, np.linspace(0.0, scene.duration, 3), ENGINE.settings_of(scene, "tuned")[-1])
     assert scene.driver and violation_series(scene, run).max() < 1e-9
+
+
+def test_the_library_is_found_beside_the_package_or_in_this_process(tmp_path, monkeypatch) -> None:
+    own = Path(mujoco.__file__).parent
+    beside = library(own)
+    assert beside.parent == own and any(map(beside.match, LIBRARIES))
+    if hasattr(psutil.Process, "memory_maps"):
+        assert library(tmp_path).name == beside.name, "the library that the package has loaded"
+        monkeypatch.setattr(psutil.Process, "memory_maps", lambda self: [])
+    with pytest.raises(FileNotFoundError, match=f"{tmp_path}; the families named 'compiled'"):
+        library(tmp_path)

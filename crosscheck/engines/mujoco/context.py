@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import psutil
 
 from crosscheck.engines.mujoco.struct_layout import offset
 from mbref.scene import Driver
@@ -82,9 +83,26 @@ def function(name: str) -> int:
     """Return the address of a function in MuJoCo's library."""
     import mujoco
 
-    folder = Path(mujoco.__file__).parent
-    found = [path for pattern in LIBRARIES for path in sorted(folder.glob(pattern))]
-    return int(ctypes.cast(getattr(ctypes.CDLL(str(found[0])), name), ctypes.c_void_p).value or 0)
+    path = library(Path(mujoco.__file__).parent)
+    return int(ctypes.cast(getattr(ctypes.CDLL(str(path)), name), ctypes.c_void_p).value or 0)
+
+
+def library(package: Path) -> Path:
+    """Return MuJoCo's library in the folder of its Python package, otherwise the library in this process.
+
+    Raises FileNotFoundError, with the names and the folder, if there is none.
+    """
+    found = [path for pattern in LIBRARIES for path in sorted(package.glob(pattern))]
+    own = psutil.Process()
+    loaded = () if found or not hasattr(own, "memory_maps") else own.memory_maps()  # macOS has none
+    places = map(Path, (part.path for part in loaded))
+    found += [path for path in places if any(map(path.match, LIBRARIES))]
+    if not found:
+        raise FileNotFoundError(
+            f"MuJoCo's library ({', '.join(LIBRARIES)}) is not in {package}; the families named 'compiled' "
+            "call it. Reinstall the package mujoco, or use another family"
+        )
+    return found[0]
 
 
 def context(
