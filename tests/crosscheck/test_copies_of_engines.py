@@ -31,8 +31,11 @@ WAYS = {  # engine and setting; its own steps are short enough that errors are b
     "simbody merson": ("simbody", Setting("merson", {"accuracy": 1e-8})),
     "sundials ggl": ("sundials", Setting("ggl", {"rtol": 1e-8})),
     "newton lox": ("newton", Setting("lox", {"step": 1e-3, "alpha": 0.01})),
+    "mjx stock": ("mjx", Setting("stock", {"step": 1e-3})),
+    "mjx single": ("mjx", Setting("stock, single", {"step": 1e-3})),
+    "warp stock": ("warp", Setting("stock", {"step": 1e-3})),
 }
-SLOW = ("newton lox",)  # compiles kernels for minutes
+SLOW = ("newton lox", "mjx stock", "mjx single", "warp stock")  # compile their code for minutes
 MODULES = {
     "drake": "pydrake",
     "dart": "dartpy",
@@ -43,6 +46,8 @@ MODULES = {
     "simbody": "opensim",
     "sundials": "sksundae",
     "newton": "newton",
+    "mjx": "mujoco.mjx",
+    "warp": "mujoco_warp",
 }
 WORSE = 4.0  # times the original's error: another cut changes the error's constant, not its order
 FLOOR = 1e-8  # rounding over a run, and what remains of Newton's method

@@ -1,4 +1,5 @@
-"""MuJoCo MJX: MuJoCo's model stepped by code in JAX, here on the processor in double precision.
+"""MuJoCo MJX: MuJoCo's model stepped by code in JAX, here on the processor, in double precision except in the
+family SINGLE.
 
 Code is compiled for each model before the timed run, which takes 5 to 30 s.
 """
@@ -17,6 +18,8 @@ from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
+SINGLE = "stock, single"
+
 
 class Mjx(Engine):
     """MuJoCo MJX (PyPI ``mujoco-mjx``)."""
@@ -24,7 +27,8 @@ class Mjx(Engine):
     name = "mjx"
     package = "mujoco-mjx"
     supports = SUPPORTS
-    families, options = FAMILIES, OPTIONS
+    families = FAMILIES | {SINGLE: "like stock, in single precision, which is JAX's default"}
+    options = OPTIONS
 
     def prepare(self, families: Sequence[str]) -> None:
         _mjx()
@@ -35,19 +39,19 @@ class Mjx(Engine):
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return settings with steps chosen by the angle that a body turns in one step."""
-        return sweep(scene)
+        return sweep(scene, self.families)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
         return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
 
 
-def _mjx() -> Any:
-    """Return the modules jax and mujoco.mjx, set to double precision on the processor."""
+def _mjx(is_single: bool = False) -> Any:
+    """Return the modules jax and mujoco.mjx, set to double or single precision on the processor."""
     import jax
 
     config: Any = jax.config
-    config.update("jax_enable_x64", True)
+    config.update("jax_enable_x64", not is_single)
     config.update("jax_platforms", "cpu")
     from mujoco import mjx
 
@@ -55,15 +59,15 @@ def _mjx() -> Any:
 
 
 def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
-    world = _World(PortedModel(scene, setting))
+    world = _World(PortedModel(scene, setting), setting.family == SINGLE)
     return FixedSteps(scene, world.ported.built.tree, world, setting.options["step"])
 
 
 class _World:
     """A model and its data in JAX, and compiled code that takes steps."""
 
-    def __init__(self, ported: PortedModel):
-        jax, mjx = _mjx()
+    def __init__(self, ported: PortedModel, is_single: bool):
+        jax, mjx = _mjx(is_single)
         self.ported = ported
         self.model = mjx.put_model(ported.model)
         self.data = mjx.put_data(ported.model, ported.data)

@@ -7,7 +7,7 @@ coordinates by MuJoCo in C, which adds only rounding.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -43,12 +43,12 @@ def refusal(scene: Scene, port: str) -> Cannot | None:
     return lacks_mass(scene)
 
 
-def sweep(scene: Scene) -> Sequence[Setting]:
+def sweep(scene: Scene, families: Collection[str] = FAMILIES) -> Sequence[Setting]:
     """Return fixed steps chosen by the angle that a body turns in one step, coarse to fine in each family."""
     fine = steps(scene, stated_rate(scene))
     plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
     return [
-        Setting(family, {"step": h}) for family in FAMILIES for h in (plain if family == "defaults" else fine)
+        Setting(family, {"step": h}) for family in families for h in (plain if family == "defaults" else fine)
     ]
 
 
@@ -64,7 +64,7 @@ class PortedModel:
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         if setting.family != "defaults":
             kind = mujoco.mjtIntegrator
-            model.opt.integrator = kind.mjINT_RK4 if setting.family == "stock" else kind.mjINT_EULER
+            model.opt.integrator = kind.mjINT_EULER if setting.family == "euler" else kind.mjINT_RK4
             model.eq_solref[:], model.eq_solimp[:] = (2 * setting.options["step"], 1.0), STIFFEST
         self.data = mujoco.MjData(model)
         self.data.qvel[:] = self.built.rates
