@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.closed_loops.mechanisms import Difficulty
 from crosscheck.closed_loops.records import REFUSED, kept, read, write
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.metrics import order_of_convergence
@@ -25,10 +25,7 @@ from crosscheck.processes.pool import end_idle
 from crosscheck.study.grid import Case, Record, default_cases, key, run_in_turn, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
-from mbref.scene import Scene
-from mbref.scenes import find_scene
 
-ROOT = Path(__file__).parents[1]
 FILE = Path(__file__).parent / "orders" / "records.jsonl"
 SAMPLES = 11
 TIME_LIMIT = 4.0  # s of CPU time of a run, so that all runs of the page take less than half an hour
@@ -38,28 +35,14 @@ LOWER = 0.7  # of the least error so far: a method of order one halves the error
 TOLERANCES = ("rtol", "accuracy")  # options of families with error-controlled steps
 
 
-class Mechanism(NamedTuple):
-    """A column of the table: its heading, the scene's name or path, and the end time, s."""
-
-    heading: str
-    scene: str
-    end: float
-
-    def make(self) -> Scene:
-        """Return the scene up to ``end``."""
-        place = str(ROOT / self.scene) if self.scene.endswith(".toml") else self.scene
-        return find_scene(place).with_(duration=self.end)
-
-
-PLACES = {column.heading: column.place() for column in DIFFICULTIES}
 MECHANISMS = (
-    Mechanism("planar slider-crank", "planar_slider_crank", 0.1),
-    Mechanism("spatial slider-crank", "spatial_slider_crank", 0.02),
-    Mechanism("four-bar, free", PLACES["four-bar"], 1.0),
-    Mechanism("four-bar, driven", PLACES["driven"], 1.0),
-    Mechanism("five-bar", "five_bar_gravity", 0.5),
-    Mechanism("Bennett", "bennett", 0.5),
-    Mechanism("heavy top", "heavy_top", 0.5),
+    Difficulty("planar slider-crank", "A moment turns the crank.", "planar_slider_crank", 0.1),
+    Difficulty("spatial slider-crank", "A moment turns the crank.", "spatial_slider_crank", 0.02),
+    Difficulty("four-bar, free", "A planar four-bar swings under gravity.", "four_bar_free", 1.0),
+    Difficulty("four-bar, driven", "A polynomial drives its crank.", "four_bar_driven", 1.0),
+    Difficulty("five-bar", "A planar five-bar swings under gravity.", "five_bar_gravity", 0.5),
+    Difficulty("Bennett", "Bennett's spatial four-bar; three rows are redundant.", "bennett", 0.5),
+    Difficulty("heavy top", "A body on a ball joint, without a loop.", "heavy_top", 0.5),
 )
 
 
@@ -124,7 +107,7 @@ the engine chooses its steps, the mean step counts. Order 1 means that half the 
 """
 
 
-def ladder(row: Row, mechanism: Mechanism) -> list[Case]:
+def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
     """Return the runs of a row on a mechanism, coarse to fine: halved steps, or tenths of the tolerance.
 
     Steps are the interval of the samples divided by a power of two, so that halved steps are exact. The list
@@ -197,13 +180,12 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
     end_idle()
 
 
-def _refuse(row: Row, mechanism: Mechanism, path: Path) -> None:
+def _refuse(row: Row, mechanism: Difficulty, path: Path) -> None:
     """Store the refusal of a mechanism by an engine or by its family."""
-    scene = mechanism.make()
-    cannot = engine(row.engine).cannot(scene)
+    cannot = engine(row.engine).cannot(mechanism.make())
     reason = cannot.reason if cannot else f"the family {row.family} does not serve this mechanism"
-    found = {"key": f"{row.name} {scene.name}", "engine": row.engine, "family": row.family}
-    found |= {"scene": scene.name, "outcome": REFUSED, "message": reason}
+    found = {"key": f"{row.name} {mechanism.scene}", "engine": row.engine, "family": row.family}
+    found |= {"scene": mechanism.scene, "outcome": REFUSED, "message": reason}
     found |= {"version": engine(row.engine).version(), "date": made_by()["date"]}
     write([*(r for r in read(path) if r["key"] != found["key"]), found], path)
 
@@ -217,6 +199,7 @@ def page(path: Path = FILE) -> str:
     parts += ["| --- |" + " :-: |" * len(MECHANISMS)]
     for row, found in rows.items():
         parts.append(f"| [{row.name}](#{_anchor(row)}) | " + " | ".join(map(cell, found.values())) + " |")
+    parts += ["", *(f"- **{m.heading}** (`{m.place()}`, to {m.end:g} s): {m.about}" for m in MECHANISMS)]
     parts += ["", "## The runs", "", "Each line has steps (s) or tolerances with their errors.", ""]
     for row, found in rows.items():
         parts += [f'<a id="{_anchor(row)}"></a>**{row.name}** {versions[row.engine]}: {row.method}.', ""]
@@ -228,9 +211,7 @@ def page(path: Path = FILE) -> str:
 def _by_mechanism(row: Row, records: Sequence[Record]) -> Mapping[str, Sequence[Record]]:
     """Return the records of a row by heading of the mechanism, coarse to fine."""
     own = [r for r in records if (r["engine"], r["family"]) == (row.engine, row.family)]
-    return {
-        m.heading: sorted((r for r in own if r["scene"] == m.make().name), key=_fineness) for m in MECHANISMS
-    }
+    return {m.heading: sorted((r for r in own if r["scene"] == m.scene), key=_fineness) for m in MECHANISMS}
 
 
 def _fineness(record: Record) -> float:
