@@ -20,7 +20,7 @@ FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 21
 TIME_LIMIT = 60.0  # s of CPU time of a run, so that all runs of the table take an hour
 # of engines that take milliseconds for a step on the processor, where finer steps meet single precision
-SHORT_LIMIT, SHORT = 10.0, ("warp", "newton")
+SHORT_LIMIT, SHORT = 30.0, ("warp", "newton")
 REFUSED = "REFUSED"  # outcome of a record without a run
 KEPT = (
     "key",

@@ -69,6 +69,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["conformance"],
         ["findings"],
         ["closed_loops"],
+        ["convergence"],
         ["small_motions"],
         ["paper"],
         ["cli"],
@@ -82,7 +83,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
         ["sections"],
         ["render", "stored"],
-        ["__main__", "ladders", "which_engine", "convergence"],
+        ["__main__", "ladders", "which_engine"],
     ),
 }
 

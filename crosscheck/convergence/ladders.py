@@ -1,15 +1,9 @@
-"""The page on orders of convergence: errors of engines on runs at halved steps, from committed records.
-
-``python -m reports.convergence docs/convergence.md`` writes the page anew, without a path it prints the page.
-``python -m reports.convergence --run [--engine E] [docs/convergence.md]`` first makes the runs that the
-records lack.
-"""
+"""Runs of engines at halved steps, from which orders of convergence are measured, and their records."""
 
 from __future__ import annotations
 
-import argparse
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -19,21 +13,19 @@ import numpy as np
 from crosscheck.closed_loops.mechanisms import Difficulty
 from crosscheck.closed_loops.records import REFUSED, kept, read, write
 from crosscheck.engine import Setting, engine
-from crosscheck.judge.metrics import order_of_convergence
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
 from crosscheck.study.grid import Case, Record, default_cases, key, run_in_turn, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
 
-FILE = Path(__file__).parent / "orders" / "records.jsonl"
+FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 11
-TIME_LIMIT = 4.0  # s of CPU time of a run, so that all runs of the page take less than half an hour
+TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take a quarter of an hour
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
 LOWER = 0.7  # of the least error so far: a method of order one halves the error with the step
 TOLERANCES = ("rtol", "accuracy")  # options of families with error-controlled steps
-
 
 MECHANISMS = (
     Difficulty("planar slider-crank", "A moment turns the crank.", "planar_slider_crank", 0.1),
@@ -81,30 +73,6 @@ ROWS = (
     Row("newton", "padmm, moreau", "Kamino in single precision, Moreau's midpoint (order 2)"),
     Row("newton", "lox", "Kamino in single precision, Euler (order 1)"),
 )
-HEAD = f"""# Orders of convergence
-
-This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
-choose a step. Every run is made again at half of its step, or at a tenth of its tolerance, until the error no
-longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time.
-
-```sh
-python -m reports.convergence docs/convergence.md                # this page, from committed records
-python -m reports.convergence --run --engine drake               # the runs that the records lack
-```
-
-Each cell has the least error of all runs and the measured order. The error is the largest of any body at any
-sample, relative to the mechanism's length or in rad, against a closed form or the [reference
-solution](reference.md). The order is the slope of log error over log step, in the longest range of at least
-three steps in which it is nearly constant (`order_of_convergence` in `crosscheck/judge/metrics.py`). Where
-the engine chooses its steps, the mean step counts. Order 1 means that half the step halves the error; order
-4, that it divides the error by 16.
-
-- `3e-12 (4.0)`: the least error is a floor: finer steps do not lower it. The order is 4.0 above the floor.
-- `3e-04 ↓ (1.0)`: the finest step within {TIME_LIMIT:g} s has the least error; finer steps would lower it.
-- `<1e-12`: less than the bound on the truth's error.
-- Without a number in parentheses, no range of steps has a constant order.
-- `–`: the engine refuses the mechanism; the reason is below.
-"""
 
 
 def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
@@ -149,20 +117,36 @@ def _would_take(case: Case, coarser: Record) -> float:
 
 
 def in_vain(records: Sequence[Record]) -> int:
-    """Return the number of last runs whose errors are not lower than the least error before them; runs count
-    from the first right motion."""
-    least, vain = math.inf, 0
+    """Return the number of last runs whose errors are not lower than the least error before them.
+
+    Runs count from the first right motion. A run with as many steps as the run before, at a smaller
+    tolerance, does not count.
+    """
+    least, vain, steps = math.inf, 0, 0
     for record in records:
         found = max(error(record), error_bound(record)) if is_completed(record) else math.inf
-        if least <= FALSE_SUCCESS:
-            vain = vain + 1 if found > LOWER * least else 0
-        least = min(least, found)
+        if found <= LOWER * least:
+            vain = 0
+        elif least <= FALSE_SUCCESS and record["cost"]["steps"] != steps:
+            vain += 1
+        least, steps = min(least, found), record["cost"]["steps"]
     return vain
+
+
+def fineness(record: Record) -> float:
+    """Return the step (s) or the tolerance of a run; 0 for a refusal."""
+    options = record.get("asked", {}).get("options", {})
+    return float(next((options[name] for name in ("step", *TOLERANCES) if name in options), 0.0))
+
+
+def point(record: Record) -> str:
+    """Return step or tolerance of a run with its error, or with how it ended."""
+    result = f"{error(record):.1e}" if is_completed(record) else ended(record)
+    return f"{fineness(record):.2g}: {result}"
 
 
 def measure(engines: Sequence[str], path: Path = FILE) -> None:
     """Make and store the runs that the file lacks, one at a time."""
-    path.parent.mkdir(exist_ok=True)
     with ThreadPoolExecutor(1) as one:
 
         def run(case: Case) -> Record:
@@ -171,7 +155,7 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
                 return known[key(case)]
             [made] = study([case], one, run=run_in_turn)
             write([*known.values(), kept(made)], path)
-            print(f"{made['engine']} {made['family']} {made['scene']}: {_point(made)}", flush=True)
+            print(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}", flush=True)
             return made
 
         for row in (row for row in ROWS if row.engine in engines):
@@ -188,100 +172,3 @@ def _refuse(row: Row, mechanism: Difficulty, path: Path) -> None:
     found |= {"scene": mechanism.scene, "outcome": REFUSED, "message": reason}
     found |= {"version": engine(row.engine).version(), "date": made_by()["date"]}
     write([*(r for r in read(path) if r["key"] != found["key"]), found], path)
-
-
-def page(path: Path = FILE) -> str:
-    """Return the page in Markdown."""
-    records = read(path)
-    versions = {r["engine"]: r["version"] for r in records}
-    rows = {row: _by_mechanism(row, records) for row in ROWS if row.engine in versions}
-    parts = [HEAD, "| engine, family | " + " | ".join(m.heading for m in MECHANISMS) + " |"]
-    parts += ["| --- |" + " :-: |" * len(MECHANISMS)]
-    for row, found in rows.items():
-        parts.append(f"| [{row.name}](#{_anchor(row)}) | " + " | ".join(map(cell, found.values())) + " |")
-    parts += ["", *(f"- **{m.heading}** (`{m.place()}`, to {m.end:g} s): {m.about}" for m in MECHANISMS)]
-    parts += ["", "## The runs", "", "Each line has steps (s) or tolerances with their errors.", ""]
-    for row, found in rows.items():
-        parts += [f'<a id="{_anchor(row)}"></a>**{row.name}** {versions[row.engine]}: {row.method}.', ""]
-        parts += [f"- {name}: {_runs(of_row)}" for name, of_row in found.items()]
-        parts += [""]
-    return "\n".join(parts).rstrip() + "\n"
-
-
-def _by_mechanism(row: Row, records: Sequence[Record]) -> Mapping[str, Sequence[Record]]:
-    """Return the records of a row by heading of the mechanism, coarse to fine."""
-    own = [r for r in records if (r["engine"], r["family"]) == (row.engine, row.family)]
-    return {m.heading: sorted((r for r in own if r["scene"] == m.scene), key=_fineness) for m in MECHANISMS}
-
-
-def _fineness(record: Record) -> float:
-    options = record.get("asked", {}).get("options", {})
-    return -float(next((options[name] for name in ("step", *TOLERANCES) if name in options), 0.0))
-
-
-def _anchor(row: Row) -> str:
-    return "".join(c if c.isalnum() else "-" for c in row.name)
-
-
-def cell(records: Sequence[Record]) -> str:
-    """Return the least error of the runs, whether it is a floor, and the measured order."""
-    if not records:
-        return "○"
-    if records[0]["outcome"] == REFUSED:
-        return "–"
-    done = [record for record in records if is_completed(record)]
-    if not done:
-        return "!"
-    least = min(done, key=error)
-    text = f"{error(least):.0e}" if error(least) >= error_bound(least) else f"<{error_bound(least):.0e}"
-    falls = " ↓" if in_vain(records) < VAIN and error(least) > error_bound(least) else ""
-    found = order(done)
-    return text + falls + (f" ({found:.1f})" if found is not None else "")
-
-
-def order(records: Sequence[Record]) -> float | None:
-    """Return the measured order of completed runs whose errors exceed the bound on the truth's error."""
-    above = [record for record in records if error(record) > error_bound(record)]
-    if len(above) < 3:
-        return None
-    return order_of_convergence([step(record) for record in above], [error(record) for record in above])
-
-
-def step(record: Record) -> float:
-    """Return the step of a run, or the mean step where the engine chose its steps, s."""
-    own = record["asked"]["options"].get("step")
-    return float(own or record["t_end"] / record["cost"]["steps"])
-
-
-def _runs(records: Sequence[Record]) -> str:
-    if not records:
-        return "not measured"
-    if records[0]["outcome"] == REFUSED:
-        return f"refused: {records[0]['message']}"
-    return "; ".join(map(_point, records))
-
-
-def _point(record: Record) -> str:
-    setting = -_fineness(record)
-    return (
-        f"{setting:.2g}: {error(record):.1e}" if is_completed(record) else f"{setting:.2g}: {ended(record)}"
-    )
-
-
-def main() -> None:
-    """Make runs if requested, and write or print the page."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("page", nargs="?", metavar="FILE")
-    parser.add_argument("--run", action="store_true", help="make the runs that the records lack")
-    parser.add_argument("--engine", action="append", metavar="E", help="only this engine; may repeat")
-    arguments = parser.parse_args()
-    if arguments.run:
-        measure(arguments.engine or [name for name in dict.fromkeys(r.engine for r in ROWS)])
-    if arguments.page:
-        Path(arguments.page).write_text(page())
-    elif not arguments.run:
-        print(page(), end="")
-
-
-if __name__ == "__main__":
-    main()

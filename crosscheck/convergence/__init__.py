@@ -1,0 +1,1 @@
+"""Orders of convergence of engines: errors of runs at halved steps, and their page."""

@@ -1,0 +1,86 @@
+"""Orders of convergence / errors with a known order and floor, and the committed page."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from crosscheck.convergence import document
+from crosscheck.convergence.document import cell, order
+from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, climb, fineness, in_vain, ladder
+from crosscheck.engine import engine
+from crosscheck.study.grid import Case
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "convergence.md"
+
+
+def run(step: float, error: float, seconds: float = 0.1, outcome: str = "COMPLETED", **changes) -> dict:
+    record = {
+        "asked": {"options": {"step": step}},
+        "outcome": outcome,
+        "metrics": {"error": error, "error_bound": 1e-14},
+        "cost": {"seconds": seconds, "steps": round(1 / step)},
+        "t_end": 1.0,
+    }
+    return {**record, **changes}
+
+
+def runs(power: float, floor: float, count: int = 12) -> list[dict]:
+    """Runs at halved steps with the error step**power + floor."""
+    return [run(0.1 / 2**k, (0.1 / 2**k) ** power + floor) for k in range(count)]
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
+def test_order_above_a_floor(power: float) -> None:
+    found = runs(power, 1e-9)
+    assert order(found) == pytest.approx(power, abs=0.05 * power)  # the last run may be at the floor
+    assert order([run(0.1 / 2**k, 1e-9) for k in range(5)]) is None
+    assert order(found[:2]) is None
+
+
+def test_cells_by_hand() -> None:
+    assert cell(runs(4.0, 3e-12)) == "3e-12 (3.9)"
+    assert cell(runs(1.0, 0.0, 6)) == "3e-03 ↓ (1.0)"
+    assert cell([*runs(4.0, 0.0, 8), run(1e-4, 2e-15)]) == "<1e-14 (4.0)"
+    assert cell([run(0.1, 0.5, outcome="STEP_FAILED")]) == "!"
+    assert cell([{"outcome": "REFUSED"}]) == "–" and cell([]) == "○"
+
+
+def test_runs_in_vain() -> None:
+    assert in_vain(runs(4.0, 1e-6)[:3]) == 0
+    assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0, "no right motion yet"
+    found = [run(0.1, 1e-6), run(0.05, 0.8e-6), run(0.02, 0.9e-6)]
+    assert in_vain(found) == VAIN and in_vain([*found, run(0.01, 1e-9)]) == 0
+    equal = [run(0.1, 1e-9), *(run(0.1, 1e-9, cost={"seconds": 0.1, "steps": 10}) for _ in range(3))]
+    assert in_vain(equal) == 0, "a smaller tolerance with as many steps"
+
+
+def test_a_ladder_ends_where_finer_runs_are_in_vain_or_take_too_long() -> None:
+    row = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
+    cases = ladder(row, MECHANISMS[5])
+    steps = [case.setting.options["step"] for case in cases]
+    assert all(a == 2 * b for a, b in pairwise(steps)) and len(steps) > 10
+    assert (MECHANISMS[5].end / 10) / steps[0] == round((MECHANISMS[5].end / 10) / steps[0])
+
+    def fourth(case: Case) -> dict:
+        h = case.setting.options["step"]
+        return run(h, 1e4 * h**4 + 1e-10, 1e-5 / h)
+
+    found = climb(cases, fourth)
+    assert in_vain(found) == VAIN and len(found) < len(cases)
+    slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
+    assert len(slow) == 1, "the second run would take 3 s"
+
+
+def test_rows_name_families_of_engines() -> None:
+    assert all(row.family in engine(row.engine).families for row in ROWS)
+    assert len({row.name for row in ROWS}) == len(ROWS)
+
+
+def test_committed_page_follows_from_the_committed_records() -> None:
+    assert DOCUMENT.read_text() == document.page(), (
+        "docs/convergence.md is stale: python -m crosscheck.convergence docs/convergence.md renews it"
+    )
+    assert fineness({"outcome": "REFUSED"}) == 0.0
