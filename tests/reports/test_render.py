@@ -8,6 +8,7 @@ import re
 import shlex
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,9 +25,9 @@ from crosscheck.study.grid import Case, Record, default_cases, key, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import render, stored
+from reports import mechanisms, render, stored
 from reports.blocks import Block, Heading, Matrix, Table
-from reports.sections import blocks
+from reports.sections import blocks, paper
 
 FAKE = "fake_engines:FAKE"
 
@@ -196,6 +197,40 @@ def test_sections_with_scenes_of_their_own_take_no_others(tmp_path, capsys, aske
     assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
     assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err
     assert not folder.exists(), "something was run"
+
+
+@pytest.mark.parametrize(("depth", "is_whole"), [("quick", False), ("whole", True)])
+def test_section_of_the_paper_prints_its_score(tmp_path, capsys, monkeypatch, depth, is_whole):
+    asked = []
+
+    def found(out, whole, notice):
+        asked.append((out, whole))
+        return collection.Paper({}, {})
+
+    monkeypatch.setattr(collection, "paper", found)
+    monkeypatch.setattr(paper, "score", lambda records: f"{len(records)} cells")
+    monkeypatch.setattr(paper, "render", lambda *_: [Heading("Its tables")])
+    assert program.main(["--section", "paper", "--depth", depth, "--out", str(tmp_path)]) == 0
+    assert asked == [(tmp_path, is_whole)] and capsys.readouterr().out == "0 cells\n"
+    page = (tmp_path / "index.html").read_text()
+    assert "Its tables" in page and f"<title>{program.TITLES['paper',]}</title>" in page
+
+
+def test_animated_picture_of_the_readme(tmp_path, capsys, monkeypatch):
+    made = SimpleNamespace(scene=still("s"), exact=None, records=[{"scene": "s"}], singular=[0.25])
+    monkeypatch.setattr(program, "moving_picture", lambda: made)
+    monkeypatch.setattr(
+        mechanisms, "compared", lambda scene, exact, runs, singular: f"{scene.name}{singular}"
+    )
+    assert program.main(["--picture", str(tmp_path / "a.svg")]) == 0
+    assert (tmp_path / "a.svg").read_text() == "s[0.25]"
+    assert capsys.readouterr().err == f"written: {tmp_path / 'a.svg'}\n"
+
+
+def test_a_scene_that_is_no_scene_is_refused_by_its_faults(tmp_path, capsys):
+    (tmp_path / "bad.toml").write_text("gravity = 3\n")
+    assert program.main([str(tmp_path / "bad.toml"), "--out", str(tmp_path / "out")]) == 2
+    assert "gravity" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
 def test_words_of_tables_may_break_where_the_page_is_narrow():

@@ -1,0 +1,241 @@
+"""Cells and sentences of a report on runs without an error, a sample or an end / worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+from synthetic import scene
+from test_figures_by_hand import BLOCK, SCENE, group, moving, of, plain
+
+from crosscheck.paper.cells import Cell
+from crosscheck.paper.runs import HEAVY, UNEQUAL, Label
+from crosscheck.setting import BRANCHES
+from reports import benchmark_plot, speed_figure
+from reports.blocks import Table
+from reports.runs import Run, SceneRuns
+from reports.sections import (
+    accelerations,
+    conformance,
+    crossings,
+    paper,
+    paper_cranks,
+    paper_figures,
+    paper_sweep,
+    provenance,
+    published,
+)
+from reports.sections.paper_cranks import RAISED
+
+HALF_TURN = "θ₂ = π/2"
+RATE = 124.8  # rad/s, of the crank of the paper's linkages
+
+
+def ended(t_end: float, outcome: str = "VIOLATION", message: str = "") -> Run:
+    return Run({**plain("mbref", "x", 1e-3, 1.0, outcome, t_end), "message": message})
+
+
+def test_the_printed_end_between_two_crossings_and_at_the_start():
+    """θ₂ = π/2 - 124.8 t passes 0 at t = π/2/124.8 = 12.59 ms; 20 ms are 0.925 rad after it."""
+    assert paper._papers_place(Cell("I", "ALF", HALF_TURN, None, "")) == []
+    [start] = paper._papers_place(Cell("I", "ALF", HALF_TURN, 0.0, "a"))
+    assert start.startswith("the start is singular")
+    [between] = paper._papers_place(Cell("I", "ALF", HALF_TURN, 0.02, "b"))
+    assert between == "the printed end is 0.93 rad from a singular position"
+    near = (math.pi / 2 + 0.09) / RATE
+    assert paper._papers_place(Cell("I", "ALF", HALF_TURN, near, "b")) == []
+    far = (math.pi / 2 + 0.11) / RATE
+    assert len(paper._papers_place(Cell("I", "ALF", HALF_TURN, far, "b"))) == 1
+
+
+def test_where_a_linkage_ended():
+    """From θ₂ = π/2 the singular positions 0, -π, -2π follow at 12.587, 37.760 and 62.933 ms."""
+    done = Run({**plain("mbref", "x", 1e-3, 1.0), "metrics": {"violation_position": 2e-9}})
+    assert paper._where(HALF_TURN, done) == "passes every singular position, violation 2.0e-09"
+    first, second = math.pi / 2 / RATE, 3 * math.pi / 2 / RATE
+    assert paper._where(HALF_TURN, ended(first)) == (
+        "ends at θ₂ = 0, singular position 1 of 0.0126, 0.0378, 0.0629 s"
+    )
+    assert "singular position 2 of 0.0126, 0.0378, 0.0629, 0.0881 s" in paper._where(HALF_TURN, ended(second))
+    assert paper._where(HALF_TURN, ended(first + 0.005)) == (
+        "ends 0.62 rad from the singular position θ₂ = 0, on a wrong branch"
+    )
+
+
+def test_a_message_stands_for_an_outcome_that_the_paper_has_no_letter_for():
+    assert paper._message(ended(0.1, "VIOLATION", "off")) == []
+    assert paper._message(ended(0.1, "TIMED_OUT", "the time is up")) == ["the time is up"]
+    assert paper._message(Run(plain("mbref", "x", 1e-3, 1.0))) == []
+
+
+def test_most_frequent_end_of_draws():
+    runs = [ended(0.0125), ended(0.1), ended(0.01252), Run(plain("mbref", "x", 1e-3, 1.0))]
+    letter = runs[0].outcome.letter
+    assert paper_sweep._most([]) == "–"
+    assert paper_sweep._most([*runs, ended(0.0131)]) == f"0.013 {letter} (3 of 5)"
+    assert paper_sweep._most([runs[3], runs[3], runs[0]]) == "– (2 of 3)"
+
+
+def test_a_crank_without_a_sample_and_one_with_a_larger_rank_tolerance():
+    empty = {
+        "times": [],
+        "bodies": {"b": {name: [] for name in moving("a", "x", (1.0,)).record["bodies"]["b"]}},
+    }
+    lost = Run({**moving("a", "x", (1.0,), outcome="STEP_FAILED").record, **empty, "t_end": 0.0})
+    shown = paper_cranks._cells(HEAVY, lost)
+    assert len(shown) == 8 and set(shown[1:]) == {"–"} and shown[0].startswith("0 s ")
+    raised = {**plain("mbref", "x", 2e-5, 1.0, "VIOLATION", 12.3456), "settings": {}}
+    label = Label("dynamic", "MPI (SVD)", UNEQUAL, RAISED.name)
+    assert paper_cranks._raised({}) == ""
+    assert "the motion stays right, error 2.0e-05, until drift ends it at 12.35 s. " in paper_cranks._raised(
+        {label: raised}
+    )
+    assert paper_cranks._passed(UNEQUAL, 1.0) == "–"
+
+
+def test_a_run_that_ends_early_has_a_mark_at_its_last_sample():
+    runs = {
+        "whole": moving("a", "x", (1.0, 1.0, 1.0)),
+        "short": moving("a", "y", (1.0, 1.0), outcome="VIOLATION"),
+    }
+    for record_ in (run.record for run in runs.values()):
+        record_["bodies"]["b"]["angular_velocity"] = [
+            [0.0, 0.0, 2.0 + k] for k in range(len(record_["times"]))
+        ]
+    runs = {name: Run(run.record) for name, run in runs.items()}
+    whole, short, mark = paper_figures.plot_rates(runs).axes[0].lines
+    assert whole.get_xydata().tolist() == [[0.0, 2.0], [0.5, 3.0], [1.0, 4.0]]
+    assert short.get_xydata().tolist() == [[0.0, 2.0], [0.5, 3.0]]
+    assert mark.get_xydata().tolist() == [[0.5, 3.0]] and mark.get_color() == short.get_color()
+    assert [line.get_label() for line in (whole, short)] == ["whole", "short"]
+
+
+def test_commits_and_dates_of_records():
+    made = [
+        Run({"commit": "abc", "date": "2026-05-02T10:00:00"}),
+        Run({"commit": "abc", "date": "2026-04-01T10:00:00"}),
+    ]
+    assert provenance._made([]) == "" and provenance._made([Run({"commit": "abc"})]) == ""
+    assert provenance._made(made) == " of commit abc, 2026-04-01 to 2026-05-02"
+    assert provenance._made([made[0]] * 2) == " of commit abc, 2026-05-02"
+    assert provenance._made([Run({"date": "2026-05-02"})]) == " of 2026-05-02"
+    assert provenance._timing([ended(0.5)]) == "No run completed."
+    timed = [Run({**plain("a", "x", 1e-3, 1.0), "timing": {"repeats": k}}) for k in (5, 3)]
+    assert "the least of 3 or 5 runs;" in provenance._timing([*timed, ended(0.5)])
+    assert "the least of 1 runs;" in provenance._timing([Run(plain("a", "x", 1e-3, 1.0))])
+
+
+def test_a_published_problem_that_a_run_does_not_finish():
+    frame = scene("h_frame")
+    early = Run({**plain("a", "x", None, 0.25, "STEP_FAILED", 0.01234, step=0.1), "scene": frame.name})
+    group_ = SceneRuns(frame, [early])
+    assert published._row(group_, early) == ("a", "x", "step=0.1", "–", "ended at 0.0123 s", "250 ms")
+
+
+def test_no_errors_no_speed_figure():
+    assert speed_figure.speed_svg(group((plain("a", "x", None, 1.0),)), "") == ""
+    assert "<svg" in speed_figure.speed_svg(group((plain("a", "x", 1e-3, 1.0),)), "")
+
+
+def test_a_suite_without_violations_and_the_worst_of_several():
+    def violation(measured: float, allowed: float, scene: str) -> dict[str, Any]:
+        named = {"property": "p", "card": "a check", "scene": scene, "reason": "a reason"}
+        return {**named, "measured": measured, "allowed": allowed}
+
+    assert [b.text for b in conformance._drawn_violations([{"engine": "a", "violations": []}])] == [
+        "No random mechanism violates a check."
+    ]
+    found = [violation(4.0, 2.0, "s1"), violation(3.0, 1.0, "s2"), violation(5.0, 4.0, "s3")]
+    [table] = conformance._drawn_violations([{"engine": "no_engine", "violations": found}])
+    [row] = table.rows
+    assert row[1:4] == ("a check", "3", "s2") and row[6:] == ("a reason", "–")
+    assert [float(cell) for cell in row[4:6]] == [3.0, 1.0] and table.right == {2, 4, 5}
+
+
+def crossing(time: float) -> dict[str, Any]:
+    return {"time": time, "sentence": f"two at {time}", "taken": 1}
+
+
+def test_singular_positions_of_the_most_accurate_run():
+    several = [crossing(0.01 * k) for k in range(1, 14)]
+    runs = [
+        {**plain("a", "x", 1e-3, 1.0), "crossings": [crossing(0.5)]},
+        {**plain("b", "y", 1e-6, 1.0), "crossings": several},
+        {**plain("c", "z", 1e-9, 1.0), "crossings": []},
+        {**plain("d", "w", 1e-9, 1.0, "STEP_FAILED", 0.5), "crossings": several},
+    ]
+    table = of(Table, crossings.render(group(tuple(runs))))
+    assert "passed by b y;" in table.caption and table.caption.endswith(" The first 12 of 13.")
+    assert [row[:2] for row in table.rows][::11] == [("1", "0.01"), ("12", "0.12")]
+    assert table.rows[0][2:] == ("two at 0.01", "1")
+    runs[1]["crossings"] = several[:12]
+    assert "The first" not in of(Table, crossings.render(group(tuple(runs)))).caption
+    assert crossings.render(group((runs[2],))) == []
+
+
+@pytest.mark.parametrize(
+    ("marks", "said"),
+    [
+        ({}, None),
+        ({"A": [0, 1, 0], "B": [0, 0, 0]}, "of the reactions of A at t = 0.5 s than elsewhere."),
+        ({"A": [1, 1, 2], "B": [0, 3, 0]}, "of the reactions of A, B at t = 0.5, 1 s than elsewhere."),
+        ({"A": [1, 1, 1]}, "No sample lies so near a singular position"),
+        ({"A": []}, "No sample lies so near a singular position"),
+    ],
+)
+def test_samples_with_fewer_reactions(marks, said):
+    run = Run({**plain("a", "x", 1e-3, 1.0), "times": [0.0, 0.5, 1.0], "open_reactions": marks})
+    found = list(crossings._open_reactions(run))
+    assert (said is None and not found) or said in found[0], found
+
+
+def test_title_of_a_branch():
+    asked = {"engine": "a", "options": {BRANCHES: [[2, 1]]}}
+    run = {**plain("a", "x", 1e-3, 1.0), "asked": asked}
+    assert crossings._asked(run) == (2, 1) and crossings._title(run) == "Branch 1, smooth"
+    asked["options"][BRANCHES] = [[2, 3]]
+    assert crossings._title({**run, "outcome": "STEP_FAILED", "t_end": 0.123456}) == (
+        "Branch 3; ended at t = 0.1235 s: STEP_FAILED"
+    )
+
+
+def test_no_accelerations_of_bodies_without_masses_or_without_samples():
+    massless = SCENE.with_(body=(BLOCK.model_copy(update={"mass": None, "inertia": None}),))
+    run = moving("a", "x", (1.0, 1.0))
+    assert accelerations.render(SceneRuns(massless, [run])) == []
+    assert accelerations.render(SceneRuns(SCENE, [run])) == [], "a run without accelerations"
+
+
+def test_benchmark_plot_shows_the_least_cost_of_each_engine():
+    """Two families of b: the least cost at each level; at 1e-9 only a has one."""
+    curves = [
+        {"engine": "a", "cost": [0.002, None, 0.5]},
+        {"engine": "b", "cost": [0.003, 0.004, None]},
+        {"engine": "b", "cost": [0.001, 0.008, None]},
+    ]
+    limit = {"engine": "limit", "cost": [0.0005, 0.0006, 0.0007]}
+    data = {
+        "scenes": {
+            "first_scene": {"levels": [1e-3, 1e-6, 1e-9], "curves": [*curves, limit]},
+            "second": {"levels": [1e-3, 1e-6, 1e-9], "curves": curves[:1]},
+        }
+    }
+    figure = benchmark_plot.draw(data)
+    points = [
+        {line.get_label(): line.get_xydata().round(9).tolist() for line in axes.lines} for axes in figure.axes
+    ]
+    assert points == [
+        {"a": [[-0.06, 2.0], [0.94, 2.0]], "b": [[0.0, 1.0]], "limit": [[0.06, 0.5]]},
+        {"b": [[0.0, 4.0]], "limit": [[0.06, 0.6]]},
+        {"a": [[-0.06, 500.0], [0.94, 500.0]], "limit": [[0.06, 0.7]]},
+    ]
+    assert [axes.get_ylabel() for axes in figure.axes] == ["ms at 1e-3", "ms at 1e-6", "ms at 1e-9"]
+    assert {axes.get_yscale() for axes in figure.axes} == {"log"}
+    names = [label.get_text() for label in figure.axes[-1].get_xticklabels()]
+    assert names == ["first scene", "second"] and figure.axes[-1].get_xticks().tolist() == [0, 1]
+    marks = {line.get_label(): line.get_marker() for line in figure.axes[0].lines}
+    assert marks["limit"] == "_" and len(set(marks.values())) == 3
+    assert "CPU milliseconds per simulated second" in figure.axes[0].get_title()
+    [legend] = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["a", "b", "limit"]
