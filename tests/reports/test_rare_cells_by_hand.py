@@ -18,6 +18,7 @@ from reports.runs import Run, SceneRuns
 from reports.sections import (
     accelerations,
     conformance,
+    convergence,
     crossings,
     paper,
     paper_cranks,
@@ -239,3 +240,45 @@ def test_benchmark_plot_shows_the_least_cost_of_each_engine():
     assert "CPU milliseconds per simulated second" in figure.axes[0].get_title()
     [legend] = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["a", "b", "limit"]
+
+
+def test_bias_outweighs_discretisation_beyond_five_times_it():
+    weighed = [convergence._heavier(bias, 0.25) for bias in (1.5, 1.25, 0.25, 0.125)]
+    assert weighed == ["bias", "–", "–", "discretisation"]
+
+
+def stepping(family: str, errors: dict[float, float], a_group: str = "a") -> list[dict[str, Any]]:
+    return [plain(a_group, family, error, 1.0, step=step) for step, error in errors.items()]
+
+
+def test_slopes_over_a_step_and_their_caption():
+    """Errors h² and 3 h⁴ on three steps; two runs, equal errors and failures give no slope."""
+    squares = stepping("two", {h: h**2 for h in (0.1, 0.05, 0.025)})
+    fourths = stepping("four", {h: 3 * h**4 for h in (0.1, 0.05, 0.025)})
+    short = stepping("short", {0.1: 1e-2, 0.05: 1e-3})
+    level = stepping("level", dict.fromkeys((0.1, 0.05, 0.025), 1e-9))
+    lost = [
+        {**record, "outcome": "STEP_FAILED"} for record in stepping("lost", {h: h for h in (0.1, 0.2, 0.3)})
+    ]
+    groups = [group((*squares, *fourths, *short, *level, *lost))]
+    curves = sorted(groups[0].curves())
+    assert [convergence._row(groups, curve) for curve in curves] == [
+        ("a", "four", "step", "4"),
+        ("a", "level", "step", "–"),
+        ("a", "lost", "step", "–"),
+        ("a", "short", "step", "–"),
+        ("a", "two", "step", "2"),
+    ]
+    assert convergence._caption(groups, curves) == "Slopes from 2 (a two, block) to 4 (a four, block)."
+    assert convergence._caption([group(tuple(squares))], [("a", "two")]) == "One slope: 2 (a two, block)."
+    assert convergence._caption([group(tuple(short))], [("a", "short")]) == (
+        "No family has three runs on a line."
+    )
+
+
+def test_the_option_that_varies_is_the_first_number_that_does():
+    runs = [
+        Run(plain("a", "x", 1e-3, 1.0, solver=s, size=2.0, rtol=r)) for s, r in (("p", 1e-3), ("q", 1e-4))
+    ]
+    assert convergence.swept_option(runs) == "rtol"
+    assert convergence.swept_option(runs[:1]) is None and convergence.swept_option([]) is None
