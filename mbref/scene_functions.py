@@ -8,6 +8,7 @@ Splines, 1978, chapter IV).
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,8 @@ FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic 
 
 Row = Annotated[tuple[Real, Real], Strict(False)]
 Table = Annotated[tuple[Row, ...], Strict(False), BeforeValidator(as_list)]
+Cubic = tuple[float, float, float, float]
+ZEROS: Cubic = (0.0, 0.0, 0.0, 0.0)
 
 
 class Sine(Entry):
@@ -34,7 +37,7 @@ class Piece(NamedTuple):
 
     begin: float
     part: float  # 1 where polynomial and sine act, 0 where the function is switched off
-    cubic: tuple[float, float, float, float]
+    cubic: Cubic
 
 
 class TimeFunction(Entry):
@@ -76,21 +79,26 @@ class TimeFunction(Entry):
         cuts = {0.0, *(t for t in (start, stop) if 0.0 < t < np.inf)}
         if self.table is not None:
             cuts |= {t for t, _ in self.table[1:-1] if t > 0.0}
-        return tuple(self._piece(t, start <= t < stop) for t in sorted(cuts))
+        cubics = self._cubics(sorted(cuts))
+        return tuple(
+            Piece(t, 1.0, cubic) if start <= t < stop else Piece(t, 0.0, ZEROS) for t, cubic in cubics
+        )
 
-    def _piece(self, begin: float, is_on: bool) -> Piece:
-        if not is_on or self.table is None:
-            return Piece(begin, float(is_on), (0.0, 0.0, 0.0, 0.0))
+    def _cubics(self, begins: list[float]) -> Iterator[tuple[float, Cubic]]:
+        """Yield each time in ``begins`` (s) with the coefficients of the table's cubic in the time since
+        then."""
+        if self.table is None:
+            yield from ((begin, ZEROS) for begin in begins)
+            return
         from scipy.interpolate import CubicSpline  # only scenes with tables need it
 
         times, values = zip(*self.table, strict=True)
         spline = CubicSpline(times, values)
-        k = int(np.clip(np.searchsorted(times, begin, side="right") - 1, 0, len(times) - 2))
-        a, b, c, d = spline.c[::-1, k].tolist()
-        s = begin - times[k]
-        return Piece(
-            begin, 1.0, (a + s * (b + s * (c + s * d)), b + s * (2 * c + 3 * s * d), c + 3 * s * d, d)
-        )
+        rows = np.clip(np.searchsorted(times, begins, side="right") - 1, 0, len(times) - 2)
+        for begin, k in zip(begins, rows.tolist(), strict=True):
+            a, b, c, d = spline.c[::-1, k].tolist()
+            s = begin - times[k]
+            yield begin, (a + s * (b + s * (c + s * d)), b + s * (2 * c + 3 * s * d), c + 3 * s * d, d)
 
     def values(self, times: np.ndarray) -> np.ndarray:
         """Return the values (k,) at times (k,) in s; at a time of switching, the value of the piece that
