@@ -33,7 +33,7 @@ AHEAD = (
     64  # runs submitted to the executor before the first result is needed; at least twice the number of cores
 )
 # most runs that a process receives at once, and the wall time (s) that they may take
-MOST_AT_ONCE, SECONDS = 128, 0.05
+MOST_AT_ONCE, SECONDS = 256, 0.1
 
 
 def ensemble(

@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 LINE = 64  # bytes
+Kind = tuple[tuple[int, ...], np.dtype]  # shape and type of an array
 
 
-def aligned_zeros(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
-    """Return zeros of a shape and type, C-contiguous."""
-    size = math.prod(shape) * np.dtype(dtype).itemsize
-    memory = np.zeros(size + LINE, np.uint8)
-    first = -memory.ctypes.data % LINE
-    return memory[first : first + size].view(dtype).reshape(shape)
+def aligned_zeros(kinds: Iterable[Kind]) -> list[np.ndarray]:
+    """Return zeros of these shapes and types, C-contiguous, one after another in one block of memory."""
+    kinds = [*kinds]
+    sizes = [math.prod(shape) * dtype.itemsize for shape, dtype in kinds]
+    places = [0]
+    for size in sizes:
+        places.append(places[-1] - (-size // LINE) * LINE)
+    block = np.zeros(places[-1] + LINE, np.uint8)
+    first = -block.ctypes.data % LINE
+    return [
+        block[first + place : first + place + size].view(dtype).reshape(shape)
+        for place, size, (shape, dtype) in zip(places[:-1], sizes, kinds, strict=True)
+    ]
 
 
-def aligned_copy(array: np.ndarray) -> np.ndarray:
-    """Return a C-contiguous copy that begins at a cache line."""
-    copy = aligned_zeros(array.shape, array.dtype)
-    copy[...] = array
-    return copy
+def block_of(array: np.ndarray) -> np.ndarray:
+    """Return the block of memory of an array that ``aligned_zeros`` made, or any other array itself."""
+    block = array.base
+    return block if isinstance(block, np.ndarray) and block.dtype == np.uint8 else array

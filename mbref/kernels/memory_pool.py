@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.kernels.aligned import aligned_copy
+from mbref.kernels.aligned import aligned_zeros, block_of
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import Numbers
 
@@ -22,17 +22,18 @@ MOST_KEYS, MOST_OF_A_KEY, MOST_BYTES = 64, 4, 1 << 20
 
 
 class SavedNumbers:
-    """Copies of all arrays and records of a memory."""
+    """Copies of all arrays and records of a memory, by blocks of memory."""
 
     def __init__(self, values: Any):
-        arrays = {id(array): array for array in arrays_in(values) if array.nbytes and array.flags.writeable}
-        self._pairs = [(array, array.copy()) for array in arrays.values()]
-        self.size = sum(array.nbytes for array, _ in self._pairs)  # bytes
+        written = (array for array in arrays_in(values) if array.nbytes and array.flags.writeable)
+        blocks = {id(block): block for block in map(block_of, written)}
+        self._pairs = [(block, block.copy()) for block in blocks.values()]
+        self.size = sum(block.nbytes for block, _ in self._pairs)  # bytes
 
     def restore(self) -> None:
         """Write the numbers back to the arrays and records from which they were copied."""
-        for array, numbers in self._pairs:
-            array[...] = numbers
+        for block, numbers in self._pairs:
+            block[...] = numbers
 
 
 def arrays_in(values: Any) -> Iterator[np.ndarray]:
@@ -122,4 +123,9 @@ def shapes_of(values: Any) -> tuple[Any, ...]:
 
 def copied(values: Any) -> Any:
     """Return an instance of an equal schema with its own arrays."""
-    return type(values)(*(copied(v) if isinstance(v, tuple) else aligned_copy(v) for v in values))
+    arrays = [value for value in values if not isinstance(value, tuple)]
+    copies = aligned_zeros((array.shape, array.dtype) for array in arrays)
+    for copy, array in zip(copies, arrays, strict=True):
+        copy[...] = array
+    found = iter(copies)
+    return type(values)(*(copied(v) if isinstance(v, tuple) else next(found) for v in values))

@@ -30,7 +30,7 @@ from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, unbox
 from numba.np.numpy_support import from_dtype
 
-from mbref.kernels.aligned import aligned_zeros
+from mbref.kernels.aligned import Kind, aligned_zeros
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
 from mbref.kernels.dimensions import Shapes, check_sizes, size_of
 from mbref.kernels.records import Numbers, dtype_of, is_record, numbers_of, record
@@ -116,29 +116,34 @@ def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:
 
 def allocate(schema: type, sizes: Mapping[str, int], **given: Any) -> Any:
     """Return the schema with the ``given`` fields, and zeros of the declared shapes for all other fields."""
-    makers = _makers(schema, tuple(sizes.items()), frozenset(given))
-    return schema(**given, **{name: make() for name, make in makers})
+    names, kinds, makers = _layout(schema, tuple(sizes.items()), frozenset(given))
+    arrays = zip(names, aligned_zeros(kinds), strict=True)
+    return schema(**given, **dict(arrays), **{name: make() for name, make in makers})
 
 
 @functools.lru_cache(maxsize=MOST_SHAPES)
-def _makers(
+def _layout(
     schema: type, sizes: tuple[tuple[str, int], ...], given: frozenset[str]
-) -> list[tuple[str, Callable[[], Any]]]:
-    """Return the name of each field that is not given, and the function that makes it."""
-    hints = zip(fields_of(schema).values(), _hints(schema), strict=True)
-    return [
-        (field.name, _maker(field, hint, dict(sizes))) for field, hint in hints if field.name not in given
-    ]
+) -> tuple[list[str], list[Kind], list[tuple[str, Callable[[], Any]]]]:
+    """Return names and kinds of the arrays that are not given, and the other fields that are not given, each
+    with the function that makes it."""
+    names, kinds, makers = [], [], []
+    for field, hint in zip(fields_of(schema).values(), _hints(schema), strict=True):
+        if field.name in given:
+            continue
+        if field.dtype is not None and field.shape:
+            names.append(field.name)
+            kinds.append((tuple(size_of(part, dict(sizes)) for part in field.shape), field.dtype))
+        else:
+            makers.append((field.name, _maker(field, hint, dict(sizes))))
+    return names, kinds, makers
 
 
 def _maker(field: Field, hint: Any, sizes: Mapping[str, int]) -> Callable[[], Any]:
-    """Return the function that makes a field: a schema, a record, or zeros."""
+    """Return the function that makes a field: a schema or a record."""
     if field.schema:
         return functools.partial(allocate, field.schema, sizes)
-    if not field.shape:
-        return lambda: record(hint())
-    shape = tuple(size_of(part, sizes) for part in field.shape)
-    return functools.partial(aligned_zeros, shape, field.dtype)
+    return lambda: record(hint())
 
 
 @functools.cache
