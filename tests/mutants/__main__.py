@@ -6,12 +6,12 @@ run out of time it is counted apart.  ``--only mbref/taylor`` draws from files o
 ``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
-The test files that name the mutant's function or module run first, then the quickest, until a test fails or
-20 s of CPU time are over; other work on the machine does not end them.  A test that fails without the mutant,
-too, is left out.  Results stay in ``build/mutants.jsonl`` as long as the file and its tests are the same, so
-that an interrupted run goes on where it ended.  Tests of files with kernels run as plain Python, so that no
-kernel is compiled for a mutant.  A mutant that only a test of a stored text sees is counted apart.  Exit
-status 1 where a mutant survives, is seen by a stored text alone or runs out of time.
+The test files that name the mutant's function or module run first, then the quickest, each for 5 s of CPU
+time at most, until a test fails or 40 s are over; other work on the machine does not end them. A test that
+fails without the mutant, too, is left out. Results stay in ``build/mutants.jsonl`` as long as the file and
+its tests are the same, so that an interrupted run goes on where it ended. Tests of files with kernels run
+as plain Python, so that no kernel is compiled for a mutant. A mutant that only a test of a stored text sees
+is counted apart. Exit status 1 where a mutant survives, is seen by a stored text alone or runs out of time.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ RENDERED = (
     "crosscheck/study/",
     "crosscheck/judge/",
 )  # packages whose numbers stand in stored texts
-BUDGET, LIMIT = 20.0, 60.0  # CPU s after which no test begins, and after which a test is ended
+# CPU s of a test file and of all files, after which no test begins, and after which a test is ended
+OF_FILE, BUDGET, LIMIT = 5.0, 40.0, 90.0
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
 PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
 WITH_KERNELS = (
@@ -166,6 +167,7 @@ class Tree:
             "files": files,
             "out": out,
             "only": only,
+            "of_file": OF_FILE,
             "budget": BUDGET,
             "limit": LIMIT,
             "waiting": WAITING * LIMIT,

@@ -4,10 +4,10 @@ The process reads requests from its input, one JSON object a line, and answers i
 none of the project's packages: each fork imports them anew, with the mutant that stands in the tree.
 
 A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
-of the one test that runs; empty: all), ``budget`` (CPU s after which no test begins), ``limit`` (CPU s of the
-fork) and ``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was
-up), ``failed`` (the id of the test that failed first, or the file that could not be collected) and
-``seconds`` (CPU s by file).
+of the one test that runs; empty: all), ``of_file`` and ``budget`` (CPU s of a file and of all files, after
+which no test begins), ``limit`` (CPU s of the fork) and ``waiting`` (s of wall time).  The answer has
+``status`` (pytest's exit status; none: the time was up), ``failed`` (the id of the test that failed first, or
+the file that could not be collected) and ``seconds`` (CPU s by file).
 """
 
 from __future__ import annotations
@@ -41,8 +41,13 @@ class Session:
     """A pytest plugin that leaves out tests and stops when the time is up."""
 
     def __init__(self, request: dict[str, Any]) -> None:
-        self._out, self._only, self._budget = set(request["out"]), request["only"], request["budget"]
+        self._out, self._only, self._of_file = set(request["out"]), request["only"], request["of_file"]
+        self._end = 0.0  # CPU s
         self.failed = ""
+
+    def pytest_sessionstart(self) -> None:
+        """Begin the time of a file."""
+        self._end = _cpu() + self._of_file
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
         """Leave out tests."""
@@ -51,8 +56,8 @@ class Session:
         ]
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
-        """End where the time is up."""
-        if _cpu() > self._budget:
+        """End where the time of the file is up."""
+        if _cpu() > self._end:
             pytest.exit("long enough", returncode=5)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
