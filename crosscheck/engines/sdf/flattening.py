@@ -14,7 +14,6 @@ from mbref.scene import SceneError
 
 STATIC = "static"  # attribute of a link that does not move
 FORMATS = ("", "euler_rpy", "quat_xyzw")
-AXES_IN_MODEL = (1, 4)  # last version whose axes are given in the frame of the model
 
 
 def flattened(root: ET.Element) -> ET.Element:
@@ -25,7 +24,7 @@ def flattened(root: ET.Element) -> ET.Element:
     _refuse_parts(outside, "the world")
     flat = ET.Element("model", name="all")
     is_alone = len(models) == 1 and outside.find("joint") is None
-    writer = _Writer(flat, _version(root))
+    writer = _Writer(flat)
     for element in outside:
         if element.tag in ("joint", "frame"):
             writer.add(element, "", WORLD)
@@ -34,18 +33,7 @@ def flattened(root: ET.Element) -> ET.Element:
     return flat
 
 
-def _version(root: ET.Element) -> tuple[int, ...]:
-    try:
-        return tuple(int(word) for word in root.get("version", "").split("."))
-    except ValueError:
-        raise SceneError([f"version {root.get('version')!r}: is no version of SDF"]) from None
-
-
 def _refuse_parts(element: ET.Element, where: str) -> None:
-    include = element.find("include")
-    if include is not None:
-        uri = include.findtext("uri", "").strip()
-        raise SceneError([f"{where}: includes {uri!r}, which is not read; write the models into one file"])
     if element.get("placement_frame"):
         raise SceneError([f"{where}: has a placement_frame, which is not read; give the pose of the model"])
 
@@ -53,8 +41,8 @@ def _refuse_parts(element: ET.Element, where: str) -> None:
 class _Writer:
     """Writes copies of elements with full names into one model."""
 
-    def __init__(self, flat: ET.Element, version: tuple[int, ...]):
-        self.flat, self.axes_in_model = flat, version <= AXES_IN_MODEL
+    def __init__(self, flat: ET.Element):
+        self.flat = flat
 
     def add_model(
         self, model: ET.Element, prefix: str, outer: str, is_alone: bool = False, is_static: bool = False
@@ -86,6 +74,9 @@ class _Writer:
                     raise SceneError([f"joint {found.get('name')!r}: names no {side}"])
                 end.text = _full(str(end.text).strip(), prefix, frame)
             base = found.findtext("child", "")
+            reference = found.find("gearbox_reference_body")
+            if reference is not None:
+                reference.text = _full((reference.text or "").strip(), prefix, frame)
             for tag in ("axis", "axis2"):
                 self._axis(found.find(tag), prefix, frame)
         if element.tag == "frame":
@@ -114,7 +105,7 @@ class _Writer:
         xyz = axis.find("xyz") if axis is not None else None
         if axis is None or xyz is None:
             return
-        in_model = axis.findtext("use_parent_model_frame", str(self.axes_in_model)).strip().lower()
+        in_model = axis.findtext("use_parent_model_frame", "").strip().lower()
         if given := xyz.get("expressed_in"):
             xyz.set("expressed_in", _full(given, prefix, frame))
         elif in_model in ("true", "1"):

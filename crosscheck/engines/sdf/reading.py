@@ -12,8 +12,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_others
+from crosscheck.engines.sdf import gearing
 from crosscheck.engines.sdf.flattening import STATIC, flattened
 from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, Pose, numbers, pose_of
+from crosscheck.engines.sdf.including import expanded
 from mbref import rotations
 from mbref.formats import Imported, ImportOptions, numbered
 from mbref.scene import (
@@ -34,6 +36,7 @@ from mbref.scene import (
 )
 
 GRAVITY = (0.0, 0.0, -9.8)  # m/s², the format's default for a file without gravity
+ENDS, GEARBOX = ("parent", "child"), "gearbox"
 SQUARE = 1e-6  # cosine between the axes of a universal joint; a larger cosine is no rounding
 TYPES: dict[str, Any] = {
     "fixed": Fixed,
@@ -69,13 +72,15 @@ def read(path: Path, options: ImportOptions) -> Imported:
         raise SceneError([f"{path}: is no XML: {error}"]) from None
     reader = _Reader()
     world = root.find("world")
-    if root.tag != "sdf" or (root if world is None else world).find("model") is None:
+    parts = {part.tag for part in (root if world is None else world)}
+    if root.tag != "sdf" or not parts & {"model", "include"}:
         raise SceneError([f"{path}: has no model"])
+    root = expanded(root, path)
     reader.read(flattened(root))
     if not reader.bodies:
         raise SceneError([f"{path}: has no body that moves"])
     refuse_others(reader.parts, without)
-    given = world.find("gravity") if world is not None else None
+    given = root.find("world/gravity")
     gravity = GRAVITY if given is None else tuple(numbers(given, "gravity", 3).tolist())
     scene = reader.scene(path.stem, gravity, options.hold)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
@@ -130,8 +135,12 @@ class _Reader:
             self.name_of[own] = GROUND if is_fixed else f"link {own}" if own == GROUND else own
             if not is_fixed:
                 self.bodies.append(self._body(link, own, frames))
+        gears = [joint for joint in model.findall("joint") if joint.get("type") == GEARBOX]
         for joint in model.findall("joint"):
-            self._joint(joint, frames)
+            if joint not in gears:
+                self._joint(joint, frames)
+        for joint in gears:
+            self._gearbox(joint, frames)
 
     def _body(self, link: ET.Element, own: str, frames: Frames) -> Body:
         inertial = link.find("inertial")
@@ -166,12 +175,8 @@ class _Reader:
     def _joint(self, joint: ET.Element, frames: Frames) -> None:
         name, kind = str(joint.get("name")), str(joint.get("type"))
         if kind not in TYPES:
-            raise SceneError([f"joint {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
-        ends = [joint.findtext(side, "").strip() for side in ("parent", "child")]
-        for end in ends:
-            if end != WORLD and not frames.has(end):
-                raise SceneError([f"joint {name!r}: the file has no link or frame {end!r}"])
-        first, second = (self.name_of[frames.link_of(end)] for end in ends)
+            raise SceneError([f"joint {name!r}: type {kind!r} is none of {', '.join((*TYPES, GEARBOX))}"])
+        first, second = (self._body_at(joint, joint.findtext(side, ""), frames) for side in ENDS)
         if first == second and first != GROUND:
             raise SceneError([f"joint {name!r}: both sides are on link {first!r}"])
         if first == second:
@@ -194,6 +199,23 @@ class _Reader:
             if (axis := joint.find(tag)) is not None:
                 self._dynamics(axis, made)
                 self._mimic(axis, made)
+
+    def _body_at(self, joint: ET.Element, end: str, frames: Frames) -> str:
+        """Return the body of a link or frame that a joint names."""
+        if (end := end.strip()) != WORLD and not frames.has(end):
+            raise SceneError([f"joint {joint.get('name')!r}: the file has no link or frame {end!r}"])
+        return self.name_of[frames.link_of(end)]
+
+    def _gearbox(self, joint: ET.Element, frames: Frames) -> None:
+        """Add the coupling of two hinges that a gearbox is."""
+        name, reference = str(joint.get("name")), gearing.reference_of(joint)
+        ends = *(joint.findtext(side, "") for side in ENDS), reference
+        parent, child, base = (self._body_at(joint, end, frames) for end in ends)
+        at = frames.world(name)
+        axes = [_axis(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
+        ratio = _number(joint.find("gearbox_ratio"), f"joint {name!r}: gearbox_ratio", 1.0)
+        links = parent, child, base
+        self.couplings.append(gearing.of_gearbox(name, links, axes, ratio, self.joints))
 
     def _screw(self, joint: ET.Element, made: Joint) -> None:
         if joint.find("screw_thread_pitch") is None:

@@ -1,0 +1,122 @@
+"""Models that an SDF file includes by a path or ``model://name``, written in place of each ``<include>``."""
+
+from __future__ import annotations
+
+import copy
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from mbref.scene import SceneError
+
+VARIABLES = ("SDF_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
+SCHEMES = ("model://", "file://", "package://")
+CONFIGURATION, MODEL_FILE = "model.config", "model.sdf"
+AXES_IN_MODEL = (1, 4)  # last version whose axes are given in the frame of the model
+OVERRIDES = ("pose", "static")
+
+
+def expanded(root: ET.Element, file: Path) -> ET.Element:
+    """Return a copy with the included models in place of all includes; raises SceneError, OSError.
+
+    A model is looked for beside the file, in each folder above it, and in the folders of VARIABLES.
+    """
+    found = copy.deepcopy(root)
+    state_frame_of_axes(found)
+    _expand(found, (file.resolve(),))
+    return found
+
+
+def state_frame_of_axes(root: ET.Element) -> None:
+    """Write into each axis whether its file's version gives axes in the frame of the model."""
+    in_model = _version(root) <= AXES_IN_MODEL
+    for tag in ("axis", "axis2"):
+        for axis in root.iter(tag):
+            if axis.find("use_parent_model_frame") is None:
+                ET.SubElement(axis, "use_parent_model_frame").text = str(in_model).lower()
+
+
+def _version(root: ET.Element) -> tuple[int, ...]:
+    try:
+        return tuple(int(word) for word in root.get("version", "").split("."))
+    except ValueError:
+        raise SceneError([f"version {root.get('version')!r}: is no version of SDF"]) from None
+
+
+def _expand(element: ET.Element, files: tuple[Path, ...]) -> None:
+    """Replace the includes of an element and its parts; ``files`` includes the file of the element last."""
+    for k, part in enumerate(list(element)):
+        if part.tag == "include":
+            element[k] = _included(part, files)
+        elif part.tag in ("world", "model"):
+            _expand(part, files)
+
+
+def _included(include: ET.Element, files: tuple[Path, ...]) -> ET.Element:
+    uri = include.findtext("uri", "").strip()
+    if include.get("merge", "false").lower() in ("true", "1"):
+        raise SceneError([f"include {uri!r}: merge='true' is not read; give the model a name of its own"])
+    if include.find("placement_frame") is not None:
+        raise SceneError([f"include {uri!r}: placement_frame is not read; give the pose of the model"])
+    path = _file_of(uri, files[-1].parent)
+    if path in files:
+        raise SceneError([f"include {uri!r}: {path} includes itself"])
+    try:
+        root = ET.parse(path).getroot()
+    except ET.ParseError as error:
+        raise SceneError([f"include {uri!r}: {path} is no XML: {error}"]) from None
+    model = root.find("model")
+    if model is None:
+        raise SceneError([f"include {uri!r}: {path} has no model"])
+    state_frame_of_axes(root)
+    model.set("name", include.findtext("name", "").strip() or str(model.get("name")))
+    for tag in OVERRIDES:
+        if (given := include.find(tag)) is not None:
+            for own in model.findall(tag):
+                model.remove(own)
+            model.append(given)
+    _expand(model, (*files, path))
+    return model
+
+
+def _file_of(uri: str, folder: Path) -> Path:
+    """Return the SDF file of an address; raises SceneError that names every place without the model."""
+    scheme = next((s for s in SCHEMES if uri.startswith(s)), "")
+    if not uri or (not scheme and "://" in uri):
+        raise SceneError([f"include {uri!r}: is no path, file:// or model://; download the model first"])
+    name, tried = uri.removeprefix(scheme), []
+    for place in _places(folder):
+        path = place / name
+        tried.append(str(path))
+        if path.is_dir():
+            path = path / _main_file(path)
+        if path.is_file():
+            return path.resolve()
+    raise SceneError(
+        [
+            f"include {uri!r}: is none of {', '.join(tried)}; put the model beside the file, "
+            f"or name its folder in {VARIABLES[0]} or {VARIABLES[1]}"
+        ]
+    )
+
+
+def _places(folder: Path) -> Iterator[Path]:
+    yield from (folder, *_above(folder))
+    for variable in VARIABLES:
+        yield from (Path(word) for word in os.environ.get(variable, "").split(os.pathsep) if word)
+
+
+def _above(folder: Path, most: int = 2) -> Sequence[Path]:
+    """Return the folders above, since models include models that lie beside their own folder."""
+    return folder.parents[:most]
+
+
+def _main_file(folder: Path) -> str:
+    """Return the file of the newest version that a model's configuration names."""
+    configuration = folder / CONFIGURATION
+    if not configuration.is_file():
+        return MODEL_FILE
+    found = ET.parse(configuration).getroot().findall("sdf")
+    newest = max(found, key=lambda sdf: [int(n) for n in sdf.get("version", "0").split(".")], default=None)
+    return MODEL_FILE if newest is None else str(newest.text).strip()

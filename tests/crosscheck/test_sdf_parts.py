@@ -1,0 +1,76 @@
+"""Included files and gearboxes of SDF."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.gauss_principle import gauss
+from mbref.scene import SceneError
+from tests.crosscheck.test_sdf import HINGE, LINK, pair, read
+
+GEARBOX = """<joint name="G" type="gearbox"><parent>{parent}</parent><child>{child}</child>
+<gearbox_ratio>3</gearbox_ratio><gearbox_reference_body>frame</gearbox_reference_body>
+<axis><xyz>0 1 0</xyz></axis><axis2><xyz>0 {sense} 0</xyz></axis2></joint>"""
+
+
+def finger(version: str) -> str:
+    """Return a model whose link is turned about x, with a hinge along y; 1.4 means y of the model."""
+    link = LINK.format(name="tip", pose="0 0 0 1.5707963267948966 0 0", centre="0.1 0 0")
+    hinge = HINGE.format(name="knuckle", kind="revolute", parent="world", child="tip", more="")
+    return (
+        f'<sdf version="{version}"><model name="finger"><pose>0 7 0 0 0 0</pose>{link}{hinge}</model></sdf>'
+    )
+
+
+@pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.10", (0, 0, 1))])
+@pytest.mark.parametrize("uri", ["model://finger", "finger", "file://finger/old.sdf"])
+def test_a_model_beside_the_file_is_included_with_the_axes_of_its_version(uri, version, axis, tmp_path):
+    (tmp_path / "finger").mkdir()
+    (tmp_path / "finger" / "old.sdf").write_text(finger(version))
+    config = '<model><sdf version="1.2">older.sdf</sdf><sdf version="1.4">old.sdf</sdf></model>'
+    (tmp_path / "finger" / "model.config").write_text(config)
+    include = f"<include><uri>{uri}</uri><name>thumb</name><pose>0 0 2 0 0 0</pose></include>"
+    scene = read(tmp_path, pair(joint=include)).scene
+    assert [body.name for body in scene.body] == ["a", "b", "thumb::tip"]
+    assert np.allclose(scene.body[2].position, (0.1, 0, 2))
+    assert np.allclose(scene.joint_named("thumb::knuckle").axis, axis)
+
+
+def test_a_model_without_overrides_keeps_its_name_and_pose_and_is_found_by_a_variable(tmp_path, monkeypatch):
+    (tmp_path / "models" / "finger").mkdir(parents=True)
+    (tmp_path / "models" / "finger" / "model.sdf").write_text(finger("1.7"))
+    monkeypatch.setenv("SDF_PATH", str(tmp_path / "models"))
+    scene = read(tmp_path, pair(joint="<include><uri>model://finger</uri></include>")).scene
+    assert np.allclose(scene.body[2].position, (0.1, 7, 0))
+
+
+def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool = False) -> str:
+    """Return two wheels on a frame that turns, and a gearbox between them."""
+    names = ("frame", "one", "two")
+    centres = ("0.05 0 0", "0.1 0 0.02", "-0.08 0 0.1")
+    links = "".join(
+        LINK.format(name=n, pose="0 0 1 0 0 0", centre=c) for n, c in zip(names, centres, strict=True)
+    )
+    ends = [("world", "frame"), ("frame", "one"), ("two", "frame") if swapped else ("frame", "two")]
+    hinges = "".join(
+        HINGE.format(name=f"of {n}", kind="revolute", parent=first, child=second, more="")
+        for n, (first, second) in zip(names, ends, strict=True)
+    )
+    box = GEARBOX.format(parent=parent, child=child, sense=sense)
+    return f'<sdf version="1.7"><model name="m">{links}{hinges}{box}</model></sdf>'
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+@pytest.mark.parametrize("sense", [1, -1])
+def test_a_gearbox_turns_its_child_by_minus_its_ratio_times_its_parent(sense, swapped, tmp_path):
+    """The angle of the child about its axis is -3 times the parent's, whatever the hinges' senses are."""
+    scene = read(tmp_path, gears(sense=sense, swapped=swapped)).scene
+    spins = gauss(scene)[len(scene.body) :, 1]
+    of_parent, of_child = spins[1] - spins[0], sense * (spins[2] - spins[0])
+    assert abs(of_parent) > 1 and of_child == pytest.approx(-3 * of_parent, rel=1e-9)
+
+
+def test_a_gearbox_without_hinges_on_its_reference_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="joint 'G': a gearbox needs a hinge along its axis between 'frame'"):
+        read(tmp_path, gears(parent="frame", child="one"))
