@@ -58,6 +58,8 @@ class Supports:
     over_time : collection of str
         What can follow a function of time beyond polynomial and sine of a driver: ``"table"`` of a driver,
         ``"factor"`` of a load.
+    massless_links : bool
+        Bodies of mass 0 and inertia 0.
     """
 
     joints: Collection[str] = ()
@@ -66,6 +68,7 @@ class Supports:
     couplings: Collection[str] = ()
     armatures: Collection[str] = ()
     over_time: Collection[str] = ()
+    massless_links: bool = False
 
     def missing(self, scene: Scene) -> Cannot | None:
         """Return the refusal of the first joint, coupling, driver or load that is not declared.
@@ -84,6 +87,8 @@ class Supports:
         return Cannot(Owner.ADAPTER, f"{missing}, which the adapter does not map") if missing else None
 
     def _missing(self, scene: Scene) -> Iterator[str]:
+        links = [] if self.massless_links else [body.name for body in scene.body if body.mass == 0]
+        yield from (f"body {name!r} is a massless link" for name in links)
         for joint in scene.joint:
             if joint.type not in self.joints:
                 yield f"joint {joint.name!r} is of type {joint.type!r}"

@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import field_validator
 
-from mbref.scene_fields import Entry, Name, Point, Positive, Quaternion, Reals, Vector, as_list
+from mbref.scene_fields import Entry, Mass, Name, Point, Quaternion, Reals, Vector, as_list
 from mbref.scene_functions import TimeFunction
 from mbref.scene_validation import checked_inertia
 
@@ -22,12 +22,13 @@ class Body(Entry):
 
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
     (kg m²).  A kinematic analysis needs neither ``mass`` nor ``inertia``; a body has both or none of them.
+    A body of mass 0 and inertia 0 is a massless link, whose motion follows from the bodies at its joints.
     ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed from the
     constraints and the given velocities.
     """
 
     name: Name
-    mass: Positive | None = None
+    mass: Mass | None = None
     inertia: Inertia = None
     position: Point
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)

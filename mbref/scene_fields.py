@@ -93,6 +93,11 @@ def checked_length(value: float) -> float:
     return checked_size(value)
 
 
+def checked_mass(value: float) -> float:
+    """Return the number, zero or positive; raises ValueError if its powers would overflow or vanish."""
+    return value if value == 0 else checked_length(value)
+
+
 def as_list(value: Any) -> Any:
     """Return an array as a list, so that arrays are accepted for lists."""
     return value.tolist() if hasattr(value, "tolist") else value
@@ -106,6 +111,7 @@ def field_of(entry: Any, key: str) -> Any:
 Sized = AfterValidator(checked_size)
 Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
+Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterValidator(checked_mass)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
 Vector = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(as_list)]

@@ -78,7 +78,7 @@ def _inertias(scene: Scene) -> Iterator[str]:
     """Yield bodies whose radius of gyration is many times the size of the mechanism."""
     size = _size(scene)
     for body in scene.body:
-        if body.mass is None or body.inertia is None or size == 0:
+        if not body.mass or body.inertia is None or size == 0:
             continue
         array = np.array(body.inertia)
         trace = float(array.sum() if array.ndim == 1 else np.trace(array))

@@ -192,6 +192,11 @@ def _names(entries: Sequence[Any]) -> list[str]:
     return [_text(entry, "name") for entry in entries]
 
 
+def _has_number(value: Any) -> bool:
+    """Return whether a list, also of lists, contains a number that is not zero."""
+    return any(map(_has_number, value)) if isinstance(value, list | tuple) else value != 0
+
+
 def reference_faults(data: Mapping[str, Any]) -> Faults:
     """Yield faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
     The arguments are raw tables, so that these faults are found together with the faults of single fields."""
@@ -206,6 +211,8 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
                 f"body[{i}].{missing}",
                 "is missing; give mass and inertia, or neither (kinematics)",
             )
+        elif mass == 0 and _has_number(inertia):
+            yield f"body[{i}].mass", "is 0, but the inertia is not; a massless link has neither"
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
         yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)

@@ -75,6 +75,7 @@ class Mbref(Engine):
             couplings=both,
             armatures=both,
             over_time=(TABLE, FACTOR),
+            massless_links=True,
         )
 
     def version(self) -> str:

@@ -225,8 +225,9 @@ def _of_one_point(scene: Scene) -> float:
     way = max(speeds) * scene.duration + np.linalg.norm(scene.gravity) * scene.duration**2 / 2
     if not scene.has_mass():
         return float(way)
+    masses = np.array([body.mass for body in scene.body], dtype=float)
     largest = np.linalg.eigvalsh(inertia_matrices(scene))[:, -1]
-    return float(np.sqrt(largest / [body.mass for body in scene.body]).max(initial=way))
+    return float(np.sqrt(largest[masses > 0] / masses[masses > 0]).max(initial=way))
 
 
 def inertia_matrices(scene: Scene) -> np.ndarray:

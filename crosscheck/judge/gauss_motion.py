@@ -93,8 +93,9 @@ def accelerations(
     turn = rotations.to_matrix(orientation)
     force = applied(scene, t, state, since)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    if any(joint.reflected_inertia for joint in scene.joint):
-        return _with_armatures(scene, t, state, force, rank)
+    is_singular = any(body.mass == 0 for body in scene.body)
+    if is_singular or any(joint.reflected_inertia for joint in scene.joint):
+        return _with_coupled_masses(scene, t, state, force, rank, is_singular)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
     roots[:, :3, :3] = np.sqrt([body.mass or 0.0 for body in scene.body])[:, None, None] * np.eye(3)
     roots[:, 3:, 3:] = np.swapaxes(np.linalg.cholesky(inertia), 1, 2)
@@ -110,8 +111,11 @@ def accelerations(
     return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
 
 
-def _with_armatures(scene: Scene, t: float, state: State, force: np.ndarray, rank: int | None) -> np.ndarray:
-    """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix."""
+def _with_coupled_masses(
+    scene: Scene, t: float, state: State, force: np.ndarray, rank: int | None, is_singular: bool
+) -> np.ndarray:
+    """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix, or whose
+    mass matrix is singular because of massless links."""
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     armatures = reflected(scene, position, orientation, velocity, spin)
@@ -120,15 +124,32 @@ def _with_armatures(scene: Scene, t: float, state: State, force: np.ndarray, ran
         at = slice(6 * b, 6 * b + 3), slice(6 * b + 3, 6 * b + 6)
         mass[at[0], at[0]] += (body.mass or 0.0) * np.eye(3)
         mass[at[1], at[1]] += turn[b] @ inertia_matrices(scene)[b] @ turn[b].T
-    inverse = np.linalg.inv(np.linalg.cholesky(mass).T)
-    unbound = inverse.T @ (force.ravel() + armatures.force)
     rows, _ = jacobian(scene, t, position, orientation)
     still = np.zeros_like(position)
     bias = closure_accelerations(scene, t, position, orientation, velocity, spin, still, still)
+    coasting, push = np.concatenate([np.zeros(0), *bias.values()]), force.ravel() + armatures.force
+    if is_singular:
+        return _along_free_directions(mass, push, rows, coasting, rank).reshape(-1, 6)
+    inverse = np.linalg.inv(np.linalg.cholesky(mass).T)
+    unbound = inverse.T @ push
     weighted = rows @ inverse
-    wanted = -np.concatenate([np.zeros(0), *bias.values()]) - weighted @ unbound
+    wanted = -coasting - weighted @ unbound
     found = unbound + (_least(weighted, wanted, rank) if len(rows) else 0.0)
     return (inverse @ found).reshape(-1, 6)
+
+
+def _along_free_directions(
+    mass: np.ndarray, push: np.ndarray, rows: np.ndarray, coasting: np.ndarray, rank: int | None
+) -> np.ndarray:
+    """Return a (n,) with J a = -coasting, and M a - f without a component along directions that J leaves
+    free."""
+    if not np.isfinite(rows).all():
+        return np.full(len(mass), np.nan)
+    u, s, vt = np.linalg.svd(rows)
+    r = int(np.sum(s > RANK * s[0])) if rank is None else rank
+    held, free = vt[:r].T @ (u[:, :r].T @ -coasting / s[:r]), vt[r:].T
+    found: np.ndarray = held + free @ np.linalg.solve(free.T @ mass @ free, free.T @ (push - mass @ held))
+    return found
 
 
 def _least(matrix: np.ndarray, wanted: np.ndarray, rank: int | None) -> np.ndarray:

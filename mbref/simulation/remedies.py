@@ -6,7 +6,9 @@ scene decide.
 
 from __future__ import annotations
 
-from mbref.equations.diagnosis import counts
+import numpy as np
+
+from mbref.equations.diagnosis import counts, scaled_jacobian
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.simulation.trial import trial_of
@@ -21,6 +23,7 @@ from mbref.stepping.loop import (
 from mbref.stepping.run import Run
 
 FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this motion"
+LOOSE = 1e-10  # singular value of rows of unit length; smaller ones are rounding
 BY_STATUS = {
     VIOLATED: "+projection corrects violations after every step",
     UNDECIDED: "a smaller rtol may determine the branch; --branch selects one",
@@ -48,9 +51,10 @@ def _follows(run: Run) -> str:
 
 def _of_singular_matrix(run: Run) -> str:
     formulation, scene = run.method.formulation, run.scene
-    massless = [
-        body.name for body, m in zip(scene.body, run.model.mass.reshape(-1, 6), strict=True) if not m.all()
-    ]
+    if loose := _undetermined(run):
+        return f"nothing determines the motion of body {loose!r}, which has mass 0"
+    masses = run.model.mass[: 6 * len(scene.body)].reshape(-1, 6)
+    massless = [body.name for body, m in zip(scene.body, masses, strict=True) if not m.all()]
     found = counts(scene)
     if massless and not formulation.handles_singular_mass:
         able = _completes(run) or _bearing(mass=True, redundancy=found.redundant > 0)
@@ -59,6 +63,18 @@ def _of_singular_matrix(run: Run) -> str:
         able = _completes(run) or _bearing(redundancy=True)
         return f"constraint rows are redundant ({found.redundant} of {found.rows}); {able}"
     return _follows(run) if run.model.closed_loops else ""
+
+
+def _undetermined(run: Run) -> str:
+    """Return the body of mass 0 that moves most if bodies with mass stay; empty if all bodies stay then."""
+    places = [b for b, body in enumerate(run.scene.body) if body.mass == 0]
+    columns = [6 * b + k for b in places for k in range(6)]
+    rows = scaled_jacobian(run.model, 0.0, run.start.q)[:, columns]
+    _, sizes, motions = np.linalg.svd(np.vstack([rows, np.zeros((len(columns), len(columns)))]))
+    if not columns or sizes[-1] > LOOSE:
+        return ""
+    moved = np.abs(motions[-1]).reshape(-1, 6).max(axis=1)
+    return run.scene.body[places[int(moved.argmax())]].name
 
 
 def _completes(run: Run) -> str:

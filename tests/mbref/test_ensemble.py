@@ -142,7 +142,7 @@ def test_several_numbers_of_one_entry_vary():
         ("body[3].mass=1:2", "body[3].mass: the scene has no '3'"),
         ("body[0].weight=1:2", "body[0].weight: the scene has no 'weight'"),
         ("body[0].name=1:2", "body[0].name: the scene has no number at this path"),
-        ("body[0].mass=-2:-1", "variant 0: body[crank].mass: must be positive"),
+        ("body[0].mass=-2:-1", "variant 0: body[crank].mass: must not be negative"),
     ],
 )
 def test_command_refuses_what_cannot_vary(text: str, says: str, capsys: pytest.CaptureFixture):

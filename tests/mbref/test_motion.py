@@ -229,7 +229,7 @@ def test_a_path_changes_one_value():
     ]:
         with pytest.raises(SceneError, match=says):
             scene.with_(path, 1.0)
-    with pytest.raises(SceneError, match="must be positive"):
+    with pytest.raises(SceneError, match="must not be negative"):
         scene.with_("body[slider].mass", -1.0)
 
 

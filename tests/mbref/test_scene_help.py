@@ -38,7 +38,7 @@ def line_of(text: str) -> int:
 @pytest.mark.parametrize(
     ("old", "new", "path", "says", "line"),
     [
-        ("mass = 2.0", "mass = -2.0", "body[rod].mass", "must be positive", "mass = 2.0"),
+        ("mass = 2.0", "mass = -2.0", "body[rod].mass", "must not be negative", "mass = 2.0"),
         ("gravity =", "gravty =", "gravty", "did you mean 'gravity'?", "gravity"),
         ("anchor = [0.2", "ancor = [0.2", "joint[B].ancor", "did you mean 'anchor'?", "anchor = [0.2"),
         (

@@ -56,7 +56,7 @@ class Dart(Engine):
     name = "dart"
     package = "dartpy"
     modules = ("dartpy",)
-    supports = EVERYTHING
+    supports = replace(EVERYTHING, massless_links=True)
     families, options, integrated_here = FAMILIES, OPTIONS, (terms.FAMILY,)
 
     def refuses(self, scene: Scene) -> Cannot | None:

@@ -53,6 +53,7 @@ SUPPORTS = Supports(
     over_time=(FACTOR,),
     couplings=("angle", "displacement"),
     armatures=("angle", "displacement"),
+    massless_links=True,
 )
 
 

@@ -47,6 +47,7 @@ SUPPORTS = Supports(
     couplings=("angle", "displacement"),
     armatures=("angle", "displacement"),
     over_time=(TABLE, FACTOR),
+    massless_links=True,
 )
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 UNIT = (1.0, 0.0, 0.0, 0.0)

@@ -23,7 +23,7 @@ from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
-SUPPORTS = replace(OF_MUJOCO, over_time=())
+SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
 DEFAULT_STEP = 2e-3  # s
 # impedance parameters; MuJoCo clamps the first two at this value
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)

@@ -27,6 +27,8 @@ def write(scene: Scene) -> Exported:
     masses."""
     if not scene.has_mass():
         raise SceneError([f"{scene.name}: MJCF needs the mass and inertia of every body"])
+    if links := [body.name for body in scene.body if body.mass == 0]:
+        raise SceneError([f"body {links[0]!r}: is a massless link; MuJoCo reads no moving body of mass 0"])
     kept = [load for load in scene.load if not (isinstance(load, CONSTANT) or load.over_time)]
     bare = scene.with_(driver=(), load=kept)
     tree = spanning_tree(bare)

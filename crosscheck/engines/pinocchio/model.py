@@ -45,6 +45,7 @@ SUPPORTS = Supports(
     loads=tuple(LOAD_TYPES),
     couplings=("angle", "displacement"),  # refused by the engine with a reason
     armatures=("angle", "displacement"),
+    massless_links=True,
 )
 # kg m² or kg; armature of a driven coordinate, so large that only its own torque moves it
 DRIVEN_ARMATURE = 1e18

@@ -1,0 +1,77 @@
+"""Massless links: bodies of mass 0 between the slides of a gantry and between the hinges of a hip."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbref import simulate
+from mbref.scene import Body, Revolute, Scene, SceneError, SlideSpring, Translational, Universal
+from mbref.trajectory import Outcome
+
+TIMES = np.linspace(0.0, 0.5, 6)
+LOAD = Body(name="load", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0.3, 0.1, -1.0))
+LINK = Body(name="link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
+CENTRE, X, Y, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+METHODS = ("taylor", "lm1+projection", "alf+projection")
+
+
+def hip(*more: Body | Revolute) -> Scene:
+    """Return a body on two crossing hinges."""
+    hinges = (
+        Revolute(name="a", bodies=("ground", "link"), anchor=CENTRE, axis=X),
+        Revolute(name="b", bodies=("link", "load"), anchor=CENTRE, axis=Y),
+    )
+    bodies = (LINK, LOAD, *(part for part in more if isinstance(part, Body)))
+    joints = (*hinges, *(part for part in more if isinstance(part, Revolute)))
+    return Scene(name="hip", gravity=(0.0, 0.0, -9.81), body=bodies, joint=joints)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_gantry_swings_on_its_spring_and_falls(method):
+    slides = (
+        Translational(name="x", bodies=("ground", "link"), anchor=CENTRE, axis=X),
+        Translational(name="z", bodies=("link", "load"), anchor=CENTRE, axis=Z),
+    )
+    spring = SlideSpring(joint="x", stiffness=50.0, natural_displacement=-0.2)
+    scene = Scene(name="g", gravity=(0.0, 0.0, -9.81), body=(LINK, LOAD), joint=slides, load=(spring,))
+    motion = simulate(scene, method, times=TIMES, rtol=1e-11)
+    assert np.allclose(motion["load"].position[:, 0], 0.1 + 0.2 * np.cos(5.0 * TIMES), atol=1e-10)
+    assert np.allclose(motion["load"].position[:, 2], -1.0 - 9.81 / 2 * TIMES**2, atol=1e-10)
+    assert np.allclose(motion["link"].position[:, 0], -0.2 + 0.2 * np.cos(5.0 * TIMES), atol=1e-10)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
+    joint = Universal(name="u", bodies=("ground", "load"), anchor=CENTRE, axes=(X, Y))
+    other = simulate(
+        Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,)), times=TIMES, rtol=1e-11
+    )
+    motion = simulate(hip(), method, times=TIMES, rtol=1e-11)
+    assert motion.outcome == Outcome.COMPLETED
+    assert np.allclose(motion["load"].position, other["load"].position, atol=1e-9)
+
+
+def test_methods_that_divide_by_masses_name_the_link():
+    message = simulate(hip(), "mpi-svd+projection", times=TIMES).message
+    assert "body 'link' lacks mass or a moment of inertia; taylor completes this motion" in message
+
+
+def test_a_link_whose_motion_nothing_determines_is_named():
+    tip = LINK.model_copy(update={"name": "tip", "position": (0.3, 0.1, -1.2)})
+    hinge = Revolute(name="c", bodies=("load", "tip"), anchor=(0.3, 0.1, -1.1), axis=Y)
+    for method in ("taylor", "lm1+projection"):
+        motion = simulate(hip(tip, hinge), method, times=TIMES)
+        assert "nothing determines the motion of body 'tip', which has mass 0" in motion.message
+
+
+def test_a_rotor_determines_the_motion_of_its_link():
+    tip = LINK.model_copy(update={"name": "tip", "position": (0.3, 0.1, -1.2)})
+    hinge = Revolute(name="c", bodies=("load", "tip"), anchor=(0.3, 0.1, -1.1), axis=Y, armature=0.1)
+    assert simulate(hip(tip, hinge), times=TIMES).outcome == Outcome.COMPLETED
+
+
+def test_a_mass_of_zero_with_an_inertia_is_refused():
+    heavy = LINK.model_copy(update={"inertia": (0.0, 0.0, 1.0)})
+    with pytest.raises(SceneError, match=r"body\[link\].mass: is 0, but the inertia is not"):
+        Scene(name="s", body=(heavy,), joint=())
