@@ -6,7 +6,6 @@ import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.reading import Source
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import rotations
@@ -26,7 +25,7 @@ def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
     for name in OFF if key < 0 else OFF[:-1]:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     model.opt.jacobian, model.eq_solref[:] = mujoco.mjtJacobian.mjJAC_DENSE, NO_SOFTNESS
-    data, groups = mujoco.MjData(model), Groups(mujoco, model)
+    data, groups = mujoco.MjData(model), found.groups
     if key >= 0:
         data.ctrl[:] = model.key_ctrl[key]
     turns = [
@@ -56,7 +55,7 @@ def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
         data.qpos[:] = y[: model.nq]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
-        places.append([groups.placed(data, g).position for g in groups.massive])
+        places.append([groups.placed(data, g).position for g in groups.pieces])
     return np.array(places)
 
 

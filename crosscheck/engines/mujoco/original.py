@@ -17,7 +17,6 @@ import numpy as np
 
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
-from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import checked
 from crosscheck.engines.mujoco.importing.loads import controlled, is_motor, motor_force
 from crosscheck.engines.mujoco.importing.reading import Source, source
@@ -150,7 +149,7 @@ class _Original:
         path, options = Path(setting.options["file"]), _import_options(setting.options)
         read = source(path, options)
         self.mujoco, self.model, self.counts = mujoco, read.original, Counts()
-        self.groups = Groups(mujoco, self.model)
+        self.groups = read.groups
         key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe or "\0")
         self.motors = [a for a in controlled(mujoco, self.model, key) if is_motor(mujoco, self.model, a)]
         bits = mujoco.mjtDisableBit
@@ -204,12 +203,12 @@ class _Original:
         """Return poses, velocities and accelerations of the scene's bodies."""
         data = self.data if t == 0 else self.between
         self.mujoco.mj_forward(self.model, data)
-        placed = [self.groups.placed(data, group) for group in self.groups.massive]
+        placed = [self.groups.placed(data, piece) for piece in self.groups.pieces]
         twists = np.array([p.jacobian @ data.qvel for p in placed])
         changes = np.array(
             [
-                p.jacobian @ data.qacc + self._bias(data, group, p.position)
-                for group, p in zip(self.groups.massive, placed, strict=True)
+                p.jacobian @ data.qacc + self.groups.drift(data, piece)
+                for piece, p in zip(self.groups.pieces, placed, strict=True)
             ]
         )
         return Sample(
@@ -220,12 +219,6 @@ class _Original:
             acceleration=changes[:, :3],
             angular_acceleration=changes[:, 3:],
         )
-
-    def _bias(self, data: Any, group: int, point: np.ndarray) -> np.ndarray:
-        """Return the acceleration (6,) of a point of a group at constant joint velocities."""
-        rates = np.zeros((6, self.model.nv))
-        self.mujoco.mj_jacDot(self.model, data, rates[:3], rates[3:], point, group)
-        return np.asarray(rates @ data.qvel)
 
 
 def _import_options(options: Mapping[str, Any]) -> ImportOptions:

@@ -68,7 +68,7 @@ class Agreement:
         self.mujoco.mj_tendon(self.model, data)
         self.mujoco.mj_makeConstraint(self.model, data)
         self.mujoco.mj_fwdVelocity(self.model, data)
-        placed = [self.groups.placed(data, g) for g in self.groups.massive]
+        placed = [self.groups.placed(data, g) for g in self.groups.pieces]
         pose = np.array([p.position for p in placed]), np.array([p.orientation for p in placed])
         twists = np.vstack([p.jacobian for p in placed])
         self._masses(scene, pose, twists)
@@ -93,13 +93,7 @@ class Agreement:
 
     def _drift(self) -> np.ndarray:
         """Return the accelerations (6 nb,) of the bodies' twists at constant joint velocities: Ḃ q̇."""
-        data, found = self.poses.data, []
-        for g in self.groups.massive:
-            rates = np.zeros((6, self.model.nv))
-            centre = self.groups.placed(data, g).position
-            self.mujoco.mj_jacDot(self.model, data, rates[:3], rates[3:], centre, g)
-            found.append(rates @ data.qvel)
-        return np.concatenate(found)
+        return np.concatenate([self.groups.drift(self.poses.data, piece) for piece in self.groups.pieces])
 
     def _same(self, ours: np.ndarray, theirs: np.ndarray, what: str) -> None:
         scale = max(np.abs(theirs).max(initial=0.0), np.abs(ours).max(initial=0.0), 1e-300)

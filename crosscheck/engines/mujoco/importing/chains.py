@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
+from crosscheck.engines.mujoco.importing.groups import WORLD, Groups, Piece
 from mbref.scene import (
     Cylindrical,
     Distance,
     Joint,
     Planar,
     Revolute,
-    SceneError,
     Spherical,
     Translational,
     Universal,
@@ -28,29 +27,45 @@ Made = list[tuple[type[Any], dict[str, Any]]]
 
 @dataclass(frozen=True)
 class Chain:
-    """The motions of a group relative to the next group with mass that carries it.
+    """The motions of a body of the scene relative to the body that carries it.
 
     ``kinds`` are free, ball, slide or hinge; ``anchors`` and ``axes`` (n, 3) are in the world, from the
-    carrying group to the carried one; ``joints`` are MuJoCo's numbers.
+    carrying body to the carried one; ``joints`` are MuJoCo's numbers.
     """
 
-    groups: tuple[int, int]
+    ends: tuple[Piece, Piece]
     joints: tuple[int, ...]
     kinds: tuple[str, ...]
     anchors: np.ndarray
     axes: np.ndarray
 
+    def parts(self, groups: Groups) -> list[Chain]:
+        """Return chains of one joint each, with massless links between them."""
+        links = [_link_after(groups, j) for j in self.joints[:-1]]
+        ends = zip([self.ends[0], *links], [*links, self.ends[1]], strict=True)
+        return [
+            Chain(pair, (j,), (kind,), self.anchors[k : k + 1], self.axes[k : k + 1])
+            for k, (pair, j, kind) in enumerate(zip(ends, self.joints, self.kinds, strict=True))
+        ]
+
+
+def _link_after(groups: Groups, joint: int) -> Piece:
+    """Return the massless link that a joint is the last to move, which is a group without mass if no joint
+    of the group follows."""
+    group = int(groups.model.jnt_bodyid[joint])
+    return Piece(group, -1 if joint == groups.joints(group)[-1] else joint)
+
 
 def chains(mujoco: Any, groups: Groups, data: Any) -> Iterator[Chain]:
-    """Return the chain of every group with mass; raises SceneError if a group without mass carries
-    several."""
-    for group in groups.massive:
+    """Return the chain of every group that is a body of the scene."""
+    own = {piece.group for piece in groups.pieces if piece.last < 0} | {WORLD}
+    for group in sorted(own - {WORLD}, key=list(groups.members).index):
         joints, parent = groups.joints(group), groups.parent(group)
-        while not groups.mass[parent] > 0:
-            _refuse_branch(groups, parent)
+        while parent not in own:
             joints, parent = [*groups.joints(parent), *joints], groups.parent(parent)
         kinds = tuple(kind_of(mujoco, groups.model, j) for j in joints)
-        yield Chain((parent, group), tuple(joints), kinds, data.xanchor[joints], data.xaxis[joints])
+        ends = Piece(parent), Piece(group)
+        yield Chain(ends, tuple(joints), kinds, data.xanchor[joints], data.xaxis[joints])
 
 
 def kind_of(mujoco: Any, model: Any, joint: int) -> str:
@@ -58,34 +73,33 @@ def kind_of(mujoco: Any, model: Any, joint: int) -> str:
     return str(mujoco.mjtJoint(model.jnt_type[joint]).name.removeprefix("mjJNT_").lower())
 
 
-def without_effect(groups: Groups) -> list[int]:
-    """Return groups without mass that carry no other group, so that nothing determines their motion."""
+def without_effect(groups: Groups, held: Collection[int]) -> list[int]:
+    """Return groups without mass that carry no other group and are not among ``held``, so that nothing
+    determines their motion."""
 
     def carries(group: int) -> bool:
-        return any(groups.mass[child] > 0 or carries(child) for child in groups.children(group))
+        return group in held or any(
+            groups.mass[child] > 0 or carries(child) for child in groups.children(group)
+        )
 
     return [g for g in groups.members if g != WORLD and not groups.mass[g] > 0 and not carries(g)]
 
 
-def _refuse_branch(groups: Groups, group: int) -> None:
-    idle = without_effect(groups)
-    carried = [g for g in groups.children(group) if g not in idle]
-    if len(carried) > 1:
-        names = " and ".join(repr(groups.names[g]) for g in carried)
-        raise SceneError(
-            [f"body {groups.names[group]!r}: has no mass and carries {names}; a scene needs its mass"]
-        )
+def branching(groups: Groups, held: Collection[int]) -> list[int]:
+    """Return groups without mass that are among ``held``, or carry several groups whose motion has an
+    effect."""
+    idle = without_effect(groups, held)
+    light = [g for g in groups.members if g != WORLD and not groups.mass[g] > 0]
+    return [g for g in light if g in held or sum(c not in idle for c in groups.children(g)) > 1]
 
 
-def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint]:
-    """Return the scene's joints with the motions of a chain; none for a free body.
-
-    Raises SceneError for motions that no joints of a scene have.
-    """
-    pair = (groups.names[chain.groups[0]], groups.names[chain.groups[1]])
+def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint] | None:
+    """Return the scene's joints with the motions of a chain without links between them; none for a free body,
+    None if no joints of a scene have these motions."""
+    pair = (groups.name(chain.ends[0]), groups.name(chain.ends[1]))
     made = _recognised(chain, extent)
     if made is None:
-        raise SceneError([_refusal(chain, pair)])
+        return None
     own = [groups.model.joint(j).name for j in chain.joints]
     name = next((n for n in own if n), f"{pair[1]} joint")
     found: list[Joint] = []
@@ -94,17 +108,9 @@ def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint]:
     return found
 
 
-def _refusal(chain: Chain, pair: tuple[str, str]) -> str:
-    between = "" if pair[0] == "ground" else f" on {pair[0]!r}"
-    return (
-        f"body {pair[1]!r}{between}: joints {', '.join(chain.kinds)} in a row have links without mass "
-        "between them, which no joints of a scene describe exactly; give each of these links its own mass"
-    )
-
-
 def _recognised(chain: Chain, extent: float) -> Made | None:
     """Return types of joints and their places; None if a scene has no such joints."""
-    if _rank(chain, extent) < _freedoms(chain):
+    if rank(chain, extent) < freedoms(chain):
         return None
     for recognise in (_free, _single, _cylindrical, _universal, _spherical, _planar, _two_hinges, _rod):
         found = recognise(chain, extent)
@@ -113,11 +119,12 @@ def _recognised(chain: Chain, extent: float) -> Made | None:
     return None
 
 
-def _freedoms(chain: Chain) -> int:
+def freedoms(chain: Chain) -> int:
+    """Return the number of joint velocities of a chain."""
     return sum({"free": 6, "ball": 3}.get(kind, 1) for kind in chain.kinds)
 
 
-def _rank(chain: Chain, extent: float) -> int:
+def rank(chain: Chain, extent: float) -> int:
     """Return the number of independent motions at the pose."""
     twists: list[np.ndarray] = []
     for kind, anchor, axis in zip(chain.kinds, chain.anchors, chain.axes, strict=True):
@@ -132,7 +139,7 @@ def _rank(chain: Chain, extent: float) -> int:
 
 
 def _free(chain: Chain, extent: float) -> Made | None:
-    return [] if _freedoms(chain) == 6 else None
+    return [] if freedoms(chain) == 6 else None
 
 
 def _single(chain: Chain, extent: float) -> Made | None:

@@ -77,12 +77,7 @@ class Closure:
         return list(self.type.facts.forbidden_rotations)
 
     def joint(self, data: Any, groups: Groups) -> Joint:
-        """Return the scene's joint at a closed pose; raises SceneError if one side has no mass."""
-        for frame in self.frames:
-            group = int(groups.of[frame.body])
-            if not groups.mass[group] > 0:
-                name = groups.model.body(frame.body).name
-                raise SceneError([f"closure {self.name!r}: ends on body {name!r}, which has no mass"])
+        """Return the scene's joint at a closed pose; raises SceneError if both sides are on one body."""
         first, second = (groups.name_of(frame.body) for frame in self.frames)
         if first == second:
             raise SceneError([f"closure {self.name!r}: both sides are on {first!r}, or fixed to it"])

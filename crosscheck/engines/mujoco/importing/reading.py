@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.importing import actuators, couplings, left_out, loads, urdf
+from crosscheck.engines.mujoco.importing import actuators, couplings, left_out, loads, massless, urdf
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
-from crosscheck.engines.mujoco.importing.chains import Chain, chains, joints_of, kind_of, without_effect
+from crosscheck.engines.mujoco.importing.chains import Chain, branching, kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.holding import compiled
@@ -36,12 +36,13 @@ class Source:
     """A file that was read: the scene, and MuJoCo's model of it at the pose of the scene.
 
     ``model`` is without the parts that were left out; ``qpos`` and ``qvel`` are its coordinates.
-    ``original`` is ``model`` with the file's own options.
+    ``original`` is ``model`` with the file's own options; ``groups`` has the bodies of the scene.
     """
 
     imported: Imported
     model: Any
     original: Any
+    groups: Groups
     qpos: np.ndarray
     qvel: np.ndarray
 
@@ -71,7 +72,7 @@ def source(path: Path, options: ImportOptions) -> Source:
     Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     imported = Imported(scene, (*wanted, *left_out.notes(mujoco, model)), tuple(reader.notes))
-    return Source(imported, model, original, *state)
+    return Source(imported, model, original, reader.groups, *state)
 
 
 def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None]:
@@ -151,9 +152,9 @@ class _Reader:
 
     def _bodies(self) -> Iterator[Body]:
         data = self.poses.data
-        for g in self.groups.massive:
-            twist = self.groups.placed(data, g).jacobian @ data.qvel if np.any(data.qvel) else None
-            yield self.groups.body(data, g, twist)
+        for piece in self.groups.pieces:
+            twist = self.groups.placed(data, piece).jacobian @ data.qvel if np.any(data.qvel) else None
+            yield self.groups.body(data, piece, twist)
 
     def _closures(self) -> list[Closure]:
         """Return the closures of the file and of the user; joint rows are stored separately."""
@@ -215,15 +216,13 @@ class _Reader:
     def _read_joints(self, closures: list[Closure]) -> None:
         data, extent = self.poses.data, self.poses.extent
         self.joint_of: dict[int, Joint] = {}
-        idle = without_effect(self.groups)
-        for g in idle:
-            self.notes.append(
-                f"body {self.groups.names[g]!r} has no mass and carries none: its motion has no effect"
-            )
+        held = massless.held(self.model, self.groups, closures)
+        self.notes += massless.idle(self.groups, held)
+        self.groups.keep(branching(self.groups, held), ())
+        wanted = massless.needs(self.mujoco, self.model, self.rows, self._key(), self.without)
         found: list[Joint] = []
         whole: dict[int, int] = {}
-        for chain in chains(self.mujoco, self.groups, data):
-            joints = joints_of(chain, self.groups, extent)
+        for chain, joints in massless.read(self.mujoco, self.groups, data, wanted, extent):
             whole.update({j: len(found) for j in chain.joints if len(joints) == 1})
             found += self._with_armature(chain, joints)
         count = len(found)
@@ -288,12 +287,19 @@ class _Reader:
         name, what = left_out.joint_name(self.model, j), "couples" if couples else "locks"
         raise SceneError([f"equality {row.name!r}: {what} {name}, which is not a single hinge or slide"])
 
+    def _key(self) -> int:
+        """Return MuJoCo's number of the keyframe at which the motion begins; -1 if there is none."""
+        kinds = self.mujoco.mjtObj
+        return int(self.mujoco.mj_name2id(self.model, kinds.mjOBJ_KEY, self.options.keyframe or "\0"))
+
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, self.options.keyframe or "\0")
+        motors = (
+            () if "motors" in self.without else loads.of_motors(mujoco, model, self._key(), self.joint_of)
+        )
         both = [
             *loads.of_joints(mujoco, model, data, self.joint_of),
-            *(() if "motors" in self.without else loads.of_motors(mujoco, model, key, self.joint_of)),
+            *motors,
             *loads.of_tendons(mujoco, model, data, self.groups),
         ]
         self.parts += [part for part in both if isinstance(part, Part)]
