@@ -15,6 +15,7 @@ from mbref.motion import Motion
 from mbref.simulation.crossings import Crossings
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.remedies import remedy
+from mbref.simulation.rounded_numbers import advice
 from mbref.simulation.singular_position import Met, is_near, met_by
 from mbref.simulation.trial import trial_of
 from mbref.stepping.loop import (
@@ -66,8 +67,8 @@ NO_BRANCH = (
 )
 
 NEARLY_DEPENDENT = (
-    "constraint rows are nearly dependent there (singular value {:.1e} of unit rows), so that their rank is "
-    "uncertain: give the axes and points of the joints with 12 digits"
+    "constraint rows are nearly dependent at the start (singular value {:.1e} of unit rows), so that their "
+    "rank is uncertain: give the axes and points of the joints with 12 digits"
 )
 NEAR_SINGULAR = (
     "; if the mechanism begins near a singular position, rounding changes its motion: begin at that "
@@ -80,6 +81,14 @@ NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 SINGULAR_POSITION = "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it{}"
 LOSE_RANK = " (the constraint rows of {} lose rank)"
+# statuses that rounded numbers may cause
+OF_ROUNDING = (
+    STEP_TOO_SMALL,
+    NOT_CONVERGED,
+    SINGULAR,
+    CREEPING,
+    UNDECIDED,
+)  # may follow from rounded numbers
 # statuses of failures near a singular position that it may have caused
 FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)
 
@@ -189,7 +198,8 @@ def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
     """Return a report on the correction of the start, on rows that are redundant to rounding, and on the
     number of passed singular positions."""
     passed = f"singular positions passed: {crossings}" if crossings else ""
-    return "; ".join(filter(None, (start.report(), _rounded(ranks), passed)))
+    nearly = NEARLY_DEPENDENT.format(ranks.least) if ranks.least < NEARLY else ""
+    return "; ".join(filter(None, (start.report(), _rounded(ranks), nearly, passed)))
 
 
 def _rounded(ranks: Ranks) -> str:
@@ -200,7 +210,7 @@ def _remedy(run: Run, status: int) -> str:
     """Return the remedy for an early end; if rows are nearly dependent at the start, a remedy for the
     scene."""
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
-        return remedy(run, status)
+        return (advice(run) if status in OF_ROUNDING else "") or remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
     return NEARLY_DEPENDENT.format(run.ranks.least) + (NEAR_SINGULAR.format(NEARLY) if turned else "")
 

@@ -13,8 +13,12 @@ from crosscheck.judge.gauss_principle import gauss, rank, singular_values
 from mbref import rotations, simulate
 from mbref.design.along_motion import general_pose
 from mbref.equations.model import Model
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
+from mbref.simulation.rounded_numbers import advice
+from mbref.simulation.simulate import Limits
+from mbref.simulation.start_run import start_run
 from mbref.trajectory import Outcome
 
 TURN = rotations.from_vector(np.array([0.3, -0.7, 0.5]))
@@ -86,9 +90,25 @@ def test_a_loop_that_needs_equal_lengths_and_rounded_numbers():
     outcomes = [run.outcome for run in runs.values()]
     assert outcomes == [Outcome.COMPLETED, Outcome.UNDECIDED, Outcome.COMPLETED, Outcome.COMPLETED]
     assert np.abs(np.diff(runs[7].position, axis=0)).max() < 1e-15
+    assert "nearly dependent at the start" in runs[7].message, "a locked mechanism seems to hang at rest"
+    assert all("nearly" not in runs[digits].message for digits in (12, None))
     assert "give the axes and points of the joints with 12 digits" in runs[9].message
     assert np.abs(np.diff(runs[12].position, axis=0)).max() > 1e-4
     assert np.abs(runs[12].position - runs[None].position).max() < 1e-10
+
+
+def test_a_run_that_rounded_numbers_end_asks_for_more_digits():
+    """A slider-crank, redundant in a slanted plane: 6 digits end its run, 12 digits do not."""
+    run = simulate(turned("planar_slider_crank", 6))
+    assert run.outcome != Outcome.COMPLETED
+    assert "file's numbers seem to be rounded: give the axes and points of the joints with 12" in run.message
+    assert simulate(turned("planar_slider_crank", 12)).outcome == Outcome.COMPLETED
+
+
+def test_a_singular_start_is_not_taken_for_rounding():
+    for name in ("four_bar_straight", "four_bar_gravity", "sarrus"):
+        start = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
+        assert advice(start) == "", name
 
 
 def test_a_mechanism_that_rounding_locks_is_diagnosed(monkeypatch):
