@@ -103,6 +103,11 @@ def as_list(value: Any) -> Any:
     return value.tolist() if hasattr(value, "tolist") else value
 
 
+def is_some(value: Any) -> bool:
+    """Return whether a list, also of lists, contains a number that is not zero."""
+    return any(map(is_some, value)) if isinstance(value, list | tuple) else value != 0
+
+
 def field_of(entry: Any, key: str) -> Any:
     """Return a field of an entry, which may be a raw table or a model."""
     return entry.get(key) if isinstance(entry, Mapping) else getattr(entry, key, None)

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from mbref.scene_couplings import default_coordinates
-from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, meant, shown
+from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene_function_faults import factor_faults, initial_value, rows_of, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate
 from mbref.scene_loads import LOAD_TYPES, JointLoad
@@ -192,11 +192,6 @@ def _names(entries: Sequence[Any]) -> list[str]:
     return [_text(entry, "name") for entry in entries]
 
 
-def _has_number(value: Any) -> bool:
-    """Return whether a list, also of lists, contains a number that is not zero."""
-    return any(map(_has_number, value)) if isinstance(value, list | tuple) else value != 0
-
-
 def reference_faults(data: Mapping[str, Any]) -> Faults:
     """Yield faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
     The arguments are raw tables, so that these faults are found together with the faults of single fields."""
@@ -211,7 +206,7 @@ def reference_faults(data: Mapping[str, Any]) -> Faults:
                 f"body[{i}].{missing}",
                 "is missing; give mass and inertia, or neither (kinematics)",
             )
-        elif mass == 0 and _has_number(inertia):
+        elif mass == 0 and is_some(inertia):
             yield f"body[{i}].mass", "is 0, but the inertia is not; a massless link has neither"
     known = {*_names(bodies), GROUND}
     for i, joint in enumerate(joints):
