@@ -1,7 +1,8 @@
 """A fork server: a process that has imported what every child process needs. Children are its forks.
 
 The imports take about a second of CPU time, a fork takes milliseconds. The server is a program of its own,
-because a fork of this process might lack threads that hold locks.
+because a fork of this process might lack threads that hold locks. The server of `multiprocessing` would run a
+user's script again in each child, unless the script guards its calls by ``if __name__ == "__main__"``.
 
 ``python -m crosscheck.processes.fork_server`` has a socket to its parent as standard input. The parent sends
 the environment of a child, whose PYTHONPATH is its module search path, and three file descriptors: standard
