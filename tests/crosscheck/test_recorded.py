@@ -14,11 +14,11 @@ from crosscheck.recorded.reading import read
 from mbref import rotations
 from mbref.scene import Body, Revolute, Scene, SceneError, Spring, TorsionSpring
 
-TIMES = np.linspace(0.0, 0.8, 161)
+TIMES = np.linspace(0.0, 0.4, 81)
 SCENE = Scene(
     name="double_pendulum",
     gravity=(0.3, -9.81, 0.5),
-    duration=0.8,
+    duration=0.4,
     body=[
         Body(name="upper", mass=2.0, inertia=(0.02, 0.05, 0.06), position=(0.3, 0.0, 0.0)),
         Body(
@@ -187,9 +187,9 @@ def test_two_planted_differences_are_the_first_explanation(name, table):
 
 
 def test_errors_begin_where_the_motions_part(table):
-    late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.5)}
+    late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.2501)}
     column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
-    assert column.name == "upper.position.x" and column.begins == pytest.approx(0.505)
+    assert column.name == "upper.position.x" and column.begins == pytest.approx(0.255)
     assert column.largest == pytest.approx(1e-3)
 
 
@@ -243,8 +243,8 @@ def test_faulty_tables_are_refused(text, columns, says, tmp_path):
 def test_commands_write_and_judge(tmp_path, capsys):
     SCENE.save(tmp_path / "s.toml")
     scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
-    assert main(["reference", scene, "--out", out, "--samples", "161"]) == 0
-    assert "161 samples to t = 0.8 s, error at most" in capsys.readouterr().out
+    assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0
+    assert "81 samples to t = 0.4 s, error at most" in capsys.readouterr().out
     assert main(["judge", scene, out]) == 0
     assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
     assert "quaternions in the order" in capsys.readouterr().out
@@ -254,10 +254,10 @@ def test_commands_write_and_judge(tmp_path, capsys):
 
 def test_a_reference_without_time_is_reported(monkeypatch):
     found = reference(SCENE, TIMES.tolist())
-    part = NoReference("no time is left", 0.4, found.at(TIMES[:81]))
+    part = NoReference("no time is left", 0.2, found.at(TIMES[:41]))
     monkeypatch.setattr(exactly, "reference", lambda *_: part)
-    known = judge_motion(SCENE, {"time": TIMES[:81], "upper.position.x": found.position[:81, 0, 0]})
-    assert known.reason == "no time is left" and known.until == pytest.approx(0.4) and known.is_right
+    known = judge_motion(SCENE, {"time": TIMES[:41], "upper.position.x": found.position[:41, 0, 0]})
+    assert known.reason == "no time is left" and known.until == pytest.approx(0.2) and known.is_right
     nothing = NoReference("no time is left", 0.0, found.at(TIMES[:0]))
     monkeypatch.setattr(exactly, "reference", lambda *_: nothing)
     with pytest.raises(SceneError, match="has no reference: no time is left"):
