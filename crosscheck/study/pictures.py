@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Setting, engine
+from crosscheck.processes.pool import run_estimated
 from crosscheck.setting import BRANCHES
-from crosscheck.study.grid import Case, Record, run_case, study
+from crosscheck.study.chains import Chains
+from crosscheck.study.grid import Case, Record, record_of, study
 from crosscheck.study.record_view import error, is_completed
 from mbref.crossing import Crossing
+from mbref.trajectory import Trajectory
 
 DIGITS = 6  # decimal digits kept of a position, relative to the size of the mechanism: finer than a pixel
 FRAMES = 75  # frames of the motion on a branch
@@ -32,7 +35,7 @@ def worst_runs(runs: Sequence[Run], truths: Sequence[Record], path: Path | None)
         if truth["motion"] and own:
             worst, _ = max(own, key=lambda run: error(run[1]))
             cases.append(worst._replace(times=np.array(truth["motion"]["times"])))
-    return study(cases, None, path, run=_pictured)
+    return _studied(cases, path)
 
 
 def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
@@ -42,7 +45,7 @@ def branches(runs: Sequence[Run], path: Path | None) -> list[Record]:
         if is_completed(run[1]) and run[1]["crossings"] and BRANCHES in engine(run[0].engine).options:
             by_scene.setdefault(run[1]["scene"], []).append(run)
     best = [min(own, key=lambda run: error(run[1])) for own in by_scene.values()]
-    return study([case for run in best for case in _along_branches(*run)], None, path, run=_pictured)
+    return _studied([case for run in best for case in _along_branches(*run)], path)
 
 
 def shown(crossings: Sequence[Mapping[str, Any]]) -> list[int]:
@@ -61,9 +64,19 @@ def _along_branches(case: Case, record: Record) -> Iterator[Case]:
             yield case._replace(times=times, setting=Setting(case.setting.family, options))
 
 
-def _pictured(case: Case) -> Record:
+def _studied(cases: Sequence[Case], path: Path | None) -> list[Record]:
+    """Return the records of runs; the children that have run the engines before are used again."""
+    with Chains(_pictured) as threads:
+        return study(cases, threads, path, run=_run)
+
+
+def _run(case: Case) -> Trajectory:
+    return run_estimated(case.engine, case.scene, case.times, case.setting, case.time_limit)
+
+
+def _pictured(case: Case, trajectory: Trajectory) -> Record:
     """Return the record of a run without the fields that no picture needs."""
-    record = {name: value for name, value in run_case(case).items() if name not in DROPPED}
+    record = {name: value for name, value in record_of(case, trajectory).items() if name not in DROPPED}
     return {**record, "bodies": shortened(record["bodies"])}
 
 
