@@ -109,3 +109,16 @@ def test_mechanisms_are_listed_with_their_ends(section):
     [table] = [b for b in section if isinstance(b, Table) and b.header[0] == "Column"]
     assert [row[0] for row in table.rows] == [column.heading for column in DIFFICULTIES]
     assert [float(row[2]) for row in table.rows] == [column.end for column in DIFFICULTIES]
+
+
+def test_captions_and_headers_of_the_tables(section):
+    assert [(b.header, b.caption) for b in section if isinstance(b, Table)][:2] == [
+        (("Sign", "Meaning"), "How to read a cell."),
+        (("Column", "Scene", "Until (s)", "Mechanism"), "Scenes that the columns run."),
+    ]
+    best, defaults = maps(section)
+    assert (
+        best.caption.startswith("Each engine by its best family")
+        and "as the library has them" in defaults.caption
+    )
+    assert best.label == defaults.label == "engine"

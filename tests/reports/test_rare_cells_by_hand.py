@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from synthetic import scene
-from test_figures_by_hand import BLOCK, SCENE, group, moving, of, plain
+from test_figures_by_hand import BLOCK, RECORDS, SCENE, group, moving, of, plain
 
 from crosscheck.paper.cells import Cell
 from crosscheck.paper.runs import HEAVY, UNEQUAL, Label
@@ -26,6 +26,9 @@ from reports.sections import (
     paper_sweep,
     provenance,
     published,
+    records,
+    stability,
+    support,
 )
 from reports.sections.paper_cranks import RAISED
 
@@ -282,3 +285,107 @@ def test_the_option_that_varies_is_the_first_number_that_does():
     ]
     assert convergence.swept_option(runs) == "rtol"
     assert convergence.swept_option(runs[:1]) is None and convergence.swept_option([]) is None
+
+
+def test_a_card_has_the_numbers_and_the_origin_of_its_run():
+    measured = {"violation_position": 2e-9, "energy_error": 3e-5, "reaction_error": None}
+    asked = {"engine": "a", "options": {"rtol": 1e-3}, "samples": 3, "end": 1.0}
+    made = {"commit": "abc", "date": "2026-05-02", "machine": {"cpu": "a processor"}, "message": "the matrix"}
+    made["asked"] = asked
+    whole = {
+        **RECORDS[0],
+        **made,
+        "key": "0123456789abcdef",
+        "metrics": {**RECORDS[0]["metrics"], **measured},
+    }
+    card = records._card(group(), Run(whole))
+    assert card.numbers == {
+        "Error": "2.00e-02",
+        "Time of stepping": "500 ms",
+        "Outcome": "completed, t = 1 s",
+        "Joints open by": "2.0e-09",
+        "Energy is off by": "3.0e-05",
+        "Reactions are off by": "–",
+    }
+    assert card.made == "record 0123456789ab, a 1, commit abc, made 2026-05-02, on a processor"
+    assert (card.place, card.settings, card.message) == ("k-0123456789ab", "rtol=0.001", "the matrix")
+    assert card.command.startswith("crosscheck run scenes/block.toml --engine a --setting x")
+    lost = {**RECORDS[7], **made, "commit": None, "cost": {"seconds": 0.0, "steps": 0}}
+    card = records._card(group(), Run(lost))
+    assert card.numbers["Time of stepping"] == card.numbers["Error"] == "–"
+    assert card.numbers["Outcome"] == "timed out, t = 0.5 s" and "commit" not in card.made
+    _, text, *blocks = records.render([group(tuple({**r, **made} for r in RECORDS))])
+    assert [len(block.cards) for block in blocks] == [3, 4, 1] and "repeats its run" in text.text
+
+
+def test_support_of_the_engines_that_have_records():
+    known, unknown = (plain(name, "x", 1e-3, 1.0) for name in ("mbref", "a"))
+    assert support.render([group((unknown,))]) == []
+    heading, table, *reasons = support.render([group((unknown, known))])
+    assert (
+        heading.text == "Support"
+        and table.header == ("Feature", "mbref")
+        and table.caption == support.CAPTION
+    )
+    assert {len(row) for row in table.rows} == {2} and {row[1][:1] for row in table.rows} <= {"✓", "–"}
+    assert [text.text[:3] for text in reasons] == [f"{i}. " for i in range(1, len(reasons) + 1)]
+
+
+def test_sentences_of_the_ladders_need_taylor_and_another_method():
+    one, two = stability.Count(3, 1, 0), stability.Count(2, 1, 1)
+    taylor, other = ("mbref", "taylor"), ("mujoco", "projected")
+    assert (
+        stability._results({}) == stability._results({taylor: one}) == stability._results({other: two}) == []
+    )
+    better = ("mbref", "mpi-svd+none")
+    first, second = stability._results({taylor: one, other: two, better: stability.Count(3, 0, 0)})
+    assert first == "Of 4 runs by taylor 3 are right, 1 ended early, and 0 completed with a wrong motion."
+    assert second.startswith("Of the others, mpi-svd+none is right most often (3 of 3 runs), and mujoco")
+    assert second.endswith("projected completes wrong motions most often (1 of 4).")
+    table = stability._table({taylor: one, other: two})
+    assert [tuple(row) for row in table.rows] == [
+        ("mbref", "taylor", "3", "1", "0"),
+        ("mujoco", "projected", "2", "1", "1"),
+    ]
+    assert table.header == ("Engine", "Method", "Right", "Ended", "False") and table.right == {2, 3, 4}
+
+
+@pytest.mark.parametrize(
+    ("engine", "error", "is_false"),
+    [("mbref", 1.1e-6, True), ("mbref", 0.9e-6, False), ("mujoco", 0.011, True), ("mujoco", 1e-2, False)],
+)
+def test_a_false_success_of_mbref_is_a_smaller_error(engine, error, is_false):
+    assert pytest.approx(1e-6) == stability.ALLOWED
+    assert stability.is_false(plain(engine, "x", error, 1.0)) is is_false
+    assert not stability.is_false(plain(engine, "x", error, 1.0, "STEP_FAILED", 0.5))
+    assert stability.is_false(plain(engine, "x", math.nan, 1.0)), "an unknown error is no success"
+
+
+def test_end_times_of_the_sweep_in_their_panels():
+    """A cell of the paper has one bar at its end, a triangle at the printed time, and lines at crossings."""
+    label = Label("I", "MPI (SVD)", HALF_TURN, "the settings")
+    record = {**plain("mbref", "x", 1e-3, 1.0, "VIOLATION", 0.0378), "settings": {}}
+    late = {**record, "t_end": 0.2}
+    other = next(cell for cell in paper_sweep.SWEPT if cell.row == "ALF" and cell.column == HALF_TURN)
+    second = Label("I", "ALF", HALF_TURN, label.variant)
+    drawing = paper_sweep.plot({label: record, second: late})
+    assert drawing.get_size_inches().tolist() == [7.4, 7.0] and len(drawing.axes) == len(paper_sweep.COLUMNS)
+    axes = drawing.axes[paper_sweep.COLUMNS.index(HALF_TURN)]
+    assert axes.get_title() == f"{HALF_TURN}: 1 runs end here, 1 later or never"
+    [bar] = [patch for patch in axes.patches if patch.get_height()]
+    assert bar.get_x() <= 0.0378 <= bar.get_x() + bar.get_width() and bar.get_width() == pytest.approx(1e-3)
+    *crossings_, triangles = axes.lines
+    assert triangles.get_marker() == "^" and set(triangles.get_ydata()) == {0.0}
+    assert other.end is None or other.end in triangles.get_xdata()
+    assert [line.get_xdata()[0] for line in crossings_][:2] == pytest.approx(
+        [math.pi / 2 / RATE, 3 * math.pi / 2 / RATE]
+    )
+    assert [line.get_linestyle() for line in crossings_][:3] == [":", "--", ":"], "odd multiples are dashed"
+    assert drawing.axes[-1].get_xlabel() == "end time (s)" and axes.get_ylabel() == "runs"
+
+
+def test_cells_of_end_times():
+    run = Run(plain("mbref", "x", 1e-3, 1.0))
+    assert paper_sweep._text(None) == "–" and paper_sweep._text(run) == "20"
+    assert paper_sweep._text(ended(0.012345)) == f"0.0123 {ended(0.1).outcome.letter}"
+    assert paper_sweep._text(ended(0.5, "TIMED_OUT")) == "0.5000 TIMED_OUT"
