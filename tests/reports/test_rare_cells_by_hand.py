@@ -273,6 +273,13 @@ def test_slopes_over_a_step_and_their_caption():
         ("a", "two", "step", "2"),
     ]
     assert convergence._caption(groups, curves) == "Slopes from 2 (a two, block) to 4 (a four, block)."
+    tight = tuple(plain("a", "x", e, 1.0, rtol=e) for e in (1e-3, 1e-4, 1e-5))
+    heading, _, table = convergence.render([group(tight)])
+    assert table.right == {3} and table.header == ("Engine", "Family", "Over", "block")
+    assert tuple(table.rows[0]) == ("a", "x", "rtol", "1") and (heading.text, heading.level) == (
+        "Order of convergence",
+        2,
+    )
     assert convergence._caption([group(tuple(squares))], [("a", "two")]) == "One slope: 2 (a two, block)."
     assert convergence._caption([group(tuple(short))], [("a", "short")]) == (
         "No family has three runs on a line."
