@@ -1,0 +1,126 @@
+"""Measures of published problems / motions of a block and of two hinges, off by known amounts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.judge import published_measures as measures
+from mbref import rotations
+from mbref.scene import Body, Revolute, Scene
+from mbref.trajectory import Trajectory
+
+ARM = Body(name="arm", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))
+FAR = Body(name="far", mass=3.0, inertia=(1.0, 1.0, 1.0), position=(3.0, 4.0, 0.0))
+HINGES = tuple(
+    Revolute(name=name, bodies=("ground", body), anchor=anchor, axis=(0.0, 0.0, 1.0))
+    for name, body, anchor in (("A", "arm", (0.0, 0.0, 0.0)), ("B", "far", (3.0, 4.0, 0.0)))
+)
+SCENE = Scene(name="two", gravity=(0.0, 0.0, -10.0), body=(ARM, FAR), joint=HINGES, duration=1.0)
+TIMES = np.array([0.0, 0.5, 1.0])
+
+
+def at_rest(k: int = 3) -> Trajectory:
+    still = np.zeros((k, 2, 3))
+    places = np.tile([ARM.position, FAR.position], (k, 1, 1))
+    turns = np.tile([1.0, 0.0, 0.0, 0.0], (k, 2, 1))
+    return Trajectory("two", "e", "1", "m", {}, TIMES[:k], ("arm", "far"), places, turns, still, still.copy())
+
+
+def moved(sample: int, body: int, by: tuple[float, float, float], k: int = 3) -> Trajectory:
+    run = at_rest(k)
+    run.position[sample, body] += by
+    return run
+
+
+def test_energy_is_the_largest_change_in_joule():
+    """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m have 3 J."""
+    fast = at_rest()
+    fast.velocity[2, 0] = (0.0, 3.0, 0.0)
+    assert measures.energy(SCENE, fast, None) == pytest.approx(9.0)
+    assert measures.energy(SCENE, moved(1, 1, (0.0, 0.0, 0.1)), None) == pytest.approx(3.0)
+    assert measures.energy(SCENE, at_rest(), None) == 0.0
+
+
+def test_distances_of_a_centre():
+    """The second body is 5 m from the origin; it is off by 0.5 m once in three samples."""
+    off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
+    assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
+    assert measures.distance("arm")(SCENE, off, true) == 0.0
+    assert measures.relative_distance("far")(SCENE, off, true) == pytest.approx(0.1)
+    assert measures.mean_square_distance("far")(SCENE, off, true) == pytest.approx(0.5 / np.sqrt(3))
+    for measure in (measures.distance, measures.relative_distance, measures.mean_square_distance):
+        assert measure("far")(SCENE, off, None) is None, "there is no truth"
+        assert measure("far")(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0, (
+            "truth to the second sample"
+        )
+    assert measures.mean_square_distance("far")(SCENE, at_rest(0), at_rest(0)) is None
+
+
+def test_relative_error_of_each_observed_number():
+    """Numbers 2 and 1e-5 are off by 0.02 and 1e-5: 0.01, and 0.01 of the least denominator 1e-3."""
+
+    def first(motion: Trajectory) -> np.ndarray:
+        return motion.position[:, :, 0]
+
+    measure, true = measures.relative_to_each(first), at_rest()
+    true.position[:, 0, 0], true.position[:, 1, 0] = 2.0, 1e-5
+    run = replace(true, position=true.position.copy())
+    run.position[1, 0, 0] += 0.02
+    assert measure(SCENE, run, true) == pytest.approx(0.01) and measure(SCENE, run, None) is None
+    run.position[2, 1, 0] -= 3e-5
+    assert measure(SCENE, run, true) == pytest.approx(0.03)
+    assert measure(SCENE, run, at_rest(0)) == 0.0, "a truth without a sample"
+
+
+def test_relative_error_at_the_end():
+    def seen(scene: Scene, motion: Trajectory) -> dict[str, float]:
+        return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1]), "z": 1.0}
+
+    measure = measures.relative_at_the_end(seen, ("x", "y"))
+    run = moved(2, 0, (-0.25, 0.0, 0.0))
+    run.position[2, 1, 1] += 2.0
+    run.position[1] += 100.0
+    assert measure(SCENE, run, at_rest()) == pytest.approx(0.5), "y is off by 2 of 4, x by 0.25 of 1"
+    assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, at_rest()) == pytest.approx(0.25)
+    negative = at_rest()
+    negative.position[2, 0, 0] = -1.0
+    assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, negative) == pytest.approx(1.75)
+    assert measure(SCENE, run, None) is None
+    assert measure(SCENE, run, at_rest(2)) is None, "the truth ends before"
+    assert measure(SCENE, at_rest(0), at_rest(0)) is None
+
+
+def turning(angles: tuple[tuple[float, float], ...]) -> Trajectory:
+    """Both bodies turned about z by angles (rad) at each sample, with rates that pass them."""
+    run = at_rest(len(angles))
+    for k, pair in enumerate(angles):
+        for b, angle in enumerate(pair):
+            run.orientation[k, b] = rotations.from_vector(np.array([0.0, 0.0, angle]))
+    rates = np.gradient(np.array(angles), TIMES[: len(angles)], axis=0)
+    run.angular_velocity[:, :, 2] = rates
+    run.position[:, 0, :2] = [(np.cos(a), np.sin(a)) for a, _ in angles]
+    return run
+
+
+def test_hinges_that_turn_in_opposite_directions():
+    pair = measures.opposite_hinges([("A", "B")])
+    assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.2), (0.5, -0.5))), None) == pytest.approx(0.0, abs=1e-15)
+    assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.3), (0.5, -0.44))), None) == pytest.approx(0.1)
+    assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.3), (0.5, -0.9))), None) == pytest.approx(0.4)
+    assert measures.opposite_hinges([])(SCENE, at_rest(), None) == 0.0
+
+
+def test_a_guided_body_keeps_its_vertical_line_and_its_orientation():
+    guided = measures.guided("far")
+    assert guided(SCENE, moved(1, 1, (0.03, 0.04, 7.0)), None) == pytest.approx(0.05), "its height is free"
+    tilted = at_rest()
+    tilted.orientation[2, 1] = rotations.from_vector(np.array([0.0, 0.2, 0.0]))
+    assert guided(SCENE, tilted, None) == pytest.approx(0.2)
+    tilted.position[0, 1, 0] += 0.3
+    assert (
+        guided(SCENE, tilted, None) == pytest.approx(0.3)
+        and measures.guided("arm")(SCENE, tilted, None) == 0.0
+    )
