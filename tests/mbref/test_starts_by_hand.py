@@ -1,0 +1,73 @@
+"""Consistent starts of two bodies, worked out by hand, by dense and by sparse matrices."""
+
+import numpy as np
+import pytest
+
+from mbref.equations.initial_state import LARGE, Start, consistent_start, solve_positions
+from mbref.equations.model import Model
+from mbref.scene import Body, Scene, SceneError, Spherical
+
+ARM, INERTIA = 0.5, 0.2
+PAIRS = (1, LARGE // 3 + 1)  # three rows a pair: one pair is solved by dense, many by sparse matrices
+
+
+def pairs(count, gap=0.0, **of_first):
+    """Pairs of a mass at a ball joint with a rod of mass 3, whose centre is ARM above the joint."""
+    bodies, joints = [], []
+    for k in range(count):
+        x = 2.0 * k
+        first = Body(name=f"a{k}", mass=1.0, inertia=(0.1,) * 3, position=(x, 0.0, 0.0), **of_first)
+        rod = Body(name=f"b{k}", mass=3.0, inertia=(INERTIA, INERTIA, 0.0), position=(x + gap, 0.0, ARM))
+        bodies += [first, rod]
+        anchors = {"anchor": (x, 0.0, 0.0)}
+        joints.append(Spherical(name=f"J{k}", bodies=(first.name, rod.name), **anchors))
+    return Model(Scene(name="pairs", body=tuple(bodies), joint=tuple(joints)))
+
+
+@pytest.mark.parametrize("count", PAIRS)
+def test_positions_change_least_in_the_metric_of_the_masses(count):
+    """The gap g along the rod closes by displacements in the ratio of the other's mass."""
+    model, gap = pairs(count), 1e-3
+    q = model.start().copy().reshape(-1, 2, 7)
+    q[:, 1, 2] += gap
+    found, phi = solve_positions(model, 0.0, q.ravel())
+    moved = found.reshape(-1, 2, 7) - q
+    assert np.abs(phi).max() < 1e-14
+    assert moved[:, 0, 2] == pytest.approx(0.75 * gap, rel=1e-9)
+    assert moved[:, 1, 2] == pytest.approx(-0.25 * gap, rel=1e-9)
+    assert np.abs(np.delete(moved, 2, axis=2)).max() < 1e-15
+
+
+@pytest.mark.parametrize("count", PAIRS)
+def test_velocities_that_are_not_given_have_the_least_kinetic_energy(count):
+    """A joint that moves by u across the rod: the rod's centre moves by u I / (I + m l²)."""
+    found = consistent_start(pairs(count, velocity=(1.0, 0.0, 0.0)))
+    v = found.v.reshape(-1, 2, 6)
+    effective = INERTIA + 3.0 * ARM**2
+    assert v[:, 0, 0] == pytest.approx(1.0, rel=1e-9)
+    assert v[:, 1, 0] == pytest.approx(INERTIA / effective, rel=1e-9)
+    assert v[:, 1, 4] == pytest.approx(-3.0 * ARM / effective, rel=1e-9)
+    others = v.copy()
+    others[:, 0, 0] = others[:, 1, 0] = others[:, 1, 4] = 0.0
+    assert np.abs(others).max() < 1e-9
+    assert found.velocity_violation < 1e-9 and not found.follows_branch
+
+
+@pytest.mark.parametrize("count", PAIRS)
+def test_given_velocities_that_contradict_each_other_are_a_fault_of_the_joint(count):
+    bodies = pairs(count).scene
+    wrong = bodies.with_("body[b0].velocity", [1.0, 0.0, 0.0])
+    wrong = wrong.with_("body[b0].angular_velocity", [0.0, 0.0, 0.0])
+    wrong = wrong.with_("body[a0].velocity", [0.0, 0.0, 0.0])
+    with pytest.raises(SceneError, match=r"joint\[J0\]: velocities given to bodies violate it by 1 m/s"):
+        consistent_start(Model(wrong))
+
+
+def test_the_report_names_what_was_corrected():
+    state = dict.fromkeys(("q", "v", "given"), np.zeros(0))
+    report = lambda *off: Start(**state, position_violation=off[0], velocity_violation=off[1]).report()  # noqa: E731
+    assert report(1e-10, 1e-10) == ""
+    assert report(2e-9, 0.0) == "initial positions were off the constraints by 2.00e-09; corrected"
+    assert report(0.0, 3e-9) == "initial velocities by 3.00e-09; corrected"
+    both = "initial positions were off the constraints by 2.00e-03 and velocities by 3.00e-04; corrected"
+    assert report(2e-3, 3e-4) == both
