@@ -3,9 +3,8 @@ tolerances."""
 
 from __future__ import annotations
 
-import functools
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
@@ -13,7 +12,8 @@ from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
-from mbref.scene import LOAD_TYPES, Scene
+from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene
+from mbref.scene_joints import Coordinate
 from mbref.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -61,22 +61,15 @@ class Mbref(Engine):
     name = "mbref"
     package = "mbref"
     families, options = FAMILIES, OPTIONS
-
-    @functools.cached_property
-    def supports(self) -> Supports:  # type: ignore[override]  # naming the engine imports nothing
-        """Return the supported features: every joint of mbref's table, and every load of a scene file."""
-        from mbref.equations.joints import JOINTS
-
-        both = ("angle", "displacement")
-        return Supports(
-            tuple(JOINTS),
-            drivers=both,
-            loads=tuple(LOAD_TYPES),
-            couplings=both,
-            armatures=both,
-            over_time=(TABLE, FACTOR),
-            massless_links=True,
-        )
+    supports = Supports(
+        joints=tuple(JOINT_TYPES),
+        drivers=get_args(Coordinate),
+        loads=tuple(LOAD_TYPES),
+        couplings=get_args(Coordinate),
+        armatures=get_args(Coordinate),
+        over_time=(TABLE, FACTOR),
+        massless_links=True,
+    )
 
     def version(self) -> str:
         from mbref import __version__

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from mbref.equations.joints.base import AXES, Primitive, coordinate_angle, coordinate_displacement
+from mbref.equations.joints import AXES, Primitive, coordinate_angle, coordinate_displacement
 from mbref.scene import Body, Joint, Revolute, Scene, Translational
 from mbref.scene_joints import ANGLE, Coordinate
 

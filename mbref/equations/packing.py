@@ -16,8 +16,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
-from mbref.equations.joints import driver_primitive, primitives_of
-from mbref.equations.joints.base import Primitive, frame
+from mbref.equations.joints import Primitive, driver_primitive, frame, primitives_of
 from mbref.equations.parts import FRAME, NONE, all_parts
 from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
 from mbref.equations.units import body_lengths, inverse_root, metric

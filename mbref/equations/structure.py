@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.joints.base import ROWS_OF
+from mbref.equations.joints import ROWS_OF
 from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, ANGLE, FORCE, SPRING
 
 MOST_KEPT = 256  # largest number of cached structures

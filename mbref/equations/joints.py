@@ -1,18 +1,24 @@
-"""A joint as a list of primitive constraints between two bodies, and the vectors of these constraints."""
+"""A joint as a list of primitive constraints between two bodies, which follow from the facts of its type."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import sqrt
+from math import dist, sqrt
 from typing import NamedTuple
 
 from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
+from mbref.scene import JOINT_TYPES, Joint, SceneError
+from mbref.scene_joints import X, Y, Z
 
 Vector = tuple[float, float, float]
 
 ZERO = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, ANGLE: 1, SLIDE: 1}
+# directions of the first and of the second body that stay perpendicular: the first two pairs keep the axes
+# parallel, the third prevents rotation about them
+ABOUT_AXIS = ((X, Z), (Y, Z), (X, Y))
+WITHOUT_AXIS = ((X, Y), (Y, Z), (Z, X))
 
 
 class Primitive(NamedTuple):
@@ -27,6 +33,30 @@ class Primitive(NamedTuple):
     turning: Vector = ZERO  # for drivers: direction in the first body, perpendicular to `first`
     length: float = 0.0  # length of a distance constraint, or the factor of a joint coordinate
     driven: bool = False
+
+
+def primitives_of(joint: Joint) -> list[Primitive]:
+    """Return the primitive constraints of a joint; raises SceneError for a joint type without equations."""
+    if joint.type not in JOINT_TYPES:
+        raise SceneError([f"joint {joint.name!r}: mbref has no equations for joints of type {joint.type!r}"])
+    facts, (first, second) = joint.facts, joint.anchor_pair
+    if facts.condition == "constant distance":
+        return [Primitive(DISTANCE, point_first=first, point_second=second, length=dist(first, second))]
+    if facts.condition == "perpendicular axes":
+        return [coincident(first), perpendicular(*map(unit, joint.directions))]
+    axes, pairs = (frame(joint.directions[0]), ABOUT_AXIS) if joint.directions else (AXES, WITHOUT_AXIS)
+    parallel = [perpendicular(axes[j], axes[k]) for j, k in pairs[: len(facts.forbidden_rotations)]]
+    if len(facts.forbidden_translations) == len(axes):
+        return [coincident(first), *parallel]
+    return [*parallel, *(in_plane(first, axes[k]) for k in facts.forbidden_translations)]
+
+
+def driver_primitive(joint: Joint) -> Primitive:
+    """Return the row of a driver of the joint; raises SceneError if the joint cannot be driven."""
+    if joint.facts.driven is None:
+        raise SceneError([f"joint {joint.name!r}: joints of type {joint.type!r} cannot be driven"])
+    axis, anchor = joint.directions[0], joint.anchor_pair[0]
+    return driven_angle(axis) if joint.facts.driven == "angle" else driven_displacement(anchor, axis)
 
 
 def unit(v: Sequence[float]) -> Vector:
