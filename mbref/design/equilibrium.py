@@ -300,7 +300,7 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     # the shape is scaled such that this entry becomes 1
     largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]
     q = tangent.q.reshape(1, model.nb, 7)
-    forces = reactions(model, q, model.blocks_along(np.zeros(1), q), multipliers(tangent)[None])
+    forces = reactions(model, q, model.terms(np.zeros(1), q).blocks, multipliers(tangent)[None])
     scene = _with_angles(placed(model, tangent.q), model, tangent.q)
     return Equilibrium(
         scene.with_(body=tangent.frame.bodies(scene)),

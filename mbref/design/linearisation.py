@@ -35,7 +35,7 @@ class Tangent:
         length = max(model.length, 1e-12)
         self.units = np.tile(np.repeat([1.0, 1.0 / length], 3), model.nb)
         self.step = STEP * length
-        self.basis = _null_space(model.terms(0.0, q, np.zeros(model.n)).jacobian * self.units)
+        self.basis = _null_space(model.terms(0.0, q).jacobian * self.units)
 
     @property
     def freedoms(self) -> int:
@@ -46,7 +46,7 @@ class Tangent:
         """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
         moved = displaced(self.q, self.units * (self.basis @ y))
         found, _ = solve_positions(self.model, 0.0, moved)
-        phi = self.model.terms(0.0, found, np.zeros(self.model.n)).phi
+        phi = self.model.terms(0.0, found).phi
         if np.abs(phi).max(initial=0.0) > MET * max(1.0, self.model.length):
             raise OffConstraints
         return found

@@ -64,7 +64,7 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
     agree = decisions.which_agree(run.model, q, v, packs.mass, terms)
     symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
-    ranks = all_ranks(run.model, terms.jacobian[:, 0], packs.data.metric_root, symbolic, tolerance)
+    ranks = all_ranks(run.model, terms.blocks[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
     return Candidates(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
 

@@ -22,8 +22,8 @@ class Evaluations:
         self._parameters = Parameters(parameters_of(model.memory.values, packs.data, packs))
 
     def terms(self, places: np.ndarray, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Return the terms of c scenes, given by index, at k states each; the Jacobian is given by blocks (c,
-        k, m, 12): m rows, columns of two bodies.
+        """Return the terms of c scenes, given by index, at k states each; blocks have the shape (c, k, m,
+        12): m rows, columns of two bodies.
 
         Arguments are times (c, k), coordinates (c, k, 7 nb) and velocities (c, k, 6 nb).
         """
@@ -34,8 +34,9 @@ class Evaluations:
             self._parameters.write(place)
             evaluate_along(times[k], q[k], v[k], blocks[k], rows[k], forces[k], memory.packed.argument)
         self._model.put_numbers(memory.values, self._model.data)
-        phi, nu, gamma = (rows[..., i * m : (i + 1) * m] for i in range(3))
-        return Terms(self._packs.mass[places], blocks.reshape(*shape, *columns.shape), phi, nu, gamma, forces)
+        blocks = blocks.reshape(*shape, *columns.shape)
+        phi, nu, gamma = np.split(rows, 3, axis=-1)
+        return Terms(self._model.structure, self._packs.mass[places], blocks, phi, nu, gamma, forces)
 
     def starts(self) -> list[Start | SceneError]:
         """Return the consistent start of each scene, or the error of a scene without one."""
@@ -53,6 +54,4 @@ class Evaluations:
 
     def _at_start(self, places: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
         """Return the terms at t = 0 for one state of each scene, with blocks (c, m, 12)."""
-        terms = self.terms(places, np.zeros((len(places), 1)), q[:, None], v[:, None])
-        of_states = (terms.jacobian, terms.phi, terms.nu, terms.gamma, terms.force)
-        return Terms(terms.mass, *(values[:, 0] for values in of_states))
+        return self.terms(places, np.zeros((len(places), 1)), q[:, None], v[:, None])[:, 0]

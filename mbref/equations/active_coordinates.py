@@ -30,15 +30,16 @@ def active_entries(
     """
     states, steady = random_states(1, STATES, model.n), _steady(model)
     moving = np.zeros(model.n, dtype=bool)
-    entries, start_rows, start_columns = patterns(model, at_start(model, q, v))
+    entries, start_rows, start_columns = patterns(model, model.terms(np.zeros(1), q, v))
     start_columns |= v != 0
     while True:
         sample = states.of(moving, moving)
         if read is not None:
             read.append(sample)
-        others, rows, columns = patterns(model, model.at(q, sample))
+        about = sample.about(q, model.scene.duration)
+        others, rows, columns = patterns(model, model.terms(*about))
         if steady is not None:
-            columns |= patterns(steady, steady.at(q, sample))[2]
+            columns |= patterns(steady, steady.terms(*about))[2]
         entries |= others
         found, driven = reached(model, entries, rows | start_rows, columns | start_columns)
         if np.array_equal(found, moving):
@@ -59,11 +60,6 @@ def _steady(model: Model) -> Model | None:
     return Model(model.scene.with_(load=loads))
 
 
-def at_start(model: Model, q: np.ndarray, v: np.ndarray) -> Terms:
-    """Return the terms at t = 0, for one state, in the form of ``Model.along``."""
-    return model.along(np.zeros(1), q.reshape(1, -1), v.reshape(1, -1))
-
-
 def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return which entries (m, 12) of the Jacobian are nonzero at any of k states.
 
@@ -75,7 +71,7 @@ def patterns(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.nda
 
 def nonzero(model: Model, terms: Terms) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return ``patterns`` of each state: entries (…, m, 12), rows (…, m) and columns (…, n)."""
-    entries: np.ndarray = (terms.jacobian != 0) & model.structure.of_bodies
+    entries: np.ndarray = (terms.blocks != 0) & model.structure.of_bodies
     rows: np.ndarray = (terms.gamma != 0) | (terms.phi != 0) | (terms.nu != 0)
     return entries, rows, np.not_equal(terms.force, 0)
 

@@ -20,10 +20,9 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     """
     model = Model(without_armatures(scene))
     q, v, a = coordinates(model, motion)
-    terms = model.along(motion.times, q, v)
-    blocks = model.dense(terms.jacobian)
-    velocity = np.einsum("kmn,kn->km", blocks, v) - terms.nu
-    acceleration = None if a is None else np.einsum("kmn,kn->km", blocks, a) - terms.gamma
+    terms = model.terms(motion.times, q, v)
+    velocity = np.einsum("kmn,kn->km", terms.jacobian, v) - terms.nu
+    acceleration = None if a is None else np.einsum("kmn,kn->km", terms.jacobian, a) - terms.gamma
     model.release()
     return Violation(
         _largest(terms.phi), _largest(velocity), None if acceleration is None else _largest(acceleration)
@@ -36,7 +35,7 @@ def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarr
     model = Model(without_armatures(scene))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
-    found = determined_components(model, q, model.blocks_along(motion.times, q))
+    found = determined_components(model, q, model.terms(motion.times, q).blocks)
     model.release()
     return found
 

@@ -163,7 +163,7 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
 
     Time is scaled by the velocities v (n,), and left out if nothing depends on it.
     """
-    at_rest = model.terms(t, q, np.zeros(model.n))
+    at_rest = model.terms(t, q)
     lengths = np.column_stack([np.ones((model.nb, 3)), np.tile(1.0 / model.data.lengths[:, None], 3)]).ravel()
     rows = row_lengths(at_rest.jacobian * lengths)
     driven = bool(np.any(at_rest.nu) or np.any(at_rest.gamma))
@@ -192,7 +192,7 @@ def _rates(model: Model, t: float, q: np.ndarray, directions: np.ndarray) -> np.
     count, v, time = len(directions), directions[:, :-1], directions[:, -1:]
     velocities = np.concatenate([v, -v, np.zeros((1, model.n))])
     states = len(velocities)
-    gamma = model.along(np.full(states, t), np.tile(q, (states, 1)), velocities).gamma
+    gamma = model.terms(np.full(states, t), np.tile(q, (states, 1)), velocities).gamma
     there, back, at_rest = gamma[:count], gamma[count:-1], gamma[-1]
     return (there + back) / 2 - at_rest + time * (there - back) / 2 + time**2 * at_rest
 

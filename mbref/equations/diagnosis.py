@@ -128,7 +128,7 @@ def _determined(model: Model, start: Start) -> dict[str, tuple[str, ...]]:
     """Return for each joint the names of the components of its reaction that equilibrium determines at t =
     0."""
     q = start.q.reshape(1, model.nb, 7)
-    found = determined_components(model, q, model.blocks_along(np.zeros(1), q))
+    found = determined_components(model, q, model.terms(np.zeros(1), q).blocks)
     return {name: tuple(np.array(COMPONENTS)[mask[0]].tolist()) for name, mask in found.items()}
 
 
@@ -138,13 +138,12 @@ def _counts(model: Model, rank: int) -> Counts:
 
 
 def _redundancy(model: Model, start: Start) -> Redundancy:
-    terms = model.blocks(0.0, start.q, np.zeros(model.n))
-    return Redundancy(model.sparse(terms.jacobian))
+    return Redundancy(model.structure.sparse(model.terms(0.0, start.q).blocks))
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
     """Return Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
-    jacobian = model.terms(t, q, np.zeros(model.n)).jacobian
+    jacobian = model.terms(t, q).jacobian
     return jacobian / row_lengths(jacobian)[:, None]
 
 

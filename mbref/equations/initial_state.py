@@ -83,7 +83,7 @@ def _alone(model: Model, t: float = 0.0) -> Alike:
         mass=model.mass[None],
         length=np.array([model.length]),
         bodies=[model.bodies],
-        terms=lambda places, q, v: model.along(np.full(len(q), t), q, v),
+        terms=lambda places, q, v: model.terms(np.full(len(q), t), q, v),
         model_of=lambda place: model,
     )
 
@@ -106,7 +106,7 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     by_body = np.ones((len(q), model.nb, 2, 3))
     by_body[:, :, 1] = 1 / scenes.length[:, None, None]
     scale = by_body.reshape(v.shape)
-    jacobian = terms.jacobian if model.m > LARGE else model.dense(terms.jacobian) * scale[:, None]
+    jacobian = terms.blocks if model.m > LARGE else terms.jacobian * scale[:, None]
     rates = map(Rates, v, given, terms.nu, scale, jacobian)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
     return [faults.get(k) or _start(scenes, k, *state) for k, state in states]
@@ -224,7 +224,7 @@ def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray,
         return q, first.phi, first
     for _ in range(MOST_ITERATIONS):
         places = places[open_]
-        x = _least_changes(scenes, places, terms.jacobian[open_], -terms.phi[open_])
+        x = _least_changes(scenes, places, terms.blocks[open_], -terms.phi[open_])
         moves = np.abs(x).max(axis=1) >= 1e-15
         places, moved = places[moves], q[places[moves]]
         displace_all(moved, x[moves], np.zeros(q.shape[1]))
@@ -243,9 +243,9 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
     mass = np.where(mass > 0, mass, 1.0)
     if model.m > LARGE:
         rows = zip(blocks, mass, rhs, strict=True)
-        return np.array([MinimumNorm(model.sparse(block), own)(b) for block, own, b in rows])
+        return np.array([MinimumNorm(model.structure.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
-    unit, rhs = _unit_rows(model.dense(blocks) * inverse_root[:, None], rhs)
+    unit, rhs = _unit_rows(model.structure.dense(blocks) * inverse_root[:, None], rhs)
     return inverse_root * [least_norm(*each, RANK_TOLERANCE)[0] for each in zip(unit, rhs, strict=True)]
 
 
@@ -303,7 +303,7 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
     from scipy.sparse import csr_array, vstack
 
     model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates
-    jacobian = model.sparse(blocks)
+    jacobian = model.structure.sparse(blocks)
     x = MinimumNorm(jacobian, scale**-2)(nu)
     off = np.abs(jacobian @ x - nu)
     if np.max(off) > CONTRADICTED * np.max(np.abs(x / scale)):

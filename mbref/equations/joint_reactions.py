@@ -51,7 +51,7 @@ class Balance:
         """Return the model of the scene, and its constraint Jacobian Φ_q as blocks (k samples, m rows, 12
         columns of two bodies)."""
         model = self._model or Model(self._scene)
-        blocks = model.blocks_along(self._times, self._q)
+        blocks = model.terms(self._times, self._q).blocks
         model.release()
         return model, blocks
 
@@ -180,7 +180,7 @@ def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray
     The argument is Φ_q as blocks (k, m, 12). Samples with fewer null vectors than other samples have zeros in
     place of the missing vectors.
     """
-    jacobian = model.dense(blocks)
+    jacobian = model.structure.dense(blocks)
     lengths = row_lengths(jacobian)
     left, values, _ = np.linalg.svd(jacobian / lengths[..., None])
     rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)

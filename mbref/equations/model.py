@@ -6,9 +6,10 @@ converted to the bodies' own frames.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from mbref import rotations
 from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.packing import Packs, row_of
-from mbref.equations.random_states import RandomStates
+from mbref.equations.structure import Structure
 from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
 from mbref.kernels.memory_pool import Pooled, acquire, copied, release
 from mbref.kernels.named_memory import allocate
@@ -24,20 +25,30 @@ from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
 from mbref.scene import Scene
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 
 @dataclass(frozen=True)
 class Terms:
-    """The terms of Eqs. 1-4 at one state: n = 6 nb velocities, m rows."""
+    """The terms of Eqs. 1-4 at states of any shape (…): n = 6 nb velocities, m rows.
 
+    An index selects states: ``terms[0]``.
+    """
+
+    structure: Structure
     mass: np.ndarray  # (n,) diagonal of M; 1 where the scene has no masses
-    jacobian: np.ndarray  # (m, n) Φ_q
-    phi: np.ndarray  # (m,) Φ, in metres or radians
-    nu: np.ndarray  # (m,) right-hand side of Φ_q q' = ν
-    gamma: np.ndarray  # (m,) right-hand side of Φ_q q'' = γ
-    force: np.ndarray  # (n,) g
+    blocks: np.ndarray  # (…, m, 12) Φ_q in the columns of both bodies of a row
+    phi: np.ndarray  # (…, m) Φ, in metres or radians
+    nu: np.ndarray  # (…, m) right-hand side of Φ_q q' = ν
+    gamma: np.ndarray  # (…, m) right-hand side of Φ_q q'' = γ
+    force: np.ndarray  # (…, n) g
+
+    def __getitem__(self, place: Any) -> Terms:
+        of_states = self.blocks, self.phi, self.nu, self.gamma, self.force
+        return Terms(self.structure, self.mass, *(values[place] for values in of_states))
+
+    @functools.cached_property
+    def jacobian(self) -> np.ndarray:
+        """Φ_q (…, m, n)."""
+        return self.structure.dense(self.blocks)
 
 
 class Model:
@@ -45,6 +56,7 @@ class Model:
     is modelled.
 
     ``entry_columns`` (m, 12) has the columns of the blocks' entries; columns of the fixed frame are ≥ n.
+    ``to_local`` (nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames of the bodies.
     A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
@@ -56,9 +68,11 @@ class Model:
         self.nb, self.n, self.kinematic = packs.nb, 6 * packs.nb, packs.kinematic
         self.structure, self.data = packs.structure, row_of(packs.data, place)
         self.m, self.row_joint = len(self.structure.row_joint), self.structure.row_joint
-        self.entry_columns = self.structure.entry_columns
+        self.entry_columns, self.sizes = self.structure.entry_columns, self.structure.sizes
+        self.has_angles, self.closed_loops = self.structure.has_angles, self.structure.closed_loops
         self.mass, self.principal = packs.mass[place], packs.principal[place]
         self.length, self.orientation = float(packs.length[place]), packs.orientation[place]
+        self.to_local = packs.to_local[place]
         self._pooled: Pooled | None = None
 
     @property
@@ -74,11 +88,6 @@ class Model:
         if self._pooled is not None:
             release(self._pooled)
             self._pooled = None
-
-    @property
-    def sizes(self) -> dict[str, int]:
-        """Sizes of the model's memory (see ``kernels.layout``)."""
-        return self.structure.sizes
 
     def equations(
         self, sizes: Mapping[str, int] | None = None, data: SceneData | None = None, **system: Any
@@ -112,76 +121,29 @@ class Model:
         equations.system.mass[:] = self.mass
         equations.system.inverse_root[:] = self._packs.inverse_root[self._place]
 
-    @property
-    def has_angles(self) -> bool:
-        """True if a load about a joint's axis or a coupling unwraps its angle."""
-        return self.structure.has_angles
-
     def start(self) -> np.ndarray:
         """Coordinates (7 nb,) of the scene's poses, for principal frames."""
         return self._packs.start()[self._place]
 
-    def terms(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Return the terms at time t (s), coordinates q (7 nb,), velocities v (6 nb,)."""
-        found = self.blocks(t, q, v)
-        return replace(found, jacobian=self.dense(found.jacobian))
+    def terms(self, times: float | np.ndarray, q: np.ndarray, v: np.ndarray | None = None) -> Terms:
+        """Return the terms at a time (s), coordinates q (7 nb,) and velocities v (6 nb,), by default at rest.
 
-    def dense(self, blocks: np.ndarray) -> np.ndarray:
-        """Return Φ_q (…, m, n) from its blocks (…, m, 12)."""
-        matrix, rows = np.zeros((*blocks.shape[:-1], self.nb + 1, 6)), self.structure.rows
-        for side in range(self.structure.sides):
-            matrix[..., rows, self.structure.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
-        return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], self.n)
-
-    def along(self, times: np.ndarray, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Return the terms at k states, with the blocks (k, m, 12) instead of Jacobians; mass (n,) is
-        constant.
-
-        Arguments are times (k,) in s, q (k, 7 nb) and v (k, n).
+        For k times (k,), with q (k, 7 nb) and v (k, 6 nb), return the terms at k states.
         """
-        count = len(times)
-        blocks, rows = np.empty((count, self.entry_columns.size)), np.empty((count, 3 * self.m))
-        forces = np.empty((count, self.n))
-        evaluate_along(times, q, v, blocks, rows, forces, self.memory.packed.argument)
-        phi, nu, gamma = (rows[:, k * self.m : (k + 1) * self.m] for k in range(3))
-        return Terms(self.mass, blocks.reshape(count, *self.entry_columns.shape), phi, nu, gamma, forces)
-
-    def sparse(self, blocks: np.ndarray) -> csr_array:
-        """Return Φ_q (m, n) from its blocks (m, 12), as a sparse matrix."""
-        from scipy.sparse import csr_array
-
-        columns = self.entry_columns
-        row, entry = np.nonzero((blocks != 0) & (columns < self.n))
-        return csr_array((blocks[row, entry], (row, columns[row, entry])), shape=(self.m, self.n))
-
-    def blocks(self, t: float, q: np.ndarray, v: np.ndarray) -> Terms:
-        """Return the terms with the blocks (m, 12) of both bodies' columns in place of the Jacobian."""
-        at = np.ascontiguousarray(q).reshape(1, -1), np.ascontiguousarray(v).reshape(1, -1)
-        found = self.along(np.array([float(t)]), *at)
-        return Terms(self.mass, found.jacobian[0], found.phi[0], found.nu[0], found.gamma[0], found.force[0])
-
-    def blocks_along(self, times: np.ndarray, q: np.ndarray) -> np.ndarray:
-        """Return blocks (k, m, 12) of Φ_q at coordinates q (k, nb, 7) at times (k,) in s."""
-        return self.along(times, q.reshape(len(q), 7 * self.nb), np.zeros((len(q), self.n))).jacobian
-
-    def at(self, q: np.ndarray, states: RandomStates) -> Terms:
-        """Return ``along`` at states displaced from q (7 nb,); times are fractions of the duration."""
-        moved = all_displaced(q, states.displacement)
-        return self.along(states.part * self.scene.duration, moved, states.velocity)
-
-    @property
-    def closed_loops(self) -> int:
-        """Number of independent loops of bodies and joints; without a loop no position is singular."""
-        return self.structure.closed_loops
+        t = np.array(times, dtype=float, ndmin=1)
+        q = np.ascontiguousarray(q, dtype=float).reshape(t.size, 7 * self.nb)
+        v = np.zeros((t.size, self.n)) if v is None else np.ascontiguousarray(v).reshape(t.size, self.n)
+        blocks, rows = np.empty((t.size, self.entry_columns.size)), np.empty((t.size, 3 * self.m))
+        forces = np.empty((t.size, self.n))
+        evaluate_along(t, q, v, blocks, rows, forces, self.memory.packed.argument)
+        blocks = blocks.reshape(t.size, *self.entry_columns.shape)
+        phi, nu, gamma = np.split(rows, 3, axis=1)
+        found = Terms(self.structure, self.mass, blocks, phi, nu, gamma, forces)
+        return found if np.ndim(times) else found[0]
 
     def index(self, name: str) -> int:
         """Return the index of a body, ``nb`` for the fixed frame."""
         return self._packs.index[name]
-
-    @property
-    def to_local(self) -> np.ndarray:
-        """Rotations (nb + 1, 3, 3) from the world at t = 0 to the principal frames of the bodies."""
-        return self._packs.to_local[self._place]
 
     def direction(self, name: str, vector: Sequence[float]) -> np.ndarray:
         """Return a world vector (3,) at t = 0 in the principal frame of a body."""

@@ -10,6 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbref.equations.model import all_displaced
+
 
 class RandomStates(NamedTuple):
     """Random states: k times as fractions of the duration, displacements (k, n) of the coordinates, and
@@ -24,6 +26,10 @@ class RandomStates(NamedTuple):
         nonzero."""
         velocity = np.zeros_like(self.velocity) if moving is None else moving * self.velocity
         return RandomStates(self.part, displacing * self.displacement, velocity)
+
+    def about(self, q: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return times (k,) in s, coordinates (k, 7 nb) displaced from q (7 nb,), and velocities (k, n)."""
+        return self.part * duration, all_displaced(q, self.displacement), self.velocity
 
 
 @lru_cache(maxsize=64)

@@ -83,12 +83,12 @@ def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:
     for reduction in known:
         terms = reduction.decisions.terms(model, start)
         if reduction.decisions.agrees(model, start, terms):
-            return reduction, terms.jacobian[0, 0]
+            return reduction, terms.blocks[0, 0]
     found = _found(model, start)
     if model.structure not in _known and len(_known) >= MOST_STRUCTURES:
         _known.pop(next(iter(_known)), None)
     _known[model.structure] = [found, *known][:MOST_OF_ONE]
-    return found, model.blocks(0.0, start.q, start.v).jacobian
+    return found, model.terms(0.0, start.q, start.v).blocks
 
 
 def _found(model: Model, start: Start) -> Reduction:

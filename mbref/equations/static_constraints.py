@@ -132,7 +132,7 @@ def held_by_rows(
     can_rest, asked = moving & (model.mass > 0), asked or Asked()
     held, left = _found(model, start.q, moving, entries, can_rest, asked)
     asked.shared = np.flatnonzero(_bears_on(model, entries, are_held(held, model.n)))
-    blocks = model.blocks(0.0, start.q, start.v).jacobian
+    blocks = model.terms(0.0, start.q, start.v).blocks
     redundant = asked.shared[are_redundant(model, blocks, asked.shared)]
     shared = _columns_of(model, entries, redundant) & are_held(held, model.n)
     if shared.any():
@@ -157,8 +157,8 @@ def _found(
     while resting.any():
         states = random_states(2, STATES, model.n).of(moving & ~resting)
         asked.read.append(states)
-        terms = model.at(q, states)
-        samples, driven = terms.jacobian, (terms.nu != 0).any(axis=0)
+        terms = model.terms(*states.about(q, model.scene.duration))
+        samples, driven = terms.blocks, (terms.nu != 0).any(axis=0)
         left = entries & (samples != 0).any(axis=0)
         rows, held = _Rows(model, samples, left, driven), []
         for bearing, columns, chosen in _tries(rows, moving, can_rest):
@@ -195,9 +195,9 @@ def are_redundant(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndar
 def _null_shares(model: Model, blocks: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return the components (…, r) of r rows in the left null space of Jacobians with blocks (…, m, 12)."""
     if model.m <= LARGE:
-        return dense_null_shares(model.dense(blocks), rows)
+        return dense_null_shares(model.structure.dense(blocks), rows)
     every = blocks.reshape(-1, *blocks.shape[-2:])
-    found = [null_shares(MinimumNorm(model.sparse(one), np.ones(model.n)), rows) for one in every]
+    found = [null_shares(MinimumNorm(model.structure.sparse(one), np.ones(model.n)), rows) for one in every]
     return np.array(found).reshape(*blocks.shape[:-2], rows.size)
 
 

@@ -56,8 +56,7 @@ class StructuralDecisions:
     def terms(self, model: Model, start: Start) -> Terms:
         """Return the terms (1, k, …) of a scene at ``states``."""
         part, places, velocities = self.states(start.q[None], start.v[None])
-        found = model.along(part * model.scene.duration, places[0], velocities[0])
-        return Terms(*(value[None] for value in vars(found).values()))
+        return model.terms(part * model.scene.duration, places[0], velocities[0])[None]
 
     def which_agree(
         self, model: Model, q: np.ndarray, v: np.ndarray, mass: np.ndarray, terms: Terms
@@ -112,7 +111,7 @@ class StructuralDecisions:
         found = np.concatenate([one.reshape(*shape, -1) for one in nonzero(model, terms)], axis=2)
         found = found[:, :1] | _of_rounds(found[:, 1 : self._split], self._rounds[0])
         entries, acting = found[..., : model.entry_columns.size], found[..., model.entry_columns.size :]
-        redundant = are_redundant(model, terms.jacobian[:, 0], self._shared)
+        redundant = are_redundant(model, terms.blocks[:, 0], self._shared)
         decisive = [v != 0, q != 0, mass > 0, entries, *self._of_held(terms), redundant]
         joined = np.concatenate([answer.reshape(len(q), -1) for answer in decisive], axis=1)
         return Answers(joined, entries.reshape(*found.shape[:2], *model.entry_columns.shape), acting)
@@ -120,7 +119,7 @@ class StructuralDecisions:
     def _of_held(self, terms: Terms) -> list[np.ndarray]:
         """Return which active entries and rows are nonzero in each round, and which rows could keep columns
         at rest."""
-        samples, rounds = terms.jacobian[:, self._split :], self._rounds[1]
+        samples, rounds = terms.blocks[:, self._split :], self._rounds[1]
         left = _of_rounds((samples != 0) & self._entries, rounds)
         return [left, _of_rounds(terms.nu[:, self._split :] != 0, rounds), *self._trials.answers(samples)]
 

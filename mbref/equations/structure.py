@@ -7,12 +7,15 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from mbref.equations.joints import ROWS_OF
 from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, ANGLE, FORCE, SPRING
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 MOST_KEPT = 256  # largest number of cached structures
 
@@ -138,6 +141,21 @@ class Structure:
         on_body = self.anchored[:, None] == np.arange(self.nb)
         shares: np.ndarray = on_body / np.maximum(on_body.sum(axis=0), 1)
         return shares
+
+    def dense(self, blocks: np.ndarray) -> np.ndarray:
+        """Return Φ_q (…, m, n) from its blocks (…, m, 12)."""
+        matrix = np.zeros((*blocks.shape[:-1], self.nb + 1, 6))
+        for side in range(self.sides):
+            matrix[..., self.rows, self.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]
+        return matrix[..., : self.nb, :].reshape(*blocks.shape[:-1], 6 * self.nb)
+
+    def sparse(self, blocks: np.ndarray) -> csr_array:
+        """Return Φ_q (m, n) from its blocks (m, 12), as a sparse matrix."""
+        from scipy.sparse import csr_array
+
+        row, entry = np.nonzero((blocks != 0) & self.of_bodies)
+        shape = len(self.rows), 6 * self.nb
+        return csr_array((blocks[row, entry], (row, self.entry_columns[row, entry])), shape=shape)
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)

@@ -25,7 +25,7 @@ def is_at_dead_position(run: Run) -> bool:
     if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
         return False
     now, length = float(run.memory.loop.clock.time), model.length
-    terms = model.terms(now, state.coordinates, np.zeros(model.n))
+    terms = model.terms(now, state.coordinates)
     jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
     velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDING)[0]
     rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)

@@ -62,7 +62,7 @@ def _rank(run: Run, t: float, q: np.ndarray) -> int:
 def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return singular values and left singular vectors (m, m) of Φ_q with unit rows and columns scaled to
     unit length."""
-    terms, model = run.model.terms(t, q, np.zeros(run.model.n)), run.model
+    terms, model = run.model.terms(t, q), run.model
     jacobian = terms.jacobian * model.data.metric_root
     left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None])
     return np.concatenate([values, np.zeros(model.m)]), left

@@ -37,7 +37,7 @@ def ranks_at(
     """
     size = factor.symbolic.row.size
     if blocks is None:
-        blocks = model.blocks(0.0, q, np.zeros(model.n)).jacobian
+        blocks = model.terms(0.0, q).blocks
     if size > MOST_ROWS:
         return NO_RANKS._replace(rank=size if are_clear(model, blocks, factor) else 0)
     (found,) = all_ranks(model, blocks[None], model.data.metric_root[None], factor.symbolic, tolerance)
@@ -54,7 +54,7 @@ def all_ranks(
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
     if rows.size > MOST_ROWS or not rows.size:
         return [NO_RANKS] * len(blocks)
-    jacobian = model.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]
+    jacobian = model.structure.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]
     every = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None], compute_uv=False)
     return [_ranks(values, tolerance) for values in every]
 

@@ -23,7 +23,7 @@ SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
 
 def violation(scene: Scene) -> float:
     model = Model(scene.with_(driver=()))
-    return float(np.abs(model.blocks(0.0, model.start(), np.zeros(model.n)).phi).max())
+    return float(np.abs(model.terms(0.0, model.start()).phi).max())
 
 
 def length(scene: Scene, first: str, second: str) -> float:

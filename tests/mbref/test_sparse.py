@@ -284,5 +284,5 @@ def test_pivots_tell_that_many_rows_are_independent(stabilisation):
 
 def test_pivots_tell_that_rows_are_redundant():
     run = start_run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
-    blocks = run.model.blocks(0.0, run.start.q, np.zeros(run.model.n)).jacobian
+    blocks = run.model.terms(0.0, run.start.q).blocks
     assert not are_clear(run.model, blocks, run.memory.factor)
