@@ -18,15 +18,14 @@ from mbref.crossing import Crossing
 from mbref.ensembles.candidates import Candidates, candidates_of
 from mbref.ensembles.parameters import Parameters
 from mbref.equations.initial_state import LARGE
-from mbref.equations.joint_reactions import Balance
+from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import motion_of
 from mbref.kernels.layout import Counts
 from mbref.kernels.memory_pool import SavedNumbers
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.comparison import may_leave
-from mbref.simulation.crossings import Crossings
-from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, reactions_of, report_of
+from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, lazy_crossings, report_of
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import NEARLY, Run
 from mbref.stepping.singular_start import begins_at_rest, begins_in_motion
@@ -64,7 +63,6 @@ class BatchResult(NamedTuple):
         """Return index and motion of each run; ``scenes`` are all scenes of the batch."""
         for k, place in enumerate(self.places):
             poses = {name: array[k] for name, array in self.poses.items()}
-            balance = Balance(scenes[place], self.times, self.coordinates[k], self.multipliers[k])
             yield (
                 place,
                 Motion(
@@ -72,7 +70,7 @@ class BatchResult(NamedTuple):
                     mechanism=scenes[place],
                     times=self.times,
                     **poses,
-                    **reactions_of(balance),
+                    **lazy_reactions(scenes[place], self.times, self.coordinates[k], self.multipliers[k]),
                     outcome=OUTCOMES[DONE],
                     t_end=float(self.times[-1]),
                     message=self.messages[k],
@@ -140,7 +138,7 @@ class Batch:
                 self._keep(k)
                 completed.append(k)
                 if run.crossings:
-                    self._crossings[k] = Crossings(self._candidates.model(k), run.crossings)
+                    self._crossings[k] = lazy_crossings(self._candidates.packs.scenes[k], run.crossings)
         return completed
 
     def result(self, places: list[int], seconds: float) -> BatchResult:

@@ -12,7 +12,6 @@ from mbref.ensembles.evaluations import Evaluations
 from mbref.ensembles.parameters import parameters_of
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.initial_state import Start
-from mbref.equations.model import Model
 from mbref.equations.packing import Packs
 from mbref.equations.reduction import Reduction
 from mbref.kernels.layout import Memory
@@ -35,10 +34,6 @@ class Candidates(NamedTuple):
     starts: dict[int, Start]
     ranks: list[Ranks]
     fit: list[int]
-
-    def model(self, place: int) -> Model:
-        """Return the model of the scene with the given index."""
-        return Model(self.packs.scenes[place], self.packs, place)
 
     def parameters(self, run: Run, memory: Memory) -> list[tuple[Any, ...]]:
         """Return the arrays of a run's memory in which the scenes differ, each with the values of all

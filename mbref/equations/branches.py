@@ -46,24 +46,12 @@ class Branches(NamedTuple):
 
 class Passed(NamedTuple):
     """A crossing at a time (s): coordinates (7 nb,), velocities (n,) on the smooth branch, and the branch
-    taken."""
+    taken, from 1."""
 
     time: float
     coordinates: np.ndarray
     velocities: np.ndarray
     taken: int
-
-
-class SingularPosition(NamedTuple):
-    """A crossing at a time (s): coordinates (7 nb,), velocities (b, n) of the branches, and the number of the
-    taken branch. The first branch is the smooth branch; ``taken`` counts from 1.
-    """
-
-    time: float
-    coordinates: np.ndarray
-    velocities: np.ndarray
-    taken: int
-    sentence: str
 
 
 class Fit(NamedTuple):
@@ -301,14 +289,13 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
     return u[:-1] * np.sqrt(energy / own) * (1.0 if along >= 0 else -1.0)
 
 
-def singular_position(model: Model, passed: Passed) -> SingularPosition:
-    """Return the branches at a crossing that a motion passed.
+def branches_passed(model: Model, passed: Passed) -> Branches:
+    """Return the branches at a crossing that a motion passed; the first branch is the smooth branch.
 
     Raises ValueError if the requested branch does not exist.
     """
     t, q, v, taken = passed
-    large = model.m > MOST_ROWS
-    found = Branches(v[None], NOT_LOOKED_FOR) if large else branches(model, t, q, v)
+    found = Branches(v[None], NOT_LOOKED_FOR) if model.m > MOST_ROWS else branches(model, t, q, v)
     if taken > len(found.velocities):
         raise ValueError(f"branches: the crossing at t = {t:.6g} s has no branch {taken}: {found.sentence}")
-    return SingularPosition(t, q, found.velocities, taken, found.sentence)
+    return found

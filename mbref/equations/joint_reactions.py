@@ -2,14 +2,12 @@
 
 The part of a coupling's or an armature's row that acts along a joint's coordinate is part of its reaction,
 like a driver's row.
-
-Reactions are computed at first access, because this takes longer than a short run.
 """
 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +17,7 @@ from mbref.equations.model import Model
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import ANGLE
+from mbref.lazy import LazyMapping
 from mbref.scene import Scene
 
 MOST_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
@@ -26,75 +25,34 @@ OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination
 SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
 
-class Balance:
-    """Samples of a run for the balance of forces and reactions: times (k,) in s, q (k, nb, 7), λ (k, m)."""
+def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray) -> dict[str, Any]:
+    """Return ``reactions`` and ``open_reactions`` of a Motion, by joint, without those that are not computed.
 
-    def __init__(
-        self,
-        scene: Scene,
-        times: np.ndarray,
-        q: np.ndarray,
-        multipliers: np.ndarray,
-        model: Model | None = None,
-    ):
-        self._scene, self._times, self._q, self._multipliers = scene, times, q, multipliers
-        self._model = model
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Leave out the model, which another process makes again when needed."""
-        found = {**vars(self), "_model": None}
-        found.pop("_blocks", None)
-        return found
-
-    @functools.cached_property
-    def _blocks(self) -> tuple[Model, np.ndarray]:
-        """Return the model of the scene, and its constraint Jacobian Φ_q as blocks (k samples, m rows, 12
-        columns of two bodies)."""
-        model = self._model or Model(self._scene)
-        blocks = model.terms(self._times, self._q).blocks
-        model.release()
-        return model, blocks
-
-    def reactions(self) -> OfJoints | None:
-        """Reaction (k, 6) of each joint, see ``reactions``; None if the scene has no masses."""
-        return OfJoints(self._scene, self._reactions) if self._scene.has_mass() else None
-
-    def open_dimensions(self) -> OfJoints | None:
-        """Number of undetermined reaction components (k,) of each joint; None if they are not computed."""
-        found = self._scene.has_mass() and self._multipliers.shape[1] <= MOST_ROWS
-        return OfJoints(self._scene, self._open_dimensions) if found else None
-
-    def _reactions(self) -> dict[str, np.ndarray]:
-        model, blocks = self._blocks
-        return reactions(model, self._q, blocks, self._multipliers)
-
-    def _open_dimensions(self) -> dict[str, np.ndarray]:
-        return open_dimensions(*self._blocks)
+    Arguments are times (k,) in s, q (k, nb, 7) and λ (k, m).
+    """
+    if not scene.has_mass():
+        return {}
+    names = tuple(joint.name for joint in scene.joint)
+    found = {"reactions": LazyMapping(names, _reactions, scene, times, q, multipliers)}
+    if multipliers.shape[1] <= MOST_ROWS:
+        found["open_reactions"] = LazyMapping(names, _open_dimensions, scene, times, q)
+    return found
 
 
-class OfJoints(Mapping[str, np.ndarray]):
-    """Arrays by the names of a scene's joints, computed at first access."""
+def _reactions(
+    scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray
+) -> dict[str, np.ndarray]:
+    model = Model(scene)
+    blocks = model.terms(times, q).blocks
+    model.release()
+    return reactions(model, q, blocks, multipliers)
 
-    def __init__(self, scene: Scene, find: Callable[[], dict[str, np.ndarray]]):
-        self._names, self._find = tuple(joint.name for joint in scene.joint), find
 
-    @functools.cached_property
-    def _found(self) -> dict[str, np.ndarray]:
-        return self._find()
-
-    def __getitem__(self, name: str) -> np.ndarray:
-        if name not in self._names:
-            raise KeyError(name)
-        return self._found[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)
-
-    def __repr__(self) -> str:
-        return repr(self._found)
+def _open_dimensions(scene: Scene, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
+    model = Model(scene)
+    blocks = model.terms(times, q).blocks
+    model.release()
+    return open_dimensions(model, blocks)
 
 
 def reactions(

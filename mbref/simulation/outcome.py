@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from mbref import __version__
 from mbref.crossing import Crossing
-from mbref.equations.branches import Passed, tangents
+from mbref.equations.branches import Passed, branches_passed, tangents
 from mbref.equations.initial_state import Start
-from mbref.equations.joint_reactions import Balance
+from mbref.equations.joint_reactions import lazy_reactions
+from mbref.equations.model import Model
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
+from mbref.lazy import LazySequence
 from mbref.motion import Motion
-from mbref.simulation.crossings import Crossings
+from mbref.scene import Scene
 from mbref.simulation.dead_position import is_at_dead_position
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice
@@ -108,7 +112,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         **facts_of(run),
         times=times,
         **model.motion(q, v, a),
-        **reactions_of(Balance(run.scene, times, q, multipliers, model)),
+        **lazy_reactions(run.scene, times, q, multipliers),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status) if met is None else _met(run, met),
@@ -131,11 +135,6 @@ def facts_of(run: Run) -> dict[str, Any]:
         },
         "bodies": tuple(body.name for body in run.scene.body),
     }
-
-
-def reactions_of(balance: Balance) -> dict[str, Any]:
-    """Return the fields of a Motion for the joint reactions."""
-    return {"reactions": balance.reactions(), "open_reactions": balance.open_dimensions()}
 
 
 def cost_of(seconds: float, built: float, counts: Sequence[int]) -> Cost:
@@ -166,10 +165,30 @@ def _crossings(run: Run, met: Met | None) -> Sequence[Crossing] | None:
     None for a method that does not detect singular positions.
     """
     if met is not None:
-        return Crossings(run.model, [Passed(met.time, met.coordinates, met.velocities, NONE_TAKEN)])
-    if not run.method.stabilisation.projects:
-        return None
-    return Crossings(run.model, run.crossings) if run.crossings else ()
+        return lazy_crossings(run.scene, [Passed(met.time, met.coordinates, met.velocities, NONE_TAKEN)])
+    return lazy_crossings(run.scene, run.crossings) if run.method.stabilisation.projects else None
+
+
+def lazy_crossings(scene: Scene, passed: Sequence[Passed]) -> Sequence[Crossing]:
+    """Return the singular positions that a run passed; their branches are computed at first access."""
+    return LazySequence(range(len(passed)), _with_branches, scene, passed) if passed else ()
+
+
+def _with_branches(scene: Scene, passed: Sequence[Passed]) -> tuple[Crossing, ...]:
+    """Return singular positions in the scene's frames."""
+    model = Model(scene)
+    found = tuple(_with_branches_of(model, one) for one in passed)
+    model.release()
+    return found
+
+
+def _with_branches_of(model: Model, passed: Passed) -> Crossing:
+    velocities, sentence = branches_passed(model, passed)
+    v = velocities.reshape(len(velocities), model.nb, 6)
+    q = np.broadcast_to(passed.coordinates.reshape(-1, 7), (*v.shape[:2], 7))
+    motion = model.motion(q, v, np.zeros_like(v))
+    place = motion["position"][0], motion["orientation"][0], motion["velocity"], motion["angular_velocity"]
+    return Crossing(passed.time, *place, passed.taken, sentence)
 
 
 def _message(run: Run, status: int) -> str:

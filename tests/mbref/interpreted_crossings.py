@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mbref.equations.branches import Passed
+from mbref.equations.branches import Branches, Passed
 from mbref.kernels.compilation import PLAIN
 from mbref.kernels.layout import OK
 from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
@@ -259,8 +259,7 @@ def leaving(monkeypatch, times):
 def test_a_branch_is_entered_behind_the_crossing_and_before_the_next_sample(monkeypatch):
     velocities = np.array([[1.0, 0, 0, 0, 0, 0], [0.0, 2.0, 0, 0, 0, 0]])
     passed = Passed(1.0, np.zeros(7), velocities[0], 2)
-    crossing = SimpleNamespace(time=1.0, coordinates=np.zeros(7), velocities=velocities, taken=2)
-    monkeypatch.setattr(departure, "singular_position", lambda *_: crossing)
+    monkeypatch.setattr(departure, "branches_passed", lambda *_: Branches(velocities, "2 branches"))
     found, clock, taken = leaving(monkeypatch, [0.0, 1.0, 5.0])
     assert found.along_branch(passed) == PAUSED
     _, direction, ahead, (q, v) = taken[0]

@@ -21,7 +21,7 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        ["rotations", "records", "crossing", "trajectory", "error_estimate", "scene_services"],
+        ["rotations", "records", "lazy", "crossing", "trajectory", "error_estimate", "scene_services"],
         [
             "scene",
             "scene_bodies",

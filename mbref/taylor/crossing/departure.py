@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.equations.branches import SMOOTH, Passed, SingularPosition, singular_position
+from mbref.equations.branches import SMOOTH, Passed, branches_passed
 from mbref.equations.model import displaced, displacement
 from mbref.kernels.layout import OK
 from mbref.stepping.loop import PAUSED, UNDECIDED
@@ -39,15 +39,15 @@ class Departure:
     def along_branch(self, passed: Passed) -> int:
         """Continue along another branch than the smooth branch from a singular position that was just passed;
         return PAUSED or the failure status."""
-        crossing, run = singular_position(self._run.model, passed), self._run
-        velocities, clock = crossing.velocities[crossing.taken - 1], run.memory.loop.clock
-        clock.sample = int(np.searchsorted(run.times, crossing.time, side="right"))
+        run, clock = self._run, self._run.memory.loop.clock
+        velocities = branches_passed(run.model, passed).velocities[passed.taken - 1]
+        clock.sample = int(np.searchsorted(run.times, passed.time, side="right"))
         self._taylor.progress.completed = min(int(self._taylor.progress.completed), int(clock.sample))
         following = run.times[int(clock.sample) :]
         ahead = self._time_in_which(velocities)
-        ahead = min(ahead, 0.5 * float(following[0] - crossing.time) if following.size else np.inf)
-        moved = displaced(crossing.coordinates, ahead * velocities), velocities
-        return self._come_from(crossing, velocities, ahead, moved)
+        ahead = min(ahead, 0.5 * float(following[0] - passed.time) if following.size else np.inf)
+        moved = displaced(passed.coordinates, ahead * velocities), velocities
+        return self._come_from(passed, velocities, ahead, moved)
 
     def from_start(self, way: Leaving) -> int:
         """Continue from a singular position at t = 0; return PAUSED or the failure status."""
@@ -96,9 +96,7 @@ class Departure:
         across = terms.force - terms.mass * acceleration
         samples.multipliers[k] = np.linalg.lstsq(terms.jacobian.T, across, rcond=None)[0]
 
-    def _come_from(
-        self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
-    ) -> int:
+    def _come_from(self, start: Passed, velocities: np.ndarray, ahead: float, moved: State) -> int:
         """Continue at a time ``ahead`` (s) after a singular position that is left with velocities (n,).
 
         ``moved`` is a state near the motion, which is corrected. Return PAUSED or the failure status.
@@ -128,9 +126,7 @@ class Departure:
         began.coordinates[:], began.velocities[:] = memory.state.coordinates, memory.state.velocities
         began.angles[:] = memory.equations.angles
 
-    def _corrected(
-        self, start: Passed | SingularPosition, velocities: np.ndarray, ahead: float, moved: State
-    ) -> int:
+    def _corrected(self, start: Passed, velocities: np.ndarray, ahead: float, moved: State) -> int:
         """Correct the state until its series, evaluated backwards, gives the singular position with
         velocities (n,); return the status."""
         (q, v), state = moved, self._run.memory.state
