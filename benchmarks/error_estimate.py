@@ -22,7 +22,7 @@ from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series, exact_motion
 from crosscheck.judge.truth import truth_for
 from mbref import Limits, Scene, simulate
-from mbref.equations.degrees_of_freedom import undriven_freedoms
+from mbref.equations.diagnosis import undriven_freedoms
 from mbref.scene import Spherical, Spring, Translational
 from mbref.scenes import SCENES, find_scene
 from mbref.trajectory import Trajectory

@@ -77,7 +77,7 @@ class Mbref(Engine):
         return __version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        from mbref.equations.degrees_of_freedom import undriven_freedoms
+        from mbref.equations.diagnosis import undriven_freedoms
 
         if not scene.has_mass() and undriven_freedoms(scene) > 0:
             return Cannot(
@@ -98,7 +98,7 @@ class Mbref(Engine):
         return [Setting(family, {"rtol": rtol}) for rtol in TOLERANCES]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        from mbref.equations.degrees_of_freedom import undriven_freedoms
+        from mbref.equations.diagnosis import undriven_freedoms
         from mbref.simulation.simulate import why_no_code
 
         method = _method(family)

@@ -1,4 +1,4 @@
-"""Diagnosis of a scene: counts, rank, redundant rows, unique reactions, distance from singular."""
+"""Diagnosis of a scene: counts, degrees of freedom, redundant rows, unique reactions, singular values."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from mbref.equations.initial_state import LARGE, Start, consistent_start
+from mbref.equations.initial_state import LARGE, Start, consistent_start, solve_positions
 from mbref.equations.joint_reactions import determined_components
-from mbref.equations.model import Model
+from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
@@ -21,6 +21,7 @@ RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled J
 # weight of a row in a left null vector above which the row takes part in a redundancy
 UNIQUE_TOLERANCE = 1e-8
 UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
+PERTURBATION = 1e-2  # rad; rotation of the fastest body away from a singular start
 MOST_ROWS = 300  # rows; for more, a dense singular value decomposition takes more than about 0.1 s
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -81,6 +82,32 @@ def rank_at_start(model: Model, start: Start) -> int:
     if model.m > LARGE:
         return _redundancy(model, start).rank
     return rank_of(scaled_jacobian(model, 0.0, start.q))
+
+
+def undriven_freedoms(scene: Scene) -> int:
+    """Return the degrees of freedom that no driver prescribes, counted near the start if the start is
+    singular."""
+    model = Model(scene)
+    return freedoms_left(model, consistent_start(model))
+
+
+def freedoms_left(model: Model, start: Start) -> int:
+    """Return ``undriven_freedoms`` of a model with its start."""
+    freedoms = model.n - rank_at_start(model, start)
+    if freedoms == 0 or not model.scene.driver:
+        return freedoms
+    return model.n - rank_of(scaled_jacobian(model, *perturbed_state(model, start)))
+
+
+def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
+    """Return time and coordinates (7 nb,) at which the fastest body has turned by PERTURBATION."""
+    q, v = start.q, start.v
+    terms = model.terms(0.0, q, v)
+    acceleration = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=RANK_TOLERANCE)[0]
+    fastest = np.max(np.abs(v.reshape(-1, 6)[:, 3:]), initial=0.0)
+    t = min(1.0, PERTURBATION / fastest) if fastest > 0 else 1.0
+    q, _ = solve_positions(model, t, displaced(q, t * v + 0.5 * t * t * acceleration))
+    return t, q
 
 
 def diagnose(scene: Scene | str | Path) -> Diagnosis:

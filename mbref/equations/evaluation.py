@@ -5,7 +5,6 @@ from __future__ import annotations
 from mbref.equations.functions import select_pieces
 from mbref.equations.loads import forces
 from mbref.equations.primitives import constraints
-from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.kernels.compilation import INT, MATRIX, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import EQUATIONS
 from mbref.linear_algebra.vectors import copy
@@ -110,6 +109,28 @@ def right_hand_side(v, equations):
         for row in range(rhs.shape[0]):
             rhs[row] -= velocity_gain * rows.phi_rate[row]
             rhs[row] -= position_gain * rows.phi[row]
+
+
+@inlined
+def add_static_multipliers(static, system):
+    """Compute the multipliers of statically determined rows, which ``static_constraints`` eliminates.
+
+    They balance the forces on columns without acceleration.
+    """
+    blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
+    width = system.blocks.shape[1]
+    start, entry, column, first, other = (
+        static.start, static.entry, static.column, static.other_start, static.other,
+    )  # fmt: skip
+    for k in range(static.row.shape[0]):
+        value, square = 0.0, 0.0
+        for p in range(start[k], start[k + 1]):
+            balance, own = force[column[p]], blocks[entry[p]]
+            for o in range(first[p], first[p + 1]):
+                balance -= blocks[other[o]] * multipliers[other[o] // width]
+            value += own * balance
+            square += own * own
+        multipliers[static.row[k]] = value / square
 
 
 @kernel

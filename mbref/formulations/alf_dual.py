@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mbref.equations.static_multipliers import add_static_multipliers
+from mbref.equations.evaluation import add_static_multipliers
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import About, Formulation, Sparse
 from mbref.kernels.compilation import exchangeable, inlined, kernel

@@ -8,7 +8,6 @@ from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
-from mbref.stepping.samples import take_sample
 from mbref.stepping.singular_crossing import (
     keep_position,
     meets_singular_position,
@@ -21,6 +20,18 @@ DONE, VIOLATED, STEP_TOO_SMALL, TOO_MANY_STEPS, PAUSED, UNDECIDED, LEFT_MOTION, 
 # steps up to which tolerances are not reduced; steps after which the mean step length is known
 MANY, PACE = 1000.0, 50
 LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # least tolerance of a step; tolerance of first steps / rtol
+
+
+@kernel
+def take_sample(memory):
+    """Record state, accelerations and multipliers of the last evaluation."""
+    samples, state, system = memory.loop.samples, memory.state, memory.equations.system
+    k = memory.loop.clock.sample
+    copy(state.coordinates, samples.coordinates[k])
+    copy(state.velocities, samples.velocities[k])
+    copy(system.acceleration, samples.accelerations[k])
+    copy(system.multipliers, samples.multipliers[k])
+    memory.loop.clock.sample = k + 1
 
 
 @kernel

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
-from mbref.equations.degrees_of_freedom import freedoms_left
+from mbref.equations.diagnosis import freedoms_left
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
@@ -37,7 +37,7 @@ from mbref.stabilisation.base import Stabilisation
 from mbref.stepping.control import control_of
 from mbref.stepping.limits import Limits
 from mbref.stepping.preparation import prepare
-from mbref.stepping.ranks import NO_RANKS, Ranks, ranks_at
+from mbref.stepping.ranks import NO_RANKS, ranks_at
 
 NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
@@ -116,22 +116,19 @@ class Run:
     def _posed(self) -> tuple[Model, Start, Reduction | None]:
         """Return the scene as a model, its consistent start, and the reduction that the method needs.
 
-        None stands for all equations.
+        None stands for all equations. Raises SceneError if bodies lack a mass and drivers leave a degree of
+        freedom.
         """
         model = Model(self.scene)
         start = consistent_start(model)
-        self._check_freedoms(model, start)
+        if model.kinematic and freedoms_left(model, start) > 0:
+            raise SceneError(missing_masses(self.scene))
         if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
             return model, start, None
         q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
         start = replace(start, q=q[0], v=v[0])
         reduction, self._blocks = reduction_of(model, start)
         return model, at_rest(start, reduction.held), reduction
-
-    def _check_freedoms(self, model: Model, start: Start) -> None:
-        """Raise SceneError if bodies lack a mass and drivers leave a degree of freedom."""
-        if model.kinematic and freedoms_left(model, start) > 0:
-            raise SceneError(missing_masses(self.scene))
 
     def begin_again(self) -> None:
         """Reset the memory to the scene's parameters and the initial state."""
@@ -192,7 +189,7 @@ class Run:
         equations = model.equations(
             sizes,
             data,
-            options=formulation.packed_options(method.options_of(formulation)),
+            options=method.packed_options(formulation),
             scratch=packed(algebra.scratch(model.m, model.n, at_every_state)),
         )
         return Memory(
@@ -243,7 +240,7 @@ class Run:
         memory.state.coordinates[:] = self.start.q
         memory.state.velocities[:] = self.start.v
         self.ranks, settings = NO_RANKS, memory.equations.system.settings
-        ranks = self._ranks_at_start()
+        ranks = ranks_at(self.model, self.start.q, memory.factor, self.limits.rank_tolerance, self._blocks)
         settings.independent = ranks.rank == memory.pivots.size
         if self.method.stabilisation.projects:
             self.ranks = ranks
@@ -252,11 +249,6 @@ class Run:
             memory.watch.regular = freedoms <= (0 if self.scene.driver else 1)
             settings.nearly_dependent = self.ranks.least < NEARLY
             settings.rounding *= min(1.0, self.model.length)
-
-    def _ranks_at_start(self) -> Ranks:
-        """Return the rank of the constraint rows at the start, and the singular value that decides it."""
-        factor, tolerance = self.memory.factor, self.limits.rank_tolerance
-        return ranks_at(self.model, self.start.q, factor, tolerance, self._blocks)
 
 
 def missing_masses(scene: Scene) -> list[str]:

@@ -7,17 +7,16 @@ Multipliers balance the forces in the metric of a projection, so that bodies may
 
 from __future__ import annotations
 
-from mbref.equations.evaluation import evaluate
+from mbref.equations.evaluation import add_static_multipliers, evaluate
 from mbref.equations.functions import select_pieces
 from mbref.equations.primitives import constraints
-from mbref.equations.static_multipliers import add_static_multipliers
 from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.minimum_norm import find_least_multipliers
 from mbref.linear_algebra.sparse_cholesky import regularised_factor
 from mbref.linear_algebra.vectors import copy
 from mbref.stabilisation.projection import ALPHA
-from mbref.stepping.samples import take_sample
+from mbref.stepping.loop import take_sample
 from mbref.taylor.layout import SAMPLE, SERIES
 from mbref.taylor.loads import expand_functions
 from mbref.taylor.samples import find_poses, put_state

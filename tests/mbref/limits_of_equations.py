@@ -8,7 +8,6 @@ import numpy as np
 from mbref.equations import (
     active_coordinates,
     branches,
-    degrees_of_freedom,
     diagnosis,
     initial_state,
     joint_reactions,
@@ -59,18 +58,12 @@ def _(_):
     return flips(lambda value: diagnosis.rank_of(np.diag([1.0, value])) == 1, 0.98e-10, 1.02e-10)
 
 
-@check("equations.degrees_of_freedom RANK_TOLERANCE")
-def _(_):
-    least = lambda value: degrees_of_freedom._least(np.diag([1.0, value]), np.ones(2))[1] == 0.0  # noqa: E731
-    return flips(least, 0.98e-10, 1.02e-10)
-
-
-@check("equations.degrees_of_freedom PERTURBATION")
+@check("equations.diagnosis PERTURBATION")
 def _(_):
     model = Model(pendulum(rate=5.0))
     start = initial_state.consistent_start(model)
     fastest = np.abs(start.v.reshape(-1, 6)[:, 3:]).max()
-    return near(degrees_of_freedom.perturbed_state(model, start)[0], 1e-2 / fastest)
+    return near(diagnosis.perturbed_state(model, start)[0], 1e-2 / fastest)
 
 
 @check("equations.active_coordinates STILL")

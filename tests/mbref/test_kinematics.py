@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbref.equations.degrees_of_freedom import undriven_freedoms
+from mbref.equations.diagnosis import undriven_freedoms
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.scene import Driver, SceneError
