@@ -8,17 +8,10 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
 from mbref.kernels.compilation import Exchangeable
-from mbref.kernels.layout import Counts, Settings, SparseFactor, System
-from mbref.kernels.named_memory import Packed, allocate, packed
-from mbref.kernels.records import record
-from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
-
-
-class NoOptions(NamedTuple):
-    """A formulation without numbers of its own."""
+from mbref.kernels.layout import SparseFactor
+from mbref.kernels.named_memory import allocate
+from mbref.kernels.records import NoNumbers
 
 
 class About(NamedTuple):
@@ -45,10 +38,6 @@ class LinearAlgebra(ABC):
     def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
         """Return the kernel's memory for m rows, n velocities and a sparse factor if one is used."""
 
-    @abstractmethod
-    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
-        """Return memory of the sparse factor of one dense Jacobian (m, n), if one is used."""
-
 
 @dataclass(frozen=True)
 class Dense(LinearAlgebra):
@@ -62,9 +51,6 @@ class Dense(LinearAlgebra):
 
     def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
         return allocate(self.memory, {"m": m, "n": n})
-
-    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
-        return None
 
 
 @dataclass(frozen=True)
@@ -81,12 +67,6 @@ class Sparse(LinearAlgebra):
 
     def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
         return factor
-
-    def factor_of(self, jacobian: np.ndarray) -> SparseFactor | None:
-        row, column = np.nonzero(jacobian)
-        entry = row * jacobian.shape[1] + column
-        everything = np.ones(jacobian.shape[1], dtype=bool)
-        return sparse_factor(symbolic_factorisation(row, column, entry, everything))
 
 
 @dataclass(frozen=True)
@@ -111,44 +91,10 @@ class Formulation:
     needs_independent_columns: bool = False
     # True if dependent rows must not be left out, because the formulation selects or weights rows itself
     needs_all_rows: bool = False
-    numbers: type = NoOptions  # record of the method's own numbers with their defaults
+    numbers: type = NoNumbers  # record of the method's own numbers with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
 
     @cached_property
     def options(self) -> Mapping[str, float]:
         """Names and defaults of the method's numbers."""
         return self.numbers()._asdict()
-
-    def packed_options(self, options: Mapping[str, float]) -> Packed | None:
-        """Return the method's numbers for its kernel."""
-        if not self.options:
-            return None
-        return packed(record(self.numbers(**{**self.options, **options})))
-
-    def solve(
-        self, mass: np.ndarray, jacobian: np.ndarray, force: np.ndarray, gamma: np.ndarray,
-        rank_tolerance: float = 1e-10, **options: float,
-    ) -> tuple[int, np.ndarray, np.ndarray]:  # fmt: skip
-        """Return (status, q̈ (n,), λ (m,)) of one system; mass (n,) is the diagonal of M, jacobian (m, n).
-
-        Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
-        """
-        m, n = jacobian.shape
-        numbers, factor = np.ascontiguousarray(jacobian, dtype=float), self.linear_algebra.factor_of(jacobian)
-        mass = np.ascontiguousarray(mass, dtype=float)
-        system = System(
-            mass=mass,
-            inverse_root=1 / np.sqrt(np.where(mass > 0, mass, 1.0)),
-            force=np.ascontiguousarray(force, dtype=float),
-            acceleration=np.zeros(n),
-            blocks=numbers,
-            jacobian=numbers,
-            rhs=np.ascontiguousarray(gamma, dtype=float),
-            multipliers=np.zeros(m),
-            settings=record(Settings(rank_tolerance=rank_tolerance)),
-            counts=record(Counts()),
-            options=self.packed_options(options),
-            scratch=packed(self.linear_algebra.scratch(m, n, factor)),
-        )
-        status: Any = self.accelerate.callable(packed(system).argument)
-        return status, system.acceleration, system.multipliers

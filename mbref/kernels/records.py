@@ -5,11 +5,15 @@ from __future__ import annotations
 import functools
 import operator
 import typing
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 Schema = TypeVar("Schema")
+
+
+class NoNumbers(NamedTuple):
+    """Schema of a part of a method without numbers of its own."""
 
 
 class Numbers(np.void):  # type: ignore[misc]  # NumPy's stubs call it final

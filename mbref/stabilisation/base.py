@@ -6,13 +6,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 from mbref.kernels.compilation import Exchangeable
-
-
-class NoOptions(NamedTuple):
-    """A stabilisation without numbers of its own."""
+from mbref.kernels.records import NoNumbers
 
 
 @dataclass(frozen=True)
@@ -28,13 +24,12 @@ class Stabilisation:
     """
 
     name: str
-    source: str  # equations of the paper, or the reference
     enter: Exchangeable
     rates: Exchangeable
     rates_with_outputs: Exchangeable
     accept: Exchangeable
     memory: type | None = None
-    numbers: type = NoOptions  # the method's own numbers, a record with their defaults
+    numbers: type = NoNumbers  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
     projects: bool = False  # True if every accepted state satisfies the constraints
     watches_rank: bool = False  # True if a run ends at a singular position

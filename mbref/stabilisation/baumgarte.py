@@ -18,6 +18,4 @@ def _feedback(options: Mapping[str, float]) -> tuple[float, float]:
     return 2 * options["alpha"], options["beta"] ** 2
 
 
-BAUMGARTE = Stabilisation(
-    "baumgarte", "Eq. 9", enter, rates, rates, accept, numbers=Options, feedback=_feedback
-)
+BAUMGARTE = Stabilisation("baumgarte", enter, rates, rates, accept, numbers=Options, feedback=_feedback)

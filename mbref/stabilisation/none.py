@@ -3,4 +3,4 @@
 from mbref.stabilisation.all_coordinates import accept, enter, rates
 from mbref.stabilisation.base import Stabilisation
 
-NONE = Stabilisation("none", "Figure 2", enter, rates, rates, accept)
+NONE = Stabilisation("none", enter, rates, rates, accept)

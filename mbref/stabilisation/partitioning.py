@@ -288,7 +288,6 @@ def accept(t, y, memory):
 
 PARTITIONING = Stabilisation(
     "partitioning",
-    "Eqs. 10-16",
     enter,
     rates,
     rates,

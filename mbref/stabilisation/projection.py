@@ -292,6 +292,6 @@ def whole_rates(t, y, y_rate, memory):
 
 
 PROJECTION = Stabilisation(
-    "projection", "Bayo & Ledesma 1996", enter, rates, whole_rates, accept, memory=Scratch,
+    "projection", enter, rates, whole_rates, accept, memory=Scratch,
     projects=True, watches_rank=True, largest_turn=LARGEST_TURN,
 )  # fmt: skip

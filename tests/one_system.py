@@ -1,0 +1,50 @@
+"""Solution of one system of equations of motion by a formulation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mbref.formulations.base import Formulation
+from mbref.kernels.layout import Counts, Settings, SparseFactor, System
+from mbref.kernels.named_memory import packed
+from mbref.kernels.records import record
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+
+
+def solve(
+    formulation: Formulation, mass: np.ndarray, jacobian: np.ndarray, force: np.ndarray, gamma: np.ndarray,
+    rank_tolerance: float = 1e-10, **options: float,
+) -> tuple[int, np.ndarray, np.ndarray]:  # fmt: skip
+    """Return (status, q̈ (n,), λ (m,)); mass (n,) is the diagonal of M, jacobian (m, n).
+
+    Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
+    """
+    m, n = jacobian.shape
+    algebra, numbers = formulation.linear_algebra, np.ascontiguousarray(jacobian, dtype=float)
+    mass = np.ascontiguousarray(mass, dtype=float)
+    chosen = {**formulation.options, **options}
+    system = System(
+        mass=mass,
+        inverse_root=1 / np.sqrt(np.where(mass > 0, mass, 1.0)),
+        force=np.ascontiguousarray(force, dtype=float),
+        acceleration=np.zeros(n),
+        blocks=numbers,
+        jacobian=numbers,
+        rhs=np.ascontiguousarray(gamma, dtype=float),
+        multipliers=np.zeros(m),
+        settings=record(Settings(rank_tolerance=rank_tolerance)),
+        counts=record(Counts()),
+        options=packed(record(formulation.numbers(**chosen))) if chosen else None,
+        scratch=packed(algebra.scratch(m, n, _factor(numbers) if algebra.sparse else None)),
+    )
+    status: Any = formulation.accelerate.callable(packed(system).argument)
+    return status, system.acceleration, system.multipliers
+
+
+def _factor(jacobian: np.ndarray) -> SparseFactor:
+    """Return memory of the sparse factor of a dense Jacobian (m, n)."""
+    row, column = np.nonzero(jacobian)
+    entry = row * jacobian.shape[1] + column
+    return sparse_factor(symbolic_factorisation(row, column, entry, np.ones(jacobian.shape[1], dtype=bool)))
