@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -43,113 +43,91 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
         return []
     at_pose = Model(placed(model, general_pose(model)))
     rows = _rows(at_pose)
-    redundant = Combinations.of(rows)
-    if not redundant.number:
-        return []
-    involved = [joint.name for joint in at_pose.scene.joint if redundant.involves(joint.name)]
-    choices = {
-        name: {kind: w for kind, w in kinds.items() if redundant.with_exchange(name, w) is not None}
-        for name, kinds in _choices(scene, at_pose, rows, involved).items()
-    }
+    dependences, number = _dependences(rows)
+    part = {name: np.linalg.norm(of_joint, axis=1) for name, of_joint in dependences.items()}
+    involved = [joint.name for joint in at_pose.scene.joint if part[joint.name].max() > PART]
+    choices = _choices(scene, at_pose, rows, {name: dependences[name] for name in involved})
     kept = {name: {k: w for k, w in kinds.items() if k != REMOVED} for name, kinds in choices.items()}
-    found = _smallest(redundant, kept, most)
-    found += [e for e in _smallest(redundant, choices, most) if REMOVED in e.values()]
-    found = found or [e for e in [_joint_by_joint(redundant, choices)] if e]
+    found = _smallest(kept, number, most)
+    found += [e for e in _smallest(choices, number, most) if REMOVED in e.values()]
+    found = found or [e for e in [_joint_by_joint(choices, number)] if e]
     return [exchange for exchange in found if _is_cure(rows, choices, exchange)]
 
 
 class Weaker(NamedTuple):
-    """A weaker joint type at the place of a joint: its rows, and their coefficients in the rows of the
-    joint."""
+    """A weaker joint type at the place of a joint: its rows, and the components of the row combinations that
+    it lacks in the c dependences (left null vectors) of all rows.
+
+    The rank is unchanged if the components of all lost combinations are independent.
+    """
 
     rows: np.ndarray  # (k, n), of unit length
-    kept: np.ndarray  # (k, d): rows of the weaker type as combinations of the d rows of the joint
-    lost: np.ndarray  # (d - k, d): orthonormal basis of the row combinations that the weaker type lacks
+    lost: np.ndarray  # (d - k, c) for d rows of the joint
 
 
 Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining rows
 
 
-class Combinations:
-    """A basis of the vanishing linear combinations of the rows of Φ_q (its left null vectors), by joint.
-
-    After an exchange the combinations without the lost rows remain. The rank is unchanged if each lost row
-    removes one combination.
-    """
-
-    def __init__(self, parts: Mapping[str, np.ndarray], number: int):
-        self.parts, self.number = parts, number  # joint → (rows of the joint, number)
-
-    @classmethod
-    def of(cls, rows: Mapping[str, np.ndarray]) -> Combinations:
-        """Return the vanishing combinations of rows (d, n) by joint."""
-        left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
-        null = left[:, int(np.sum(values > ROUNDING * values[0])) :]
-        ends = np.cumsum([len(r) for r in rows.values()])[:-1]
-        return cls(dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1])
-
-    def involves(self, joint: str) -> bool:
-        """Return whether a combination contains a row of the joint."""
-        return bool(np.linalg.norm(self.parts[joint], axis=1).max() > PART)
-
-    def with_exchange(self, name: str, weaker: Weaker) -> Combinations | None:
-        """Return the combinations that remain after an exchange; None if the exchange lowers the rank."""
-        _, values, vt = np.linalg.svd(weaker.lost @ self.parts[name])
-        if len(weaker.lost) > self.number or np.sum(values > PART) < len(weaker.lost):
-            return None
-        left = vt[len(weaker.lost) :].T
-        parts = {joint: part @ left for joint, part in self.parts.items()}
-        parts[name] = np.linalg.pinv(weaker.kept.T) @ parts[name]
-        return Combinations(parts, left.shape[1])
+def _dependences(rows: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int]:
+    """Return a basis of the c vanishing linear combinations of rows (d, n), by joint (d, c), and c."""
+    left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
+    null = left[:, int(np.sum(values > ROUNDING * values[0])) :]
+    ends = np.cumsum([len(r) for r in rows.values()])[:-1]
+    return dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1]
 
 
-def _smallest(redundant: Combinations, choices: Choices, most: int) -> list[Exchange]:
-    """Return the sets of the fewest joints that end the redundancy, at most ``most``; none for more than four
-    joints."""
+def _keep_rank(lost: np.ndarray) -> bool:
+    """Return whether the rank is unchanged without row combinations that have these components (l, c)."""
+    return bool(np.sum(np.linalg.svd(lost, compute_uv=False) > PART) == len(lost))
+
+
+def _smallest(choices: Choices, number: int, most: int) -> list[Exchange]:
+    """Return the sets of the fewest joints that end all dependences, at most ``most``; none for more than
+    four joints."""
     for size in range(1, MOST_EXCHANGES + 1):
-        if found := list(itertools.islice(_of_size(redundant, choices, size), most)):
+        if found := list(itertools.islice(_of_size(choices, number, size), most)):
             return found
     return []
 
 
-def _of_size(redundant: Combinations, choices: Choices, size: int) -> Iterator[Exchange]:
-    """Yield the exchanges of ``size`` joints that end the redundancy, for a limited number of trials."""
+def _of_size(choices: Choices, number: int, size: int) -> Iterator[Exchange]:
+    """Yield the exchanges of ``size`` joints that end all dependences, for a limited number of trials."""
     names, trials = list(choices), itertools.count(1)
     most = [max((len(weaker.lost) for weaker in choices[name].values()), default=0) for name in names]
     # rows that can be lost from joint k on
     reach = [sorted(most[k:], reverse=True) for k in range(len(names) + 1)]
 
-    def extended(chosen: Exchange, left: Combinations, first: int) -> Iterator[Exchange]:
+    def extended(chosen: Exchange, lost: np.ndarray, first: int) -> Iterator[Exchange]:
         missing = size - len(chosen)
         if missing == 0:
-            if left.number == 0:
+            if len(lost) == number:
                 yield chosen
             return
         for k in range(first, len(names)):
-            if sum(reach[k][:missing]) < left.number:
+            if sum(reach[k][:missing]) < number - len(lost):
                 return
             for kind, weaker in choices[names[k]].items():
                 if next(trials) > MOST_TRIALS:
                     return
-                if (rest := left.with_exchange(names[k], weaker)) is not None:
-                    yield from extended({**chosen, names[k]: kind}, rest, k + 1)
+                if _keep_rank(more := np.concatenate([lost, weaker.lost])):
+                    yield from extended({**chosen, names[k]: kind}, more, k + 1)
 
-    return extended({}, redundant, 0)
+    return extended({}, np.zeros((0, number)), 0)
 
 
-def _joint_by_joint(redundant: Combinations, choices: Choices) -> Exchange | None:
-    """Return exchanges that end the redundancy, found joint by joint: each exchange loses as many rows as
+def _joint_by_joint(choices: Choices, number: int) -> Exchange | None:
+    """Return exchanges that end all dependences, found joint by joint: each exchange loses as many rows as
     possible. A joint is removed if no weaker type is left. Return None if no set is found.
     """
     chosen: Exchange = {}
     offers = [(name, kind) for name, kinds in choices.items() for kind in kinds]
     offers.sort(key=lambda offer: (offer[1] == REMOVED, -len(choices[offer[0]][offer[1]].lost)))
+    lost = np.zeros((0, number))
     for name, kind in offers:
-        if name not in chosen and redundant.number:
-            left = redundant.with_exchange(name, choices[name][kind])
-            if left is not None:
-                redundant, chosen[name] = left, kind
-    return None if redundant.number else {name: chosen[name] for name in choices if name in chosen}
+        more = np.concatenate([lost, choices[name][kind].lost])
+        if name not in chosen and len(lost) < number and _keep_rank(more):
+            lost, chosen[name] = more, kind
+    return {name: chosen[name] for name in choices if name in chosen} if len(lost) == number else None
 
 
 def _is_cure(rows: Mapping[str, np.ndarray], choices: Choices, exchange: Exchange) -> bool:
@@ -177,8 +155,13 @@ def _bearing(scene: Scene, name: str) -> list[str]:
     return [k for k, f in facts.items() if driven in (None, f.driven) and acting <= {*f.loaded}]
 
 
-def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Sequence[str]) -> Choices:
-    """Return the weaker types of the named joints, and their removal, at the model's poses."""
+def _choices(
+    scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Mapping[str, np.ndarray]
+) -> Choices:
+    """Return the weaker types of joints, and their removal, that keep the rank at the model's poses.
+
+    ``names`` gives the dependences (d, c) of each of these joints.
+    """
     bearing = {name: _bearing(scene, name) for name in names}
     found: dict[str, dict[str, Weaker]] = {name: {} for name in names}
     for kind in dict.fromkeys(itertools.chain(*WEAKER.values())):
@@ -188,21 +171,19 @@ def _choices(scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: 
         joints = tuple(_as(j, kind) if j.name in changed else j for j in model.scene.joint)
         weaker_rows = _rows(Model(model.scene.with_(joint=joints))) if changed else {}
         for name in changed:
-            found[name][kind] = _weaker(weaker_rows[name], rows[name])
+            found[name][kind] = _weaker(weaker_rows[name], rows[name], names[name])
     for name in names:
         order = WEAKER.get(scene.joint_named(name).type, ())
         found[name] = {kind: found[name][kind] for kind in order if kind in found[name]}
         if len(bearing[name]) == len(JOINT_TYPES):
-            found[name][REMOVED] = _weaker(rows[name][:0], rows[name])
-    return found
+            found[name][REMOVED] = _weaker(rows[name][:0], rows[name], names[name])
+    return {name: {k: w for k, w in kinds.items() if _keep_rank(w.lost)} for name, kinds in found.items()}
 
 
-def _weaker(rows: np.ndarray, own: np.ndarray) -> Weaker:
-    """Return the coefficients of rows (k, n) in a joint's own rows (d, n), and the combinations that the rows
-    (k, n) lack."""
-    kept = rows @ np.linalg.pinv(own)
-    _, _, vt = np.linalg.svd(kept.reshape(-1, len(own)))
-    return Weaker(rows, kept, vt[len(rows) :])
+def _weaker(rows: np.ndarray, own: np.ndarray, dependences: np.ndarray) -> Weaker:
+    """Return a weaker type with rows (k, n) from a joint's own rows (d, n) and their dependences (d, c)."""
+    _, _, vt = np.linalg.svd((rows @ np.linalg.pinv(own)).reshape(-1, len(own)))
+    return Weaker(rows, vt[len(rows) :] @ dependences)
 
 
 def _as(joint: Joint, kind: str) -> Joint:
