@@ -21,6 +21,7 @@ from crosscheck.judge.metrics import order_of_convergence
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_bound, is_completed
 
+NEAR = 3.0  # errors up to this multiple of a floor are partly the floor
 HEAD = f"""# Orders of convergence
 
 This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
@@ -39,7 +40,8 @@ three steps in which it is nearly constant (`order_of_convergence` in `crosschec
 the engine chooses its steps, the mean step counts. Order 1 means that half the step halves the error; order
 4, that it divides the error by 16.
 
-- `3e-12 (4.0)`: the least error is a floor: finer steps do not lower it. The order is 4.0 above the floor.
+- `3e-12 (4.0)`: the least error is a floor: finer steps do not lower it. The order is 4.0 in a range of steps
+  whose errors are more than {NEAR:g} times the floor.
 - `3e-04 ↓ (1.0)`: the finest step within {TIME_LIMIT:g} s has the least error; finer steps would lower it.
 - `<1e-12`: less than the bound on the truth's error.
 - Without a number in parentheses, no range of steps has a constant order.
@@ -95,10 +97,12 @@ def cell(records: Sequence[Record]) -> str:
 
 
 def order(records: Sequence[Record]) -> float | None:
-    """Return the measured order of completed runs whose errors exceed the bound on the truth's error."""
+    """Return the measured order of completed runs, from errors above the bound on the truth's error and above
+    the floor."""
+    floor = NEAR * min(map(error, records)) if in_vain(records) >= VAIN else 0.0
     least: dict[float, float] = {}
     for record in records:
-        if error(record) > error_bound(record):
+        if error(record) > max(error_bound(record), floor):
             least[step(record)] = min(error(record), least.get(step(record), error(record)))
     return order_of_convergence(list(least), list(least.values())) if len(least) > 2 else None
 
@@ -106,7 +110,7 @@ def order(records: Sequence[Record]) -> float | None:
 def step(record: Record) -> float:
     """Return the step of a run, or the mean step where the engine chose its steps, s."""
     own = record["asked"]["options"].get("step")
-    return float(own or record["t_end"] / record["cost"]["steps"])
+    return float(own or record["t_end"] / max(record["cost"]["steps"], 1))
 
 
 def _runs(records: Sequence[Record]) -> str:

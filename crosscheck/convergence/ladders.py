@@ -154,7 +154,7 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
             if key(case) in known:
                 return known[key(case)]
             [made] = study([case], one, run=run_in_turn)
-            write([*known.values(), kept(made)], path)
+            write([*known.values(), short(made)], path)
             print(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}", flush=True)
             return made
 
@@ -162,6 +162,12 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
             for mechanism in MECHANISMS:
                 climb(ladder(row, mechanism), run) or _refuse(row, mechanism, path)
     end_idle()
+
+
+def short(record: Record) -> Record:
+    """Return the record of a run without its motion, its settings, and further numbers of its cost."""
+    found = {name: value for name, value in kept(record).items() if name not in ("settings", "commit")}
+    return found | {"cost": {name: record["cost"][name] for name in ("seconds", "steps")}}
 
 
 def _refuse(row: Row, mechanism: Difficulty, path: Path) -> None:
