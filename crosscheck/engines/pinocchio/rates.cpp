@@ -18,6 +18,7 @@ using Eigen::Index;
 using Matrix = pin::Data::MatrixXs;
 using Vector = Eigen::VectorXd;
 using State = Eigen::Map<Vector>;
+using Given = Eigen::Ref<const Vector>;
 
 namespace {
 
@@ -136,7 +137,7 @@ void solve_least(Mechanism &m) {
 }
 
 bool meet(Mechanism &m) {
-  pin::crba(m.model, m.data, m.q, pin::Convention::WORLD);
+  pin::crba(m.model, m.data, Given(m.q), pin::Convention::WORLD); // this type is compiled in the library
   m.root.compute(m.data.M.selfadjointView<Eigen::Upper>());
   double worst = errors(m);
   for (int k = 0; worst > CLOSED && k < PROJECTIONS; ++k) {
