@@ -203,7 +203,22 @@ STEPS = (remedies.STEP_TOO_SMALL, remedies.TOO_MANY_STEPS, remedies.CREEPING)
 def failed(formulation: str = "lm1", is_series: bool = False, loops: bool = True) -> SimpleNamespace:
     method = SimpleNamespace(formulation=remedies.FORMULATIONS[formulation], is_series=is_series)
     model = SimpleNamespace(mass=np.ones(6), closed_loops=loops)
-    return SimpleNamespace(method=method, scene=SCENE, model=model)
+    return SimpleNamespace(method=method, scene=SCENE, model=model, start=SimpleNamespace(q=np.zeros(7)))
+
+
+@pytest.fixture(autouse=True)
+def _rows_of_the_hinge(monkeypatch):
+    monkeypatch.setattr(remedies, "scaled_jacobian", lambda model, t, q: np.eye(5, 6))
+
+
+def test_a_body_of_mass_zero_that_nothing_holds_is_named():
+    """The rows of the hinge leave the sixth coordinate of the bar free."""
+    run = failed()
+    assert remedies._undetermined(run) == ""
+    run.scene = SCENE.with_(body=(BAR.model_copy(update={"mass": 0.0, "inertia": (0.0, 0.0, 0.0)}),))
+    assert remedies.remedy(run, remedies.SINGULAR) == (
+        "nothing determines the motion of body 'bar', which has mass 0"
+    )
 
 
 @pytest.mark.parametrize(
