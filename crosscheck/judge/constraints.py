@@ -27,6 +27,8 @@ from mbref.scene_joints import DISPLACEMENT
 
 Residuals = dict[str, np.ndarray]
 
+COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
+
 
 def closure(scene: Scene, t: np.ndarray | float, position: np.ndarray, orientation: np.ndarray) -> Residuals:
     """Return position residuals (…, rows) by joint name, m and rad, for positions (…, nb, 3) and unit
@@ -208,14 +210,15 @@ def scene_length(scene: Scene) -> float:
     """Return the characteristic length (m): the largest distance between two joint anchors or centres of mass
     at t = 0.
 
-    If all these points coincide, the length is the distance that a free body travels or a radius of gyration,
-    whichever is larger, and 1 if both vanish.
+    If all these points coincide up to rounding, the length is the distance that a free body travels or a
+    radius of gyration, whichever is larger, and 1 if both vanish.
     """
     points = [body.position for body in scene.body]
     for joint in scene.joint:
         points += joint.anchor_pair
     array = np.array(points)
-    return float(np.linalg.norm(array[:, None] - array[None], axis=-1).max()) or _of_one_point(scene) or 1.0
+    length = float(np.linalg.norm(array[:, None] - array[None], axis=-1).max())
+    return length if length > COINCIDENT * np.abs(array).max() else _of_one_point(scene) or 1.0
 
 
 def _of_one_point(scene: Scene) -> float:

@@ -37,6 +37,7 @@ REFUSED = {
     "gravcomp.xml": "compensation of the weight of b.*--without gravity-compensation",
     "joint_coupled_quadratically.xml": "equality 'e' of type joint, whose polynomial is not linear",
     "mimic_of_a_fixed_joint.urdf": "joint 'C' mimics 'A': the file has no such joint that moves",
+    "missing_mesh_inertia.xml": "body 'link2': its inertia follows from the shape 'link2', whose file",
     "motor_of_tendon.xml": "control value of 's' in the keyframe, no motor of a joint.*--without motors",
     "motor_with_filter.xml": "control value of 'actuator 0' in the keyframe, no motor of a joint",
     "parallel_slides.xml": "body 'a': joints slide, slide in a row have dependent motions",
@@ -59,6 +60,7 @@ REFUSED = {
 }
 FREE_IN_PINOCCHIO = ("floating_root.urdf", "hold_floating.urdf", "planar_root.urdf")  # coordinates differ
 ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
+SLOW = ("gripper_2f.xml", "kangaroo_leg.xml", "stewart.xml")  # 4 to 16 s
 READ = sorted(path.name for path in KINDS.iterdir() if path.name not in REFUSED)
 
 
@@ -68,7 +70,14 @@ def found(name: str) -> Source:
     return source(KINDS / name, options)
 
 
-@pytest.mark.parametrize("name", [name for name in READ if not name.startswith(ROWS_OF_OUR_OWN)])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.slow if name in SLOW else ())
+        for name in READ
+        if not name.startswith(ROWS_OF_OUR_OWN)
+    ],
+)
 def test_a_file_of_each_kind_moves_as_its_own_model(name):
     read_file = found(name)
     assert apart(read_file.original, read_file, 0.02, read_file.original.nkey - 1) < SAME
@@ -119,6 +128,11 @@ def test_files_that_include_and_attach_others(tmp_path):
 def test_straight_chains_are_closed_in_the_direction_in_which_they_fall():
     scene = found("connect_by_sites.xml").imported.scene
     assert scene.joint_named("C").anchor[2] < 1.0  # the chain is straight at a height of 1 m
+
+
+def test_missing_shapes_are_named():
+    notes = found("missing_mesh.xml").imported.notes
+    assert "files that are missing: link1.stl, link2.obj, skin.png; these shapes have no effect" in notes
 
 
 def test_motion_capture_bodies_stand_where_the_keyframe_has_them():

@@ -9,18 +9,33 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.importing.meshes import without_missing
 from mbref.scene import SceneError
 
 
-def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any:
-    """Return the model of an MJCF file in which some bodies have no joint to the world.
+def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> tuple[Any, list[str]]:
+    """Return the model of an MJCF file in which some bodies have no joint to the world, and notes.
 
     These and motion-capture bodies stay at the pose of the keyframe, or of the reference. Raises SceneError
     for a body without joints to the world, ValueError if MuJoCo cannot read the file.
     """
-    if not hold:
-        return _with_placed_mocaps(mujoco, mujoco.MjModel.from_xml_path(str(path)), keyframe)
-    spec = mujoco.MjSpec.from_file(str(path))
+    notes: list[str] = []
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError:
+        spec = mujoco.MjSpec.from_file(str(path))
+        if not (notes := without_missing(mujoco, spec)):
+            raise
+        model = spec.compile()
+    else:
+        spec = mujoco.MjSpec.from_file(str(path)) if hold else None
+    if hold:
+        model = _held(mujoco, spec, hold, keyframe)
+    return _with_placed_mocaps(mujoco, model, keyframe), notes
+
+
+def _held(mujoco: Any, spec: Any, hold: Sequence[str], keyframe: str) -> Any:
+    """Return the model of a specification without the joints of some bodies to the world."""
     placed = _placed(mujoco, spec.compile(), keyframe)
     world = [body for body in spec.bodies if body.parent == spec.worldbody and body.joints]
     known = {body.name: body for body in world}
@@ -38,7 +53,7 @@ def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> Any
     for name in hold:  # after compilation, because a position in the file may count from a frame
         body = model.body(name).id
         model.body_pos[body], model.body_quat[body] = placed.body(name).xpos, placed.body(name).xquat
-    return _with_placed_mocaps(mujoco, model, keyframe)
+    return model
 
 
 def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:

@@ -56,10 +56,10 @@ def source(path: Path, options: ImportOptions) -> Source:
     import mujoco
 
     without = left_out.checked(options.without)
-    model, text = _compiled(mujoco, path, options)
+    model, text, notes = _compiled(mujoco, path, options)
     if model.nbody < 2:  # the first body is the world
         raise SceneError([f"{path}: has no body"])
-    reader = _Reader(mujoco, model, text, options, without)
+    reader = _Reader(mujoco, model, text, options, without, notes=notes)
     if not reader.groups.massive:
         raise SceneError([f"{path}: has no body that moves"])
     left_out.refuse_others(left_out.flexible(model), without)
@@ -75,18 +75,19 @@ def source(path: Path, options: ImportOptions) -> Source:
     return Source(imported, model, original, reader.groups, *state)
 
 
-def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None]:
-    """Return the compiled model, and the text of a URDF."""
+def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None, list[str]]:
+    """Return the compiled model, the text of a URDF, and notes."""
     try:
         if path.suffix != ".urdf":
             path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
-            return compiled(mujoco, path, options.hold, options.keyframe), None
+            model, notes = compiled(mujoco, path, options.hold, options.keyframe)
+            return model, None, notes
         text = urdf.prepared(path.read_text(encoding="utf-8"), options.hold)
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
     text.take_back(mujoco, model)
-    return model, text
+    return model, text, []
 
 
 def _renamed(joints: list[Joint]) -> Iterator[Joint]:
