@@ -51,6 +51,8 @@ Numbers = tuple[float, ...]
 AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
+COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
+
 
 class Packs:
     """Scenes of one shape: structure, SceneData, masses, frames and lengths. For s scenes of nb bodies:
@@ -195,7 +197,7 @@ class Packs:
         points = np.concatenate(own, axis=1)
         apart = points[:, :, None] - points[:, None]
         self.length = np.sqrt((apart * apart).sum(axis=-1).max(axis=(1, 2)))
-        self.length = np.where(self.length > 0.0, self.length, 1.0)
+        self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
     def _fixed_in_bodies(self, of_primitives: Sequence[Numbers]) -> tuple[Primitives, Loads]:
