@@ -75,3 +75,11 @@ def test_a_mass_of_zero_with_an_inertia_is_refused():
     heavy = LINK.model_copy(update={"inertia": (0.0, 0.0, 1.0)})
     with pytest.raises(SceneError, match=r"body\[link\].mass: is 0, but the inertia is not"):
         Scene(name="s", body=(heavy,), joint=())
+
+
+def test_points_that_coincide_up_to_rounding_are_no_length():
+    slide = Translational(name="x", bodies=("ground", "load"), anchor=(0.45, -0.05, -0.275), axis=X)
+    load = LOAD.model_copy(update={"position": (0.45000000000000007, -0.05, -0.275), "velocity": X})
+    motion = simulate(Scene(name="s", body=(load,), joint=(slide,)), times=TIMES)
+    assert motion.outcome == Outcome.COMPLETED
+    assert np.allclose(motion["load"].position[:, 0], 0.45 + TIMES, atol=1e-12)
