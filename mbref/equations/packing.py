@@ -192,9 +192,8 @@ class Packs:
     def _lengths(self, joints: Sequence[Joint]) -> np.ndarray:
         """Return lengths (s, nb) of bodies, the vectors to their anchors, and the scenes' ``length``."""
         anchors = self._rows(_once(_anchors, joints), 6).reshape(len(self.scenes), -1, 3)
-        scene = self.scenes[0]
-        own = self._centres[:, : len(scene.body)], anchors[:, : 2 * len(scene.joint)]
-        points = np.concatenate(own, axis=1)
+        nb, nj = len(self.scenes[0].body), len(self.scenes[0].joint)
+        points = np.concatenate((self._centres[:, :nb], anchors[:, : 2 * nj]), axis=1)
         apart = points[:, :, None] - points[:, None]
         self.length = np.sqrt((apart * apart).sum(axis=-1).max(axis=(1, 2)))
         self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)

@@ -68,10 +68,12 @@ def _of_singular_matrix(run: Run) -> str:
 def _undetermined(run: Run) -> str:
     """Return the body of mass 0 that moves most if bodies with mass stay; empty if all bodies stay then."""
     places = [b for b, body in enumerate(run.scene.body) if body.mass == 0]
+    if not places:
+        return ""
     columns = [6 * b + k for b in places for k in range(6)]
     rows = scaled_jacobian(run.model, 0.0, run.start.q)[:, columns]
     _, sizes, motions = np.linalg.svd(np.vstack([rows, np.zeros((len(columns), len(columns)))]))
-    if not columns or sizes[-1] > LOOSE:
+    if sizes[-1] > LOOSE:
         return ""
     moved = np.abs(motions[-1]).reshape(-1, 6).max(axis=1)
     return run.scene.body[places[int(moved.argmax())]].name
