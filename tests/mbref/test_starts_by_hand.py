@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mbref.equations.initial_state import LARGE, Start, consistent_start, solve_positions
+from mbref.equations.initial_state import LARGE, Start, consistent_start, rate_violation, solve_positions
 from mbref.equations.model import Model
 from mbref.scene import Body, Scene, SceneError, Spherical
 
@@ -61,6 +61,15 @@ def test_given_velocities_that_contradict_each_other_are_a_fault_of_the_joint(co
     wrong = wrong.with_("body[a0].velocity", [0.0, 0.0, 0.0])
     with pytest.raises(SceneError, match=r"joint\[J0\]: velocities given to bodies violate it by 1 m/s"):
         consistent_start(Model(wrong))
+
+
+@pytest.mark.parametrize("speed", [0.01, 2.0])
+def test_violation_of_rates_is_of_unit_rows_and_relative_to_the_largest_velocity(speed):
+    """The row of x has the entries 1, -1 and ARM, a length of 1.5."""
+    model, v = pairs(1), np.zeros(12)
+    v[0], v[7] = speed, 0.1 * speed
+    q = model.start().ravel()
+    assert rate_violation(model, q, v) == pytest.approx(1.0 / 1.5)
 
 
 def test_the_report_names_what_was_corrected():
