@@ -141,6 +141,24 @@ def test_drakes_own_steps_couple_and_turn_rotors():
 
 
 @every
+def test_bullet_couples_joints_to_first_order_and_refuses_armatures(make):
+    pytest.importorskip("pybullet")
+    scene, bullet = make().with_(duration=0.2), engine("bullet")
+    rotor = next((joint.name for joint in scene.joint if joint.reflected_inertia), "")
+    if rotor:
+        refusal = bullet.cannot(scene)
+        assert refusal.owner is Owner.ENGINE and f"joint {rotor!r} has an armature" in refusal.reason
+        return
+    errors = []
+    for step in (2e-3, 1e-3):
+        setting = Setting("iterated", {"step": step, "iterations": 1000})
+        found = measure(scene, bullet.run(scene, np.array([0.0, 0.1, 0.2]), setting), truth_for(scene))
+        errors.append(found["error"])
+        assert found["violation_position"] < 1e-7, found
+    assert errors[1] < 3e-3 and errors[0] / errors[1] == pytest.approx(2.0, abs=0.1), errors
+
+
+@every
 def test_mujoco_moves_as_the_reference(make):
     scene, mujoco = make().with_(duration=0.8), engine("mujoco")
     found = measure(

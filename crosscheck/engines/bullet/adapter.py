@@ -8,11 +8,10 @@ velocity over a step, so that the prescribed position is reached at the end of t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.engines.bullet.model import STRONGEST, Mechanism
 from crosscheck.engines.driver_motion import mean_rate
 from crosscheck.engines.fixed_steps import FixedSteps, Loads, scouted_rate, simulated, steps, unended_piece
@@ -41,12 +40,14 @@ class Bullet(Engine):
     name = "bullet"
     package = "pybullet"
     modules = ("pybullet",)
-    supports = replace(EVERYTHING, couplings=(), armatures=())
+    supports = EVERYTHING
     families, options = FAMILIES, OPTIONS
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse scenes without masses whose motion the drivers do not determine completely, and loads over
-        time that have pieces."""
+        """Refuse armatures, scenes without masses whose motion the drivers do not determine completely, and
+        loads over time that have pieces."""
+        if rotor := next((joint.name for joint in scene.joint if joint.reflected_inertia), ""):
+            return Cannot(Owner.ENGINE, f"joint {rotor!r} has an armature, which Bullet's joints do not have")
         return lacks_mass(scene) or unended_piece(scene)
 
     def settings(self, scene: Scene) -> Sequence[Setting]:

@@ -21,7 +21,7 @@ from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Coupling, Scene
 
 NEGLIGIBLE = 1e-12  # mass of auxiliary bodies in chains of joints / mass of the links
 STRONGEST, FASTEST = 1e9, 1e9  # N, limit of a closure force; rad/s or m/s, limit of a joint rate
@@ -56,6 +56,8 @@ class Mechanism:
             self._add(parts[start:end], start)
         for closure in tree.closures:
             self._close(closure)
+        for coupling in scene.coupling:
+            self._couple(coupling)
 
     def _add(self, parts: list[Piece], start: int) -> None:
         """Add a multibody of connected pieces; the first piece has the number ``start``."""
@@ -137,6 +139,15 @@ class Mechanism:
             kind = p.JOINT_FIXED if weld else p.JOINT_POINT2POINT
             c = p.createConstraint(*one[0], *other[0], kind, O, one[1], other[1], *frames)
             p.changeConstraint(c, maxForce=STRONGEST)
+
+    def _couple(self, coupling: Coupling) -> None:
+        """Couple the rates of two joints: PyBullet's gear keeps q₁' + (gear ratio) q₂' = 0."""
+        first, second = (
+            self.joints[self.tree.coordinate(self.scene, joint.name, kind)]
+            for joint, kind in self.scene.coupled(coupling)
+        )
+        gear = self.p.createConstraint(*first, *second, self.p.JOINT_GEAR, [0.0, 0.0, 1.0], O, O)
+        self.p.changeConstraint(gear, gearRatio=-1 / coupling.ratio, maxForce=STRONGEST)
 
     def _end(self, link: int, point: np.ndarray) -> tuple[tuple[int, int], list[float]]:
         """Return multibody and link, and a point (world at t = 0) in the frame of the link's centre of
