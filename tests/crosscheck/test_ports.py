@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.findings.finding import FOLDER
@@ -57,6 +58,31 @@ def test_a_port_and_mujoco_in_c(name: str) -> None:
         assert run.outcome is Outcome.COMPLETED, run.message
         off = float(error_series(scene, run, exact).max())
         assert off < MARGIN * measured, f"{simulator}: {off:.1e} from the truth"
+
+
+# measured differences of runs in single and in double precision over 0.2 s, at steps of 1 ms
+APART = {"four_bar_free": {"mjx": 1.5e-6, "warp": 5.9e-7}, "bennett": {"mjx": 9.8e-8, "warp": 2.5e-7}}
+SINGLE = {
+    "mjx": ("mjx", "stock, single"),
+    "warp": ("mujoco", "stock"),
+}  # the port, or MuJoCo in C, to compare
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", MODULES)
+@pytest.mark.parametrize("mechanism", APART)
+def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: str) -> None:
+    """A larger difference would be a defect of the port; no difference means that both are double."""
+    if not is_installed(MODULES[name]):
+        pytest.skip(f"{MODULES[name]} is not installed")
+    column = next(column for column in DIFFICULTIES if column.scene == mechanism)
+    scene, times = column.make().with_(duration=0.2), np.array([0.0, 0.1, 0.2])
+    runs = [
+        engine(simulator).run(scene, times, Setting(family, {"step": 1e-3}))
+        for simulator, family in ((name, "stock"), SINGLE[name])
+    ]
+    apart = float(error_series(scene, *runs).max())
+    assert 1e-9 < apart < MARGIN * APART[mechanism][name], f"{apart:.1e} apart"
 
 
 def side_by_side(scenes: Mapping[str, Scene]) -> Scene:
