@@ -19,9 +19,8 @@ from mbref.drawing.view import View
 from mbref.energy import kinetic, potential
 from mbref.error_estimate import ErrorEstimate
 from mbref.joint_motion import JointMotion, joint_motion
-from mbref.motion_columns import all_columns
 from mbref.motion_files import dataframe, read_json, write_csv, write_json
-from mbref.outputs import chosen
+from mbref.outputs import all_columns, chosen
 from mbref.scene import Scene
 from mbref.scene_services import SERVICES, Violation
 from mbref.trajectory import Trajectory

@@ -135,6 +135,30 @@ def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[
             yield from output.columns(name, values)
 
 
+def all_columns(motion: Any) -> dict[str, np.ndarray]:
+    """Return ``time`` and all columns (k,) of a Motion, by name."""
+    scene, table = motion.mechanism, {"time": motion.times}
+    for name in motion.bodies:
+        table.update(columns_of("body", name, vars(motion[name])))
+    for joint in scene.joint:
+        table.update(columns_of("joint", joint.name, vars(motion.joint(joint.name))))
+    for driver in scene.driver:
+        table.update(columns_of("driver", driver.joint, vars(motion.driver(driver.joint))))
+    for place in range(len(scene.load)):
+        table.update(columns_of("load", str(place), vars(motion.load_at(place))))
+    table.update(columns_of("mechanism", "", _totals(motion)))
+    return table
+
+
+def _totals(motion: Any) -> dict[str, np.ndarray | None]:
+    """Return the numbers of the whole mechanism by their names in the table of outputs."""
+    levels = {f"{level}_violation": rows for level, rows in motion.violation._asdict().items()}
+    energies = ("kinetic_energy", "potential_energy", "energy") if motion.mechanism.has_mass() else ()
+    found = {name: getattr(motion, name) for name in energies}
+    estimate = None if motion.known_estimate is None else motion.known_estimate.error
+    return {**levels, "largest_reaction": motion.largest_reaction, **found, "error_estimate": estimate}
+
+
 def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:
     """Return the columns with these names or beginnings, such as ``rod.position``.
 

@@ -16,7 +16,6 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, ValidationError, model_validator
 
 from mbref.scene_bodies import Body, Driver
-from mbref.scene_couplings import Coupling
 from mbref.scene_fields import (
     Entry,
     Name,
@@ -27,6 +26,7 @@ from mbref.scene_functions import Factor, Sine, TimeFunction
 from mbref.scene_joints import (
     JOINT_TYPES,
     Coordinate,
+    Coupling,
     Cylindrical,
     Distance,
     Fixed,
@@ -39,7 +39,6 @@ from mbref.scene_joints import (
     Translational,
     Universal,
 )
-from mbref.scene_lines import with_lines
 from mbref.scene_loads import (
     LOAD_TYPES,
     Force,
@@ -53,9 +52,8 @@ from mbref.scene_loads import (
     TorsionSpring,
 )
 from mbref.scene_paths import replaced_at
-from mbref.scene_reading import read_toml
 from mbref.scene_services import SERVICES, Counts
-from mbref.scene_text import as_lists, scene_text
+from mbref.scene_toml import as_lists, read_toml, scene_text, with_lines
 from mbref.scene_validation import (
     GROUND,
     SceneError,

@@ -10,10 +10,9 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import ValidationError
 
-from mbref.scene_couplings import default_coordinates
 from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene_function_faults import factor_faults, initial_value, rows_of, table_faults
-from mbref.scene_joints import JOINT_TYPES, Coordinate
+from mbref.scene_joints import JOINT_TYPES, Coordinate, default_coordinates
 from mbref.scene_loads import LOAD_TYPES, JointLoad
 from mbref.scene_units import dimension_of
 

@@ -22,7 +22,7 @@ from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands
 from mbref.method import MethodError
 from mbref.scene import SceneError
-from mbref.scene_lines import with_lines
+from mbref.scene_toml import with_lines
 
 BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 EPILOG = """\

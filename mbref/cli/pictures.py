@@ -10,9 +10,8 @@ from typing import Any
 from mbref.cli.branches import along_branches, chosen, of_several_branches, sentence
 from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import progress_bar, warn
-from mbref.drawing.film import write_film
+from mbref.drawing.film import png, write_film
 from mbref.drawing.picture import moving, side_by_side, still
-from mbref.drawing.png import png
 from mbref.drawing.view import View
 from mbref.method import default_method
 from mbref.scenes import find_scene

@@ -1,5 +1,4 @@
-"""An animated mechanism as GIF (by Pillow) or MP4 (by ffmpeg), from pictures of its samples that resvg
-draws."""
+"""Pictures as PNG (by resvg), and animated mechanisms as GIF (by Pillow) or MP4 (by ffmpeg)."""
 
 from __future__ import annotations
 
@@ -12,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from mbref.drawing.picture import frames
-from mbref.drawing.png import png
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import View
 from mbref.scene import Scene
@@ -20,6 +18,18 @@ from mbref.trajectory import Trajectory
 
 BLOCK = 16  # px; size of blocks of the video codec
 MISSING = "{} needs {}: pip install 'mbref[video]'; SVG needs nothing more"
+
+
+def png(svg: str, zoom: int = 2) -> bytes:
+    """Return the picture as PNG at twice its size; of an animation, the first frame.
+
+    Raises ValueError without resvg.
+    """
+    try:
+        import resvg_py
+    except ImportError:
+        raise ValueError("PNG needs resvg: pip install 'mbref[draw]'; SVG needs nothing more") from None
+    return bytes(resvg_py.svg_to_bytes(svg_string=svg, zoom=zoom))
 
 
 def write_film(path: Path, scene: Scene, motion: Trajectory, view: View | None = None) -> None:

@@ -9,10 +9,10 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
+from mbref.drawing.film import png
 from mbref.drawing.labels import LETTER, LINE
 from mbref.drawing.marks import SIGNS
 from mbref.drawing.picture import moving, side_by_side, still
-from mbref.drawing.png import png
 from mbref.drawing.shapes import at_rest, shapes
 from mbref.drawing.timeline import FRAMES, Timeline
 from mbref.drawing.view import Page, View, view_of

@@ -164,7 +164,7 @@ FAULTS = {
 def test_faulty_functions_are_refused_by_path_and_line(message, tmp_path):
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
-    from mbref.scene_text import scene_text
+    from mbref.scene_toml import scene_text
 
     path = tmp_path / "slide.toml"
     path.write_text(scene_text(text))

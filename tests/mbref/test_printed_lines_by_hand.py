@@ -16,8 +16,8 @@ from mbref.design.equilibrium import Equilibrium
 from mbref.drawing import film
 from mbref.equations.diagnosis import Diagnosis
 from mbref.scene import Body, Driver, Factor, Revolute, Scene, Sine
-from mbref.scene_lines import toml_hint, with_lines
 from mbref.scene_services import Counts
+from mbref.scene_toml import toml_hint, with_lines
 from mbref.simulation import remedies
 
 BAR = Body(name="bar", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.5, 0.0, 0.0))

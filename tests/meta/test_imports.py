@@ -8,7 +8,7 @@ import pytest
 from imports import ROOT, children, circles, floors, graph, imported, sources, upward
 
 DOORS = (
-    r"command_line|formats|scene|scene_fields|scene_joints|scene_lines|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
+    r"command_line|formats|scene|scene_fields|scene_joints|scene_toml|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
@@ -25,23 +25,20 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         [
             "scene",
             "scene_bodies",
-            "scene_couplings",
             "scene_fields",
             "scene_functions",
             "scene_function_faults",
             "scene_joints",
-            "scene_lines",
             "scene_loads",
             "scene_paths",
-            "scene_reading",
-            "scene_text",
+            "scene_toml",
             "scene_units",
             "scene_validation",
         ],
         ["command_line", "formats", "scenes", "scene_slips", "variation", "outputs"],
         ["drawing"],
         ["joint_motion", "actuation", "energy"],
-        ["motion", "motion_columns", "motion_files"],
+        ["motion", "motion_files"],
         ["kernels"],
         ["linear_algebra"],
         ["equations"],

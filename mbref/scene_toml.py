@@ -1,9 +1,16 @@
-"""Line numbers of faulty fields in a scene file."""
+"""Scene files: reading and writing of TOML text, and the lines of faulty fields."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from mbref.scene_validation import SceneError
 
 TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
@@ -12,8 +19,27 @@ SINGLE = re.compile(r"\s*\[\s*(body|joint|coupling|driver|load)\s*\]")
 LINE = re.compile(r" \(line \d+\)$")
 AT = re.compile(r"at line (\d+)")
 PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
+FIRST = ("name", "type", "joint", "joints", "bodies", "body")  # keys that come first in a written entry
 
 Line = tuple[int, str, int, str]  # number from 1, table, index in the table, key (empty for a header)
+
+
+def read_toml(path: str | Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a TOML file (UTF-8) and its tables; raises SceneError that names the file."""
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+        data = tomllib.loads(text)
+    except OSError as error:
+        raise SceneError([f"{path}: cannot be read: {error.strerror}"]) from None
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError([f"{path}: is not TOML: {error}{toml_hint(text, str(error))}"]) from None
+    except UnicodeDecodeError as error:
+        raise SceneError([f"{path}: is not UTF-8 text (at byte {error.start})"]) from None
+    except ValueError as error:  # a number of thousands of digits
+        raise SceneError([f"{path}: is not TOML: {error}"]) from None
+    except RecursionError:
+        raise SceneError([f"{path}: is nested too deeply"]) from None
+    return text, data
 
 
 def with_lines(text: str, faults: Sequence[str]) -> list[str]:
@@ -78,3 +104,40 @@ def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: st
         place = names.get((table, entry), int(entry) if entry.isdigit() else -1)
     at = {(t, p, k): number for number, t, p, k in reversed(lines)}
     return at.get((table, place, key or ""), at.get((table, place, "")))
+
+
+def scene_text(data: Mapping[str, Any]) -> str:
+    """Return the TOML text of a scene's nested tables: entries such as [[joint]], with each vector on one
+    line."""
+    entries = {key: value for key, value in data.items() if _is_of_tables(value)}
+    blocks = ["\n".join(_key_lines({key: value for key, value in data.items() if key not in entries}))]
+    blocks += [
+        f"[[{key}]]\n" + "\n".join(_key_lines(entry)) for key, found in entries.items() for entry in found
+    ]
+    return "\n\n".join(blocks) + "\n"
+
+
+def _is_of_tables(value: Any) -> bool:
+    return isinstance(value, list) and any(isinstance(item, Mapping) for item in value)
+
+
+def _key_lines(table: Mapping[str, Any]) -> Iterator[str]:
+    """Return lines ``key = value``, names and types first."""
+    for key in sorted(table, key=lambda key: FIRST.index(key) if key in FIRST else len(FIRST)):
+        yield f"{key} = {_value(table[key])}"
+
+
+def _value(value: Any) -> str:
+    """Return a value on one line."""
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(_key_lines(value)) + " }"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_value, value)) + "]"
+    return tomli_w.dumps({"x": value}).removeprefix("x = ").rstrip("\n")
+
+
+def as_lists(value: Any) -> Any:
+    """Return tuples as lists, as writers of TOML and JSON need them."""
+    if isinstance(value, Mapping):
+        return {k: as_lists(v) for k, v in value.items()}
+    return [as_lists(v) for v in value] if isinstance(value, tuple | list) else value
