@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 from mbref.cli.first_run import Simulate
+from mbref.equations.branches import SMOOTH
 from mbref.method import MethodError
 from mbref.motion import Motion
 from mbref.stepping.limits import Limits
 from mbref.trajectory import Outcome
 
 FRAMES = 101  # number of samples of a motion
-SMOOTH = 1  # number of the smooth branch, which is taken unless the user chooses another
 
 
 def chosen(smooth: Motion, number: int | None) -> int:

@@ -1,17 +1,19 @@
-"""Options that several commands share: the scene, the method, the times, the limits of a run."""
+"""Options that several commands share, and the run that they request: scene, method, times and limits."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from mbref.cli.output import warn
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.method import SERIES, SHORT, SPARSE
+from mbref.method import SERIES, SHORT, SPARSE, default_method
 from mbref.scene import Scene
+from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
 
 if TYPE_CHECKING:
@@ -53,6 +55,26 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
     when.add_argument("--times", help="sample times in s, increasing, e.g. 0.1,0.2,0.4")
     when.add_argument("--samples", type=int, help="this many equally spaced times from 0 to the duration")
     parser.add_argument("--duration", type=float, help="end time in s (default: the scene's)")
+
+
+class Request(NamedTuple):
+    """Arguments of ``simulate``."""
+
+    scene: Scene
+    method: str
+    times: np.ndarray  # (k,), s
+    limits: Limits
+
+
+def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Request:
+    """Return the run that the options request, with branches by crossing; prints warnings about its scene.
+
+    Raises SceneError, or ValueError that names the faulty option.
+    """
+    scene = find_scene(options.scene)
+    times, limits = sample_times(options, scene), limits_of(options, branches)
+    warn(scene)
+    return Request(scene, options.method or default_method(scene), times, limits)
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:

@@ -18,6 +18,8 @@ from mbref.scene_slips import probable_slips
 if TYPE_CHECKING:
     from rich.table import Table
 
+    from mbref.motion import Motion
+
 PIPED_WIDTH = 80  # characters of a line without a terminal
 TIME = "s"
 HOUR = 3600.0  # s
@@ -42,6 +44,14 @@ def warn(scene: Scene) -> None:
     """Print warnings about numbers of a scene that are probably mistakes on stderr."""
     for slip in probable_slips(scene):
         print(f"warning: {slip}", file=sys.stderr)
+
+
+def exit_status(*motions: Motion) -> int:
+    """Print the outcomes of runs that ended early; return 1 if there is one, otherwise 0."""
+    ended = [motion for motion in motions if motion.outcome.name != "COMPLETED"]
+    for motion in ended:
+        print(f"{motion.outcome.name}: {motion.message}")
+    return 1 if ended else 0
 
 
 def rounded(vector: np.ndarray) -> np.ndarray:

@@ -8,12 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from mbref.cli.branches import along_branches, chosen, of_several_branches, sentence
-from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import progress_bar, warn
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.output import exit_status, progress_bar, warn
 from mbref.drawing.film import png, write_film
 from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.view import View
-from mbref.method import default_method
 from mbref.scenes import find_scene
 
 MOVING = (".svg", ".gif", ".mp4")
@@ -86,24 +85,16 @@ def _draw(options: argparse.Namespace) -> int:
 def _animate(options: argparse.Namespace) -> int:
     from mbref.cli.first_run import simulator
 
-    scene, view = find_scene(options.scene), _view(options)
     parted = options.branches or options.crossing is not None
-    path, times, limits = (
-        path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING))),
-        sample_times(options, scene),
-        limits_of(options),
-    )
-    warn(scene)
-    method = options.method or default_method(scene)
-    with (
-        simulator(method) as simulate,
-        progress_bar("simulating", float(times[-1])) as progress,
-    ):
-        motion = simulate(scene, method, times, limits, progress)
+    path = path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING)))
+    run, view = request_of(options), _view(options)
+    scene = run.scene
+    with simulator(run.method) as simulate, progress_bar("simulating", float(run.times[-1])) as progress:
+        motion = simulate(*run, progress)
         motions, picture = {"": motion}, partial(moving, scene, motion, view)
         if parted:
             number = chosen(motion, options.crossing)
-            motions = along_branches(simulate, motion, method, limits, number)
+            motions = along_branches(simulate, motion, run.method, run.limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
     if path.suffix == ".svg":
         path.write_text(picture(), encoding="utf-8")
@@ -112,10 +103,7 @@ def _animate(options: argparse.Namespace) -> int:
     print(path)
     if not parted and (several := of_several_branches(motion)):
         print(f"{sentence(motion, several[0])}; --branches shows them side by side")
-    ended = [m for m in motions.values() if m.outcome.name != "COMPLETED"]
-    for motion in ended:
-        print(f"{motion.outcome.name}: {motion.message}")
-    return 1 if ended else 0
+    return exit_status(*motions.values())
 
 
 def _view(options: argparse.Namespace) -> View | None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import progress_bar, warn
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.output import exit_status, progress_bar
 from mbref.cli.pictures import path_of
-from mbref.method import default_method
 from mbref.outputs import OUTPUTS
-from mbref.scenes import find_scene
 
 NAMES = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
 
@@ -42,24 +40,15 @@ def add(commands: Any) -> None:
 def _plot(options: argparse.Namespace) -> int:
     from mbref.cli.first_run import simulator
 
-    scene = find_scene(options.scene)
-    path, times, limits = (
-        path_of(options, "-plot", (".svg", ".png")),
-        sample_times(options, scene),
-        limits_of(options),
-    )
-    warn(scene)
-    method = options.method or default_method(scene)
-    with simulator(method) as simulate, progress_bar("simulating", float(times[-1])) as progress:
+    path, run = path_of(options, "-plot", (".svg", ".png")), request_of(options)
+    with simulator(run.method) as simulate, progress_bar("simulating", float(run.times[-1])) as progress:
         if options.columns:  # raises an error for unknown names
-            simulate(scene, method, times[:1], limits, progress).columns(*options.columns)
-        motion = simulate(scene, method, times, limits, progress)
+            simulate(*run._replace(times=run.times[:1]), progress).columns(*options.columns)
+        motion = simulate(*run, progress)
     try:
         figure = motion.plot(*options.columns)
     except ImportError:
         raise ValueError("a plot needs matplotlib: pip install 'mbref[report]'") from None
     figure.savefig(path, dpi=150)
     print(path)
-    if motion.outcome.name != "COMPLETED":
-        print(f"{motion.outcome.name}: {motion.message}")
-    return 0 if motion.outcome.name == "COMPLETED" else 1
+    return exit_status(motion)

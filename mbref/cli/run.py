@@ -10,14 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
-from mbref.cli.output import body_table, column_table, console, progress_bar, rounded, warn
-from mbref.method import default_method
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
 from mbref.motion import Motion
 from mbref.outputs import UNITS
 from mbref.records import strict_json
 from mbref.scene import Scene
-from mbref.scenes import find_scene
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
@@ -73,29 +71,22 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    scene = find_scene(options.scene)
-    times, limits, write = (
-        sample_times(options, scene),
-        limits_of(options, _branches(options.branch)),
-        _writer(options.out),
-    )
     from mbref.cli.first_run import simulator
 
-    warn(scene)
-    method = options.method or default_method(scene)
-    with simulator(method) as simulate:
-        with progress_bar("simulating", float(times[-1])) as progress:
+    write, run = _writer(options.out), request_of(options, _branches(options.branch))
+    with simulator(run.method) as simulate:
+        with progress_bar("simulating", float(run.times[-1])) as progress:
             if options.columns:  # raises an error for unknown names
-                first = simulate(scene, method, times[:1], limits, progress)
+                first = simulate(*run._replace(times=run.times[:1]), progress)
                 _estimated(first, options.estimate).columns(*options.columns)
-            motion = simulate(scene, method, times, limits, progress)
+            motion = simulate(*run, progress)
         motion = _estimated(motion, options.estimate)
         if options.out:
             write(motion, options.out, *options.columns)
         if options.json:
-            print(strict_json({"scene": scene.name, "records": [motion.to_record()]}), flush=True)
+            print(strict_json({"scene": run.scene.name, "records": [motion.to_record()]}), flush=True)
         else:
-            show(scene, motion, options.columns)
+            show(run.scene, motion, options.columns)
     return 0 if motion.outcome.name == "COMPLETED" else 1
 
 
