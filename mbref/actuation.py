@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
-from mbref.joint_motion import JointMotion, joint_motion, place_of, turned_since_start, velocity_of
+from mbref.joint_motion import along, joint_motion, place_of, turned_since_start, velocity_of
 from mbref.scene import JointLoad, Scene, Spring
+from mbref.scene_joints import ANGLE
 from mbref.trajectory import Trajectory
 
 
@@ -85,14 +86,14 @@ def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
     if name not in driven:
         raise KeyError(f"no driver of a joint {name!r}; driven joints: {', '.join(driven) or 'none'}")
     joint, found = scene.joint_named(name), joint_motion(scene, motion, name)
-    if found.force is None or found.moment is None:
+    coordinate = joint.facts.driven
+    if found.force is None or found.moment is None or coordinate is None:
         return DriverMotion(name, None, None, None)
-    axis = _world_axis(scene, motion, name)
-    if joint.facts.driven == "angle":
-        torque = np.einsum("ki,ki->k", found.moment, axis)
-        return DriverMotion(name, None, torque, torque * _rate(found))
-    force = np.einsum("ki,ki->k", found.force, axis)
-    return DriverMotion(name, force, None, force * _rate(found))
+    first = turned_since_start(scene, motion, joint.bodies[0])
+    axis = rotations.rotate(first, rotations.unit(joint.directions[0])[None])
+    turns, rate = coordinate == ANGLE, along(found, coordinate)[1]
+    size = np.einsum("ki,ki->k", found.moment if turns else found.force, axis)
+    return DriverMotion(name, None if turns else size, size if turns else None, size * rate)
 
 
 def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
@@ -108,12 +109,10 @@ def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
 
 def _of_joint(scene: Scene, motion: Trajectory, place: int, load: JointLoad) -> LoadMotion:
     found, action = joint_motion(scene, motion, load.joint), load.action
-    turns = load.coordinate == "angle"
-    moved = np.asarray(found.angle if turns else found.displacement)
-    rate = np.asarray(found.rate if turns else found.displacement_rate)
+    moved, rate = along(found, load.coordinate)
     factor = 1.0 if load.over_time is None else load.over_time.values(motion.times)
     size = action.amount * factor - action.stiffness * (moved - action.natural) - action.damping * rate
-    if turns:
+    if load.coordinate == ANGLE:
         return LoadMotion(place, angle=moved, rate=rate, torque=size, power=size * rate)
     return LoadMotion(place, force=size, displacement=moved, displacement_rate=rate, power=size * rate)
 
@@ -135,16 +134,3 @@ def largest_force(trajectory: Trajectory) -> np.ndarray | None:
         return None
     forces = [np.linalg.norm(wrench[:, :3], axis=1) for wrench in trajectory.reactions.values()]
     return np.asarray(np.max(forces, axis=0, initial=0.0)) if forces else np.zeros(len(trajectory.times))
-
-
-def _world_axis(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
-    """Return the axis (k, 3) of a joint, which its first body carries, as a unit vector."""
-    joint = scene.joint_named(name)
-    axis = np.array(joint.directions[0])
-    first = turned_since_start(scene, motion, joint.bodies[0])
-    return np.asarray(rotations.rotate(first, axis[None] / np.linalg.norm(axis)))
-
-
-def _rate(joint: JointMotion) -> np.ndarray:
-    """Return the rate (k,) of the angle, or of the displacement if the joint has no angle."""
-    return np.asarray(joint.displacement_rate if joint.rate is None else joint.rate)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
-from mbref.joint_motion import joint_motion, place_of
+from mbref.joint_motion import along, joint_motion, place_of
 from mbref.scene import JointLoad, Scene
 from mbref.trajectory import Trajectory
 
@@ -24,10 +24,9 @@ def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
     moving = np.einsum("b,kbi,kbi->k", mass, motion.velocity, motion.velocity)
     total = moving + turning
     for joint in scene.joint:
-        if joint.reflected_inertia:
-            found = joint_motion(scene, motion, joint.name)
-            rate = found.rate if joint.facts.driven == "angle" else found.displacement_rate
-            total = total + joint.reflected_inertia * np.asarray(rate) ** 2
+        if joint.reflected_inertia and joint.facts.driven:
+            _, rate = along(joint_motion(scene, motion, joint.name), joint.facts.driven)
+            total = total + joint.reflected_inertia * rate**2
     return np.asarray(total / 2)
 
 
@@ -47,9 +46,8 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
             stretch = np.linalg.norm(ends[1] - ends[0], axis=1) - load.natural_length
             total = total + load.stiffness * stretch**2 / 2
         elif isinstance(load, JointLoad) and load.action.stiffness:
-            found = joint_motion(scene, motion, load.joint)
-            moved = found.angle if load.coordinate == "angle" else found.displacement
-            total = total + load.action.stiffness * (np.asarray(moved) - load.action.natural) ** 2 / 2
+            moved, _ = along(joint_motion(scene, motion, load.joint), load.coordinate)
+            total = total + load.action.stiffness * (moved - load.action.natural) ** 2 / 2
     return np.asarray(total)
 
 

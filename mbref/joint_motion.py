@@ -8,6 +8,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.scene import Joint, Scene
+from mbref.scene_joints import ANGLE, Coordinate
 from mbref.trajectory import Trajectory
 
 
@@ -67,6 +68,13 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     return JointMotion(name, angle, rate, slid, speed, rotations.to_vector(relative), force, moment, marks)
 
 
+def along(found: JointMotion, coordinate: Coordinate) -> tuple[np.ndarray, np.ndarray]:
+    """Return a joint's angle (rad) or displacement (m), and its rate (k,)."""
+    turns = coordinate == ANGLE
+    value, rate = (found.angle, found.rate) if turns else (found.displacement, found.displacement_rate)
+    return np.asarray(value), np.asarray(rate)
+
+
 def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
     """Return world positions (k, 3) of a point (world, t = 0) that moves with a body, or is fixed to the
     ground."""
@@ -96,17 +104,12 @@ def turned_since_start(scene: Scene, motion: Trajectory, name: str) -> np.ndarra
     return rotations.multiply(motion.orientation[:, b], start)
 
 
-def _axis(joint: Joint) -> np.ndarray:
-    axis = np.array(joint.directions[0])
-    return np.asarray(axis / np.linalg.norm(axis))
-
-
 def _angle(
     scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray, relative: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the angle about the axis, with full turns counted by the mean rate between samples, and its
     rate."""
-    axis = _axis(joint)
+    axis = rotations.unit(joint.directions[0])
     spins = [_angular_velocity(scene, motion, name) for name in joint.bodies]
     rate = np.einsum("ki,ki->k", spins[1] - spins[0], rotations.rotate(first, axis[None]))
     wrapped = 2 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0])
@@ -128,7 +131,7 @@ def _displacement(
     ends = list(zip(joint.bodies, joint.anchor_pair, strict=True))
     places = [place_of(scene, motion, *end) for end in ends]
     speeds = [velocity_of(scene, motion, *end) for end in ends]
-    axis = rotations.rotate(first, _axis(joint)[None])
+    axis = rotations.rotate(first, rotations.unit(joint.directions[0])[None])
     turning = rotations.cross(_angular_velocity(scene, motion, joint.bodies[0]), axis)
     apart = places[1] - places[0]
     rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)

@@ -7,6 +7,7 @@ measure angles. Compiled kernels use the scalar forms in ``mbref.kernels``.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 def to_matrix(p: np.ndarray) -> np.ndarray:
@@ -60,6 +61,12 @@ def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
 def conjugate(p: np.ndarray) -> np.ndarray:
     """Return the inverse rotations (…, 4) of unit quaternions."""
     return np.asarray(p, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def unit(v: ArrayLike) -> np.ndarray:
+    """Return a vector v / |v| (n,); zero for a zero vector."""
+    v = np.asarray(v, dtype=float)
+    return np.asarray(v / (np.linalg.norm(v) or 1.0))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -17,7 +17,7 @@ from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced, displacement
-from mbref.joint_motion import joint_motion
+from mbref.joint_motion import along, joint_motion
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
@@ -216,23 +216,21 @@ def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
     rng, freedoms = np.random.default_rng(SEED), first.freedoms
     yield first
     there = back = first
-    direction = _unit(rng.standard_normal(freedoms))
+    direction = rotations.unit(rng.standard_normal(freedoms))
     for k in range(1, count):
         forth = k % 2 == 1
         tangent = there if forth else back
         ahead = tangent.basis.T @ first.basis @ direction
         sign = 1.0 if forth else -1.0
-        moved = _moved(tangent, sign * STRIDE * first.model.length * _unit(ahead))
+        moved = _moved(tangent, sign * STRIDE * first.model.length * rotations.unit(ahead))
         if moved is None or moved.freedoms != freedoms:
-            direction = _unit(rng.standard_normal(freedoms))
+            direction = rotations.unit(rng.standard_normal(freedoms))
             continue
         there, back = (moved, back) if forth else (there, moved)
-        direction = _unit(direction + 0.3 * rng.standard_normal(freedoms)) if freedoms > 1 else direction
+        direction = (
+            rotations.unit(direction + 0.3 * rng.standard_normal(freedoms)) if freedoms > 1 else direction
+        )
         yield moved
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return np.asarray(vector / (np.linalg.norm(vector) or 1.0))
 
 
 def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
@@ -325,6 +323,5 @@ def _measured_from(load: Any, scene: Scene, motion: Trajectory) -> Any:
     """Return the load with its natural angle or displacement measured from the first pose of a motion."""
     if load.type not in ("torsion_spring", "slide_spring"):
         return load
-    found, field = joint_motion(scene, motion, load.joint), f"natural_{load.coordinate}"
-    moved = found.angle if load.coordinate == "angle" else found.displacement
-    return load.model_copy(update={field: load.action.natural - float(np.asarray(moved)[0])})
+    moved, _ = along(joint_motion(scene, motion, load.joint), load.coordinate)
+    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - float(moved[0])})

@@ -109,7 +109,7 @@ def turning(scene: Scene) -> Turning:
                 "body relative to the ground at a constant rate"
             ]
         )
-    axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    axis = rotations.unit(joint.directions[0])
     if np.linalg.norm(np.cross(scene.gravity, axis)) > PARALLEL * np.linalg.norm(scene.gravity):
         raise SceneError(
             [f"driver[{driver.joint}]: its axis is not parallel to gravity, so the motion is not steady"]

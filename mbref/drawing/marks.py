@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbref import rotations
 from mbref.drawing import svg
 from mbref.drawing.shapes import attached, attack
 from mbref.drawing.svg import GREY, INK, PAPER
@@ -38,11 +39,6 @@ class Stage(NamedTuple):
         return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
 
 
-def _unit(vector: tuple[float, ...]) -> np.ndarray:
-    unit: np.ndarray = np.array(vector) / np.linalg.norm(vector)
-    return unit
-
-
 def _along(
     stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray, px: float
 ) -> np.ndarray:
@@ -69,7 +65,7 @@ def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
 def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
     """Return the pixels (1, 2, 2) of the line along which a joint to the ground slides. The line is a little
     longer than the travel."""
-    axis, point = _unit(joint.directions[0]), np.array(joint.anchor_pair[side])
+    axis, point = rotations.unit(joint.directions[0]), np.array(joint.anchor_pair[side])
     moving = attached(stage.scene, stage.motion, joint.bodies[1 - side], [joint.anchor_pair[1 - side]])[:, 0]
     travel, over = (moving - point) @ axis, 42 / stage.page.scale
     ends = point + axis * np.array([[travel.min() - over], [travel.max() + over]])
@@ -86,9 +82,9 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
             ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.timeline
         )
     if joint.type == "inline":
-        yield from _line(stage, names[0], first, _unit(joint.directions[0]))
+        yield from _line(stage, names[0], first, rotations.unit(joint.directions[0]))
     sliding = joint.facts.free_translations == 1 and joint.type != "inline" and bool(joint.directions)
-    for k, axis in enumerate(map(_unit, joint.directions)):
+    for k, axis in enumerate(map(rotations.unit, joint.directions)):
         body, point = (names[k], joint.anchor_pair[k]) if len(joint.directions) > 1 else (names[1], second)
         if sliding:
             yield from _sleeve(stage, body, point, axis)
@@ -100,7 +96,7 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
                 stage.timeline,
             )
     if joint.type == "planar":
-        yield from _plane(stage, names[0], first, _unit(joint.directions[0]))
+        yield from _plane(stage, names[0], first, rotations.unit(joint.directions[0]))
     yield svg.follow(stage.place(names[1], second), SIGNS[joint.type](), stage.timeline)
 
 
@@ -162,7 +158,7 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
     """Return a curved arrow about, or an arrow along, the axis of a driven joint, in the direction of its
     initial motion."""
     joint = stage.scene.joint_named(driver.joint)
-    axis, point = _unit(joint.directions[0]), joint.anchor_pair[1]
+    axis, point = rotations.unit(joint.directions[0]), joint.anchor_pair[1]
     rate = driver.polynomial[1] if len(driver.polynomial) > 1 else 0.0
     sense = -1.0 if rate < 0 else 1.0
     if joint.facts.driven == "angle":
@@ -177,19 +173,19 @@ def load_mark(stage: Stage, load: Load) -> str:
     if load.type == "force":
         return svg.follow(
             stage.place(load.body, load.point),
-            _arrow_from_origin(stage, _unit_or_zero(load.force)),
+            _arrow_from_origin(stage, rotations.unit(load.force)),
             stage.timeline,
         )
     if load.type == "moment":
         body = stage.scene.body[stage.scene.body_index(load.body)]
-        sign = _turning(stage, _unit_or_zero(load.moment), 20.0)
+        sign = _turning(stage, rotations.unit(load.moment), 20.0)
         return svg.follow(stage.place(load.body, body.position), sign, stage.timeline)
     if load.type == "spring":
         first, second = (stage.place(*end) for end in attack(load))
         look = f'stroke="{ACTION}" stroke-width="1.6" fill="none"'
         return svg.line(_zigzag(first, second), look, stage.timeline)
     joint = stage.scene.joint_named(load.joint)
-    at, axis = stage.place(joint.bodies[1], joint.anchor_pair[1]), _unit(joint.directions[0])
+    at, axis = stage.place(joint.bodies[1], joint.anchor_pair[1]), rotations.unit(joint.directions[0])
     sense = axis * np.copysign(1.0, load.action.amount)
     signs: dict[str, Callable[[], str]] = {
         "torsion_spring": _spiral,
@@ -205,10 +201,6 @@ def _short_zigzag(stage: Stage, axis: np.ndarray) -> str:
     end = ARROW * stage.page.directions(axis)
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in _zigzag(np.zeros((1, 2)), end[None], 8)[0])
     return f'<polyline points="{path}" stroke="{ACTION}" stroke-width="1.6" fill="none"/>'
-
-
-def _unit_or_zero(vector: tuple[float, ...]) -> np.ndarray:
-    return _unit(vector) if any(vector) else np.zeros(3)
 
 
 def _arrow_from_origin(stage: Stage, direction: np.ndarray) -> str:
