@@ -153,7 +153,8 @@ def _(monkeypatch):
 @check("equations.joint_reactions OPEN")
 def _(_):
     def vanishes(value):
-        model = SimpleNamespace(dense=lambda _: np.array([[[1.0, value], [1.0, -value]]]), m=2)
+        structure = SimpleNamespace(dense=lambda _: np.array([[[1.0, value], [1.0, -value]]]))
+        model = SimpleNamespace(structure=structure, m=2)
         found, _ = joint_reactions.vanishing_combinations(model, None)
         return found.shape[-1] == 1
 

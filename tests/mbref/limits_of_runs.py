@@ -418,7 +418,7 @@ def _(_):
 def _(_):
     def are_computed(rows):
         symbolic = SimpleNamespace(row=np.arange(rows), column=np.arange(rows))
-        model = SimpleNamespace(dense=lambda _: np.eye(rows)[None])
+        model = SimpleNamespace(structure=SimpleNamespace(dense=lambda _: np.eye(rows)[None]))
         found = ranks.all_ranks(model, np.zeros((1, rows, 12)), np.ones((1, rows)), symbolic, 1e-10)
         return found[0].rank == rows
 

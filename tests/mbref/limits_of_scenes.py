@@ -233,10 +233,11 @@ def _(_):
     def freedoms(value):
         rows = np.zeros((2, 6))
         rows[0, 0], rows[1, 0], rows[1, 1] = 1.0, math.sqrt(1.0 - value**2), value
-        terms = SimpleNamespace(jacobian=rows, nu=np.zeros(2), gamma=np.zeros(2))
-        model = SimpleNamespace(nb=1, n=6, terms=lambda *_: terms)
-        model.data = SimpleNamespace(lengths=np.ones(1))
-        model.along = lambda t, *_: SimpleNamespace(gamma=np.zeros((len(t), 2)))
+
+        def terms(t, *_):
+            return SimpleNamespace(jacobian=rows, nu=np.zeros(2), gamma=np.zeros((*np.shape(t), 2)))
+
+        model = SimpleNamespace(nb=1, n=6, terms=terms, data=SimpleNamespace(lengths=np.ones(1)))
         return branches.second_order(model, 0.0, np.zeros(7), np.zeros(6)).kernel.shape[1]
 
     return flips(lambda value: freedoms(value) == 5, 1.9e-6, 2.1e-6)

@@ -121,8 +121,8 @@ def test_scenes_that_differ_in_numbers_alone_share_a_structure():
 def test_a_repeated_run_evaluates_its_start_twice(scene, monkeypatch):
     """At rest to correct it, and beside the states at which equations are read."""
     simulated(scene)
-    asked, along = [], Model.along
-    monkeypatch.setattr(Model, "along", lambda *given: asked.append(given) or along(*given))
+    asked, terms = [], Model.terms
+    monkeypatch.setattr(Model, "terms", lambda *given: asked.append(given) or terms(*given))
     start_run(scene, Method.parse(METHODS[0]), TIMES, Limits())
     assert len(asked) == 2
 
