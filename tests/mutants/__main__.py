@@ -6,18 +6,18 @@ run out of time it is counted apart.  ``--only mbref/taylor`` draws from files o
 ``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
-The test files that name the mutant's function or module run first, then the quickest, each for 5 s of CPU
-time at most, until a test fails or 40 s are over; other work on the machine does not end them. A test that
-fails without the mutant, too, is left out. Results stay in ``build/mutants.jsonl`` as long as the file and
-its tests are the same, so that an interrupted run goes on where it ended. Tests of files with kernels run
-as plain Python, so that no kernel is compiled for a mutant. A mutant that only a test of a stored text sees
-is counted apart. Exit status 1 where a mutant survives, is seen by a stored text alone or runs out of time.
+The test files that killed other mutants of the folder run first, then files that name the mutant's function
+or module, then the quickest, each for 5 s of CPU time at most, until a test fails or 40 s are over; other
+work on the machine does not end them. A test that fails without the mutant, too, is left out. Results stay
+in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted run goes
+on where it ended. Tests of files with kernels run as plain Python, so that no kernel is compiled for a
+mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
+survives, is seen by a stored text alone or runs out of time.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import functools
 import hashlib
 import json
@@ -28,7 +28,8 @@ import shutil
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
@@ -37,6 +38,7 @@ from crosscheck import engine as crosscheck_engine
 from tests.mutants.equivalent import reason
 from tests.mutants.importers import ADAPTERS, PACKAGES, SNAPSHOTS, engines, importers
 from tests.mutants.operators import Mutant, mutants
+from tests.mutants.order import ordered
 
 ROOT = Path(__file__).parents[2]
 COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml", "README.md")
@@ -53,7 +55,6 @@ RENDERED = (
 # CPU s of a test file and of all files, after which no test begins, and after which a test is ended
 OF_FILE, BUDGET, LIMIT = 5.0, 40.0, 90.0
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
-PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
 WITH_KERNELS = (
     "mbref/kernels/",
     "mbref/linear_algebra/",
@@ -77,6 +78,7 @@ class Tree:
         self.place, self._planted, self._begun = place, 0, time.time()
         self._workers: dict[bool, subprocess.Popen[str]] = {}
         self._seconds: dict[str, float] = {}
+        self._kills: Counter[tuple[str, str]] = Counter()  # by folder of the mutant and test file
         self._sound: dict[tuple[bool, str], bool] = {}
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
@@ -95,7 +97,12 @@ class Tree:
         source = (self.place / mutant.file).read_text()
         plain = is_plain(mutant.file, source)
         texts = {test: (self.place / test).read_text() for test in tests}
-        result, test = self._seen(mutant, source, ordered(mutant, source, texts, self._seconds), plain)
+        folder = str(Path(mutant.file).parent)
+        kills = {test: self._kills[folder, test] for test in tests}
+        files = ordered(mutant, source, texts, self._seconds, kills)
+        result, test = self._seen(mutant, source, files, plain)
+        if result == KILLED:
+            self._kills[folder, test.partition("::")[0]] += 1
         if result == SURVIVED and mutant.file.startswith(RENDERED):
             result, test = self._seen(mutant, source, SNAPSHOTS, plain)
             result = BY_TEXT if result == KILLED else SURVIVED  # a text that takes too long sees nothing
@@ -186,31 +193,6 @@ def is_plain(file: str, source: str) -> bool:
     """Return whether the tests of a file run without compilation: where it has kernels."""
     has_kernels = file.startswith(WITH_KERNELS) or re.search(r"^(from|import) numba\b", source, re.MULTILINE)
     return bool(has_kernels) and file not in COMPILING
-
-
-def ordered(mutant: Mutant, source: str, tests: Mapping[str, str], seconds: Mapping[str, float]) -> list[str]:
-    """Return the names of test files with these texts.
-
-    Files that name the function or class of a mutant, or its module, come first, and then the quickest.
-    """
-    words = {Path(mutant.file).stem, *around(source, mutant)}
-    places = list(tests)
-
-    def rank(test: str) -> tuple[bool, float, int]:
-        named = any(re.search(rf"\b{word}\b", tests[test]) for word in words)
-        return not named, seconds.get(test, len(tests[test]) / PER_SECOND), places.index(test)
-
-    return sorted(tests, key=rank)
-
-
-def around(source: str, mutant: Mutant) -> list[str]:
-    """Return the names of the functions and classes that contain a mutant."""
-    return [
-        node.name
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef | ast.ClassDef)
-        and node.lineno <= mutant.line <= (node.end_lineno or 0)
-    ]
 
 
 def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutants import __main__ as runner
+from tests.mutants import order
 from tests.mutants.equivalent import REASONS
 from tests.mutants.importers import SNAPSHOTS, importers
 from tests.mutants.operators import KINDS, Mutant, mutants
@@ -144,14 +145,16 @@ def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():
     mutant, source = planted("((a) - (b))"), TINY["mbref/sums.py"]
     tests = ["test_broken.py", "test_wait.py", "test_weak.py", "test_total.py"]
     seconds = {"test_weak.py": 2.0, "test_total.py": 1.0, "test_broken.py": 0.1, "test_wait.py": 0.3}
-    assert runner.around(source, mutant) == ["total"]
+    assert order.around(source, mutant) == ["total"]
     texts = {test: TINY[test] for test in tests}
-    assert runner.ordered(mutant, source, texts, seconds) == [
+    assert order.ordered(mutant, source, texts, seconds, {}) == [
         "test_wait.py",  # all import the module ``sums``, except the last one
         "test_total.py",
         "test_weak.py",
         "test_broken.py",
     ]
+    kills = {"test_weak.py": 1, "test_broken.py": 2}
+    assert order.ordered(mutant, source, texts, seconds, kills)[:2] == ["test_broken.py", "test_weak.py"]
 
 
 def test_files_with_kernels_run_without_compilation():

@@ -1,0 +1,45 @@
+"""The order in which test files run against a mutant."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from tests.mutants.operators import Mutant
+
+PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
+
+
+def ordered(
+    mutant: Mutant,
+    source: str,
+    tests: Mapping[str, str],
+    seconds: Mapping[str, float],
+    kills: Mapping[str, int],
+) -> list[str]:
+    """Return the names of test files with these texts.
+
+    Files that have killed most mutants of the same folder come first, then files that name the function or
+    class of a mutant, or its module, and then the quickest.
+    """
+    words = {Path(mutant.file).stem, *around(source, mutant)}
+    places = list(tests)
+
+    def rank(test: str) -> tuple[int, bool, float, int]:
+        named = any(re.search(rf"\b{word}\b", tests[test]) for word in words)
+        needed = seconds.get(test, len(tests[test]) / PER_SECOND)
+        return -kills.get(test, 0), not named, needed, places.index(test)
+
+    return sorted(tests, key=rank)
+
+
+def around(source: str, mutant: Mutant) -> list[str]:
+    """Return the names of the functions and classes that contain a mutant."""
+    return [
+        node.name
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and node.lineno <= mutant.line <= (node.end_lineno or 0)
+    ]
