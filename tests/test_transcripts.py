@@ -13,15 +13,15 @@ SHOWING = {str(page.relative_to(ROOT)): page for page in PAGES if blocks(page.re
 RENEW = "python -m tests.transcripts {} renews the outputs"
 
 
-def lasts_minutes(page: Path) -> bool:
-    """Whether the commands of a page compare engines, which takes minutes."""
+def is_costly(page: Path) -> bool:
+    """Whether the commands of a page compare engines or make whole studies."""
     found = [command for block in blocks(page.read_text()) for command in commands(block)]
-    return any(command.startswith("crosscheck ") for command in found)
+    return page.name == "gallery.md" or any(command.startswith("crosscheck ") for command in found)
 
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(n, marks=[pytest.mark.slow] * lasts_minutes(page)) for n, page in SHOWING.items()],
+    [pytest.param(n, marks=[pytest.mark.slow] * is_costly(page)) for n, page in SHOWING.items()],
 )
 def test_commands_print_what_pages_show(name):
     text = SHOWING[name].read_text()

@@ -37,10 +37,11 @@ def known(monkeypatch):
     return make
 
 
-def test_every_check_and_the_sound_example_engine(known, tmp_path):
+@pytest.mark.parametrize("times", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_every_check_and_the_sound_example_engine(known, tmp_path, times):
     """Each check is decided as often as asked, and a second run takes the records of the first."""
     known(example())
-    path, plan = tmp_path / "records.jsonl", deep.Plan("example", 2)
+    path, plan = tmp_path / "records.jsonl", deep.Plan("example", times)
     found = deep.examined(plan, path)
     assert not found.violations, found.violations
     assert not found.open() and set(found.counts) == {*PROPERTIES, "run", "refusal"} - {

@@ -74,10 +74,10 @@ def test_an_unknown_finding_is_refused() -> None:
 
 
 def proofs() -> list[object]:
-    """The findings; those of engines that compile their code first are slow."""
-    slow = ("mjx", "warp", "newton")
+    """The findings; those of engines that compile their code first, or of small steps, are slow."""
+    slow = ("mjx", "warp", "newton", "dart-hinge-closure-fine-step", "dart-hinge-closure-turned")
     return [
-        pytest.param(found.name, marks=pytest.mark.slow if found.engine in slow else ())
+        pytest.param(found.name, marks=pytest.mark.slow if {found.engine, found.name} & {*slow} else ())
         for found in findings()
     ]
 

@@ -395,7 +395,10 @@ def agree_or_refuse(tmp_path, file: random_models.File) -> bool:
     return True
 
 
+@pytest.mark.parametrize(
+    "seeds", [range(30), pytest.param(range(30, 100), marks=pytest.mark.slow)], ids=["few", "many"]
+)
 @pytest.mark.parametrize("make", [random_models.mjcf, random_models.urdf], ids=["mjcf", "urdf"])
-def test_random_files_agree_with_the_compiled_model_or_are_refused(make, tmp_path):
-    agreed = [agree_or_refuse(tmp_path, make(seed)) for seed in range(100)]
-    assert sum(agreed) >= 60, sum(agreed)
+def test_random_files_agree_with_the_compiled_model_or_are_refused(make, seeds, tmp_path):
+    agreed = [agree_or_refuse(tmp_path, make(seed)) for seed in seeds]
+    assert sum(agreed) >= 0.6 * len(seeds), sum(agreed)

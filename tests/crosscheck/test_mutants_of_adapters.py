@@ -179,8 +179,9 @@ DEFECTS = {  # engine: file, text, the text with a defect; each text occurs once
         ("model", "return rotation, poses[:, :3],", "return rotation, poses[::-1, :3],"),
     ],
 }
+MANY_STEPS = "node.getLinearAcceleration(), node.getAngularAcceleration()"  # this defect costs 40 s
 CASES = [
-    pytest.param(way, *defect, marks=pytest.mark.slow if way in SLOW else ())
+    pytest.param(way, *defect, marks=[pytest.mark.slow] * (way in SLOW or defect[1] == MANY_STEPS))
     for way, found in DEFECTS.items()
     for defect in found
 ]

@@ -178,7 +178,13 @@ PAIRS = {
 }
 
 
-@pytest.mark.parametrize("name", PAIRS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.slow] * (name in ("order and shift", "sign and axes")))
+        for name in PAIRS
+    ],
+)
 def test_two_planted_differences_are_the_first_explanation(name, table):
     plant, says = PAIRS[name]
     (first, *_) = judge_motion(SCENE, plant(table)).explanations

@@ -146,6 +146,7 @@ def test_run_here_and_run_in_a_child_agree():
     assert here == child
 
 
+@pytest.mark.slow
 def test_cluster_of_two_workers_and_serial_run_agree(one_after_the_other: list[dict], tmp_path: Path):
     from distributed import Client, LocalCluster
 

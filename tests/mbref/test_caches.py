@@ -183,7 +183,11 @@ DAMAGES = (
 
 @pytest.mark.parametrize(
     ("script", "pattern", "says"),
-    [(SMALL_KERNEL, "*.nbc", "7.0\n"), (SMALL_KERNEL, "*.nbi", "7.0\n"), (SCENE, "*.code", "True\n")],
+    [
+        (SMALL_KERNEL, "*.nbc", "7.0\n"),
+        pytest.param(SMALL_KERNEL, "*.nbi", "7.0\n", marks=pytest.mark.slow),
+        (SCENE, "*.code", "True\n"),
+    ],
 )
 @pytest.mark.parametrize("damage", DAMAGES)
 def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):

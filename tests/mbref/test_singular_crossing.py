@@ -135,7 +135,9 @@ def test_a_motion_that_turns_back_before_the_flat_position_is_followed(loop, dis
     assert "passed" not in simulate(scene, "taylor", [1.5]).message
 
 
-@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-11])
+@pytest.mark.parametrize(
+    "rtol", [pytest.param(1e-6, marks=pytest.mark.slow), 1e-9, pytest.param(1e-11, marks=pytest.mark.slow)]
+)
 def test_two_loops_that_cross_at_once_are_recorded(rtol):
     """The sign of the determinant stays; of the ten crossings a run had recorded six."""
     run = simulate(find_scene("four_bar_chain[2]"), "taylor", np.linspace(0.0, 10.0, 3), Limits(rtol=rtol))

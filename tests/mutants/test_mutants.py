@@ -71,6 +71,7 @@ def test_a_seed_draws_the_same_mutants_and_another_seed_others():
     )
 
 
+@pytest.mark.slow
 def test_tests_are_those_that_import_the_file_the_nearest_first():
     found = importers("crosscheck/study/difference.py")
     assert "tests/crosscheck/test_verdict.py" in found, found
