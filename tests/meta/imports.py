@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -23,10 +24,10 @@ def sources(package: str) -> dict[str, Path]:
 
 def imported(path: Path) -> Iterator[str]:
     """Yield the dotted names that a file imports anywhere: of ``from a import b`` both ``a`` and ``a.b``."""
-    for node in _nodes(path):
+    for node in _imports(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.ImportFrom):
+        else:
             assert not node.level, f"{path}: relative import"
             yield str(node.module)
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
@@ -45,22 +46,23 @@ def graph(package: str) -> dict[str, set[str]]:
 def _targets(path: Path, modules: Mapping[str, Path]) -> set[str]:
     """Return the modules imported; ``from a import b`` is b if b is a module, otherwise a."""
     found = set()
-    for node in _nodes(path):
+    for node in _imports(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom):
+        else:
             for alias in node.names:
                 whole = f"{node.module}.{alias.name}"
                 found.add(whole if whole in modules else str(node.module))
     return found & set(modules)
 
 
-def _nodes(path: Path) -> Iterator[ast.AST]:
-    """Yield the nodes of a file, in an ``__init__`` without those under TYPE_CHECKING."""
+@functools.cache
+def _imports(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
+    """Return the imports of a file, in an ``__init__`` without those under TYPE_CHECKING."""
     tree = ast.parse(path.read_text())
     if path.name == "__init__.py":
         tree.body = [node for node in tree.body if not _is_for_types(node)]
-    return ast.walk(tree)
+    return tuple(node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _is_for_types(node: ast.stmt) -> bool:
