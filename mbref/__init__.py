@@ -5,6 +5,7 @@ The public names are imported at first access, so that ``import mbref`` takes li
 
 from __future__ import annotations
 
+from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -50,6 +51,14 @@ _MODULE_OF = {
     "variants": "mbref.variation",
 }
 
+_SERVICES = {  # functions behind methods of Scene and Motion
+    "counts": "mbref.equations.diagnosis",
+    "determined_reactions": "mbref.equations.along_trajectory",
+    "estimate_error": "mbref.second_run",
+    "still": "mbref.drawing.picture",
+    "violations": "mbref.equations.along_trajectory",
+}
+
 __all__ = [
     "SCENES",
     "Cost",
@@ -82,15 +91,11 @@ def __getattr__(name: str) -> Any:
     raise AttributeError(f"module 'mbref' has no attribute {name!r}")
 
 
-SERVICES.counts = lambda scene: import_module("mbref.equations.diagnosis").counts(scene)
-SERVICES.violations = lambda scene, motion: import_module("mbref.equations.along_trajectory").violations(
-    scene, motion
-)
-SERVICES.determined_reactions = lambda scene, motion: import_module(
-    "mbref.equations.along_trajectory"
-).determined_reactions(scene, motion)
-SERVICES.error_estimate = lambda *wanted: import_module("mbref.second_run").estimate_error(*wanted)
-SERVICES.picture = lambda scene: import_module("mbref.drawing.picture").still(scene)
+def _call(name: str, *given: Any) -> Any:
+    return getattr(import_module(_SERVICES[name]), name)(*given)
+
+
+SERVICES.update({name: partial(_call, name) for name in _SERVICES})
 
 
 def __dir__() -> list[str]:

@@ -133,7 +133,7 @@ class Motion(Trajectory):
     @property
     def violation(self) -> Violation:
         """Largest violation of a constraint row at position, velocity and acceleration level."""
-        return SERVICES.violations(self.mechanism, self)
+        return SERVICES["violations"](self.mechanism, self)
 
     @property
     def largest_reaction(self) -> np.ndarray | None:
@@ -145,14 +145,14 @@ class Motion(Trajectory):
         """Components of the reactions that equilibrium determines, by joint, shape (k, 6). An entry is true
         for a component of force (x, y, z) or moment (x, y, z), world axes, that does not depend on how
         redundant constraints share the load: in a plane across z force x, force y and moment z."""
-        return SERVICES.determined_reactions(self.mechanism, self)
+        return SERVICES["determined_reactions"](self.mechanism, self)
 
     @cached_property
     def error_estimate(self) -> ErrorEstimate:
         """Estimated global error of the motion at its samples, by a second run at a smaller tolerance. The
         second run is made on first access and takes about twice the time of the motion. Raises ValueError if
         the motion is of another engine than mbref."""
-        return SERVICES.error_estimate(self)
+        return SERVICES["estimate_error"](self)
 
     def with_error_estimate(
         self, seconds: float = math.inf, progress: Callable[[float], None] | None = None
@@ -175,7 +175,7 @@ class Motion(Trajectory):
         ValueError
             If the motion is of another engine than mbref.
         """
-        estimate = SERVICES.error_estimate(self, seconds, progress)
+        estimate = SERVICES["estimate_error"](self, seconds, progress)
         message = "; ".join(filter(None, (self.message, estimate.warning)))
         return replace(self, message=message)._keeping(estimate)
 

@@ -231,7 +231,7 @@ class Scene(Entry):
         SceneError
             If the initial positions contradict the joints.
         """
-        return SERVICES.counts(self)
+        return SERVICES["counts"](self)
 
     def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
         """Return a validated copy with some top-level fields replaced, or with another value at a path.
@@ -262,7 +262,7 @@ class Scene(Entry):
         return Scene(**{**data, **changes})
 
     def _repr_html_(self) -> str:
-        return SERVICES.picture(self)
+        return SERVICES["still"](self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as the nested tables of its file; fields with default values are left out.

@@ -1,7 +1,8 @@
 """Functions behind methods of scenes and motions that need other modules: constraint rows, drawing, error
 estimates.
 
-Scene and Motion are plain data and do not import these modules. ``mbref/__init__`` stores the functions here.
+Scene and Motion are plain data and do not import these modules. ``mbref/__init__`` puts the functions into
+SERVICES.
 """
 
 from __future__ import annotations
@@ -11,8 +12,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-
-from mbref.error_estimate import ErrorEstimate
 
 
 @dataclass(frozen=True)
@@ -62,29 +61,4 @@ class Violation(NamedTuple):
     acceleration: np.ndarray | None
 
 
-class Services:
-    """Functions of a scene or a motion, stored here when ``mbref`` is imported.
-
-    Attributes
-    ----------
-    counts : callable
-        Returns the Counts of a scene.
-    picture : callable
-        Returns a scene at t = 0 as SVG.
-    violations : callable
-        Returns the Violation of a scene's constraint rows along a trajectory.
-    determined_reactions : callable
-        Returns by joint which components (k, 6) of its reaction equilibrium determines along a trajectory.
-    error_estimate : callable
-        Returns the ErrorEstimate of a motion, by a second run with a time limit, s; see
-        ``Motion.with_error_estimate``.
-    """
-
-    counts: Callable[[Any], Counts]
-    picture: Callable[[Any], str]
-    violations: Callable[[Any, Any], Violation]
-    determined_reactions: Callable[[Any, Any], dict[str, np.ndarray]]
-    error_estimate: Callable[..., ErrorEstimate]
-
-
-SERVICES = Services()
+SERVICES: dict[str, Callable[..., Any]] = {}  # by name; each imports its module at its first call

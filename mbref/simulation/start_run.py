@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 
 import numpy as np
 
@@ -11,7 +10,7 @@ from mbref.method import Method
 from mbref.scene import Scene
 from mbref.stepping.explicit import ExplicitStepper
 from mbref.stepping.limits import Limits
-from mbref.stepping.run import Run, Stepper
+from mbref.stepping.run import Run
 from mbref.taylor.preparation import prepare_series
 from mbref.taylor.stepper import SeriesStepper
 
@@ -21,11 +20,7 @@ def start_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -
     began = time.process_time()
     if method.is_series:
         prepare_series()
-    run = Run(scene, method, times, limits, stepper_of(method))
+    stepper = SeriesStepper if method.is_series else ExplicitStepper
+    run = Run(scene, method, times, limits, stepper)
     run.built = time.process_time() - began - run.making
     return run
-
-
-def stepper_of(method: Method) -> Callable[[Run], Stepper]:
-    """Return the stepper of a method's runs."""
-    return SeriesStepper if method.is_series else ExplicitStepper
