@@ -29,6 +29,8 @@ In rows with *terms* the engine gives mass matrix, bias forces and Jacobians.
 There crosscheck closes the loops and integrates. A coarser setting than the finest one can be more accurate
 on redundant loops and near singular positions; `crosscheck tune ENGINE SCENE --error 1e-6` finds it:"""
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
+# engines whose families of settings are solvers of their own
+SEVERAL = {"newton": "Newton's solvers"}
 Cells = Mapping[str, Mapping[str, Cell]]
 
 
@@ -38,6 +40,9 @@ def page(records: Sequence[Record]) -> str:
     left_out = [name for name in engine_names() if name not in cells]
     missing = [f"Engines that were not measured: {', '.join(left_out)}.", ""] if left_out else []
     parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), *missing, DEFAULTS, "", *_table(cells, False)]
+    for name in (name for name in SEVERAL if name in cells):
+        parts += [f"{SEVERAL[name]} (families of settings of `{name}`), each by its best run:", ""]
+        parts += [*_by_family(cells[name])]
     parts += ["## The mechanisms", "", *_mechanisms(), "## The runs", ""]
     parts += [line for name, row in cells.items() for line in _engine(name, row)]
     return "\n".join(parts).rstrip() + "\n"
@@ -50,10 +55,27 @@ def _legend() -> Iterator[str]:
     yield ""
 
 
-def _table(cells: Cells, is_best: bool) -> Iterator[str]:
+def _head(first: str) -> Iterator[str]:
     headings = [column.heading for column in DIFFICULTIES]
-    yield "| engine | " + " | ".join(headings) + " |"
+    yield f"| {first} | " + " | ".join(headings) + " |"
     yield "| --- |" + " :-: |" * len(headings)
+
+
+def _by_family(row: Mapping[str, Cell]) -> Iterator[str]:
+    """Return a table of an engine's families of settings, each by its best run."""
+    yield from _head("family")
+    for family in dict.fromkeys(name for cell in row.values() for name in cell.families()):
+        yield f"| {family} | " + " | ".join(_linked(*_of(cell, family)) for cell in row.values()) + " |"
+    yield ""
+
+
+def _of(cell: Cell, family: str) -> tuple[Cell, Record | None]:
+    best = cell.best()
+    return cell, best if best and is_refusal(best) else cell.families().get(family)
+
+
+def _table(cells: Cells, is_best: bool) -> Iterator[str]:
+    yield from _head("engine")
     for name, row in cells.items():
         found = {cell: cell.best() if is_best else cell.defaults() for cell in row.values()}
         if is_best or any(map(is_run, found.values())):
