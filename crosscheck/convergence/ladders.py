@@ -160,7 +160,8 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
 
         for row in (row for row in ROWS if row.engine in engines):
             for mechanism in MECHANISMS:
-                climb(ladder(row, mechanism), run) or _refuse(row, mechanism, path)
+                if not climb(ladder(row, mechanism), run):
+                    _refuse(row, mechanism, path)
     end_idle()
 
 
