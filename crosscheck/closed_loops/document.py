@@ -24,8 +24,8 @@ crosscheck closed-loops --page docs/closed-loops.md
 ```
 """
 BEST = f"""Each engine by its best family of settings, at the finest setting of each family that was
-measured within {TIME_LIMIT:g} s of CPU time ({SHORT_LIMIT:g} s for {", ".join(SHORT)}, whose steps take milliseconds here).
-In rows with *terms* the engine gives mass matrix, bias forces and Jacobians.
+measured within {TIME_LIMIT:g} s of CPU time ({SHORT_LIMIT:g} s for {", ".join(SHORT)}, whose steps take
+milliseconds here). In rows with *terms* the engine gives mass matrix, bias forces and Jacobians.
 There crosscheck closes the loops and integrates. A coarser setting than the finest one can be more accurate
 on redundant loops and near singular positions; `crosscheck tune ENGINE SCENE --error 1e-6` finds it:"""
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
