@@ -7,7 +7,7 @@ from typing import Any
 
 from pydantic import field_validator
 
-from mbref.scene_fields import Entry, Mass, Name, Point, Quaternion, Reals, Vector, as_list
+from mbref.scene_fields import Entry, Mass, Measures, Name, Point, Quaternion, Vector, as_list
 from mbref.scene_functions import TimeFunction
 from mbref.scene_validation import checked_inertia
 
@@ -57,7 +57,7 @@ class Driver(TimeFunction):
     """
 
     joint: Name
-    polynomial: Reals = (0.0,)
+    polynomial: Measures = (0.0,)
 
     @property
     def coefficients(self) -> tuple[float, ...]:

@@ -129,6 +129,7 @@ Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeVa
 Length = Annotated[Real, BeforeValidator(length, json_schema_input_type=float | str)]  # m, or "300 mm"
 Angle = Annotated[Real, BeforeValidator(angle, json_schema_input_type=float | str)]  # rad, or "30 deg"
 LengthOrAngle = Annotated[Real, BeforeValidator(length_or_angle, json_schema_input_type=float | str)]
+Measures = Annotated[tuple[LengthOrAngle, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
 Extent = Annotated[NotNegative, BeforeValidator(length, json_schema_input_type=float | str)]
 Point = Annotated[tuple[Length, Length, Length], Strict(False), BeforeValidator(as_list)]
 PointPair = Annotated[tuple[Point, Point], Strict(False), BeforeValidator(as_list)]

@@ -29,7 +29,7 @@ COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coord
 COORDINATES = get_args(Coordinate)
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → content of its list; all other lists contain three numbers
-    "orientation": "four numbers (w, x, y, z)",
+    "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
     "polynomial": "numbers, such as [0.0, 6.0]",
     "table": "rows of time and value, such as [[0.0, 0.0], [0.5, 1.0], [1.0, 2.0], [1.5, 1.0]]",
     "bodies": "two names of bodies",
@@ -264,8 +264,7 @@ def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Ma
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
-    """Yield drivers of unknown or wrong joints, second drivers of a joint, and values that do not begin at
-    0."""
+    """Yield drivers of unknown or wrong joints, second drivers of a joint, values that do not begin at 0."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
         name = field_of(driver, "joint")
@@ -274,7 +273,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
             if name in driven:
                 yield f"driver[{i}].joint", f"{name!r} already has a driver"
             driven.add(name)
-            yield from _unit_faults(f"driver[{i}].sine.amplitude", field_of(driver, "sine"), types.get(name))
+            yield from _unit_faults(f"driver[{i}]", driver, types.get(name))
         yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
         if start := initial_value(driver):
             message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
@@ -286,13 +285,16 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
             yield f"driver[{i}].polynomial", message
 
 
-def _unit_faults(path: str, sine: Any, joint: Any) -> Faults:
-    """Yield the fault of an amplitude whose unit does not fit the coordinate that a driver prescribes."""
+def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:
+    """Yield faults of units that do not fit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
     needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
-    amplitude = field_of(sine, "amplitude")
-    if needed and dimension_of(amplitude) not in (None, needed):
-        yield path, f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {amplitude!r}"
+    terms, sine = field_of(driver, "polynomial"), field_of(field_of(driver, "sine"), "amplitude")
+    found = {f"polynomial[{k}]": c for k, c in enumerate(terms if isinstance(terms, list | tuple) else ())}
+    for field, value in (found | {"sine.amplitude": sine}).items():
+        if needed and dimension_of(value) not in (None, needed):
+            text = f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {value!r}"
+            yield f"{path}.{field}", text
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:

@@ -18,6 +18,7 @@ from mbref.scene import Scene
 
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
 SHUT = 1e-12  # fraction of the scene's length; smaller gaps are rounding errors
+OF_ERROR = 1e-3  # gap / error of a body's position; a smaller gap is not why the bodies are off
 OFF = "Contacts, limits, dry friction and motors are off, as in the scene."
 
 
@@ -47,12 +48,14 @@ def _one(group: Judged, record: Record) -> str:
 
 
 def _tuning(record: Record, scene: Scene, gap: float) -> str:
-    """Return the command that finds settings with a tenth of the gap, or of the error if no closure opens."""
+    """Return the command that finds settings with a tenth of the gap, or of the error if the gap is no cause
+    of it."""
     settings = record["settings"]
     path = Path(settings["file"])
     shown = path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path
     goal = ["--error", f"{record['metrics']['error'] / 10:.0e}"]
-    if SHUT * scene_length(scene) < gap < math.inf:
+    least = max(SHUT, OF_ERROR * record["metrics"]["position_error"]) * scene_length(scene)
+    if least < gap < math.inf:
         goal = ["--closure", f"{gap * 1e3 / 10:.1g}mm"]
     return shlex.join(
         ["crosscheck", "tune", "mujoco", str(shown), *shlex.split(settings.get("import", "")), *goal]

@@ -191,7 +191,9 @@ def test_faulty_scene_file_and_one_line_a_fault(capsys, tmp_path):
     status, out, err = run_main(capsys, "run", str(path), "--json")
     lines = err.strip().split("\n")
     assert (status, out) == (2, ""), (status, out)
-    assert any(line.startswith("body[a].mass: must not be negative, got -1.0 (line 5)") for line in lines), lines
+    assert any(line.startswith("body[a].mass: must not be negative, got -1.0 (line 5)") for line in lines), (
+        lines
+    )
     assert any(line.startswith("gravity") for line in lines), lines
 
 

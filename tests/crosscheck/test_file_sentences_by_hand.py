@@ -52,6 +52,11 @@ def test_a_file_without_closures_is_tuned_for_an_error():
     assert f"{TUNE} --error 2e-04` {BETTER}" in said(2e-3, 1e-14)
 
 
+def test_a_gap_far_below_the_error_is_not_tuned():
+    assert f"{TUNE} --error 2e-03` {BETTER}" in said(2e-2, 1.9e-5)
+    assert f"{TUNE} --closure 0.008mm` {BETTER}" in said(2e-2, 2.1e-5)
+
+
 def test_gaps_of_rounding_and_accurate_files_need_no_advice():
     assert said(1e-9, 1e-13) == f"{START} is right: bodies are off by up to 4e-06 mm and 0 rad."
     assert "open by up to 8e-09 mm" in said(1e-9, 2e-12)

@@ -259,6 +259,23 @@ def test_amplitudes_have_the_unit_of_the_driven_coordinate():
         scene.with_(driver=({**swing, "sine": late},))
 
 
+def test_coefficients_of_a_driver_have_the_unit_of_its_coordinate():
+    scene = find_scene("four_bar")
+    driver = scene.with_(driver=({"joint": "A", "polynomial": [0, "360 deg"]},)).driver[0]
+    assert driver.coefficients == (0.0, pytest.approx(2 * math.pi, rel=1e-15))
+    with pytest.raises(SceneError, match=r"driver\[A\]\.polynomial\[1\]: prescribes the angle .* got '5 mm'"):
+        scene.with_(driver=({"joint": "A", "polynomial": [0, "5 mm"]},))
+    with pytest.raises(SceneError, match=r"must be 0, motion is measured from t = 0; got 1\.5708"):
+        scene.with_(driver=({"joint": "A", "polynomial": ["90 deg"]},))
+
+
+def test_an_orientation_in_degrees_is_answered_with_the_quaternion():
+    with pytest.raises(
+        SceneError, match=r"for an angle φ about z cos\(φ/2\), 0, 0, sin\(φ/2\), got '60 deg'"
+    ):
+        find_scene("four_bar").with_("body[crank].orientation", "60 deg")
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
