@@ -49,7 +49,7 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
-        verdict = "right within the bound on the reference" if c.is_right else "[bold]off[/bold]"
+        verdict = "right within the bound on the reference" if c.is_right else "off"
         unit = SI[kind_of(c.name)]
         table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", verdict, begins)
     console().print(table)

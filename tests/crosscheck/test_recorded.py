@@ -253,7 +253,8 @@ def test_commands_write_and_judge(tmp_path, capsys):
     assert "81 samples to t = 0.4 s, error at most" in capsys.readouterr().out
     assert main(["judge", scene, out]) == 0
     assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
-    assert "quaternions in the order" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert " off " in printed and "[bold]" not in printed and "quaternions in the order" in printed
     assert main(["judge", scene, str(tmp_path / "none.csv")]) == 2
     assert main(["judge", scene, out, "--column", "upper"]) == 2
 

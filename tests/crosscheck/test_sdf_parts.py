@@ -45,6 +45,12 @@ def test_a_model_without_overrides_keeps_its_name_and_pose_and_is_found_by_a_var
     assert np.allclose(scene.body[2].position, (0.1, 7, 0))
 
 
+def test_the_ground_and_the_sun_of_a_world_are_left_out(tmp_path):
+    still = "".join(f"<include><uri>{uri}</uri></include>" for uri in ("model://sun", "model://ground_plane"))
+    text = pair().replace("<model", f'<world name="w">{still}<model').replace("</sdf>", "</world></sdf>")
+    assert [body.name for body in read(tmp_path, text).scene.body] == ["a", "b"]
+
+
 def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool = False) -> str:
     """Return two wheels on a frame that turns, and a gearbox between them."""
     names = ("frame", "one", "two")

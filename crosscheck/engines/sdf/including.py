@@ -15,12 +15,13 @@ SCHEMES = ("model://", "file://", "package://")
 CONFIGURATION, MODEL_FILE = "model.config", "model.sdf"
 AXES_IN_MODEL = (1, 4)  # last version whose axes are given in the frame of the model
 OVERRIDES = ("pose", "static")
+STILL = ("sun", "ground_plane", "asphalt_plane")  # models of Gazebo's library in which nothing moves
 
 
 def expanded(root: ET.Element, file: Path) -> ET.Element:
     """Return a copy with the included models in place of all includes; raises SceneError, OSError.
 
-    A model is looked for beside the file, in each folder above it, and in the folders of VARIABLES.
+    Includes of STILL are removed. Another model is looked for beside the file, in each folder above it, and in the folders of VARIABLES.
     """
     found = copy.deepcopy(root)
     state_frame_of_axes(found)
@@ -46,6 +47,9 @@ def _version(root: ET.Element) -> tuple[int, ...]:
 
 def _expand(element: ET.Element, files: tuple[Path, ...]) -> None:
     """Replace the includes of an element and its parts; ``files`` includes the file of the element last."""
+    for part in element.findall("include"):
+        if part.findtext("uri", "").strip().rpartition("/")[2] in STILL:
+            element.remove(part)
     for k, part in enumerate(list(element)):
         if part.tag == "include":
             element[k] = _included(part, files)
