@@ -21,7 +21,8 @@ STILL = ("sun", "ground_plane", "asphalt_plane")  # models of Gazebo's library i
 def expanded(root: ET.Element, file: Path) -> ET.Element:
     """Return a copy with the included models in place of all includes; raises SceneError, OSError.
 
-    Includes of STILL are removed. Another model is looked for beside the file, in each folder above it, and in the folders of VARIABLES.
+    Includes of STILL are removed. Another model is looked for beside the file, in the two folders above it,
+    and in the folders of VARIABLES.
     """
     found = copy.deepcopy(root)
     state_frame_of_axes(found)
