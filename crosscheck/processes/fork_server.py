@@ -31,6 +31,7 @@ from crosscheck.processes import serve
 
 # on other systems a forked process may lack threads of the system's libraries
 AVAILABLE = sys.platform == "linux"
+ENDING_SECONDS = 1.0  # s in which the server must end after its socket is closed
 Environment = Mapping[str, str]
 
 
@@ -119,10 +120,16 @@ def _started(environment: Environment) -> Server:
 
 
 @atexit.register
-def _end() -> None:
+def end() -> None:
+    """End the server; the CPU time of its forks then counts as CPU time of this process's children."""
     for server in _servers:
-        server.process.kill()
-        server.process.wait()
+        server.requests.close()
+        try:
+            server.process.wait(ENDING_SECONDS)
+        except subprocess.TimeoutExpired:  # a fork of this process has the socket, too
+            server.process.kill()
+            server.process.wait()
+    _servers.clear()
 
 
 def main() -> None:
@@ -130,7 +137,7 @@ def main() -> None:
     for name in (*BUILT_IN, *OPTIONAL):
         engine(name)  # imports the adapter, not the engine's package
     gc.freeze()
-    signal.signal(signal.SIGCHLD, signal.SIG_IGN)  # so that ended processes are removed at once
+    signal.signal(signal.SIGCHLD, _reap)
     requests: Connection[Any, Any] = Connection(os.dup(0))
     try:
         while not _is_child(requests):
@@ -138,6 +145,13 @@ def main() -> None:
     except EOFError:
         return
     serve.main()
+
+
+def _reap(*_: object) -> None:
+    """Remove ended processes; their CPU time then counts as the server's."""
+    with contextlib.suppress(ChildProcessError):  # none is left
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
 
 
 def _is_child(requests: Connection[Any, Any]) -> bool:

@@ -297,6 +297,12 @@ MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()
 
 
+def computing(seconds: float) -> None:
+    """Compute for some CPU time (s)."""
+    while time.process_time() < seconds:
+        pass
+
+
 def converse(text: str) -> tuple[str, int]:
     """Prints by Python, by the C library and to the descriptor, warns and leaves a file; says where it is."""
     print(text)

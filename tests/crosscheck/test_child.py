@@ -74,6 +74,18 @@ def test_child_starts_after_the_end_of_the_fork_server(monkeypatch: pytest.Monke
         assert made.call(operator.add, (2, 6), 60.0).value == 8
 
 
+@pytest.mark.skipif(not fork_server.AVAILABLE, reason="children are no forks on this system")
+def test_cpu_time_of_forks_counts_as_time_of_children(child: Child):
+    from fake_engines import computing
+
+    before = os.times()
+    child.call(computing, (0.5,), 60.0)
+    child.close()
+    fork_server.end()
+    assert not fork_server._servers
+    assert os.times().children_user - before.children_user > 0.4
+
+
 def test_failed_call_and_its_child(child: Child):
     with pytest.raises(ChildFailed, match="ZeroDivisionError: division by zero") as raised:
         child.call(operator.truediv, (1, 0), 60.0)
