@@ -32,7 +32,8 @@ EXTREMES = {
     "sin": "cos",
     "cos": "sin",
 }
-UNCHANGED = ("min", "max", "minimum", "maximum", "hypot", "isclose", "allclose", "logical_or", "logical_and")
+UNCHANGED = {"min", "max", "minimum", "maximum", "hypot", "isclose", "allclose"}
+UNCHANGED |= {"logical_or", "logical_and", "dot", "inner"}
 """Functions that give the same for arguments in any order."""
 KINDS = (
     "sign",
