@@ -131,7 +131,6 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     up = "../" * page.file.src_uri.count("/")
     for path in _outside(markdown):
         markdown = re.sub(rf"\]\((?:\.\./)+{re.escape(path)}\)", f"]({up}source/{path})", markdown)
-    markdown = re.sub(r"\]\((?:\.\./)+[^)#]*?([^)#/]+)/?\)", _directory, markdown)
     return formulas(markdown)
 
 
@@ -148,13 +147,6 @@ def on_post_page(output: str, **_: Any) -> str:
         'data-md-component="search" role="dialog"',
         'data-md-component="search" role="dialog" aria-label="Search"',
     )
-
-
-def _directory(match: re.Match[str]) -> str:
-    """Links to folders outside the docs lose their target; links within the site stay."""
-    target = re.search(r"\(([^)]*)\)", match[0])
-    path = target[1].replace("../", "") if target else ""
-    return "]" if not (ROOT / "docs" / path).exists() and (ROOT / path).is_dir() else match[0]
 
 
 def formulas(markdown: str) -> str:
