@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 
 from crosscheck.engine import engine_names
-from mbref.drawing import png as mbref_png
+from mbref.drawing import film
 from mbref.drawing.svg import COLOURS, GREY, INK
 from reports.runs import Curve
 
@@ -111,7 +111,7 @@ def svg(figure: Figure | str, name: str) -> str:
 def png(figure: Figure | str) -> bytes:
     """Return the picture as PNG."""
     if isinstance(figure, str):
-        return mbref_png.png(figure)
+        return film.png(figure)
     out = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
