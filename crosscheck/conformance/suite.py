@@ -265,7 +265,7 @@ def _sentence(verdict: Verdict) -> Text:
     measured = ""
     if verdict.measured is not None:
         measured = f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
-    tail = f" ({verdict.reason})" if measured and verdict.reason else verdict.reason
+    tail = f"({verdict.reason})" if measured and verdict.reason else verdict.reason
     return Text(f"{verdict.status}: {verdict.scene}, {verdict.property}:{measured} {tail}".rstrip())
 
 

@@ -389,6 +389,9 @@ def test_a_judged_recording(capsys):
     judging._show(judgement(), [])
     out = capsys.readouterr().out
     assert "2.00e-03 m" in out and "1.00e-09 m/s" in out and "0.25 s" in out
+    assert out.index("largest error") < out.index("bound") < out.index("begins at")
+    row = next(line for line in out.splitlines() if "rod.position.x" in line)
+    assert row.index("2.00e-03 m") < row.index("1.00e-09 m") < row.index("off") < row.index("0.25 s")
     assert out.count("right within the bound on the reference") == 1
     assert "None of the tested explanations removes half of the difference." in out and "not read" not in out
     mass = SimpleNamespace(sentence="a mass of 2 kg", remains=0.01234)
