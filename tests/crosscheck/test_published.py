@@ -130,6 +130,7 @@ def test_published_chain_is_as_near_as_its_step_allows():
     assert abs(problem.values["y"] - ours[1]) < 1e-6
 
 
+@pytest.mark.slow
 def test_published_governor_is_as_near_as_its_step_allows():
     """Steps of 0.5 ms of a method of second order are 6e-6 m off after 10 s."""
     problem = PUBLISHED["A05"]

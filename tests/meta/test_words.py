@@ -40,8 +40,9 @@ def comments(path: Path) -> Iterator[tuple[int, str]]:
 
 def faults(path: Path) -> list[str]:
     """Places of a file at which a docstring begins with a word of BEGINNINGS, or a private word stands."""
-    found = [(line, text) for line, text in docstrings(path) if BEGINNINGS.match(text)]
-    every = [*docstrings(path), *comments(path)]
+    described = list(docstrings(path))
+    found = [(line, text) for line, text in described if BEGINNINGS.match(text)]
+    every = [*described, *comments(path)]
     found += [(line, text) for line, text in every if WORDS.search(CODE.sub("", text))]
     return [f"{path.name}:{line}: {text[:80]}" for line, text in found]
 
