@@ -43,7 +43,9 @@ def _one(group: Judged, record: Record) -> str:
     said = "has no known error" if found is Grade.UNJUDGED else f"is {found}"
     advice = ""
     if found in (Grade.INACCURATE, Grade.WRONG):
-        advice = f" `{_tuning(record, scene, gap)}` finds a solref and a time step that are ten times better."
+        command = _tuning(record, scene, gap)
+        finds = "a solref and a time step" if "--closure" in command else "settings"
+        advice = f" `{command}` finds {finds} that are ten times better."
     return f"{start} {said}{': ' if parts else ''}{', and '.join(parts)}.{advice}"
 
 
