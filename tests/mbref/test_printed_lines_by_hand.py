@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import json
 import math
 from types import SimpleNamespace
 
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 from rich.table import Table
 
-from mbref.cli import diagnose, statics, tables
+from mbref.cli import diagnose, main, statics, tables
 from mbref.design.along_motion import AlongMotion
 from mbref.design.equilibrium import Equilibrium
 from mbref.drawing import film
@@ -347,3 +348,46 @@ def test_pictures_of_a_film_have_whole_blocks():
     assert padded.shape == (16, 32, 3) and (padded[:5, :17] == image).all()
     assert (padded[5:] == 255).all() and (padded[:, 17:] == 255).all()
     assert film._padded(np.zeros((16, 32, 3), np.uint8)).shape == (16, 32, 3)
+
+
+def test_modes_of_the_first_stable_equilibrium_or_of_the_one_that_is_asked(monkeypatch, capsys, tmp_path):
+    found = [rest([2.0, -2.0]), rest([3j, -3j]), rest([5j, -5j])]
+    monkeypatch.setattr("mbref.design.equilibrium.equilibria", lambda scene, starts: found)
+    drawn = []
+    monkeypatch.setattr(
+        "mbref.design.equilibrium.motion_of_mode", lambda each, mode: drawn.append((each, mode))
+    )
+    monkeypatch.setattr(statics, "moving", lambda scene, motion, view: "<svg/>")
+    monkeypatch.setattr(statics, "write_film", lambda path, *_: path.write_text("film"))
+    assert main(["modes", "four_bar_gravity", "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)
+    assert record["number"] == 2 and record["frequencies"] == [pytest.approx(3 / (2 * math.pi))] and not drawn
+    picture = tmp_path / "a.svg"
+    asked_for = ["modes", "four_bar_gravity", "--number", "3", "--mode", "2", "--out"]
+    assert main([*asked_for, str(picture)]) == 0
+    assert drawn == [(found[2], 2)] and picture.read_text() == "<svg/>"
+    out = capsys.readouterr().out
+    assert out.startswith("equilibrium 3: stable") and out.endswith(f"{picture}\n")
+    assert main([*asked_for, str(tmp_path / "a.gif")]) == 0 and (tmp_path / "a.gif").read_text() == "film"
+    del found[1:]
+    capsys.readouterr()
+    assert main(["modes", "four_bar_gravity", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["number"] == 1, "none is stable"
+
+
+def test_equilibria_that_are_printed_and_saved(monkeypatch, capsys, tmp_path):
+    found = [rest([2.0, -2.0]), rest([3j, -3j])]
+    monkeypatch.setattr("mbref.design.equilibrium.equilibria", lambda scene, starts: found)
+    assert main(["equilibrium", "four_bar_gravity"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("equilibrium 1: unstable") == out.count("equilibrium 2: stable") == 1
+    assert " ".join(out.split()).endswith(statics.LIMITS)
+    place = tmp_path / "rest.toml"
+    assert main(["equilibrium", "four_bar_gravity", "--number", "2", "--out", str(place)]) == 0
+    out = capsys.readouterr().out
+    assert "equilibrium 1" not in out and out.endswith(f"{place}\n") and "Other equilibria" not in out
+    assert Scene.from_file(place) == found[1].scene
+    assert main(["equilibrium", "four_bar_gravity", "--json", "--out", str(place)]) == 0
+    assert len(json.loads(capsys.readouterr().out)["equilibria"]) == 2
+    assert main(["equilibrium", "four_bar_gravity", "--out", "rest.txt"]) == 2
+    assert "--out: must end in .toml, got 'rest.txt'" in capsys.readouterr().err

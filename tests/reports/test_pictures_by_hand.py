@@ -221,6 +221,10 @@ def test_looks_of_curves_and_the_legend():
     assert not figure.legends, "nothing to explain"
     for name in "abcdef":
         axes.plot([1, 2], label=name)
+    figures.legend_below(figure, axes)
+    [legend] = figure.legends
+    assert legend._ncols == 3
+    legend.remove()
     figures.legend_below(figure, axes, 5)
     [legend] = figure.legends
     assert legend._ncols == 5 and not legend.get_frame_on()

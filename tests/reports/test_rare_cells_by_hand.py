@@ -12,6 +12,7 @@ from test_figures_by_hand import BLOCK, RECORDS, SCENE, group, moving, of, plain
 from crosscheck.paper.cells import Cell
 from crosscheck.paper.runs import HEAVY, UNEQUAL, Label
 from crosscheck.setting import BRANCHES
+from mbref.trajectory import Outcome
 from reports import benchmark_plot, speed_figure
 from reports.blocks import Table
 from reports.runs import Run, SceneRuns
@@ -396,3 +397,39 @@ def test_cells_of_end_times():
     assert paper_sweep._text(None) == "–" and paper_sweep._text(run) == "20"
     assert paper_sweep._text(ended(0.012345)) == f"0.0123 {ended(0.1).outcome.letter}"
     assert paper_sweep._text(ended(0.5, "TIMED_OUT")) == "0.5000 TIMED_OUT"
+
+
+def test_scores_and_times_of_the_sweep():
+    """All cells but one have the printed outcome and time, that one the outcome at another time."""
+    letters = {outcome.letter: outcome.label for outcome in Outcome if outcome.letter}
+    first, second = (c for c in paper_sweep.SWEPT if c.column == HALF_TURN and c.row in ("ALF", "MPI (SVD)"))
+    cells = {Label(c.table, c.row, c.column, "the settings"): c for c in paper_sweep.SWEPT}
+    records_ = {
+        label: {
+            **plain(
+                "mbref", "x", 1e-3, 1.0, letters[cell.letter], (cell.end or 0.0) + 0.02 * (cell == second)
+            ),
+            "settings": {},
+        }
+        for label, cell in cells.items()
+    }
+    count = len(paper_sweep.SWEPT)
+    table = paper_sweep._scores(records_)
+    assert tuple(table.rows[0]) == ("the settings", str(count - 1), "1", "0", str(count))
+    assert {tuple(row[1:]) for row in table.rows[1:]} == {("0", "0", "0", "0")} and table.right == {
+        1,
+        2,
+        3,
+        4,
+    }
+    times = paper_sweep._times(records_, "settings", ("the settings", "another", "seed 0"))
+    assert times.header == ("Column", "Method", "Paper", "the settings", "another", "seed 0") and times.folded
+    rows = {(row[0], row[1]): row for row in times.rows}
+    shown = f"{first.end:.4f} {first.letter}"
+    assert rows[first.column, first.row][2:] == (str(first), shown, "–", shown)
+    assert len(times.rows) == count and times.caption.startswith("End time (s) and letter of every cell over")
+    sizes = paper_sweep._sizes({})
+    assert {cell for row in sizes.rows for cell in row[2:]} == {"–"}
+    sized = Label("sized", sizes.rows[0][1], HALF_TURN, f"{sizes.rows[0][0]} m, seed 0")
+    row = paper_sweep._sizes({sized: next(iter(records_.values()))}).rows[0]
+    assert row[2 + paper_sweep.COLUMNS.index(HALF_TURN)].endswith("(1 of 1)")
