@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,12 +15,13 @@ from rich.table import Table
 from mbref.cli import diagnose, main, statics, tables
 from mbref.design.along_motion import AlongMotion
 from mbref.design.equilibrium import Equilibrium
-from mbref.drawing import film
+from mbref.drawing import film, picture
 from mbref.equations.diagnosis import Diagnosis
 from mbref.scene import Body, Driver, Factor, Revolute, Scene, Sine
 from mbref.scene_services import Counts
 from mbref.scene_toml import toml_hint, with_lines
 from mbref.simulation import remedies
+from mbref.trajectory import Outcome, Trajectory
 
 BAR = Body(name="bar", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.5, 0.0, 0.0))
 HINGE = Revolute(name="A", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
@@ -250,18 +252,59 @@ def test_remedies_that_need_no_trial():
 
 def test_formulations_that_bear_what_a_singular_matrix_is_due_to(monkeypatch):
     monkeypatch.setattr(remedies, "trial_of", lambda run: None)
+    known = [f for f in remedies.FORMULATIONS.values() if not f.needs_independent_columns]
+
+    def listed(able: list[str]) -> str:
+        return f"{', '.join(able[:-1])} or {able[-1]}" if len(able) > 1 else f"use {able[0]}"
+
     slender = failed("lm2")
     slender.model.mass = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-    text = remedies.remedy(slender, remedies.SINGULAR)
-    assert text.startswith("body 'bar' lacks mass or a moment of inertia; use ")
-    able = {name for name, f in remedies.FORMULATIONS.items() if f.handles_singular_mass}
-    named = set(text.partition("; use ")[2].replace(" or ", ", ").split(", "))
-    assert named <= able and named, text
+    assert remedies.remedy(slender, remedies.SINGULAR) == (
+        "body 'bar' lacks mass or a moment of inertia; use "
+        + listed([f.name for f in known if f.handles_singular_mass])
+    )
     monkeypatch.setattr(remedies, "counts", lambda scene: SimpleNamespace(redundant=2, rows=7))
-    text = remedies.remedy(failed(), remedies.SINGULAR)
-    assert text.startswith("constraint rows are redundant (2 of 7); use ")
-    named = set(text.partition("; use ")[2].replace(" or ", ", ").split(", "))
-    assert all(remedies.FORMULATIONS[name].handles_redundancy for name in named)
+    assert remedies.remedy(failed(), remedies.SINGULAR) == (
+        "constraint rows are redundant (2 of 7); use "
+        + listed([f.name for f in known if f.handles_redundancy])
+    )
+    assert remedies.remedy(slender, remedies.SINGULAR).endswith(
+        listed([f.name for f in known if f.handles_singular_mass and f.handles_redundancy])
+    )
+
+
+def test_titles_of_pictures():
+    """The first of several lines is bold; lines are 1.4 letters or more apart, in the middle of the panel."""
+    grid = SimpleNamespace(form=SimpleNamespace(letters=10, width=200.0), corner=lambda k: (300.0 * k, 5.0))
+    panels = [SimpleNamespace(title=["one", "two"]), SimpleNamespace(title=["alone"])]
+    first, second, alone = picture._titles(panels, grid)
+    assert 'font-weight="600"' in first and "font-weight" not in second + alone
+    assert [re.search(r'x="([\d.]+)"', text)[1] for text in (first, second, alone)] == [
+        "100.0",
+        "100.0",
+        "400.0",
+    ]
+    heights = [float(re.search(r' y="([\d.]+)"', text)[1]) for text in (first, second, alone)]
+    assert heights == pytest.approx(
+        [5 + 10 * picture.LEADING, 5 + 20 * picture.LEADING, 5 + 10 * picture.LEADING]
+    )
+
+
+def test_a_run_without_samples_has_arrays_of_its_bodies():
+    lost = Trajectory.failed(
+        scene="s",
+        engine="e",
+        version="1",
+        method="m",
+        settings={},
+        bodies=("a", "b"),
+        outcome=Outcome.CRASHED,
+        message="it failed",
+    )
+    shapes = [
+        a.shape for a in (lost.times, lost.position, lost.orientation, lost.velocity, lost.angular_velocity)
+    ]
+    assert shapes == [(0,), (0, 2, 3), (0, 2, 4), (0, 2, 3), (0, 2, 3)]
 
 
 WAVY = ((0.0, 0.0), (1.0, 1.0), (2.0, 8.0), (3.0, 27.0), (4.0, 64.0))  # t³
