@@ -98,7 +98,10 @@ def _equilibrium(options: argparse.Namespace) -> int:
     for number, each in enumerate(found, 1):
         if options.number in (None, number):
             console().print("\n".join(_lines(number, each)), soft_wrap=True)
-    console().print(f"{LIMITS}\n" * (options.number is None) + f"{options.out}\n" * bool(options.out), end="")
+    if options.number is None:
+        console().print(LIMITS)
+    if options.out:
+        console().print(options.out, soft_wrap=True)
     return 0
 
 
@@ -155,7 +158,8 @@ def _modes(options: argparse.Namespace) -> int:
         print(strict_json({"number": number, **_record(each)}))
         return 0
     console().print("\n".join(_mode_lines(number, each)), soft_wrap=True)
-    console().print(f"{path}\n" * bool(path), end="")
+    if path:
+        console().print(str(path), soft_wrap=True)
     return 0
 
 
