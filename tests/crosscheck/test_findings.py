@@ -74,7 +74,7 @@ def test_an_unknown_finding_is_refused() -> None:
 
 
 def proofs() -> list[object]:
-    """The findings; those of engines that compile their code first, or of small steps, are slow."""
+    """Return all findings; a finding is slow if its engine compiles code first or takes small steps."""
     slow = ("mjx", "warp", "newton", "dart-hinge-closure-fine-step", "dart-hinge-closure-turned")
     return [
         pytest.param(found.name, marks=pytest.mark.slow if {found.engine, found.name} & {*slow} else ())

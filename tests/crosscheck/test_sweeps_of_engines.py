@@ -24,16 +24,17 @@ PACKAGES = {
     "heyoka": "heyoka",
 }
 
+OF_MBREF = {  # of both scenes
+    "taylor": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "taylor, generated": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "alf-dual+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "mpi-svd+partitioning": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "mpi-svd+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "mpi-svd+none": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+    "mpi-qr+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
+}
 GRAVITY = {  # of planar_slider_crank_gravity
-    "mbref": {
-        "taylor": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "taylor, generated": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "alf-dual+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+partitioning": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+none": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-qr+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-    },
+    "mbref": OF_MBREF,
     "mujoco": {
         "defaults": "step 0.0032 0.002 0.0011 0.00032 0.00011 3.2e-5",
         "stock": "step 0.0032 0.0011 0.00032 0.00011 3.2e-5",
@@ -80,15 +81,7 @@ GRAVITY = {  # of planar_slider_crank_gravity
     },
 }
 DRIVEN = {  # of four_bar
-    "mbref": {
-        "taylor": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "taylor, generated": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "alf-dual+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+partitioning": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-svd+none": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-        "mpi-qr+projection": "rtol 0.001 1e-5 1e-7 1e-9 1e-10 1e-11",
-    },
+    "mbref": OF_MBREF,
     "mujoco": {
         "defaults": "step 0.002 0.0012 0.0004 0.00012 4e-5 1.2e-5",
         "stock": "step 0.0012 0.0004 0.00012 4e-5 1.2e-5",

@@ -74,8 +74,11 @@ def kind_of(mujoco: Any, model: Any, joint: int) -> str:
 
 
 def without_effect(groups: Groups, held: Collection[int]) -> list[int]:
-    """Return groups without mass that carry no other group and are not among ``held``, so that nothing
-    determines their motion."""
+    """Return groups whose motion nothing determines.
+
+    Such a group has no mass and is not in ``held``; nor does it carry a group with mass or a group in
+    ``held``.
+    """
 
     def carries(group: int) -> bool:
         return group in held or any(
