@@ -30,6 +30,7 @@ from reports.blocks import (
 
 CODE = re.compile("`([^`]+)`")
 NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b|--[\w-]+")
+SHORT_WORD = 8  # letters; a column this narrow keeps the words of its cells whole
 TITLE = "Closed-loop mechanisms: engines compared with the true motion"
 
 
@@ -59,7 +60,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> 
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters |= {"slug": slug, "numbers": numbers, "breakable": breakable}
+    environment.filters |= {"slug": slug, "numbers": numbers, "breakable": breakable, "classes": classes}
     return environment.get_template("page.html").render(
         title=title,
         chapters=[b.text for b in blocks if isinstance(b, Heading) and b.level == 2],
@@ -145,6 +146,13 @@ def numbers(text: str) -> Markup:
     """Return the text for the page: numbers and options are not broken, commands are set as code."""
     unbroken = NUMBER.sub(r'<span class="nb">\g<0></span>', str(escape(text)))
     return Markup(CODE.sub(r"<code>\1</code>", unbroken))
+
+
+def classes(cell: str, is_right: bool) -> str:
+    """Return the style classes of a table's cell; a cell of short words is broken between words only."""
+    long, short = ("right long", "right") if is_right else ("", "short")
+    whole = "whole" if all(len(word) <= SHORT_WORD for word in cell.split()) else ""
+    return f"{long if len(cell) > (12 if is_right else 27) else short} {whole}".strip()
 
 
 def breakable(name: str) -> Markup:

@@ -83,7 +83,7 @@ def write_reference(arguments: argparse.Namespace) -> int:
     reached = float(table["time"][-1])
     console().print(
         f"{arguments.out}: {len(table['time'])} samples to t = {reached:g} s, error at most "
-        f"{table['bound'].max():.1e} of the scene's length or rad",
+        f"{table['bound'].max():.1e} of the mechanism's length or rad",
         soft_wrap=True,
     )
     return COMPLETED if reached == times[-1] else OTHERWISE

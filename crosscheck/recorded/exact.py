@@ -22,7 +22,7 @@ class Exact:
     """The exact motion at the times (k,) at which it is known, the bound (k,) on its error, and the reason
     for its end.
 
-    The bound is a distance over the scene's length, or an angle (rad).
+    The bound is a distance over the mechanism's length, or an angle (rad).
     """
 
     motion: Trajectory
@@ -63,7 +63,7 @@ def reference_table(
     Returns
     -------
     dict of str to ndarray, shape (k,)
-        SI units, world frame. ``bound`` is on the error: a distance over the scene's length, or an angle
+        SI units, world frame. ``bound`` is on the error: a distance over the mechanism's length, or an angle
         (rad). The columns end where the reference ends.
 
     Raises

@@ -27,8 +27,8 @@ def render(scene_runs: SceneRuns) -> list[Block]:
             off = np.linalg.norm(stacked(scene_runs.scene, motion, 0) - exact, axis=-1).max() / scale
             rows.append((*curve, beyond_rounding(float(off))))
     caption = (
-        "Largest difference of an initial acceleration (angular ones times the scene's length) from Gauss's "
-        "principle with the judge's own joint equations, relative to the largest acceleration. "
+        "Largest difference of an initial acceleration (angular ones times the mechanism's length) from "
+        "Gauss's principle with the judge's own joint equations, relative to the largest acceleration. "
         f"{_distance(scene_runs) if scene_runs.scene.joint else ''}"
     )
     heading = Heading("Initial accelerations")

@@ -54,7 +54,7 @@ def _shown(group: SceneRuns, error: float | None, run: Run) -> str:
     error."""
     _, problem = BY_SCENE[group.scene.name]
     asks_truth = problem.measure(group.scene, run.trajectory, None) is None
-    bound = error_bound(run.record)  # relative to the scene's length
+    bound = error_bound(run.record)  # relative to the mechanism's length
     least = max(LEAST, bound * max(1.0, scene_length(group.scene)) if asks_truth else 0.0)
     if error is None or error >= least:
         return power(math.nan if error is None else error)

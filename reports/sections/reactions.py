@@ -14,7 +14,7 @@ from reports.runs import ROUNDING, Run, SceneRuns, beyond_rounding, number
 
 CAPTION = (
     "Largest difference from the reactions of the exact motion, relative to the largest of them, over "
-    "samples of the run of least error of every engine; moments count divided by the scene's length. "
+    "samples of the run of least error of every engine; moments count divided by the mechanism's length. "
     "Compared are the components that redundancy leaves unique ('open' counts the dimensions it leaves open),"
     " and, in the last row, the resultant of all joints on a body, which is always unique."
 )

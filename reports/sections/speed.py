@@ -97,7 +97,7 @@ def plot(scene_runs: SceneRuns, failures: Failures) -> Drawing:
     main.set(
         xscale="log",
         yscale="log",
-        xlabel="largest error (fraction of the scene's length, or rad)",
+        xlabel="largest error (fraction of the mechanism's length, or rad)",
         ylabel="time of stepping (s)",
     )
     if failures:

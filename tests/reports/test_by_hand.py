@@ -35,7 +35,7 @@ def test_axes_of_the_speed_plot():
     (group, *_) = synthetic.groups()
     axes = speed.plot(group, speed.failed(group.runs)).axes[0]
     assert axes.get_ylabel() == "time of stepping (s)"
-    assert axes.get_xlabel() == "largest error (fraction of the scene's length, or rad)"
+    assert axes.get_xlabel() == "largest error (fraction of the mechanism's length, or rad)"
     drawn = [line.get_xydata() for line in axes.get_lines() if line.get_label() == "mbref mpi-svd+projection"]
     assert sorted(drawn[0][:, 1]) == pytest.approx([0.01, 0.02, 0.04])
 

@@ -298,3 +298,20 @@ def test_the_cost_of_a_step_is_inverse_to_its_length():
     records = cost(family[0], 0.4, "STEP_FAILED") | cost(family[2], 0.2)
     assert ladder.finest(family, records) == [family[3]], "2 s are affordable, 20 s are not"
     assert ladder.first(family[:1]) == family[:1] and not ladder.finest(family[:1], cost(family[0], 0.1))
+
+
+@pytest.mark.parametrize(
+    ("cell", "is_right", "classes"),
+    [
+        ("MPI (SVD) + CP", False, "short whole"),
+        ("planar_slider_crank", False, "short"),
+        ("a" * 27, False, "short"),
+        ("a" * 28, False, ""),
+        ("many short words in one long cell", False, "whole"),
+        ("12345678", True, "right whole"),
+        ("123456789", True, "right"),
+        ("1234567 12345", True, "right long whole"),
+    ],
+)
+def test_cells_of_short_words_are_broken_between_words_only(cell, is_right, classes):
+    assert render.classes(cell, is_right) == classes
