@@ -234,7 +234,7 @@ def test_a_scene_that_is_no_scene_is_refused_by_its_faults(tmp_path, capsys):
 
 
 def test_words_of_tables_may_break_where_the_page_is_narrow():
-    """So that the last column of a table stays on a page of 900 to 1100 px; cells of short words break between words."""
+    """Keep the last column on a page of 900 to 1100 px: long words break; cells of short words do not."""
     style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
     [narrow] = [line for line in style.splitlines() if line.startswith("@media (max-width: 1120px)")]
     assert ".scroll :is(th, td:not(.right)), .scroll th.right { white-space: normal; }" in narrow, narrow
