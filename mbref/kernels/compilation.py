@@ -12,12 +12,13 @@ notice an edit in a kernel that another file's kernel calls.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import hashlib
 import os
 import sys
 import types as types_of_python
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from mbref.kernels.disk_cache import (
     record_files,
     remove_damaged,
 )
+from mbref.kernels.file_lock import held, is_held
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -138,16 +140,27 @@ class Exchangeable:
             return self._compile(cache=False)
         begin(CACHE)
         remove_damaged(CACHE, self.function)
-        if not self.is_kept:
-            _announce_once()
-        compiled = self._compile()
-        if not self._is_loaded(compiled):
-            record_files(CACHE)
+        with contextlib.nullcontext() if self.is_kept else held(self._lock):
+            if not self.is_kept:
+                _announce_once()
+            compiled = self._compile()
+            if not self._is_loaded(compiled):
+                record_files(CACHE)
         return compiled
 
     def prepare(self) -> None:
-        """Compile now, or load from the cache."""
+        """Compile now, or load from the cache; wait if another process compiles the kernel."""
         self.pointer  # noqa: B018
+
+    @property
+    def is_compiled_elsewhere(self) -> bool:
+        """Return whether another process compiles the kernel now."""
+        return is_held(self._lock)
+
+    @property
+    def _lock(self) -> Path:
+        """Return the file whose lock the process holds that compiles the kernel."""
+        return CACHE / "locks" / f"{self.function.__module__}.{self.function.__qualname__}"
 
     @functools.cached_property
     def callable(self) -> Entry:
@@ -200,6 +213,21 @@ def exchangeable(signature: Signature) -> Callable[[Function], Exchangeable]:
 def entry(signature: Signature) -> Callable[[Function], Entry]:
     """Return a decorator for kernels that Python calls."""
     return lambda function: Entry(function, signature)
+
+
+def prepare_all(kernels: Sequence[Exchangeable]) -> None:
+    """Compile kernels, or load them from the cache.
+
+    Kernels that another process compiles come last, so that processes with different orders share the work.
+    """
+    elsewhere = []
+    for each in kernels:
+        if each.is_compiled_elsewhere:
+            elsewhere.append(each)
+        else:
+            each.prepare()
+    for each in elsewhere:
+        each.prepare()
 
 
 def pointer_to(signature: Signature) -> types.Type:

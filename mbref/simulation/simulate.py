@@ -21,13 +21,7 @@ from mbref.stepping import preparation
 from mbref.stepping.limits import GENERATED, Limits
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
-from mbref.taylor.preparation import (
-    KERNELS_OF_SERIES,
-    STEPPING,
-    prepare_expansion,
-    prepare_series,
-    prepare_stepping,
-)
+from mbref.taylor.preparation import KERNELS_OF_SERIES, prepare_series, prepare_series_backwards
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
@@ -131,14 +125,10 @@ def prepare(method: Method) -> None:
 
     Kernels of `taylor` are included, because runs of other methods are compared with `taylor`.
     """
-    kernels, beside = (
-        (STEPPING, prepare_stepping) if method.is_series else (KERNELS_OF_SERIES, prepare_series)
-    )
-    with compiled_in_background(kernels, beside.__module__, beside.__name__):
+    beside = prepare_series_backwards
+    with compiled_in_background(KERNELS_OF_SERIES, beside.__module__, beside.__name__):
         preparation.prepare(method)
-        if method.is_series:
-            prepare_expansion()
-    prepare_series()
+        prepare_series()
 
 
 def are_compiled(method: Method) -> bool:

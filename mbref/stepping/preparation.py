@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
-from mbref.kernels.compilation import Exchangeable
+from mbref.kernels.compilation import Exchangeable, prepare_all
 from mbref.method import Method
 from mbref.stepping.loop import advance_to_end
 
 
 def prepare(method: Method) -> None:
     """Compile the kernels of the method, or load them from the cache of this machine."""
-    for kernel in kernels_of(method):
-        kernel.prepare()
+    prepare_all(kernels_of(method))
 
 
 def kernels_of(method: Method) -> list[Exchangeable]:

@@ -65,11 +65,13 @@ def add_loads(k, memory):
     add_timed_forces(k, memory)
 
 
-@inlined
-def has_varying_loads(polynomials):
+def varies(polynomials):
     """Return whether a scene has loads other than constant forces and moments, or couplings of angles."""
     loads = polynomials.springs.damping.shape[0] + polynomials.torsions.damping.shape[0]
     return loads + polynomials.slides.damping.shape[0] + polynomials.timed.function.shape[0] > 0
+
+
+has_varying_loads = inlined(varies)  # for kernels; Python calls ``varies``, which needs no compilation
 
 
 @inlined

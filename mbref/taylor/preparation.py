@@ -1,12 +1,14 @@
 """Preparation of the series: its kernels, compiled or loaded before the clock of a run starts.
 
-Two processes can share the work: the kernels of ``STEPPING`` take about as long to compile as all other
-kernels together.
+Two processes share the work: one begins with the first kernel, the other one with the last kernel. Neighbours
+call common helpers, which each process compiles for itself.
 """
 
 from __future__ import annotations
 
+from mbref.kernels.compilation import prepare_all
 from mbref.taylor.advance import advance_series, enter_series
+from mbref.taylor.crossing.detection import contains_singular_position
 from mbref.taylor.crossing.long_crossing import (
     begin_crossing,
     continue_crossing,
@@ -15,33 +17,25 @@ from mbref.taylor.crossing.long_crossing import (
     put_state_along,
 )
 from mbref.taylor.driven import follow_drivers
-from mbref.taylor.sample_completion import complete_samples
-from mbref.taylor.series_memory import CALLED
-from mbref.taylor.stepping import begin_series, take_step
+from mbref.taylor.sample_completion import complete_sample, complete_samples
+from mbref.taylor.series import expand_series, expand_with_multipliers
+from mbref.taylor.solver import respond_in_loops
+from mbref.taylor.step_start import choose_partition
+from mbref.taylor.stepping import begin_series, expand_from, take_step
 
-STEPPING = (take_step, begin_series, advance_series, follow_drivers)
-KERNELS_OF_SERIES = tuple(
-    dict.fromkeys([
-        *CALLED, complete_samples, enter_series, begin_crossing, cross_position, continue_crossing,
-        end_crossing, put_state_along, *STEPPING,
-    ])
+KERNELS_OF_SERIES = (
+    complete_sample, complete_samples, expand_from, respond_in_loops, choose_partition,
+    expand_with_multipliers, expand_series, enter_series, put_state_along, begin_crossing, end_crossing,
+    continue_crossing, cross_position, advance_series, follow_drivers, begin_series,
+    contains_singular_position, take_step,
 )  # fmt: skip
 
 
 def prepare_series() -> None:
     """Compile the kernels of the series, or load them from the cache of this machine."""
-    for kernel in KERNELS_OF_SERIES:
-        kernel.prepare()
+    prepare_all(KERNELS_OF_SERIES)
 
 
-def prepare_stepping() -> None:
-    """Compile or load the kernels that take steps."""
-    for kernel in STEPPING:
-        kernel.prepare()
-
-
-def prepare_expansion() -> None:
-    """Compile or load the kernels that expand the series, cross singular positions and complete samples."""
-    for kernel in KERNELS_OF_SERIES:
-        if kernel not in STEPPING:
-            kernel.prepare()
+def prepare_series_backwards() -> None:
+    """Compile or load the kernels of the series, from the last one to the first one."""
+    prepare_all(KERNELS_OF_SERIES[::-1])

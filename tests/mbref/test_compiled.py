@@ -1,10 +1,14 @@
 """Promises of the decorators of kernels."""
 
+from types import SimpleNamespace
+
 import numba
 import numpy as np
 import pytest
 
-from mbref.kernels.compilation import PLAIN, allocating, kernel
+from mbref.kernels.compilation import PLAIN, Entry, allocating, kernel, prepare_all
+from mbref.taylor.preparation import KERNELS_OF_SERIES
+from mbref.taylor.series_memory import CALLED
 
 
 @allocating
@@ -22,3 +26,22 @@ def test_only_a_kernel_that_says_so_can_allocate():
     assert total(3) == 3.0
     with pytest.raises(numba.core.errors.NumbaError, match="of array passed into"):
         greedy(3)
+
+
+def stand_in(name, done, is_compiled_elsewhere):
+    prepare = lambda: done.append(name)  # noqa: E731
+    return SimpleNamespace(prepare=prepare, is_compiled_elsewhere=is_compiled_elsewhere)
+
+
+def test_kernels_that_another_process_compiles_come_last():
+    done = []
+    prepare_all([stand_in(name, done, name in "ac") for name in "abcd"])
+    assert done == ["b", "d", "a", "c"]
+
+
+def test_every_kernel_of_the_series_is_prepared():
+    """A missing kernel would compile while the clock of a run counts."""
+    from mbref.taylor import stepper
+
+    called = {kernel for kernel in vars(stepper).values() if isinstance(kernel, Entry)}
+    assert {*CALLED, *called} == set(KERNELS_OF_SERIES) and called

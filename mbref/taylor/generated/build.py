@@ -18,7 +18,7 @@ from mbref.taylor.generated.instructions import Instructions
 from mbref.taylor.generated.multiplier_orders import MultiplierOrders
 from mbref.taylor.generated.power_orders import PowerOrders
 from mbref.taylor.layout import TaylorMemory
-from mbref.taylor.loads import has_varying_loads
+from mbref.taylor.loads import varies
 from mbref.taylor.simd import WIDTH
 
 EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
@@ -57,11 +57,11 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
 def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
     """Return the names of a scene's functions: loads that vary are no sums of products of series, and
     elimination of many rows is left to the kernels' loops."""
-    varies = bool(has_varying_loads(taylor.polynomials))
+    has_constant_loads = not varies(taylor.polynomials)
     rank, nr, nz = rank_of_rows(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
     by_power = power_orders.serves(taylor)
-    names = {EXPAND: not varies, POWER: not varies and by_power, FACTORISE: is_short}
+    names = {EXPAND: has_constant_loads, POWER: has_constant_loads and by_power, FACTORISE: is_short}
     return *(name for name, served in names.items() if served), *corrections.POINTERS
 
 
