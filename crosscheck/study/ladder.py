@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from crosscheck.judge.tolerances import ERROR_LEVELS
-from crosscheck.study.between import STILL_CHEAPER, coarser, work
+from crosscheck.study.between import STILL_CHEAPER, coarser, longest_step, work
 from crosscheck.study.grid import Case, Record, key
 from crosscheck.study.record_view import error, is_completed
 
@@ -54,7 +54,7 @@ def beyond(family: Family, records: Mapping[str, Record]) -> list[Case]:
         return []
     if is_completed(second) and work(first) > STILL_CHEAPER * work(second):
         return []
-    setting = coarser(family[0].setting, family[1].setting, family[0].scene.duration)
+    setting = coarser(family[0].setting, family[1].setting, longest_step(family[0].times))
     return [] if setting is None else [family[0]._replace(setting=setting)]
 
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from crosscheck.engine import Setting
 from crosscheck.judge.constraints import scene_length
-from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, work
+from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, longest_step, within, work
 from crosscheck.study.grid import Case, Record
-from crosscheck.study.ladder import families
+from crosscheck.study.ladder import Family, families
 from crosscheck.study.record_view import error, error_bound, error_text, is_completed
 from mbref.scene import Scene
 
@@ -89,7 +89,7 @@ def tuned(
     ``integrated_here`` (by crosscheck) does not end the search in families of the engine's own integrators.
     ``advance`` receives the name of each finished family.
     """
-    groups = families(cases)
+    groups = [_distinct(family) for family in families(cases)]
     firsts = run([group[0] for group in groups])
     searches = [
         _Search(group, first, level, run, measure) for group, first in zip(groups, firsts, strict=True)
@@ -103,6 +103,12 @@ def tuned(
     found = sorted((pair for s in searches for pair in s.cheapest()), key=lambda pair: _seconds(pair[1]))
     records = [record for s in searches for _, record in s.made]
     return Tuned(records, [case for case, _ in found], [record for _, record in found])
+
+
+def _distinct(family: Family) -> list[Case]:
+    """Return the family without settings whose steps are longer than the interval between samples."""
+    settings = within([case.setting for case in family], longest_step(family[0].times))
+    return [family[0]._replace(setting=setting) for setting in settings]
 
 
 Pair = tuple[Case, Record]
@@ -154,7 +160,7 @@ class _Search:
         among coarser settings. None if every coarser setting that saves work still reaches the error.
         """
         finer = self._settings[1].setting if len(self._settings) > 1 else self._settings[0].setting
-        longest = self._settings[0].scene.duration
+        longest = longest_step(self._settings[0].times)
         for _ in range(MOST_COARSER):
             setting = coarser(reached[0].setting, finer, longest)
             if setting is None:

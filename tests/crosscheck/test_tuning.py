@@ -10,7 +10,7 @@ import pytest
 
 from crosscheck.cli.options import length
 from crosscheck.engine import Setting
-from crosscheck.study.between import between, coarser, work
+from crosscheck.study.between import STEP, between, coarser, longest_step, within, work
 from crosscheck.study.comparison import _with_coarser
 from crosscheck.study.grid import Case, key
 from crosscheck.study.ladder import beyond
@@ -133,13 +133,46 @@ def test_settings_between_and_beyond():
     first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
     assert between(first, second) == Setting("f", {"step": 0.05, "beta": 4.0, "hard": 1e-7})
     assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
-    assert coarser(first, second, longest=0.39) is None, "longer than the motion"
+    assert coarser(first, second, longest=0.2) == Setting("f", {"step": 0.2, "beta": 1.0, "hard": 1e-7})
+    assert coarser(first, second, longest=0.1) is None, "the longest step has run"
     loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
-    assert coarser(*loose, longest=9.0) is None, "a tolerance of 1 asks for nothing"
+    assert coarser(*loose, longest=0.01) == Setting("f", {"rtol": 0.5}), "a tolerance of 1 asks for nothing"
+    assert coarser(Setting("f", {"rtol": 0.5}), loose[0], 9.0) is None
     assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
     assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), 9.0) is None, "nothing grows"
     assert between(first, first) is None and coarser(first, first, 1.0) is None
     assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None, "a count is not halved"
+
+
+def test_no_setting_has_a_step_longer_than_the_interval_between_samples():
+    """Runs end their steps at samples: 0.4 and 0.3 would run with 0.2, the interval from 0.1 to 0.3."""
+    assert longest_step([0.1, 0.3, 0.4]) == pytest.approx(0.2, rel=1e-15)
+    assert longest_step([0.5]) == 0.5, "the first interval begins at 0"
+    steps = [Setting("f", {"step": h, "beta": 0.2 / h}) for h in (0.4, 0.1, 0.025)]
+    assert within(steps, 0.2) == [Setting("f", {"step": 0.2, "beta": 1.0}), *steps[1:]]
+    assert within(steps, 0.1) == steps[1:] and within(steps, 0.4) == steps
+    assert within(steps, 0.05) == [Setting("f", {"step": 0.05, "beta": 4.0}), steps[2]]
+    assert within(steps, 0.02) == [Setting("f", {"step": 0.02, "beta": 8.0})]
+    loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
+    assert within(loose, 1e-3) == loose, "a tolerance is no step"
+
+
+def test_a_gain_that_follows_a_longer_step_is_not_the_answer():
+    """The error is small by chance at a gain that belongs to steps near 0.5, which run with 0.1."""
+
+    class Stabilised(Modelled):
+        def record(self, case):
+            record = super().record(case)
+            asked = case.setting.options[STEP]
+            error = 0.0 if 0.45 < asked < 0.55 else min(asked, 0.1) ** 2
+            return {**record, "metrics": {**record["metrics"], "error": error}}
+
+    engine = Stabilised(f=(2.0, 1.0, 1e-3, 1.0))
+    times = np.linspace(0.0, 1.0, 11)
+    done = tuned([case._replace(times=times) for case in engine.cases(0.5, 0.05, 0.01)], 1e-3, engine)
+    [cheapest] = done.cases
+    assert 1e-3**0.5 / 1.15 < cheapest.setting.options[STEP] <= 1e-3**0.5
+    assert max(h for _, h in engine.asked) == 0.1
 
 
 def test_work_is_counted_where_it_can_be():
@@ -148,7 +181,7 @@ def test_work_is_counted_where_it_can_be():
 
 
 def test_a_sweep_that_begins_too_fine_is_continued_to_coarser_settings():
-    """Steps 0.01 and 0.005 of a fourth-order family: 0.16 is the last to be run, as 0.16⁴ is below 1e-3."""
+    """Steps 0.01 and 0.005 of a fourth-order family: 0.32 ends them, as 0.16⁴ is below 1e-3 and 0.32⁴ not."""
     engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
     family = engine.cases(0.01, 0.005)
     records = {key(case): engine.record(case) for case in family}
