@@ -1,0 +1,42 @@
+"""Drivers with phases in every family of each adapter / the motion that they prescribe, written down."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import engine
+from mbref.trajectory import Outcome
+from tests.crosscheck.driven_arm import END, ENGINES, SLIDE, TURN, able, driven_arm, middle
+
+TIMES = np.array([0.0, 0.4 * END, END])
+WITHIN = 2e-3  # rad and m; exchanged phases, frequencies or drivers move the bodies by more than SEEN
+SEEN = 8e-3
+ROUGH = ("cpodes",)  # off by more than SEEN on a prescribed motion; it runs the model of the other families
+
+
+@pytest.mark.parametrize("name", ENGINES)
+def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name):
+    scene = able(name, driven_arm())
+    angle, rate = TURN.value(TIMES), TURN.rate(TIMES)
+    along, speed = 1.0 + SLIDE.value(TIMES), SLIDE.rate(TIMES)
+    out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+    across = np.stack([-np.sin(angle), np.cos(angle), 0 * angle], axis=-1)
+    position = np.stack([0.5 * out, along[:, None] * out], axis=1)
+    slid = speed[:, None] * out + (along * rate)[:, None] * across
+    velocity = np.stack([0.5 * rate[:, None] * across, slid], axis=1)
+    spin = np.stack([0 * rate, 0 * rate, rate], axis=-1)[:, None].repeat(2, axis=1)
+    for setting in (s for s in middle(name, scene) if s.family not in ROUGH):
+        run = engine(name).run(scene, TIMES, setting)
+        assert run.outcome is Outcome.COMPLETED, (setting, run.message)
+        assert abs(run.position - position).max() < WITHIN, setting
+        assert abs(run.velocity - velocity).max() < 10 * WITHIN, setting
+        assert abs(run.angular_velocity - spin).max() < 10 * WITHIN, setting
+
+
+def test_exchanged_phases_would_be_seen():
+    first, second = TURN._replace(phase=SLIDE.phase), SLIDE._replace(phase=TURN.phase)
+    assert abs(first.value(TIMES) - TURN.value(TIMES)).max() > SEEN
+    assert abs(second.value(TIMES) - SLIDE.value(TIMES)).max() > SEEN
+    turned = TURN._replace(phase=-TURN.phase)
+    assert abs(turned.value(TIMES) - TURN.value(TIMES)).max() > SEEN
