@@ -3,7 +3,8 @@
 ``python -m tests.mutants --seed 1 --count 300`` draws so many places of the syntax trees of the packages, and
 prints a line for each and the score of each package.  A mutant is killed where a test fails; where the tests
 run out of time it is counted apart.  ``--only mbref/taylor`` draws from files of that path alone, and
-``--list`` prints the mutants without running tests.  Mutants that change nothing are listed with the reason
+``--list`` prints the mutants without running tests; ``--tests FILE …`` runs these test files alone, such as
+the unit tests of the file.  Mutants that change nothing are listed with the reason
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
 The test files that killed other mutants of the folder run first, then files that name the mutant's function
@@ -86,11 +87,12 @@ class Tree:
             copy = shutil.copytree if (root / name).is_dir() else shutil.copy2
             copy(root / name, place / name)
 
-    def result(self, mutant: Mutant, tests: Sequence[str]) -> tuple[str, str]:
+    def result(self, mutant: Mutant, tests: Sequence[str], with_texts: bool = True) -> tuple[str, str]:
         """Return whether tests see a mutant, KILLED, BY_TEXT, SURVIVED or TIMED_OUT, and the first test that
         does.
 
-        A test that fails without the mutant, too, is left out.  The tree is left as it was.
+        A test that fails without the mutant, too, is left out.  Where no test fails, stored texts are tested
+        if ``with_texts`` is true.  The tree is left as it was.
         """
         if not tests:
             return UNTESTED, ""
@@ -103,7 +105,7 @@ class Tree:
         result, test = self._seen(mutant, source, files, plain)
         if result == KILLED:
             self._kills[folder, test.partition("::")[0]] += 1
-        if result == SURVIVED and mutant.file.startswith(RENDERED):
+        if with_texts and result == SURVIVED and mutant.file.startswith(RENDERED):
             result, test = self._seen(mutant, source, SNAPSHOTS, plain)
             result = BY_TEXT if result == KILLED else SURVIVED  # a text that takes too long sees nothing
         return result, test
@@ -247,19 +249,22 @@ def _records(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def run(chosen: Sequence[Mutant], seconds: float) -> dict[Mutant, str]:
-    """Return the result of each mutant; none is begun after that time."""
+def run(chosen: Sequence[Mutant], seconds: float, alone: Sequence[str] = ()) -> dict[Mutant, str]:
+    """Return the result of each mutant; none is begun after that time.
+
+    Test files that run ``alone`` replace those that import the mutant's file.
+    """
     found, before, end = {}, known(), time.monotonic() + seconds
     with closing(Tree(TREE)) as tree:
         for k, mutant in enumerate(chosen, 1):
-            tests = importers(mutant.file)
+            tests = alone or importers(mutant.file)
             name, by = key(mutant, tests), ""
             if why := reason(mutant, (ROOT / mutant.file).read_text()):
                 before[name] = EQUIVALENT
             elif name not in before:
                 if time.monotonic() > end:
                     break
-                before[name], by = tree.result(mutant, tests)
+                before[name], by = tree.result(mutant, tests, not alone)
                 with KEPT.open("a") as file:
                     record = {"key": name, "result": before[name], "by": by, "mutant": _line(mutant)}
                     print(json.dumps(record), file=file)
@@ -297,13 +302,14 @@ def main() -> int:
     parser.add_argument("--only", default="", metavar="PATH", help="files whose path begins so")
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no mutant after these")
     parser.add_argument("--list", action="store_true", help="print the mutants and their tests, run nothing")
+    parser.add_argument("--tests", nargs="+", default=(), metavar="FILE", help="run these test files alone")
     options = parser.parse_args()
     chosen = drawn(options.seed, options.count, options.only)
     if options.list:
         for mutant in chosen:
             print(f"{_line(mutant)}   ({' '.join(importers(mutant.file)) or 'no test imports it'})")
         return 0
-    found = run(chosen, 60 * options.minutes)
+    found = run(chosen, 60 * options.minutes, options.tests)
     for package in PACKAGES:
         if results := [result for mutant, result in found.items() if mutant.file.startswith(f"{package}/")]:
             print(f"{package}: {score(results)}")

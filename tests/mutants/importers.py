@@ -1,16 +1,19 @@
-"""The tests that import a source file, the nearest first; ``engine("name")`` imports the adapter."""
+"""The tests that import a source file, the nearest first; ``engine("name")`` and BUILT_IN import adapters."""
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
+import crosscheck.engine
 from tests.meta.imports import ROOT, imported, module_name, sources
 
 PACKAGES = ("mbref", "crosscheck", "reports")
 ADAPTERS = "crosscheck/engines/"
+LISTS = ("BUILT_IN", "OPTIONAL", "GENERATORS", "LARGE", "ON_REQUEST")
 FEWEST = 4  # test files that are run, where so many reach the source
 FARTHEST = 3  # imports between a test and the source
 SNAPSHOTS = (  # they see that a text changed, not that it is wrong
@@ -57,7 +60,7 @@ def _tests() -> Mapping[str, set[str]]:
             continue
         used = _known(path, modules) | _adapters(path)
         for helper in _known(path, helpers):
-            used |= _known(helpers[helper], modules)
+            used |= _known(helpers[helper], modules) | _adapters(helpers[helper])
         found[name] = used
     return found
 
@@ -73,7 +76,9 @@ def engines() -> list[str]:
 
 
 def _adapters(path: Path) -> set[str]:
-    """The modules of the engines that a test asks for by name."""
-    named = set(re.findall(r"""\bengine\("(\w+)"\)""", path.read_text())) & set(engines())
+    """The modules of the engines that a test asks for by name, or by a list of names of crosscheck.engine."""
+    text = path.read_text()
+    lists = [getattr(crosscheck.engine, name) for name in LISTS if re.search(rf"\b{name}\b", text)]
+    named = {*re.findall(r"""\bengine\("(\w+)"\)""", text), *itertools.chain(*lists)} & set(engines())
     inside = tuple(f"crosscheck.engines.{name}." for name in named)
     return {module for module in sources("crosscheck") if inside and module.startswith(inside)}

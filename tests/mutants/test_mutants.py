@@ -78,6 +78,7 @@ def test_tests_are_those_that_import_the_file_the_nearest_first():
     assert not set(found) & set(SNAPSHOTS)
     assert importers("tests/nothing.py") == []
     assert "tests/crosscheck/test_ondsel.py" in importers("crosscheck/engines/ondsel/model.py")
+    assert "tests/crosscheck/test_clocks.py" in importers("crosscheck/engines/exudyn/dynamic.py")
 
 
 def test_no_mutant_is_drawn_of_an_engine_that_is_not_installed(monkeypatch):
@@ -139,6 +140,8 @@ def planted(new: str) -> Mutant:
 def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
     """A time-out is no kill, and tests that fail without the mutant say nothing."""
     assert tree.result(planted(new), tests) == expected
+    if expected[0] == runner.BY_TEXT:
+        assert tree.result(planted(new), tests, with_texts=False) == (runner.SURVIVED, "")
     assert (tree.place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left"
 
 
