@@ -27,10 +27,11 @@ def text_of(node: ast.expr) -> str:
 def messages(source: str) -> Iterator[tuple[int, str]]:
     """Yield line and text of each message of a file's source."""
     tree = ast.parse(source)
-    parts = {id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in node.values}
-    alone = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in parts | alone:
+    nodes = list(ast.walk(tree))
+    skipped = {id(part) for node in nodes if isinstance(node, ast.JoinedStr) for part in node.values}
+    skipped |= {id(node.value) for node in nodes if isinstance(node, ast.Expr)}
+    for node in nodes:
+        if isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in skipped:
             text = text_of(node)
             if len(re.findall(r"[A-Za-z]{2,}", text)) >= LEAST_WORDS and not MARKUP.search(text):
                 yield node.lineno, text

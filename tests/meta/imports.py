@@ -17,6 +17,13 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
+@functools.cache
+def parsed(path: Path) -> ast.Module:
+    """Return the syntax tree of a file, parsed once for all tests; nobody changes it."""
+    return ast.parse(path.read_text())
+
+
+@functools.cache
 def sources(package: str) -> dict[str, Path]:
     """Every module of a package and its file."""
     return {module_name(path): path for path in sorted((ROOT / package).rglob("*.py"))}
@@ -33,6 +40,7 @@ def imported(path: Path) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
+@functools.cache
 def graph(package: str) -> dict[str, set[str]]:
     """Return module → modules of its package that it imports, also inside functions and for types alone.
 
@@ -59,10 +67,11 @@ def _targets(path: Path, modules: Mapping[str, Path]) -> set[str]:
 @functools.cache
 def _imports(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """Return the imports of a file, in an ``__init__`` without those under TYPE_CHECKING."""
-    tree = ast.parse(path.read_text())
+    body = parsed(path).body
     if path.name == "__init__.py":
-        tree.body = [node for node in tree.body if not _is_for_types(node)]
-    return tuple(node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom))
+        body = [node for node in body if not _is_for_types(node)]
+    nodes = (node for statement in body for node in ast.walk(statement))
+    return tuple(node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _is_for_types(node: ast.stmt) -> bool:

@@ -7,6 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from imports import parsed
 
 from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
@@ -19,11 +20,6 @@ MAY_IMPORT = {"mbref": {"mbref"}, "crosscheck": {"crosscheck", "mbref"}, "report
 ENGINE_PACKAGES = {"mujoco", "pinocchio", "exudyn", "opensim", "pyondsel", "sksundae", "casadi", "heyoka"}
 LONGEST = 330  # lines of a file
 MOST_SKIPS = 60  # marks in the repository that keep a layout from the formatter
-
-
-@functools.cache
-def parsed(path):
-    return ast.parse(path.read_text())
 
 
 @functools.cache
