@@ -1,40 +1,81 @@
 """Hypothesis profiles: ``check`` is reproducible, ``deep`` searches, ``first`` ends at a failure.
 
-Of two processes that run all tests, one compiles the general kernels first and the other the Taylor method's.
-Each computes with one thread: more would wait for each other.
+Processes that run all tests share the compilation of kernels. Each computes with one thread: more would wait
+for each other. ``slow.toml`` lists cases with the mark slow.
 """
 
 import gc
 import os
+import tomllib
+from fnmatch import fnmatchcase
+from pathlib import Path
 
 import pytest
 from hypothesis import Phase, settings
 
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
-settings.register_profile("check", max_examples=25, deadline=None, derandomize=True, database=None)
+settings.register_profile("check", max_examples=10, deadline=None, derandomize=True, database=None)
 settings.register_profile("deep", max_examples=500, deadline=None, print_blob=True)
 settings.register_profile("first", settings.get_profile("check"), phases=(Phase.generate,))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "check"))
 
+HERE = Path(__file__).parent
+SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
 MANY = 2000  # tests, among which every kernel is needed
-GENERAL = ("alf-dual+projection", "mpi-svd+partitioning", "lm1+none/rk4", "lm2+projection/adams")
+GENERAL = (
+    "alf-dual+projection",
+    "mpi-svd+partitioning",
+    "lm1+none/rk4",
+    "lm2+projection/adams",
+    "alf+none",
+    "mpi-gs+none",
+    "mpi-gs-literal+none",
+    "mpi-qr+none",
+)
+
+
+def patterns(item: pytest.Item) -> list[str]:
+    """Return the patterns of slow cases of an item's test."""
+    file = SLOW.get(item.path.relative_to(HERE).as_posix(), {})
+    return file.get(getattr(item, "originalname", item.name), [])
+
+
+def case(item: pytest.Item) -> str:
+    """Return the name of an item's parameters, empty without parameters."""
+    return item.name.partition("[")[2].removesuffix("]")
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Mark the cases that slow.toml lists."""
+    if any(fnmatchcase(case(item), pattern) for pattern in patterns(item)):
+        item.add_marker(pytest.mark.slow)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Raise UsageError if all tests were collected and slow.toml lists a case that does not exist."""
+    if len(items) < MANY:
+        return
+    listed = {(f, test, p) for f, tests in SLOW.items() for test, found in tests.items() for p in found}
+    for item in items:
+        file, test = item.path.relative_to(HERE).as_posix(), getattr(item, "originalname", item.name)
+        listed -= {(file, test, p) for p in patterns(item) if fnmatchcase(case(item), p)}
+    if listed:
+        raise pytest.UsageError(f"tests/slow.toml lists cases that do not exist: {sorted(listed)}")
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Compile this process's share of the kernels, which takes no time where they are in the cache; what has
-    been imported is not searched for garbage again."""
+    """Compile the kernels, or load them; what has been imported is not searched for garbage again."""
     gc.freeze()
-    if len(session.items) < MANY:
+    worker = os.environ.get("PYTEST_XDIST_WORKER")
+    if len(session.items) < MANY or worker is None:
         return
-    match os.environ.get("PYTEST_XDIST_WORKER"):
-        case "gw0":
-            from mbref.method import Method
-            from mbref.stepping.preparation import prepare
+    from mbref.kernels.compilation import prepare_all
+    from mbref.method import Method
+    from mbref.stepping.preparation import kernels_of
+    from mbref.taylor.preparation import KERNELS_OF_SERIES
 
-            for name in GENERAL:
-                prepare(Method.parse(name))
-        case "gw1":
-            from mbref.taylor.preparation import prepare_series
-
-            prepare_series()
+    general = dict.fromkeys(kernel for name in GENERAL for kernel in kernels_of(Method.parse(name)))
+    kernels = [*general, *KERNELS_OF_SERIES]
+    prepare_all(kernels if worker == "gw0" else kernels[::-1])

@@ -24,13 +24,7 @@ def sound_bench(scene: str) -> trial.Bench:
     return trial.set_up(InProcess(engine()), SPECIMENS[scene])
 
 
-# on a scene whose checks take ten seconds; other defects trip the same checks
-COSTLY = ("scene's single-precision masses", "moments of inertia of at least 1e-4 kg m²")
-
-
-@pytest.mark.parametrize(
-    "about", [pytest.param(about, marks=[pytest.mark.slow] * (about in COSTLY)) for about in DEFECTS]
-)
+@pytest.mark.parametrize("about", DEFECTS)
 def test_defect_and_the_check_that_tells(about):
     """The named check fails with the defect, and passes without it."""
     defect = DEFECTS[about]
