@@ -94,10 +94,7 @@ class Supports:
                 yield f"joint {joint.name!r} is of type {joint.type!r}"
             if joint.reflected_inertia and joint.facts.driven not in self.armatures:
                 yield f"joint {joint.name!r} has an armature"
-        for coupling in scene.coupling:
-            for joint, kind in scene.coupled(coupling):
-                if kind not in self.couplings:
-                    yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"
+        yield from self._missing_of_couplings(scene)
         for driver in scene.driver:
             coordinate = scene.joint_named(driver.joint).facts.driven
             if coordinate not in self.drivers:
@@ -109,3 +106,11 @@ class Supports:
                 yield f"load[{k}] is of type {load.type!r}"
             if load.over_time and FACTOR not in self.over_time:
                 yield f"load[{k}] changes with time"
+
+    def _missing_of_couplings(self, scene: Scene) -> Iterator[str]:
+        for coupling in scene.coupling:
+            if coupling.offset:
+                yield f"coupling {coupling.name!r} has an offset (scene.assembled() has none)"
+            for joint, kind in scene.coupled(coupling):
+                if kind not in self.couplings:
+                    yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"

@@ -52,6 +52,7 @@ _MODULE_OF = {
 }
 
 _SERVICES = {  # functions behind methods of Scene and Motion
+    "assembled": "mbref.design.offsets",
     "counts": "mbref.equations.diagnosis",
     "determined_reactions": "mbref.equations.along_trajectory",
     "estimate_error": "mbref.second_run",

@@ -209,7 +209,7 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
     ValueError
         If no installed format has this suffix.
     """
-    exported = _found(path, "writes").write(scene)
+    exported = _found(path, "writes").write(scene.assembled())
     Path(path).write_text(exported.text, encoding="utf-8")
     return exported.left_out
 

@@ -16,12 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, ValidationError, model_validator
 
 from mbref.scene_bodies import Body, Driver
-from mbref.scene_fields import (
-    Entry,
-    Name,
-    Positive,
-    Vector,
-)
+from mbref.scene_fields import Entry, Name, Positive, Vector
 from mbref.scene_functions import Factor, Sine, TimeFunction
 from mbref.scene_joints import (
     JOINT_TYPES,
@@ -54,13 +49,7 @@ from mbref.scene_loads import (
 from mbref.scene_paths import replaced_at
 from mbref.scene_services import SERVICES, Counts
 from mbref.scene_toml import as_lists, read_toml, scene_text, with_lines
-from mbref.scene_validation import (
-    GROUND,
-    SceneError,
-    field_faults,
-    named_paths,
-    reference_faults,
-)
+from mbref.scene_validation import GROUND, SceneError, field_faults, named_paths, reference_faults
 
 __all__ = [
     "GROUND",
@@ -118,7 +107,7 @@ class Scene(Entry):
     joint : tuple of Joint
         Joints between two bodies, or a body and ``"ground"``.
     coupling : tuple of Coupling
-        Constant ratios of joint coordinates.
+        Linear relations of two joint coordinates.
     driver : tuple of Driver
         Prescribed motions of joints.
     load : tuple of Load
@@ -219,6 +208,25 @@ class Scene(Entry):
         """
         return all(body.mass is not None for body in self.body)
 
+    def assembled(self) -> Scene:
+        """Return the scene at the poses at which its motion starts: they obey the offsets of its couplings.
+
+        The bodies move by Newton steps of least mass-weighted displacement until joints, drivers and
+        couplings hold, and carry joints and points of loads. The result has no offsets, and its joint
+        coordinates count from the new poses. Velocities, in world axes, are unchanged. A scene without
+        offsets is returned as it is.
+
+        Returns
+        -------
+        Scene
+
+        Raises
+        ------
+        SceneError
+            If no pose obeys an offset; the message names the coupling.
+        """
+        return SERVICES["assembled"](self) if any(c.offset for c in self.coupling) else self
+
     def counts(self) -> Counts:
         """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0.
 
@@ -315,12 +323,5 @@ class Scene(Entry):
 
 
 TABLES = {"": tuple(Scene.model_fields)} | {
-    name: tuple(table.model_fields)
-    for name, table in (
-        ("body", Body),
-        ("coupling", Coupling),
-        ("driver", Driver),
-        ("sine", Sine),
-        ("factor", Factor),
-    )
+    table.__name__.lower(): tuple(table.model_fields) for table in (Body, Coupling, Driver, Sine, Factor)
 }

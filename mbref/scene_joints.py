@@ -11,6 +11,7 @@ from pydantic import Discriminator, field_validator
 
 from mbref.scene_fields import (
     Entry,
+    LengthOrAngle,
     Name,
     NotNegative,
     Pair,
@@ -240,17 +241,19 @@ JOINT_TYPES: dict[str, type[Joint]] = {
 
 
 class Coupling(Entry):
-    """q₂ = ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
+    """q₂ = offset + ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
 
     A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
-    of the second body relative to the first. Both coordinates are zero at the poses that the scene gives.
-    ``coordinates`` names the coordinate of each joint. The default is the coordinate that a driver of the
-    joint would prescribe; for one joint named twice, its angle and its displacement.
+    of the second body relative to the first. Both coordinates are zero at the poses that the scene gives;
+    with an ``offset`` the motion starts at other poses (see ``Scene.assembled``). ``coordinates`` names the
+    coordinate of each joint. The default is the coordinate that a driver of the joint would prescribe; for
+    one joint named twice, its angle and its displacement.
     """
 
     name: Name
     joints: Pair
     ratio: Real  # rad/rad, m/rad, rad/m or m/m
+    offset: LengthOrAngle = 0.0  # rad or m, of the second coordinate
     coordinates: CoordinatePair | None = None
 
     @field_validator("ratio")

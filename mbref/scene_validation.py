@@ -27,6 +27,7 @@ LOADED = {  # load type → joint types along whose coordinate it can act
 }
 COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
 COORDINATES = get_args(Coordinate)
+DIMENSIONS = {"angle": "angle", "displacement": "length"}  # coordinate → dimension of its unit
 ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
 NUMBERS = {  # field → content of its list; all other lists contain three numbers
     "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
@@ -36,11 +37,7 @@ NUMBERS = {  # field → content of its list; all other lists contain three numb
     "anchors": "two points of three numbers each",
     "axes": "two axes of three numbers each",
     "points": "two points of three numbers each",
-    "body": "entries [[body]]",
-    "joint": "entries [[joint]]",
-    "driver": "entries [[driver]]",
-    "load": "entries [[load]]",
-    "coupling": "entries [[coupling]]",
+    **{key: f"entries [[{key}]]" for key in ("body", "joint", "coupling", "driver", "load")},
     "joints": "two names of joints",
     "coordinates": 'two of "angle" and "displacement"',
 }
@@ -261,6 +258,9 @@ def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Ma
             return
     if names[0] == names[1] and chosen[0] == chosen[1]:
         yield path, f"must be two different coordinates, got the {chosen[0]} of {names[0]!r} twice"
+    offset = field_of(coupling, "offset")
+    if dimension_of(offset) not in (None, DIMENSIONS.get(chosen[1], dimension_of(offset))):
+        yield f"{path.removesuffix('joints')}offset", f"is of the {chosen[1]} of {names[1]!r}, got {offset!r}"
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
@@ -288,7 +288,7 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
 def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:
     """Yield faults of units that do not fit the coordinate that a driver prescribes."""
     driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
-    needed = {"angle": "angle", "displacement": "length"}.get(str(driven))
+    needed = DIMENSIONS.get(str(driven))
     terms, sine = field_of(driver, "polynomial"), field_of(field_of(driver, "sine"), "amplitude")
     found = {f"polynomial[{k}]": c for k, c in enumerate(terms if isinstance(terms, list | tuple) else ())}
     for field, value in (found | {"sine.amplitude": sine}).items():

@@ -15,6 +15,7 @@ from rich.console import Console
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.request import Choice
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.start import started
 from crosscheck.study import sweep
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
 from crosscheck.study.fair_timing import force_differences, model_differences
@@ -194,7 +195,7 @@ def compare(
     if depth not in ("quick", "whole"):
         raise request.RequestError(f"depth: must be quick or whole, got {depth!r}")
     tell, is_quick = notice or _silent, depth == "quick"
-    given = scene if isinstance(scene, Scene) else scene_request.find_scenes([str(scene)])[0]
+    given = started(scene) if isinstance(scene, Scene) else scene_request.find_scenes([str(scene)])[0]
     lasting = request.lasting(given, None, duration)
     names = request.find_engines(_several(engines), tell)
     times = [request.sample_times(lasting, None, samples)]

@@ -24,7 +24,7 @@ def judge(arguments: argparse.Namespace) -> int:
 
     Raises RequestError and SceneError.
     """
-    (scene,) = scene_request.find_scenes([arguments.scene])
+    (scene,) = scene_request.read_scenes([arguments.scene])
     columns = dict(_assigned(text) for text in arguments.column)
     try:
         recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
@@ -68,7 +68,7 @@ def write_reference(arguments: argparse.Namespace) -> int:
 
     Raises RequestError.
     """
-    (scene,) = scene_request.find_scenes([arguments.scene])
+    (scene,) = scene_request.read_scenes([arguments.scene])
     scene = request.lasting(scene, arguments.times, arguments.duration)
     times = request.sample_times(scene, arguments.times, arguments.samples)
     table = reference_table(scene, times, arguments.reference_time)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from crosscheck.judge.constraints import initial_twists
+from crosscheck.judge.start import started
 from crosscheck.study.scouting import remember
 from mbref import formats
 from mbref.formats import ImportOptions
@@ -29,7 +30,17 @@ Notice = Callable[[str], None]  # takes one sentence for the user
 def find_scenes(
     names: Sequence[str], reading: ImportOptions | None = None, notice: Notice = lambda _: None
 ) -> list[Scene]:
-    """Return the scenes of the given names.
+    """Return the scenes of the given names at the poses at which their motions start (see ``started``).
+
+    Raises RequestError as ``read_scenes``.
+    """
+    return [started(scene) for scene in read_scenes(names, reading, notice)]
+
+
+def read_scenes(
+    names: Sequence[str], reading: ImportOptions | None = None, notice: Notice = lambda _: None
+) -> list[Scene]:
+    """Return the scenes of the given names as their files give them.
 
     Raises RequestError with every fault of every scene, and if two scenes have the same name. A file of
     another program is read with the options ``reading``; ``notice`` reports the parts of the file that the
@@ -60,7 +71,7 @@ def _started(name: str, reading: ImportOptions, notice: Notice) -> Scene:
     scene = held(find_scene(name), reading.hold)
     if name not in SCENES and Path(name).exists():
         try:
-            initial_twists(scene)
+            initial_twists(started(scene))
         except SceneError as error:
             raise SceneError(with_lines(Path(name).read_text(encoding="utf-8-sig"), error.faults)) from None
     return scene

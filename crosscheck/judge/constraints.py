@@ -92,13 +92,14 @@ def coupling_gaps(
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
 ) -> Residuals:
-    """Return position residuals (k, 1) of couplings by name, q₂ - ratio q₁ in m or rad, for trajectory arrays
-    (k, nb, ·).
+    """Return position residuals (k, 1) of couplings by name, q₂ - offset - ratio q₁ in m or rad, for
+    trajectory arrays (k, nb, ·).
 
     The residuals are NaN from the first sample on at which the samples are too far apart to count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
-    return _coupled(scene, lambda joint: coordinates(joint, *motion))
+    found = _coupled(scene, lambda joint: coordinates(joint, *motion))
+    return {c.name: found[c.name] - c.offset for c in scene.coupling}
 
 
 def _coupled(scene: Scene, of_joint: Callable[[JointFrames], np.ndarray]) -> Residuals:

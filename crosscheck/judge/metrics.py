@@ -17,6 +17,7 @@ from crosscheck.judge import constraints
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.joint_reactions import SAMPLES, compare
 from crosscheck.judge.reaction_balance import with_exact_reactions
+from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
 from mbref import rotations
@@ -75,7 +76,7 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     ValueError
         If the bodies differ from the bodies of the scene.
     """
-    trajectory = in_scene_order(scene, trajectory)
+    scene, trajectory = started(scene), in_scene_order(scene, trajectory)
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # metrics report states that are not finite, without warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge.constraints import joint_coordinates, scene_length
+from crosscheck.judge.joint_coordinates import COORDINATES
+from crosscheck.judge.start import start_coordinates, started
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -71,6 +73,17 @@ def values(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     for joint, both in coordinates.items():
         found[f"{joint}.angle"], found[f"{joint}.displacement"] = both[:, 0], both[:, 1]
     return found
+
+
+def start_columns(scene: Scene) -> dict[str, float]:
+    """Return the start values of joints' columns, which are zero in ``values``, for a scene whose couplings
+    have offsets; an empty result without offsets."""
+    if started(scene) is scene:
+        return {}
+    pairs = start_coordinates(scene).items()
+    return {
+        f"{name}.{kind}": float(x) for name, both in pairs for kind, x in zip(COORDINATES, both, strict=True)
+    }
 
 
 def _continuous(quaternions: np.ndarray) -> np.ndarray:

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.judge.reference.reference import SECONDS, NoReference, reference
+from crosscheck.judge.start import started
 from crosscheck.judge.truth import NoSolution, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
-from crosscheck.recorded.columns import SI, kind_of, values
+from crosscheck.recorded.columns import SI, kind_of, start_columns, values
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -71,8 +72,10 @@ def reference_table(
     SceneError
         If the scene's velocities contradict its joints.
     """
-    found = exact(scene, times, seconds)
-    return {"time": found.motion.times, "bound": found.bound, **values(scene, found.motion)}
+    assembled, start = started(scene), start_columns(scene)
+    found = exact(assembled, times, seconds)
+    columns = {name: x + start.get(name, 0.0) for name, x in values(assembled, found.motion).items()}
+    return {"time": found.motion.times, "bound": found.bound, **columns}
 
 
 def write(table: dict[str, np.ndarray], path: Path) -> None:

@@ -4,7 +4,7 @@ begins, and likely causes."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +12,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.start import started
 from crosscheck.recorded.changed_scenes import changed
-from crosscheck.recorded.columns import kind_of, scales, values
+from crosscheck.recorded.columns import kind_of, scales, start_columns, values
 from crosscheck.recorded.exact import Exact, exact
 from crosscheck.recorded.explanations import Difference, Explanation, ranked, simple, with_signs
 from crosscheck.recorded.pairs_of_explanations import pairs
@@ -91,7 +92,8 @@ def judge_motion(
     SceneError
         If the table has no column of the scene, or the scene has no reference.
     """
-    recording = _as_recording(scene, motion)
+    recording = _from_start(scene, _as_recording(scene, motion))
+    scene = started(scene)
     found = exact(scene, _with_dense(recording.times), seconds)
     if not len(found.motion.times):
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
@@ -115,6 +117,13 @@ def _as_recording(scene: Scene, motion: Any) -> Recording:
         times = columns.pop("time")
         return Recording(times, {n: c for n, c in columns.items() if kind_of(n)})
     return read(Path(motion), scene, {})
+
+
+def _from_start(scene: Scene, recording: Recording) -> Recording:
+    """Return the recording with joint coordinates that count from the start, as the reference's do."""
+    start = start_columns(scene)
+    columns = {name: column - start.get(name, 0.0) for name, column in recording.columns.items()}
+    return replace(recording, columns=columns)
 
 
 def _judged(scene: Scene, recording: Recording, found: Exact) -> Judgement:

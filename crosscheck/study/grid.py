@@ -20,6 +20,7 @@ from crosscheck.judge import metrics
 from crosscheck.judge.deadline import given_up
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.start import started
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed, stop_all
@@ -103,6 +104,7 @@ def default_cases(
     tuple of (list of Case, list of Unable)
         The runs, and the refusals.
     """
+    scene = started(scene)
     times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
     cases, unable = [], []
     for name in engines:

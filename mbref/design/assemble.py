@@ -65,6 +65,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     unchanged. Raises SceneError for joints that share no link, or if the loops cannot be closed with these
     lengths.
     """
+    scene = scene.assembled()
     pairs = {pair: _shared(scene, *pair) for pair in lengths}
     shifts = _shifts(scene, lengths, pairs)
     q = Model(scene).start()

@@ -122,7 +122,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     SceneError
         If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
     """
-    scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
+    scene = (scene if isinstance(scene, Scene) else find_scene(str(scene))).assembled()
     frame, model = _frame(scene), Model(scene)
     first = Tangent(model, consistent_start(model).q, frame)
     if reason := unsteady(first):

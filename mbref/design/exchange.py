@@ -38,6 +38,7 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     is redundant or no set is found. The rank is computed at a general pose, without drivers. A joint with a
     driver or a torsion spring is exchanged only for a type that can have it, and is not removed.
     """
+    scene = scene.assembled()
     model = Model(scene.with_(driver=(), load=()))
     if not model.m:
         return []

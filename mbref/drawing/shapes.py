@@ -98,8 +98,8 @@ def attached(
 
 
 def at_rest(scene: Scene) -> Trajectory:
-    """Return the trajectory of one sample, t = 0, at the scene's own poses, with zero velocities."""
-    nb = len(scene.body)
+    """Return the trajectory of one sample, t = 0, at the poses of the start, with zero velocities."""
+    nb, start = len(scene.body), scene.assembled().body
     return Trajectory(
         scene=scene.name,
         engine="mbref",
@@ -108,8 +108,8 @@ def at_rest(scene: Scene) -> Trajectory:
         settings={},
         times=np.zeros(1),
         bodies=tuple(body.name for body in scene.body),
-        position=np.array([[body.position for body in scene.body]]),
-        orientation=np.array([[body.orientation for body in scene.body]]),
+        position=np.array([[body.position for body in start]]),
+        orientation=np.array([[body.orientation for body in start]]),
         velocity=np.zeros((1, nb, 3)),
         angular_velocity=np.zeros((1, nb, 3)),
     )

@@ -75,15 +75,15 @@ class Alike(NamedTuple):
     model_of: Callable[[int], Model]
 
 
-def _alone(model: Model, t: float = 0.0) -> Alike:
-    """Return one scene in this form, with its terms at a time (s)."""
+def _alone(model: Model, t: float = 0.0, value: Any = 0.0) -> Alike:
+    """Return one scene in this form, with its terms at a time (s), and Φ minus a value (m,)."""
     return Alike(
         model=model,
         poses=model.start()[None],
         mass=model.mass[None],
         length=np.array([model.length]),
         bodies=[model.bodies],
-        terms=lambda places, q, v: model.terms(np.full(len(q), t), q, v),
+        terms=lambda places, q, v: model.terms(np.full(len(q), t), q, v).less(value),
         model_of=lambda place: model,
     )
 
@@ -199,13 +199,13 @@ def is_met(violation: Any, length: Any) -> Any:
     return violation <= 1e-14 * np.maximum(1.0, length)
 
 
-def solve_positions(model: Model, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Solve Φ(q, t) = 0 by Newton–Raphson from q (7 nb,); return the coordinates reached and Φ (m,) there.
+def solve_positions(model: Model, t: float, q: np.ndarray, value: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Solve Φ(q, t) = value (m,) from q (7 nb,); return the coordinates reached and Φ - value (m,) there.
 
-    The pseudo-inverse is used, so that redundant rows and a singular start are allowed; the change is least
-    in the metric of M.
+    Newton–Raphson steps use the pseudo-inverse, so that redundant rows and a singular start are allowed; the
+    change is least in the metric of M.
     """
-    found, _, terms = _solved(_alone(model, t), q[None], np.full(1, np.inf))
+    found, _, terms = _solved(_alone(model, t, value), q[None], np.full(1, np.inf))
     return found[0], terms.phi[0]
 
 

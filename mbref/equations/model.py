@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -45,6 +45,10 @@ class Terms:
         of_states = self.blocks, self.phi, self.nu, self.gamma, self.force
         return Terms(self.structure, self.mass, *(values[place] for values in of_states))
 
+    def less(self, value: Any) -> Terms:
+        """Return the terms of Φ - value (m,)."""
+        return replace(self, phi=self.phi - value)
+
     @functools.cached_property
     def jacobian(self) -> np.ndarray:
         """Φ_q (…, m, n)."""
@@ -63,7 +67,7 @@ class Model:
     def __init__(self, scene: Scene, packs: Packs | None = None, place: int = 0):
         """Store a scene, or the scene with an index among several that are packed."""
         packs = packs or Packs([scene])
-        self.scene, self._packs, self._place = scene, packs, place
+        self.scene, self._packs, self._place = packs.scenes[place], packs, place
         self.bodies, self.joints = packs.listed[place], packs.joints[place]
         self.nb, self.n, self.kinematic = packs.nb, 6 * packs.nb, packs.kinematic
         self.structure, self.data = packs.structure, row_of(packs.data, place)

@@ -55,22 +55,22 @@ COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distanc
 
 
 class Packs:
-    """Scenes of one shape: structure, SceneData, masses, frames and lengths. For s scenes of nb bodies:
-    ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where the mass is zero;
+    """Assembled scenes of one shape: structure, SceneData, masses, frames and lengths. For s scenes of nb
+    bodies: ``mass`` (s, 6 nb), the diagonal of M, and ``inverse_root``, M^(-1/2), 1 where the mass is zero;
     ``principal`` and ``orientation`` (s, nb, 4) of principal frames, from the body's own and from the world;
     ``length`` (s,), the largest distance between two centres of mass and joint anchors at t = 0 (m).
     ``to_local`` (s, nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames. ``listed`` has the
     bodies of each scene, ``joints`` its joints."""
 
     def __init__(self, scenes: Sequence[Scene]):
-        self.scenes, self.kinematic = scenes, not scenes[0].has_mass()
+        self.scenes = scenes = [scene.assembled() for scene in scenes]
+        self.kinematic = not scenes[0].has_mass()
         listed = [all_parts(scene) for scene in scenes]
         self.listed, self.joints = [found.bodies for found in listed], [found.joints for found in listed]
         self._coupled = [
             couplings_of(scene) + found.couplings for scene, found in zip(scenes, listed, strict=True)
         ]
-        self.bodies = self.listed[0]
-        self.nb = len(self.bodies)
+        self.bodies, self.nb = self.listed[0], len(self.listed[0])
         self.index = {body.name: b for b, body in enumerate(self.bodies)}
         self.index.setdefault(GROUND, self.nb)
         self.index[FRAME] = self.nb

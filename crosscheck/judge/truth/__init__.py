@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from crosscheck.judge.reference.reference import SECONDS
+from crosscheck.judge.start import started
 from crosscheck.judge.time_functions import ends
 from crosscheck.judge.truth.crankshaft import crankshaft
 from crosscheck.judge.truth.free_body import free_body
@@ -95,6 +96,7 @@ def truth_for(scene: Scene, reference_time: float = SECONDS) -> Truth | None:
     Truth or None
         A closed form if the scene's family is known, otherwise a reference solution. None without either.
     """
+    scene = started(scene)
     return closed_form(scene) or (ReferenceTruth(scene, reference_time) if reference_time else None)
 
 

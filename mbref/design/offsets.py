@@ -1,0 +1,75 @@
+"""Offsets of couplings: a scene moved to the poses at which its motion starts."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from mbref.design.placed import placed
+from mbref.equations.initial_state import solve_positions
+from mbref.equations.model import Model
+from mbref.joint_motion import along, joint_motion
+from mbref.scene import Load, Scene, SceneError, SlideSpring, TorsionSpring
+from mbref.scene_joints import ANGLE
+from mbref.trajectory import Trajectory
+
+# largest rotation (rad), or displacement over the mechanism's length, in one of the equal parts of a change,
+# so that angles stay below half a turn and loops on their branch
+PART = 0.2
+MOST_PARTS = 1024  # limit of time: some seconds
+MET = 1e-12  # residual (rad), or over the mechanism's length (m), that rounding may leave
+
+
+@functools.lru_cache(maxsize=64)
+def assembled(scene: Scene) -> Scene:
+    """Return a scene with offsets of couplings at poses that obey them (see ``Scene.assembled``)."""
+    offsets = {c.name: c.offset / max(1.0, abs(c.ratio)) for c in scene.coupling}
+    found = scene.with_(coupling=[c.model_copy(update={"offset": 0.0}) for c in scene.coupling])
+    value = np.array([offsets.get(name, 0.0) for name in Model(found).row_joint])
+    parts = 1
+    while parts < MOST_PARTS and not _is_small(found, value / parts):
+        parts *= 2
+    for part in range(parts):
+        model = Model(found)
+        q, residual = solve_positions(model, 0.0, model.start(), value / parts)
+        if not np.abs(residual).max() <= MET * max(1.0, model.length):
+            raise SceneError([_unmet(scene, model, residual, part / parts)])
+        found = _moved(model, q)
+    return found
+
+
+def _is_small(scene: Scene, value: np.ndarray) -> bool:
+    """Return whether Φ = value (m,) is obeyed by poses near the scene's, up to PART."""
+    model = Model(scene)
+    q, _ = solve_positions(model, 0.0, model.start(), value)
+    moved = np.abs((q - model.start()).reshape(-1, 7))
+    return bool(moved[:, :3].max() <= PART * model.length and moved[:, 3:].max() <= PART / 2)
+
+
+def _moved(model: Model, q: np.ndarray) -> Scene:
+    """Return the scene at coordinates q (7 nb,), with springs of joints as long or as twisted as before."""
+    found = placed(model, q)
+    position = np.array([[body.position for body in found.body]])
+    orientation = np.array([[body.orientation for body in found.body]])
+    still, names = np.zeros_like(position), tuple(body.name for body in found.body)
+    pose = Trajectory(found.name, "", "", "", {}, np.zeros(1), names, position, orientation, still, still)
+    return found.with_(load=[_with_natural(model.scene, pose, load) for load in found.load])
+
+
+def _with_natural(scene: Scene, pose: Trajectory, load: Load) -> Load:
+    """Return a load whose natural angle or displacement counts from a pose of the scene."""
+    if not isinstance(load, TorsionSpring | SlideSpring):
+        return load
+    moved = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
+    key = "natural_angle" if load.coordinate == ANGLE else "natural_displacement"
+    return load.model_copy(update={key: load.action.natural - moved})
+
+
+def _unmet(scene: Scene, model: Model, residual: np.ndarray, share: float) -> str:
+    worst = model.row_joint[int(np.argmax(np.abs(residual)))]
+    names = ", ".join(f"{c.name} ({c.offset:g})" for c in scene.coupling if c.offset)
+    return (
+        f"coupling: no pose obeys the offsets of {names}; after {100 * share:.0f} % of them "
+        f"{np.abs(residual).max():.3g} m or rad remain open at {worst!r}"
+    )

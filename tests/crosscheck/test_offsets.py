@@ -1,0 +1,141 @@
+"""Offsets of couplings in crosscheck: the start that the judge checks, engines, tables, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.cli.scene_request import find_scenes, read_scenes
+from crosscheck.engine import Setting, engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.metrics import measure
+from crosscheck.judge.reference.taylor import natural_motion
+from crosscheck.judge.reference.tree import tree_motion
+from crosscheck.judge.start import start_coordinates, started
+from crosscheck.judge.truth import truth_for
+from crosscheck.recorded.exact import reference_table
+from crosscheck.recorded.judgement import judge_motion
+from mbref import formats
+from mbref.scene import Scene, SceneError
+from mbref.scene_services import SERVICES
+from tests.coupled_scenes import coupled_loops, gear_pair, rack, screw, spatial_chain
+
+TIMES = np.array([0.0, 0.2, 0.4])
+OFFSETS = (
+    (gear_pair, "teeth", 0.4),
+    (rack, "teeth", 0.003),
+    (screw, "thread", -0.2),
+    (coupled_loops, "gears", 0.1),
+)
+FINE = {
+    "mbref": Setting("taylor", {"rtol": 1e-12}),
+    "mujoco": Setting("tuned", {"step": 2e-4, "beta": 2500.0, "hard": 1.0}),
+    "exudyn": Setting("tuned", {"step": 1e-3}),
+}
+every = pytest.mark.parametrize(("make", "name", "offset"), OFFSETS, ids=[m.__name__ for m, _, _ in OFFSETS])
+
+
+def shifted(make, name: str, offset: float) -> Scene:
+    return make().with_(f"coupling[{name}].offset", offset)
+
+
+@every
+def test_judge_finds_the_offset_in_the_assembled_poses(make, name, offset):
+    scene = shifted(make, name, offset)
+    assert started(scene) == scene.assembled()
+    (coupling,) = scene.coupling
+    (first, one), (second, other) = scene.coupled(coupling)
+    at = start_coordinates(scene)
+    q1, q2 = (
+        at[joint.name][["angle", "displacement"].index(kind)]
+        for joint, kind in ((first, one), (second, other))
+    )
+    assert q2 - coupling.ratio * q1 == pytest.approx(offset, abs=1e-13)
+
+
+@pytest.mark.parametrize("factor", [0.5, -1.0, 1.0 + 1e-9])
+def test_poses_of_another_offset_are_refused(factor, monkeypatch):
+    """Half of the offset, the opposite offset and an inaccurate assembly violate the judge's equation."""
+    usual = SERVICES["assembled"]
+    wrong = lambda scene: usual(scene.with_("coupling[teeth].offset", factor * scene.coupling[0].offset))  # noqa: E731
+    monkeypatch.setitem(SERVICES, "assembled", wrong)
+    with pytest.raises(SceneError, match="teeth: the poses at the start violate it by"):
+        started(shifted(gear_pair, "teeth", 0.4))
+
+
+def test_poses_off_a_joint_are_refused(monkeypatch):
+    usual = SERVICES["assembled"]
+    wrong = lambda scene: usual(scene).with_("body[wheel].position[0]", 0.4001)  # noqa: E731
+    monkeypatch.setitem(SERVICES, "assembled", wrong)
+    with pytest.raises(SceneError, match=r"B: the poses at the start violate it by 0\.0001"):
+        started(shifted(gear_pair, "teeth", 0.4))
+
+
+def test_full_turns_at_the_start_are_no_violation():
+    scene = shifted(gear_pair, "teeth", 20.0)
+    assert started(scene) == scene.assembled()
+
+
+@every
+def test_both_formulations_and_mbref_move_alike_from_the_assembled_start(make, name, offset):
+    scene = shifted(make, name, offset).with_(duration=0.4)
+    given = started(scene)
+    a, b = (motion(given, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
+    apart = np.abs(doubles(a.position - b.position)).max()
+    assert apart <= 1e-13 * max(1.0, np.abs(doubles(a.position)).max())
+    found = measure(scene, mbref.simulate(scene, times=TIMES, rtol=1e-12), truth_for(scene))
+    assert found["error"] <= 1e-11 and found["violation_position"] <= 1e-11
+
+
+@pytest.mark.parametrize("name", ["mujoco", "exudyn", "simbody", "drake", "dart"])
+def test_engines_move_from_the_assembled_start(name):
+    modules = {"simbody": "opensim", "drake": "pydrake", "dart": "dartpy"}
+    pytest.importorskip(modules.get(name, name))
+    scene, simulator = shifted(coupled_loops, "gears", 0.1).with_(duration=0.2), engine(name)
+    given, times = started(scene), np.array([0.0, 0.1, 0.2])
+    assert simulator.cannot(given) is None
+    run = simulator.run(given, times, FINE.get(name) or simulator.best_settings(given)[-1])
+    found = measure(scene, run, truth_for(scene))
+    assert found["error"] <= 1e-8, (found, run.message)
+
+
+def test_engines_refuse_a_scene_that_is_not_assembled():
+    refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
+    assert refusal is not None
+    assert refusal.reason == (
+        "coupling 'teeth' has an offset (scene.assembled() has none), which the adapter does not map"
+    )
+
+
+def test_tables_count_from_the_poses_of_the_file(tmp_path):
+    """The reference has mbref's joint coordinates, and a motion with these is judged right."""
+    scene = shifted(rack, "teeth", 0.003)
+    table = reference_table(scene, TIMES)
+    motion = mbref.simulate(scene, times=TIMES, rtol=1e-13)
+    assert np.abs(table["A.angle"] - motion.joint("A").angle).max() < 1e-11
+    assert np.abs(table["B.displacement"] - 0.003 - 0.05 * table["A.angle"]).max() < 1e-13
+    recorded = {key: table[key] for key in ("time", "A.angle", "B.displacement", "rack.position.y")}
+    assert judge_motion(scene, recorded).is_right
+    assert not judge_motion(scene, recorded | {"A.angle": table["A.angle"] - table["A.angle"][0]}).is_right
+
+
+def test_commands_read_the_assembled_scene(tmp_path):
+    scene, path = shifted(gear_pair, "teeth", 0.4), str(tmp_path / "gears.toml")
+    scene.save(path)
+    assert find_scenes([path]) == [scene.assembled()] and read_scenes([path]) == [scene]
+
+
+def test_export_and_import_keep_the_motion(tmp_path):
+    pytest.importorskip("mujoco")
+    scene, path = shifted(gear_pair, "teeth", 0.4), tmp_path / "gears.xml"
+    formats.write(scene, path)
+    back = formats.read(path).scene
+    one, other = (mbref.simulate(each, times=TIMES, rtol=1e-12) for each in (scene, back))
+    turned = [motion["wheel"].orientation for motion in (one, other)]
+    assert np.abs(turned[0] - turned[1]).max() < 1e-12
+
+
+def test_skew_chain_with_two_offsets():
+    scene = shifted(spatial_chain, "cable", 0.1).with_("coupling[mesh].offset", "-20 deg")
+    assert started(scene) == scene.assembled()

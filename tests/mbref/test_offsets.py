@@ -1,0 +1,178 @@
+"""Offsets of couplings: closed forms, the assembled start, loads that move with it, and faults."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref.design.offsets import PART
+from mbref.drawing.shapes import at_rest
+from mbref.ensembles.simulate_all import simulate_all
+from mbref.equations.model import Model
+from mbref.scene import Scene, SceneError
+from mbref.simulation.simulate import Limits
+from tests.coupled_scenes import G, coupled_loops, gear_pair, planetary, rack, screw, spatial_chain
+
+METHODS = ("taylor", "alf-dual+projection/dop853")
+CLOSED_FORM = 1e-12  # of the largest value
+EVERY = (
+    (gear_pair, "teeth", 0.4),
+    (gear_pair, "teeth", -7.0),
+    (rack, "teeth", 0.3),
+    (screw, "thread", -0.2),
+    (planetary, "mesh", 1.2),
+    (spatial_chain, "cable", 0.4),
+    (coupled_loops, "gears", 0.1),
+)
+every = pytest.mark.parametrize(
+    ("make", "name", "offset"), EVERY, ids=[f"{make.__name__} {offset}" for make, _, offset in EVERY]
+)
+
+
+def shifted(make, name: str, offset: float) -> Scene:
+    return make().with_(f"coupling[{name}].offset", offset)
+
+
+def agree(found: np.ndarray, exact: np.ndarray) -> None:
+    assert np.abs(found - exact).max() <= CLOSED_FORM * max(1.0, np.abs(exact).max())
+
+
+def agrees_from_its_start(found: np.ndarray, least: float, moved: np.ndarray) -> None:
+    """A coordinate begins near the least mass-weighted displacement and moves as a closed form."""
+    assert found[0] == pytest.approx(least, rel=5e-3)
+    agree(found - found[0], moved)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_gear_pair_starts_at_its_offset_and_turns_as_its_closed_form(method):
+    times, offset, ratio = np.linspace(0, 2, 21), 0.4, -0.5
+    motion = mbref.simulate(shifted(gear_pair, "teeth", offset), method=method, times=times, rtol=1e-13)
+    inertia = 0.03 + ratio**2 * 0.2
+    turned, (a, b) = 2.0 / inertia * times**2 / 2, (motion.joint(name).angle for name in "AB")
+    agrees_from_its_start(a, -ratio * 0.2 / inertia * offset, turned)
+    agrees_from_its_start(b, 0.03 / inertia * offset, ratio * turned)
+    agree(b, offset + ratio * a)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_rack_starts_at_its_offset_and_falls_as_its_closed_form(method):
+    times, offset, ratio = np.linspace(0, 1, 11), 0.003, 0.05
+    motion = mbref.simulate(shifted(rack, "teeth", offset), method=method, times=times, rtol=1e-13)
+    inertia = 0.2 + ratio**2 * 1.5
+    falls = -1.5 * G / (1.5 + 0.2 / ratio**2) * times**2 / 2
+    a, b = motion.joint("A").angle, motion.joint("B").displacement
+    agrees_from_its_start(a, -ratio * 1.5 / inertia * offset, falls / ratio)
+    agrees_from_its_start(b, 0.2 / inertia * offset, falls)
+    agree(b, offset + ratio * a)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_screw_starts_at_its_offset_and_turns_as_its_closed_form(method):
+    times, offset, ratio = np.linspace(0, 1, 11), 0.2, 0.01
+    motion = mbref.simulate(shifted(screw, "thread", offset), method=method, times=times, rtol=1e-13)
+    inertia = 0.02 + ratio**2 * 2.0
+    turns = -2.0 * G * ratio / inertia * times**2 / 2
+    a, b = motion.joint("S").angle, motion.joint("S").displacement
+    agrees_from_its_start(a, -ratio * 2.0 / inertia * offset, turns)
+    agrees_from_its_start(b, 0.02 / inertia * offset, ratio * turns)
+    agree(b, offset + ratio * a)
+
+
+@every
+def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
+    scene = shifted(make, name, offset)
+    motion = mbref.simulate(scene, times=[0.0, 0.1, 0.2])
+    (coupling,) = (c for c in scene.coupling if c.name == name)
+    (first, one), (second, other) = scene.coupled(coupling)
+    q = [getattr(motion.joint(joint.name), kind) for joint, kind in ((first, one), (second, other))]
+    off = q[1] - offset - coupling.ratio * q[0]
+    turns = 2 * np.pi * np.arange(-3, 4)
+    ends = (turns if kind == "angle" else np.zeros(1) for kind in (one, other))
+    first_turns, second_turns = ends
+    gaps = off + (second_turns[:, None] - coupling.ratio * first_turns)[..., None]
+    assert np.abs(gaps).max(axis=2).min() < 1e-12
+
+
+@every
+def test_assembled_scene_obeys_joints_and_has_no_offset(make, name, offset):
+    scene = shifted(make, name, offset)
+    found = scene.assembled()
+    assert found.assembled() is found and found.counts() == make().counts()
+    assert [c.offset for c in found.coupling] == [0.0] * len(found.coupling)
+    model = Model(found)
+    assert np.abs(model.terms(0.0, model.start()).phi).max() < 1e-13
+    motions = [mbref.simulate(each, times=[0.0, 0.2]) for each in (scene, found)]
+    assert np.array_equal(motions[0].position, motions[1].position)
+
+
+def test_scene_without_offsets_is_its_own_assembly():
+    scene = gear_pair()
+    assert scene.assembled() is scene
+
+
+def test_driven_joint_stays_at_its_pose():
+    scene = shifted(gear_pair, "teeth", 0.4).with_(driver=[{"joint": "A", "polynomial": [0.0, 1.0]}])
+    motion = mbref.simulate(scene, times=[0.0, 0.5])
+    agree(motion.joint("A").angle, np.array([0.0, 0.5]))
+    agree(motion.joint("B").angle, np.array([0.4, 0.4 - 0.5 * 0.5]))
+
+
+@pytest.mark.parametrize(("offset", "turns"), [(0.4, 0), (40 * PART, 2)])
+def test_springs_of_joints_count_their_angle_from_the_file(offset, turns):
+    """A spring that is relaxed at the assembled start leaves the wheels at rest; full turns count."""
+    scene = shifted(gear_pair, "teeth", offset)
+    at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0] + turns * 2 * np.pi
+    assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=0.01)
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 3.0, "natural_angle": at}
+    motion = mbref.simulate(scene.with_(load=[spring]), times=[0.0, 1.0])
+    assert np.abs(motion.angular_velocity).max() < 1e-11
+
+
+def test_points_of_springs_move_with_their_bodies():
+    spring = {
+        "type": "spring",
+        "bodies": ["ground", "rack"],
+        "points": [[0.5, 0.2, 0.0], [0.05, 0.2, 0.0]],
+        "stiffness": 10.0,
+        "natural_length": 0.1,
+    }
+    scene = shifted(rack, "teeth", 0.003).with_(load=[spring])
+    rise = scene.assembled().body[1].position[1] - scene.body[1].position[1]
+    assert rise > 0.002
+    assert scene.assembled().load[0].points == ((0.5, 0.2, 0.0), (0.05, pytest.approx(0.2 + rise), 0.0))
+
+
+def test_offset_that_no_pose_obeys_is_refused():
+    """A rocker of a four-bar turns back before the offset is reached."""
+    scene = coupled_loops().with_(
+        coupling=[{"name": "g", "joints": ["left D", "right D"], "ratio": -1.0, "offset": "200 deg"}]
+    )
+    with pytest.raises(
+        SceneError, match=r"coupling: no pose obeys the offsets of g \(3\.49\d*\); after \d+ %"
+    ):
+        mbref.simulate(scene)
+
+
+def test_offsets_have_units_of_the_second_coordinate(tmp_path):
+    text = shifted(rack, "teeth", "5 mm")
+    assert text.coupling[0].offset == 0.005
+    assert shifted(gear_pair, "teeth", "30 deg").coupling[0].offset == pytest.approx(np.pi / 6)
+    with pytest.raises(SceneError, match=r"coupling\[teeth\].offset: is of the angle of 'B', got '5 mm'"):
+        shifted(gear_pair, "teeth", "5 mm")
+    text.save(tmp_path / "rack.toml")
+    assert Scene.from_file(tmp_path / "rack.toml") == text
+
+
+def test_ensemble_of_offsets_starts_at_each():
+    scenes = [shifted(gear_pair, "teeth", offset).with_(duration=0.5) for offset in (0.0, 0.1, 0.2)]
+    together = simulate_all(scenes, "taylor", np.array([0.0, 0.5]), Limits())
+    for k, scene in enumerate(scenes):
+        alone = mbref.simulate(scene, times=[0.0, 0.5])
+        assert np.array_equal(together[k].orientation, alone.orientation)
+
+
+def test_drawing_shows_the_assembled_pose():
+    scene = shifted(rack, "teeth", 0.05)
+    assert np.array_equal(at_rest(scene).position, at_rest(scene.assembled()).position)
+    assert scene._repr_html_() != rack()._repr_html_()
