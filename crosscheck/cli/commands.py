@@ -13,6 +13,7 @@ from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
 from crosscheck.cli.closed_loops import closed_loops
 from crosscheck.cli.comparing import compare, tune
+from crosscheck.cli.convergence import convergence
 from crosscheck.cli.judging import judge, write_reference
 from crosscheck.cli.modes import modes
 from crosscheck.cli.parser import parser
@@ -169,6 +170,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "verify": _verify,
     "findings": _findings,
     "closed-loops": closed_loops,
+    "convergence": convergence,
     "modes": modes,
     "report": _report,
     "paper": _paper,

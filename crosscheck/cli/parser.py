@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -22,6 +23,7 @@ from crosscheck.cli.options import (
     whole,
 )
 from crosscheck.closed_loops.records import FILE
+from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, commands
 
@@ -63,6 +65,7 @@ def parser() -> argparse.ArgumentParser:
         _add_verify,
         _add_findings,
         _add_closed_loops,
+        _add_convergence,
         _add_modes,
         _add_report,
         _add_paper,
@@ -236,6 +239,20 @@ def _add_closed_loops(commands: Commands) -> None:
         "--run measures installed engines again"
     )
     parser = _add(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")
+    _add_stored_runs(parser, FILE)
+    parser.add_argument("--family", action="append", metavar="F", help="measure this family only; may repeat")
+
+
+def _add_convergence(commands: Commands) -> None:
+    about = (
+        "show least errors and orders of convergence of engines from stored records; "
+        "--run makes the missing runs of installed engines at halved steps"
+    )
+    parser = _add(commands, "convergence", about, "crosscheck convergence --run --engine drake")
+    _add_stored_runs(parser, LADDERS)
+
+
+def _add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:
     parser.add_argument("--run", action="store_true", help="make the runs that the records lack")
     parser.add_argument(
         "--engine",
@@ -243,9 +260,8 @@ def _add_closed_loops(commands: Commands) -> None:
         metavar="E",
         help="measure this engine only; may repeat; default: every installed one",
     )
-    parser.add_argument("--family", action="append", metavar="F", help="measure this family only; may repeat")
     parser.add_argument(
-        "--records", default=str(FILE), metavar="FILE", help="default: the records of the package"
+        "--records", default=str(records), metavar="FILE", help="default: the records of the package"
     )
     parser.add_argument(
         "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
-from crosscheck.closed_loops.records import REFUSED, read
+from crosscheck.closed_loops.records import REFUSED
 from crosscheck.convergence.ladders import (
-    FILE,
+    LONG,
+    LONG_LIMIT,
     MECHANISMS,
     ROWS,
     TIME_LIMIT,
@@ -26,11 +26,13 @@ HEAD = f"""# Orders of convergence
 
 This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
 choose a step. Every run is made again at half of its step, or at a tenth of its tolerance, until the error no
-longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time.
+longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time ({LONG_LIMIT:g} s for
+{", ".join(LONG)}, whose steps take milliseconds here).
 
 ```sh
-python -m crosscheck.convergence docs/convergence.md                # this page, from committed records
-python -m crosscheck.convergence --run --engine drake               # the runs that the records lack
+crosscheck convergence                        # print the table; nothing is simulated
+crosscheck convergence --run --engine drake   # make the runs of an installed engine that the records lack
+crosscheck convergence --page docs/convergence.md
 ```
 
 Each cell has the least error of all runs and the measured order. The error is the largest of any body at any
@@ -42,18 +44,26 @@ the engine chooses its steps, the mean step counts. Order 1 means that half the 
 
 - `3e-12 (4.0)`: the least error is a floor: finer steps do not lower it. The order is 4.0 in a range of steps
   whose errors are more than {NEAR:g} times the floor.
-- `3e-04 ↓ (1.0)`: the finest step within {TIME_LIMIT:g} s has the least error; finer steps would lower it.
+- `3e-04 ↓ (1.0)`: the finest step within the limit has the least error; finer steps would lower it.
 - `<1e-12`: less than the bound on the truth's error.
 - Without a number in parentheses, no range of steps has a constant order.
 - `–`: the engine refuses the mechanism; the reason is below.
 """
 
 
-def page(path: Path = FILE) -> str:
+Table = Mapping[Row, Mapping[str, Sequence[Record]]]
+
+
+def table(records: Sequence[Record]) -> Table:
+    """Return the records of each measured row by heading of the mechanism, coarse to fine."""
+    measured = {(r["engine"], r["family"]) for r in records}
+    return {row: _by_mechanism(row, records) for row in ROWS if (row.engine, row.family) in measured}
+
+
+def page(records: Sequence[Record]) -> str:
     """Return the page in Markdown."""
-    records = read(path)
     versions = {r["engine"]: r["version"] for r in records}
-    rows = {row: _by_mechanism(row, records) for row in ROWS if row.engine in versions}
+    rows = table(records)
     parts = [HEAD, "| engine, family | " + " | ".join(m.heading for m in MECHANISMS) + " |"]
     parts += ["| --- |" + " :-: |" * len(MECHANISMS)]
     for row, found in rows.items():
@@ -68,7 +78,6 @@ def page(path: Path = FILE) -> str:
 
 
 def _by_mechanism(row: Row, records: Sequence[Record]) -> Mapping[str, Sequence[Record]]:
-    """Return the records of a row by heading of the mechanism, coarse to fine."""
     own = [r for r in records if (r["engine"], r["family"]) == (row.engine, row.family)]
     return {
         m.heading: sorted((r for r in own if r["scene"] == m.scene), key=fineness, reverse=True)

@@ -22,6 +22,8 @@ from crosscheck.study.record_view import ended, error, error_bound, is_completed
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 11
 TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take a quarter of an hour
+# of engines that take milliseconds for a step on the processor: enough for three halved steps
+LONG_LIMIT, LONG = 10.0, ("warp", "newton")
 MOST_TIME = 120.0  # s of CPU time of a run with the compilation of its model
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
@@ -71,8 +73,13 @@ ROWS = (
     Row("bullet", "iterated", "Bullet's step (order 1)"),
     Row("mjx", "stock", "MJX's RK4 in double precision, stiffest documented closures"),
     Row("warp", "stock", "MuJoCo Warp's RK4 in single precision, stiffest documented closures"),
-    Row("newton", "padmm, moreau", "Kamino in single precision, Moreau's midpoint (order 2)"),
-    Row("newton", "lox", "Kamino in single precision, Euler (order 1)"),
+    Row("newton", "padmm, moreau", "Kamino with PADMM in single precision, Moreau's midpoint (order 2)"),
+    Row("newton", "lox, moreau", "Kamino with LOX in single precision, Moreau's midpoint (order 2)"),
+    Row("newton", "lox", "Kamino with LOX in single precision, Euler (order 1)"),
+    Row("newton", "mujoco", "SolverMuJoCo in single precision, default closures (order 1)"),
+    Row("newton", "xpbd", "SolverXPBD in single precision"),
+    Row("newton", "semi-implicit", "SolverSemiImplicit in single precision (order 1)"),
+    Row("newton", "featherstone", "SolverFeatherstone in single precision (order 1)"),
 )
 
 
@@ -97,11 +104,16 @@ def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
     return [case._replace(setting=Setting(row.family, o)) for case in offered[:1] for o in found]
 
 
+def time_limit(name: str) -> float:
+    """Return the CPU time (s) of a run of an engine, after which no finer run is made."""
+    return LONG_LIMIT if name in LONG else TIME_LIMIT
+
+
 def climb(cases: Sequence[Case], run: Callable[[Case], Record]) -> list[Record]:
     """Return records from coarse to fine, until finer runs are in vain or would take too long."""
     records: list[Record] = []
     for case in cases:
-        if records and _would_take(case, records[-1]) > TIME_LIMIT:
+        if records and _would_take(case, records[-1]) > time_limit(case.engine):
             break
         records.append(run(case))
         if in_vain(records) == VAIN:
@@ -146,8 +158,8 @@ def point(record: Record) -> str:
     return f"{fineness(record):.2g}: {result}"
 
 
-def measure(engines: Sequence[str], path: Path = FILE) -> None:
-    """Make and store the runs that the file lacks, one at a time."""
+def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], None] = print) -> None:
+    """Make and store the runs that the file lacks, one at a time; ``report`` gets a line for each run."""
     with ThreadPoolExecutor(1) as one:
 
         def run(case: Case) -> Record:
@@ -156,7 +168,7 @@ def measure(engines: Sequence[str], path: Path = FILE) -> None:
                 return known[key(case)]
             [made] = study([case], one, run=run_in_turn)
             write([*known.values(), short(made)], path)
-            print(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}", flush=True)
+            report(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}")
             return made
 
         for row in (row for row in ROWS if row.engine in engines):

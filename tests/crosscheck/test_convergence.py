@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document
 from crosscheck.convergence.document import cell, order
-from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, climb, fineness, in_vain, ladder
+from crosscheck.convergence.ladders import FILE, MECHANISMS, ROWS, VAIN, climb, fineness, in_vain, ladder
 from crosscheck.engine import engine
 from crosscheck.study.grid import Case
 
@@ -72,6 +73,11 @@ def test_a_ladder_ends_where_finer_runs_are_in_vain_or_take_too_long() -> None:
     assert in_vain(found) == VAIN and len(found) < len(cases)
     slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
     assert len(slow) == 1, "the second run would take 3 s"
+    of_warp = [case._replace(engine="warp") for case in cases]
+    slow = climb(of_warp, lambda case: fourth(case) | {"cost": {"seconds": 5.1, "steps": 10}})
+    assert len(slow) == 1, "the second run would take 10.2 s"
+    longer = climb(of_warp[:2], lambda case: fourth(case) | {"cost": {"seconds": 4.9, "steps": 10}})
+    assert len(longer) == 2, "the second run would take 9.8 s"
 
 
 def test_rows_name_families_of_engines() -> None:
@@ -80,7 +86,7 @@ def test_rows_name_families_of_engines() -> None:
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:
-    assert DOCUMENT.read_text() == document.page(), (
-        "docs/convergence.md is stale: python -m crosscheck.convergence docs/convergence.md renews it"
+    assert DOCUMENT.read_text() == document.page(read(FILE)), (
+        "docs/convergence.md is stale: crosscheck convergence --page docs/convergence.md renews it"
     )
     assert fineness({"outcome": "REFUSED"}) == 0.0

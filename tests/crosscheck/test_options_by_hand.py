@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from crosscheck.cli import closed_loops as loops
-from crosscheck.cli import commands, comparing, findings, main, modes, running
+from crosscheck.cli import commands, comparing, convergence, findings, main, modes, running
 from crosscheck.closed_loops.matrix import LEGEND
 from crosscheck.findings.finding import Answer, Status
 from mbref.scenes import SCENES
@@ -75,6 +75,23 @@ def test_closed_loops_are_measured_only_if_asked(asked, capsys, tmp_path):
     assert asked["find_engines"][0] == ["all"] and page.read_text() == "the page\n"
     assert asked["cases"][0] == ["mbref"] and asked["measure"][:3] == (["case"], ["unable"], path)
     assert main(["closed-loops", "--records", str(path), "--run", "--engine", "mbref"]) == 0
+    assert asked["find_engines"][0] == ["mbref"]
+
+
+def test_orders_of_convergence_are_measured_only_if_asked(asked, capsys, tmp_path):
+    stand_in = asked["stand_in"]
+    stand_in(convergence, "read", [])
+    stand_in(convergence.ladders, "measure")
+    stand_in(convergence.document, "page", "the page\n")
+    stand_in(convergence.request, "find_engines", ["mbref"])
+    path, page = tmp_path / "records.jsonl", tmp_path / "page.md"
+    assert main(["convergence", "--records", str(path)]) == 0
+    assert "measure" not in asked and asked["read"] == (path,)
+    assert "least errors" in capsys.readouterr().out
+    assert main(["convergence", "--records", str(path), "--run", "--page", str(page)]) == 0
+    assert asked["find_engines"][0] == ["all"] and page.read_text() == "the page\n"
+    assert asked["measure"][:2] == (["mbref"], path)
+    assert main(["convergence", "--run", "--engine", "mbref"]) == 0
     assert asked["find_engines"][0] == ["mbref"]
 
 

@@ -1,0 +1,37 @@
+"""`crosscheck convergence`: run engines at halved steps, and show least errors and orders of convergence."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.table import Table
+
+from crosscheck.cli import request
+from crosscheck.cli.running import COMPLETED, console, notice
+from crosscheck.closed_loops.records import read
+from crosscheck.convergence import document, ladders
+from crosscheck.study.grid import Record
+
+
+def convergence(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print the table of errors and orders."""
+    path = Path(arguments.records)
+    if arguments.run:
+        ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
+    found = read(path)
+    if arguments.page:
+        Path(arguments.page).write_text(document.page(found))
+        notice(f"written: {arguments.page}")
+    console().print(_table(found))
+    return COMPLETED
+
+
+def _table(records: Sequence[Record]) -> Table:
+    headings = [mechanism.heading for mechanism in ladders.MECHANISMS]
+    table = Table("engine, family", *headings, title="least errors, and orders in parentheses", box=SIMPLE)
+    for row, found in document.table(records).items():
+        table.add_row(row.name, *map(document.cell, found.values()))
+    return table
