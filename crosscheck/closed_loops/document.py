@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, is_run, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
-from crosscheck.closed_loops.records import SHORT, SHORT_LIMIT, TIME_LIMIT
+from crosscheck.closed_loops.records import TIME_LIMIT
 from crosscheck.engine import engine_names
 from crosscheck.study.grid import Record
 
@@ -24,10 +24,10 @@ crosscheck closed-loops --page docs/closed-loops.md
 ```
 """
 BEST = f"""Each engine by its best family of settings, at the finest setting of each family that was
-measured within {TIME_LIMIT:g} s of CPU time ({SHORT_LIMIT:g} s for {", ".join(SHORT)}, whose steps take
-milliseconds here). In rows with *terms* the engine gives mass matrix, bias forces and Jacobians.
-There crosscheck closes the loops and integrates. A coarser setting than the finest one can be more accurate
-on redundant loops and near singular positions; `crosscheck tune ENGINE SCENE --error 1e-6` finds it:"""
+measured within {TIME_LIMIT:g} s of CPU time. In rows with *terms* the engine gives mass matrix, bias forces
+and Jacobians. There crosscheck closes the loops and integrates. A coarser setting than the finest one can be
+more accurate on redundant loops and near singular positions; `crosscheck tune ENGINE SCENE --error 1e-6`
+finds it:"""
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
 # engines whose families of settings are solvers of their own
 SEVERAL = {"newton": "Newton's solvers"}

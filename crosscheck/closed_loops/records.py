@@ -19,8 +19,6 @@ from mbref.trajectory import Outcome
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 21
 TIME_LIMIT = 60.0  # s of CPU time of a run, so that all runs of the table take an hour
-# of engines that take milliseconds for a step on the processor, where finer steps meet single precision
-SHORT_LIMIT, SHORT = 30.0, ("warp", "newton")
 REFUSED = "REFUSED"  # outcome of a record without a run
 KEPT = (
     "key",
@@ -72,16 +70,11 @@ def cases(
         scene = column.make()
         times = np.linspace(0.0, column.end, SAMPLES)
         found, refused = default_cases(scene, engines, families, times)
-        found = [case._replace(time_limit=time_limit(case.engine)) for case in found]
+        found = [case._replace(time_limit=TIME_LIMIT) for case in found]
         ended = [case for case in found if not any(_is_too_long(case, record) for record in stored)]
         wanted += {(case.engine, case.setting.family): case for case in ended}.values()  # the finest stays
         unable += refused
     return wanted, unable
-
-
-def time_limit(name: str) -> float:
-    """Return the CPU time (s) of a run of an engine."""
-    return SHORT_LIMIT if name in SHORT else TIME_LIMIT
 
 
 def _is_too_long(case: Case, record: Record) -> bool:

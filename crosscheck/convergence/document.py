@@ -6,8 +6,6 @@ from collections.abc import Mapping, Sequence
 
 from crosscheck.closed_loops.records import REFUSED
 from crosscheck.convergence.ladders import (
-    LONG,
-    LONG_LIMIT,
     MECHANISMS,
     ROWS,
     TIME_LIMIT,
@@ -26,8 +24,7 @@ HEAD = f"""# Orders of convergence
 
 This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
 choose a step. Every run is made again at half of its step, or at a tenth of its tolerance, until the error no
-longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time ({LONG_LIMIT:g} s for
-{", ".join(LONG)}, whose steps take milliseconds here).
+longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time.
 
 ```sh
 crosscheck convergence                        # print the table; nothing is simulated

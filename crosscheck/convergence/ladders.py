@@ -22,8 +22,6 @@ from crosscheck.study.record_view import ended, error, error_bound, is_completed
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 11
 TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take a quarter of an hour
-# of engines that take milliseconds for a step on the processor: enough for three halved steps
-LONG_LIMIT, LONG = 10.0, ("warp", "newton")
 MOST_TIME = 120.0  # s of CPU time of a run with the compilation of its model
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
@@ -104,16 +102,11 @@ def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
     return [case._replace(setting=Setting(row.family, o)) for case in offered[:1] for o in found]
 
 
-def time_limit(name: str) -> float:
-    """Return the CPU time (s) of a run of an engine, after which no finer run is made."""
-    return LONG_LIMIT if name in LONG else TIME_LIMIT
-
-
 def climb(cases: Sequence[Case], run: Callable[[Case], Record]) -> list[Record]:
     """Return records from coarse to fine, until finer runs are in vain or would take too long."""
     records: list[Record] = []
     for case in cases:
-        if records and _would_take(case, records[-1]) > time_limit(case.engine):
+        if records and _would_take(case, records[-1]) > TIME_LIMIT:
             break
         records.append(run(case))
         if in_vain(records) == VAIN:

@@ -6,6 +6,7 @@ Code is compiled for each model before the timed run, which takes 5 to 30 s.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Sequence
 from typing import Any
 
@@ -58,6 +59,24 @@ def _mjx(is_single: bool = False) -> Any:
     return jax, mjx
 
 
+@functools.cache
+def _stepped(is_single: bool) -> Any:
+    """Return the function of (model, data, number of steps) that JAX compiles for each structure of a model.
+
+    Models that differ only in numbers, such as masses and places, share the compiled code.
+    """
+    jax, mjx = _mjx(is_single)
+
+    def once(model: Any, now: Any) -> Any:
+        # MJX 3.17 makes 64-bit integers of some 32-bit indices of tendons, which a loop of JAX refuses
+        return jax.tree.map(lambda old, new: new.astype(old.dtype), now, mjx.step(model, now))
+
+    def stepped(model: Any, data: Any, count: Any) -> Any:
+        return jax.lax.fori_loop(0, count, lambda _, now: once(model, now), data)
+
+    return jax.jit(stepped)
+
+
 def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
     world = _World(PortedModel(scene, setting), setting.family == SINGLE)
     return FixedSteps(scene, world.ported.built.tree, world, setting.options["step"])
@@ -67,19 +86,12 @@ class _World:
     """A model and its data in JAX, and compiled code that takes steps."""
 
     def __init__(self, ported: PortedModel, is_single: bool):
-        jax, mjx = _mjx(is_single)
+        _, mjx = _mjx(is_single)
         self.ported = ported
         self.model = mjx.put_model(ported.model)
         self.data = mjx.put_data(ported.model, ported.data)
 
-        def once(model: Any, now: Any) -> Any:
-            # MJX 3.17 makes 64-bit integers of some 32-bit indices of tendons, which a loop of JAX refuses
-            return jax.tree.map(lambda old, new: new.astype(old.dtype), now, mjx.step(model, now))
-
-        def stepped(model: Any, data: Any, count: Any) -> Any:
-            return jax.lax.fori_loop(0, count, lambda _, now: once(model, now), data)
-
-        self.stepped = jax.jit(stepped)
+        self.stepped = _stepped(is_single)
         self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
 
     def step(self, t: float, h: float, count: int) -> None:

@@ -11,6 +11,7 @@ from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.fixed_steps import FixedSteps, simulated
 from crosscheck.engines.mujoco.ports import FAMILIES, OPTIONS, SUPPORTS, PortedModel, refusal, sweep
 from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.warp_graphs import recorded
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -59,15 +60,15 @@ class _World:
     """A model and its data in Warp."""
 
     def __init__(self, ported: PortedModel):
-        self.warp, self.ported = _warp(), ported
-        self.model = self.warp.put_model(ported.model)
-        self.data = self.warp.put_data(ported.model, ported.data)
+        warp, self.ported = _warp(), ported
+        self.model, self.data = warp.put_model(ported.model), warp.put_data(ported.model, ported.data)
+        self.once = recorded(lambda: warp.step(self.model, self.data))
 
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s)."""
         self.model.opt.timestep.fill_(h)
         for _ in range(count):
-            self.warp.step(self.model, self.data)
+            self.once()
 
     def motion(self) -> LinkMotion:
         """Return the motion of the links."""
