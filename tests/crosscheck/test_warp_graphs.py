@@ -14,8 +14,8 @@ from mbref.scene import Force, Scene
 
 pytestmark = pytest.mark.slow  # kernels are compiled for minutes first
 STEP, COUNT = 1e-3, 20
-# distance (m) after COUNT steps; iterations of LOX and PADMM end elsewhere, by single precision
-APART = {"lox": 3e-5, "lox, moreau": 3e-5, "padmm, moreau": 1e-6, "defaults": 1e-6}
+# distance (m) after COUNT steps, by rounding to single precision, or by iterations of LOX that end elsewhere
+APART, OF_LOX = 1e-6, 3e-5
 
 
 def pulled() -> Scene:
@@ -39,7 +39,7 @@ def test_recorded_steps_of_newton_are_its_steps(family: str) -> None:
         plain.solver.step(mechanism.state, plain.after, plain.control, None, STEP)
         mechanism.state, plain.after = plain.after, mechanism.state
     apart = np.abs(recorded.motion().position - plain.motion().position).max()
-    assert apart <= APART.get(family, 0.0)
+    assert apart <= (OF_LOX if "lox" in family else APART)
 
 
 @pytest.mark.parametrize("family", ["stock", "euler", "defaults"])
