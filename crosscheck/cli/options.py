@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from pathlib import Path
 from typing import Any
 
 from crosscheck.engine import ALL, ON_REQUEST, engine_names
@@ -168,3 +169,20 @@ def positive(text: str) -> float:
     if not 0 < number < math.inf:
         raise argparse.ArgumentTypeError(f"must be positive, got {text}")
     return number
+
+
+def add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:
+    """Add the options of a command that shows stored runs, and makes missing ones if requested."""
+    parser.add_argument("--run", action="store_true", help="make the runs that the records lack")
+    parser.add_argument(
+        "--engine",
+        action="append",
+        metavar="E",
+        help="measure this engine only; may repeat; default: every installed one",
+    )
+    parser.add_argument(
+        "--records", default=str(records), metavar="FILE", help="default: the records of the package"
+    )
+    parser.add_argument(
+        "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from textwrap import fill
 from typing import Any
 
@@ -16,6 +15,7 @@ from crosscheck.cli.options import (
     add_reading,
     add_reference_time,
     add_selection,
+    add_stored_runs,
     digits,
     length,
     numbers,
@@ -239,7 +239,7 @@ def _add_closed_loops(commands: Commands) -> None:
         "--run measures installed engines again"
     )
     parser = _add(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")
-    _add_stored_runs(parser, FILE)
+    add_stored_runs(parser, FILE)
     parser.add_argument("--family", action="append", metavar="F", help="measure this family only; may repeat")
 
 
@@ -249,23 +249,7 @@ def _add_convergence(commands: Commands) -> None:
         "--run makes the missing runs of installed engines at halved steps"
     )
     parser = _add(commands, "convergence", about, "crosscheck convergence --run --engine drake")
-    _add_stored_runs(parser, LADDERS)
-
-
-def _add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:
-    parser.add_argument("--run", action="store_true", help="make the runs that the records lack")
-    parser.add_argument(
-        "--engine",
-        action="append",
-        metavar="E",
-        help="measure this engine only; may repeat; default: every installed one",
-    )
-    parser.add_argument(
-        "--records", default=str(records), metavar="FILE", help="default: the records of the package"
-    )
-    parser.add_argument(
-        "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"
-    )
+    add_stored_runs(parser, LADDERS)
 
 
 def _add_modes(commands: Commands) -> None:
