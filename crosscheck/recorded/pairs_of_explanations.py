@@ -26,7 +26,7 @@ def pairs(difference: Difference, singles: Sequence[Found], seconds: float) -> I
     for _, n in sorted(entry for entry in sized if entry[0] < MOST)[:FIRST]:
         sentence, complexity, columns = singles[n]
         explained = {**difference.exact, **columns}
-        later = _splines(difference.times, explained)
+        later = _explained(difference, explained)
         left = replace(difference, exact=explained, later=later, begin=float(difference.times[0]))
         for second, more, predicted in simple(left):
             if time.process_time() > end:
@@ -34,9 +34,10 @@ def pairs(difference: Difference, singles: Sequence[Found], seconds: float) -> I
             yield f"{sentence}; and {second}", complexity + more + 1, {**columns, **predicted}
 
 
-def _splines(times: np.ndarray, columns: Columns) -> Callable[[np.ndarray], Columns]:
-    splines = {name: CubicSpline(times, column) for name, column in _continuous(columns).items()}
-    return lambda t: {name: spline(t) for name, spline in splines.items()}
+def _explained(difference: Difference, columns: Columns) -> Callable[[np.ndarray], Columns]:
+    """Return the explained columns at any time, and all other columns of the exact motion."""
+    splines = {n: CubicSpline(difference.times, column) for n, column in _continuous(columns).items()}
+    return lambda t: {**difference.later(t), **{name: spline(t) for name, spline in splines.items()}}
 
 
 def _continuous(columns: Columns) -> Columns:
