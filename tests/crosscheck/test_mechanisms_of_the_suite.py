@@ -17,13 +17,17 @@ from typing import Any
 
 import pytest
 
+from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance import random_scenes
 from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.geared_mechanisms import geared_mechanism
 from crosscheck.conformance.hard_mechanisms import HARD
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.planar import planar_loops
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.small_motions.mechanisms import MECHANISMS
 from mbref.scene import Scene
 
 STORED = Path(__file__).parent / "models" / "mechanisms_of_the_suite.json"
@@ -35,6 +39,10 @@ MAKERS: dict[str, Callable[[], Any]] = {
     "floating 1": partial(random_scenes.floating, 1),
     "rotor 1": partial(random_scenes.rotor, 1),
     "without masses 1": partial(random_scenes.without_masses, 1),
+    **{f"random {seed}": partial(random_mechanism, seed) for seed in (1, 2, 5)},
+    **{f"geared {seed}": partial(geared_mechanism, seed) for seed in (1, 2)},
+    **{f"small motions of {m.name}": m.make for m in MECHANISMS},
+    "closed loops": lambda: {difficulty.heading: difficulty.make() for difficulty in DIFFICULTIES},
     "moving probes": moving_probes,
     "planar loops": planar_loops,
     "features": feature_scenes,
