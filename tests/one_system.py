@@ -7,10 +7,17 @@ from typing import Any
 import numpy as np
 
 from mbref.formulations.base import Formulation
-from mbref.kernels.layout import Counts, Settings, SparseFactor, System
+from mbref.kernels.compilation import entry, pointer_to
+from mbref.kernels.layout import ACCELERATE, Counts, Settings, SparseFactor, System
 from mbref.kernels.named_memory import packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+
+
+@entry(ACCELERATE.return_type(pointer_to(ACCELERATE), *ACCELERATE.args))
+def solved(accelerate, system):
+    """Call a formulation's kernel, which need not be compiled again for Python."""
+    return accelerate(system)
 
 
 def solve(
@@ -39,7 +46,7 @@ def solve(
         options=packed(record(formulation.numbers(**chosen))) if chosen else None,
         scratch=packed(algebra.scratch(m, n, _factor(numbers) if algebra.sparse else None)),
     )
-    status: Any = formulation.accelerate.callable(packed(system).argument)
+    status: Any = solved(formulation.accelerate.pointer, packed(system).argument)
     return status, system.acceleration, system.multipliers
 
 
