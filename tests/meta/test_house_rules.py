@@ -138,6 +138,16 @@ def test_slow_tests_are_left_out_unless_asked_for():
     assert '-m "slow or not slow"' in (ROOT / "Makefile").read_text(), "make deep leaves slow tests out"
 
 
+def test_slow_cases_are_of_tests_that_exist():
+    """The cases themselves are checked by conftest.py when all tests are collected."""
+    listed = tomllib.loads((ROOT / "tests" / "slow.toml").read_text())
+    assert len(listed) > 50
+    for file, tests in listed.items():
+        path = ROOT / "tests" / file
+        defined = set(re.findall(r"^def (test_\w+)", path.read_text(), re.M)) if path.exists() else set()
+        assert set(tests) <= defined, f"tests/slow.toml lists {set(tests) - defined}, not in {file}"
+
+
 def test_versions_are_pinned_without_addresses():
     lines = [
         line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] not in ("#", "")
