@@ -31,6 +31,7 @@ REFUSED = {
     "close_unknown.urdf": "no link, body or site 'fd'; known: world",
     "fixed_tendon_spring.xml": "tendon 't', which is not a spring between two sites",
     "flexcomp.xml": "1 flexible bodies.*--without flexible-bodies",
+    "floating_on_a_moving_link.urdf": "joint 'F': floats on link 'a', which is not the base of the file",
     "fluid.xml": "the fluid around the bodies.*--without fluid",
     "friction.urdf": "dry friction of 'A'.*--without friction",
     "frictionloss.xml": "dry friction of 'B'.*--without friction",
@@ -40,10 +41,13 @@ REFUSED = {
     "missing_mesh_inertia.xml": "body 'link2': its inertia follows from the shape 'link2', whose file",
     "motor_of_tendon.xml": "control value of 's' in the keyframe, no motor of a joint.*--without motors",
     "motor_with_filter.xml": "control value of 'actuator 0' in the keyframe, no motor of a joint",
+    "negative_mass.urdf": "link 'a': its mass must not be negative, got -1",
+    "no_inertia.urdf": "joint 'A': its bodies have no inertia about or along its axis",
     "parallel_slides.xml": "body 'a': joints slide, slide in a row have dependent motions",
     "plastic_spring.xml": "plastic spring of joint 'B'.*--without springs",
     "servo_at_keyframe.xml": "control value of 's' in the keyframe, no motor of a joint",
     "site_transmission.xml": "control value of 'actuator 0' in the keyframe, no motor of a joint",
+    "slack_tendon.xml": "tendon 't', whose spring is slack over a range.*--without springs",
     "spatial_tendon_equality.xml": "type tendon, of a tendon that no fixed sum of joint coordinates gives",
     "stiffness_arrays.xml": "polynomial springs of joint 'A'.*polynomial damping of joint 'A'",
     "straight_without_gravity.xml": "closure 'e': cannot be closed from this pose; the least gap found",
@@ -58,9 +62,24 @@ REFUSED = {
     "xacro_macro.urdf": "element <xacro:macro>: is a macro of xacro; write the URDF with",
     "xacro_property.urdf": r"<mass value='\$\{m\}'>: is an expression of xacro",
 }
-FREE_IN_PINOCCHIO = ("floating_root.urdf", "hold_floating.urdf", "planar_root.urdf")  # coordinates differ
+FREE_IN_PINOCCHIO = (
+    "floating_on_odom.urdf",
+    "floating_root.urdf",
+    "hold_floating.urdf",
+    "planar_root.urdf",
+)  # coordinates differ
 ROWS_OF_OUR_OWN = ("close", "mimic")  # MuJoCo reads none from a URDF; see test_robot_files.py
-SLOW = ("gripper_2f.xml", "kangaroo_leg.xml", "stewart.xml")  # 4 to 16 s
+SLOW = (  # 1 to 16 s
+    "excavator_with_springs.xml",
+    "gripper_2f.xml",
+    "gripper_coupled_by_springs.xml",
+    "hand_of_tendons.xml",
+    "kangaroo_leg.xml",
+    "leg_with_shin_spring.xml",
+    "stewart.xml",
+    "stewart_with_cylinders.xml",
+    "wheel_with_gearbox.xml",
+)
 READ = sorted(path.name for path in KINDS.iterdir() if path.name not in REFUSED)
 
 

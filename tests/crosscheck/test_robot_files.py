@@ -22,7 +22,9 @@ from tests.crosscheck.originals import apart
 
 ROBOTS = Path(__file__).parent / "models" / "robots"
 SAME = 1e-9  # of the largest distance moved; worst measured 6e-11
+ENDS = [(f"tip{k}", f"plat{k}") for k in range(3)]  # of the rods of delta.urdf
 OPTIONS = {
+    "delta.urdf": ImportOptions(close=[f"{tip}={plate}" for tip, plate in ENDS]),
     "digger.urdf": ImportOptions(close=["boom_eye=boom_pin:revolute:y", "bucket_eye=bucket_pin:revolute:y"]),
     "walker.xml": ImportOptions(hold=["trunk"], keyframe="crouched"),
     "hexapod.xml": ImportOptions(without=["damping"]),
@@ -31,12 +33,14 @@ OPTIONS = {
 FREEDOMS = {
     "ankle.xml": 4,  # two of them are turns of rods about their own axes
     "arm.urdf": 6,
+    "delta.urdf": 6,
     "delta.xml": 9,  # six are turns of rods
     "digger.urdf": 2,
     "gripper.xml": 3,
     "hand.urdf": 3,
     "hexapod.xml": 6,
     "kangaroo_leg.xml": 3,
+    "parallel_gripper.urdf": 1,
     "rod_leg.xml": 4,
     "walker.xml": 8,
 }
@@ -47,7 +51,14 @@ REFUSALS = (
     "the file has no such joint that moves",
     "which is not a single hinge or slide",
 )
-LASTING = {"delta.xml", "gripper.xml", "hexapod.xml", "kangaroo_leg.xml", "walker.xml"}  # CPU seconds
+LASTING = {
+    "delta.urdf",
+    "delta.xml",
+    "gripper.xml",
+    "hexapod.xml",
+    "kangaroo_leg.xml",
+    "walker.xml",
+}  # CPU seconds
 
 
 def read(name: str) -> Source:
@@ -79,6 +90,10 @@ def original(name: str, found: Source) -> mujoco.MjModel:
         return with_equalities(
             text, [("boom_eye", zero, "boom_pin", zero), ("bucket_eye", zero, "bucket_pin", zero)]
         )
+    if name == "delta.urdf":
+        return with_equalities(text, [(tip, zero, plate, zero) for tip, plate in ENDS])
+    if name == "parallel_gripper.urdf":
+        return with_equalities(text, mimics=[("fr", "finger", 1.0), ("kn", "finger", -12.5)])
     if name == "hand.urdf":
         pairs = [(f, *pair) for f in ("index", "thumb") for pair in (("b", "a", 0.8), ("c", "b", 0.6))]
         return with_equalities(text, mimics=[(f"{f}_{j}", f"{f}_{o}", ratio) for f, j, o, ratio in pairs])

@@ -80,6 +80,9 @@ class Agreement:
         still = np.zeros_like(pose[0])
         mass = _masses(scene, pose[1]) + reflected(scene, *pose, still, still).mass
         ours = twists.T @ mass @ twists
+        if ours.size and np.abs(ours).max() == 0.0:
+            joint = joint_name(self.model, int(self.model.dof_jntid[0]))
+            raise SceneError([f"joint {joint}: its bodies have no inertia about or along its axis"])
         self._same(ours, self.poses.mass(), "mass matrix")
 
     def _forces(self, scene: Scene, pose: tuple[np.ndarray, np.ndarray], twists: np.ndarray) -> None:

@@ -95,8 +95,9 @@ def _listed(names: list[str], most: int = 6) -> str:
     return ", ".join(names[:most]) + more
 
 
-def notes(mujoco: Any, model: Any) -> Iterator[str]:
-    """Return sentences about parts that a scene cannot describe and that do not change the motion."""
+def notes(mujoco: Any, model: Any, keyframe: str) -> Iterator[str]:
+    """Return sentences about parts that a scene cannot describe and that do not change the motion, which
+    begins at a keyframe if one is named."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
     servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
     counts = (
@@ -120,7 +121,7 @@ def notes(mujoco: Any, model: Any) -> Iterator[str]:
     yield from (numbered(*count) for count in counts if count[0])
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"
-    if model.nkey:
+    if model.nkey and not keyframe:
         keyframes = numbered(model.nkey, "keyframe", "keyframes")
         yield f"{keyframes}: --keyframe NAME begins the motion at a keyframe"
 

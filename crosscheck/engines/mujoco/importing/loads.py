@@ -150,7 +150,13 @@ def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[L
         name = model.tendon(k).name or f"tendon {k}"
         if len(wraps) != 2 or not plain or (low != high and stiffness):
             kind = "springs" if stiffness else "damping"
-            yield Part(kind, f"tendon {name!r}, which is not a spring between two sites")
+            is_straight = len(wraps) == 2 and plain
+            what = (
+                "whose spring is slack over a range"
+                if is_straight
+                else "which is not a spring between two sites"
+            )
+            yield Part(kind, f"tendon {name!r}, {what}")
             model.tendon_stiffness[k] = model.tendon_damping[k] = 0
             continue
         sites = [int(model.wrap_objid[w]) for w in wraps]

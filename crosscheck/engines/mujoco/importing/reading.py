@@ -71,7 +71,9 @@ def source(path: Path, options: ImportOptions) -> Source:
     original = copy.copy(model)
     Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
-    imported = Imported(scene, (*wanted, *left_out.notes(mujoco, model)), tuple(reader.notes))
+    imported = Imported(
+        scene, (*wanted, *left_out.notes(mujoco, model, options.keyframe)), tuple(reader.notes)
+    )
     return Source(imported, model, original, reader.groups, *state)
 
 
@@ -311,8 +313,7 @@ def _root_link(text: urdf.Text | None) -> str:
     """Return the link of a URDF that no joint carries, which MuJoCo fixes to the world."""
     if text is None:
         return GROUND
-    carried = {child.get("link") for child in text.root.iter("child")}
-    return next((str(k.get("name")) for k in text.root.iter("link") if k.get("name") not in carried), GROUND)
+    return urdf.urdf_faults.base(text.root) or GROUND
 
 
 def _extent(mujoco: Any, model: Any) -> float:

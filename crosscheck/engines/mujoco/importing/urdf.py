@@ -64,6 +64,7 @@ def prepared(text: str, hold: Sequence[str] = ()) -> Text:
         raise SceneError([f"URDF: is no XML: {error}"]) from None
     urdf_faults.check(root)
     urdf_faults.hold(root, hold)
+    _name_base_of_floating_joints(root)
     for parent in list(root.iter()):
         for child in [c for c in parent if c.tag in PARTS]:
             parent.remove(child)
@@ -72,6 +73,19 @@ def prepared(text: str, hold: Sequence[str] = ()) -> Text:
     options.attrib.update(fusestatic="false", discardvisual="true", balanceinertia="false")
     moved = {name: more for name, more in added.items() if more != (0.0, 0.0)}
     return Text(ET.tostring(root, encoding="unicode"), moved, whole)
+
+
+def _name_base_of_floating_joints(root: ET.Element) -> None:
+    """Name the base "world" if a joint floats on it: MuJoCo lets bodies float on this link only."""
+    name, joints = urdf_faults.base(root), root.findall("joint")
+    if not any(joint.get("type") == "floating" for joint in joints):
+        return
+    for link in root.findall("link"):
+        if link.get("name") == name:
+            link.set("name", "world")
+    for parent in (joint.find("parent") for joint in joints):
+        if parent is not None and parent.get("link") == name:
+            parent.set("link", "world")
 
 
 def _enough(link: ET.Element) -> tuple[float, float]:

@@ -13,8 +13,9 @@ SHOWN = 6  # links that a message names
 
 
 def check(root: ET.Element) -> None:
-    """Raise SceneError with every fault: macros of xacro, unknown links, links with two parents, circles."""
-    if faults := [*_macros(root)] or [*_structure(root)]:
+    """Raise SceneError with every fault: macros of xacro, unknown links, links with two parents, circles,
+    negative masses, floating joints on a link that is not the base."""
+    if faults := [*_macros(root)] or [*_structure(root), *_values(root)]:
         raise SceneError(faults)
 
 
@@ -52,6 +53,24 @@ def _structure(root: ET.Element) -> Iterator[str]:
     if len(roots) > 1:
         names = ", ".join(map(repr, roots[:SHOWN])) + (" and more" if len(roots) > SHOWN else "")
         yield f"links {names}: no joint carries them; a URDF has one such link, its base"
+
+
+def _values(root: ET.Element) -> Iterator[str]:
+    """Return a fault for each negative mass, and for each floating joint on a link that is not the base."""
+    for link in root.findall("link"):
+        mass = link.find("inertial/mass")
+        if mass is not None and float(mass.get("value") or 0.0) < 0.0:
+            yield f"link {link.get('name')!r}: its mass must not be negative, got {mass.get('value')}"
+    for joint in root.findall("joint"):
+        parent = _end(joint, "parent")
+        if joint.get("type") == "floating" and parent != base(root):
+            yield f"joint {joint.get('name')!r}: floats on link {parent!r}, which is not the base of the file"
+
+
+def base(root: ET.Element) -> str:
+    """Return the name of the link that no joint carries; an empty text without one."""
+    carried = {_end(joint, "child") for joint in root.findall("joint")}
+    return next((str(k.get("name")) for k in root.findall("link") if k.get("name") not in carried), "")
 
 
 def _end(joint: ET.Element, side: str) -> str:
