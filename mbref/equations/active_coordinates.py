@@ -9,14 +9,41 @@ not identically zero does not vanish at a random state.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.model import Model, Terms
-from mbref.equations.random_states import RandomStates, random_states
+from mbref.equations.model import Model, Terms, all_displaced
 
 STATES = 2  # number of random states; an entry may vanish at one state by chance
 STILL = 1e-12  # relative to the length, 1 rad, or the largest velocity: smaller numbers are rounding
+
+
+class RandomStates(NamedTuple):
+    """Random states: k times as fractions of the duration, displacements (k, n) of the coordinates, and
+    velocities (k, n)."""
+
+    part: np.ndarray
+    displacement: np.ndarray
+    velocity: np.ndarray
+
+    def of(self, moving: np.ndarray) -> RandomStates:
+        """Return states in which only these entries (n,) are displaced and have a velocity."""
+        return RandomStates(self.part, moving * self.displacement, moving * self.velocity)
+
+    def about(self, q: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return times (k,) in s, coordinates (k, 7 nb) displaced from q (7 nb,), and velocities (k, n)."""
+        return self.part * duration, all_displaced(q, self.displacement), self.velocity
+
+
+@lru_cache(maxsize=64)
+def random_states(count: int, n: int) -> RandomStates:
+    """Return ``count`` random states, which depend on the arguments only."""
+    rng = np.random.default_rng(1)
+    drawn = [(rng.uniform(0.1, 1.0), rng.normal(size=n), rng.normal(size=n)) for _ in range(count)]
+    part, displacement, velocity = map(np.array, zip(*drawn, strict=True))
+    return RandomStates(part, displacement, velocity)
 
 
 def active_entries(
@@ -28,12 +55,12 @@ def active_entries(
     q (7 nb,) and v (6 nb,) are the start. Entries have the columns of ``layout.System.blocks``. The states at
     which equations are evaluated are appended to ``read``.
     """
-    states, steady = random_states(1, STATES, model.n), _steady(model)
+    states, steady = random_states(STATES, model.n), _steady(model)
     moving = np.zeros(model.n, dtype=bool)
     entries, start_rows, start_columns = patterns(model, model.terms(np.zeros(1), q, v))
     start_columns |= v != 0
     while True:
-        sample = states.of(moving, moving)
+        sample = states.of(moving)
         if read is not None:
             read.append(sample)
         about = sample.about(q, model.scene.duration)
@@ -136,7 +163,7 @@ def _mixed(reached: set[int], axes: Sequence[int]) -> set[int]:
         reached = found
 
 
-def primitives_of(model: Model, rows: np.ndarray) -> np.ndarray:
+def primitives_with(model: Model, rows: np.ndarray) -> np.ndarray:
     """Return the numbers of the primitive constraints that contain one of the given constraint rows."""
     last = np.searchsorted(model.structure.row, rows, side="right") - 1
     return np.flatnonzero(np.isin(model.structure.row, model.structure.row[last]))

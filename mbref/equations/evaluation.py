@@ -70,10 +70,10 @@ def assemble_jacobian(equations, dense):
 
 @inlined
 def evaluate(t, q, v, equations):
-    """Compute Φ, Φ_q (blocks), ν, γ and g at (t, q, v), for the rows that act on moving coordinates."""
+    """Compute Φ, Φ_q (blocks), ν, γ and g at (t, q, v)."""
     set_poses(q, equations.frames)
     set_velocities(v, equations.frames)
-    constraints(t, equations.scene.moving, equations)
+    constraints(t, equations)
     forces(t, equations)
 
 
@@ -109,37 +109,6 @@ def right_hand_side(v, equations):
         for row in range(rhs.shape[0]):
             rhs[row] -= velocity_gain * rows.phi_rate[row]
             rhs[row] -= position_gain * rows.phi[row]
-
-
-@inlined
-def add_static_multipliers(static, system):
-    """Compute the multipliers of statically determined rows, which ``static_constraints`` eliminates.
-
-    They balance the forces on columns without acceleration.
-    """
-    blocks, multipliers, force = system.blocks.reshape(-1), system.multipliers, system.force
-    width = system.blocks.shape[1]
-    start, entry, column, first, other = (
-        static.start, static.entry, static.column, static.other_start, static.other,
-    )  # fmt: skip
-    for k in range(static.row.shape[0]):
-        value, square = 0.0, 0.0
-        for p in range(start[k], start[k + 1]):
-            balance, own = force[column[p]], blocks[entry[p]]
-            for o in range(first[p], first[p + 1]):
-                balance -= blocks[other[o]] * multipliers[other[o] // width]
-            value += own * balance
-            square += own * own
-        multipliers[static.row[k]] = value / square
-
-
-@kernel
-def add_resting_rows(t, static, equations):
-    """Compute Φ_q of resting rows at the state of the last evaluation, and the multipliers of rows that keep
-    columns at rest."""
-    if equations.scene.resting.shape[0] > 0:
-        constraints(t, equations.scene.resting, equations)
-        add_static_multipliers(static, equations.system)
 
 
 @inlined

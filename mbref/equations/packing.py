@@ -44,14 +44,13 @@ from mbref.scene import (
     SceneError,
     Spring,
 )
+from mbref.scene_fields import COINCIDENT
 from mbref.scene_joints import ANGLE
 
-Numbers = tuple[float, ...]
+Values = tuple[float, ...]
 # parameters of the fixed frame, in the form of ``_of_body``
 AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
-
-COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 
 
 class Packs:
@@ -92,20 +91,20 @@ class Packs:
             metric_root=inverse_root(metric(self.mass, lengths)),
             bodies=bodies,
             primitives=primitives,
-            moving=self._all(np.arange(self.structure.kind.size)),
-            resting=self._all(np.zeros(0, dtype=np.int64)),
             row_bodies=self._all(self.structure.row_bodies),
             functions=self._functions(),
             loads=loads,
         )
 
     def _in_order(
-        self, of_joints: Sequence[list[Numbers]], of_couplings: Sequence[Sequence[tuple[Primitive, ...]]]
-    ) -> list[Numbers]:
+        self,
+        of_joints: Sequence[list[Values]],
+        of_couplings: Sequence[Sequence[tuple[Primitive, ...]]],
+    ) -> list[Values]:
         """Return the parameters of all primitives, scene by scene: joints first, then couplings."""
         if not any(of_couplings):
             return [numbers for rows in of_joints for numbers in rows]
-        found: list[Numbers] = []
+        found: list[Values] = []
         count = len(self.joints[0])
         for k, pairs in enumerate(of_couplings):
             found += [numbers for rows in of_joints[k * count : (k + 1) * count] for numbers in rows]
@@ -199,7 +198,7 @@ class Packs:
         self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
-    def _fixed_in_bodies(self, of_primitives: Sequence[Numbers]) -> tuple[Primitives, Loads]:
+    def _fixed_in_bodies(self, of_primitives: Sequence[Values]) -> tuple[Primitives, Loads]:
         """Return primitives and loads from the numbers of the primitives of all joints, drivers and
         couplings. Their vectors are rotated to the principal frames of the bodies in one operation."""
         structure, scenes = self.structure, () if self.kinematic else self.scenes
@@ -302,14 +301,14 @@ def _anchors(joint: Joint) -> tuple[float, ...]:
     return *first, *second
 
 
-def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Numbers]]:
+def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Values]]:
     """Return the primitives of a joint and its driver, and 16 numbers of each: two points, three directions
     and a length. The directions are ``direction_first``, ``turning_first`` and ``direction_second``."""
     found = [*primitives_of(joint), *([driver_primitive(joint)] if joint.name in driven else [])]
     return found, [_numbers(p) for p in found]
 
 
-def _numbers(p: Primitive) -> Numbers:
+def _numbers(p: Primitive) -> Values:
     """Return two points, three directions and a length, or the factor of a joint coordinate."""
     return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
 

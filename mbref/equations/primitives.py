@@ -25,7 +25,7 @@ from numpy import arctan2, cos, floor, pi, sin
 
 from mbref.equations.functions import function_value
 from mbref.kernels.compilation import inlined, kernel
-from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT
+from mbref.kernels.scene_layout import COUPLED_ANGLE, DISTANCE, DOT1, DOT2, POINT
 from mbref.linear_algebra.vectors import (
     accumulate,
     add,
@@ -203,7 +203,7 @@ def joint_coordinate(p, equations):
         rows.phi[row], rows.nu[row], rows.gamma[row] = 0.0, 0.0, 0.0
         for k in range(blocks.shape[1]):
             blocks[row, k] = 0.0
-    if primitives.kind[p] == ANGLE:
+    if primitives.kind[p] == COUPLED_ANGLE:
         add_angle(p, equations)
     else:
         add_displacement(p, equations)
@@ -269,12 +269,10 @@ def add_displacement(p, equations):
 
 
 @inlined
-def constraints(t, primitives, equations):
-    """Evaluate Φ, Φ_q, ν and γ of the rows of these primitives, by number, at the state in
-    ``equations.frames``."""
+def constraints(t, equations):
+    """Evaluate Φ, Φ_q, ν and γ of the rows of all primitives at the state in ``equations.frames``."""
     kinds = equations.scene.primitives.kind
-    for k in range(primitives.shape[0]):
-        p = primitives[k]
+    for p in range(kinds.shape[0]):
         if kinds[p] == POINT:
             point(p, equations)
         elif kinds[p] == DOT1:

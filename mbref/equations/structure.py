@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.equations.joints import ROWS_OF
-from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, ANGLE, FORCE, SPRING
+from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -175,7 +175,7 @@ def structure_of(places: Places) -> Structure:
     row_bodies[:, :2] = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
     for bodies, row in zip(coupled, np.cumsum(rows)[[p.part == 2 for p in primitives]] - 1, strict=True):
         row_bodies[row] = bodies
-    unwraps = np.array([place.kind == ANGLE for place in primitives], dtype=bool)
+    unwraps = np.array([place.kind == COUPLED_ANGLE for place in primitives], dtype=bool)
     slots = np.where(unwraps, np.count_nonzero(is_angle) + np.cumsum(unwraps) - 1, -1)
     begins = np.array([place.part != 2 for place in primitives], dtype=np.int64)
     return Structure(

@@ -16,7 +16,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from mbref.equations.evaluation import add_static_multipliers
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import About, Formulation, Sparse
 from mbref.kernels.compilation import exchangeable, inlined, kernel
@@ -63,8 +62,8 @@ class Options(NamedTuple):
 STRONGER, LARGEST_ALPHA = 1e3, 1e16
 INFINITE = 1e300  # α that stands for a matrix without 1/α
 # squared pivots: of clearly independent rows, and above which one iteration suffices
-CLEAR, WIDE = 1e-4, 0.08
-ROUNDING = 1e-14  # relative change of accelerations that ends the iteration
+INDEPENDENT_ROWS, WIDE = 1e-4, 0.08
+SETTLED = 1e-14  # relative change of accelerations that ends the iteration
 # the largest α with which the matrix of redundant rows is positive definite in double precision
 REDUNDANT_ALPHA = 1e15
 options_of, factor_of = opener(Options), opener(SparseFactor)
@@ -72,13 +71,10 @@ options_of, factor_of = opener(Options), opener(SparseFactor)
 
 @exchangeable(ACCELERATE)
 def accelerate(system):
-    settings, factor = system.settings, factor_of(system.scratch)
-    if not (settings.independent and not settings.nearly_dependent and solve_exactly(system)):
-        status = iterate(system)
-        if status != OK:
-            return status
-    add_static_multipliers(factor.static, system)
-    return OK
+    settings = system.settings
+    if settings.independent and not settings.nearly_dependent and solve_exactly(system):
+        return OK
+    return iterate_until_solved(system)
 
 
 @kernel
@@ -95,7 +91,7 @@ def solve_exactly(system):
     if not start(INFINITE, system):
         return False
     pivot = least_squared_pivot(factor)
-    if not pivot > CLEAR:
+    if not pivot > INDEPENDENT_ROWS:
         return False
     substitute_back(factor, step)
     add_transpose(factor, step, factor.change)
@@ -103,9 +99,9 @@ def solve_exactly(system):
         system.multipliers[row[i]] = -step[i]
     size = put_accelerations(system)
     if not pivot > WIDE:
-        find_residual(factor.change, system)
+        put_residual(factor.change, system)
         size = min(size, square_of_forces(system))
-        if not substitute_forward(factor, step) <= ROUNDING * ROUNDING * size:
+        if not substitute_forward(factor, step) <= SETTLED * SETTLED * size:
             substitute_back(factor, step)
             add_transpose(factor, step, factor.change)
             for i in range(row.shape[0]):
@@ -137,7 +133,7 @@ def square_of_forces(system):
 
 
 @kernel
-def iterate(system):
+def iterate_until_solved(system):
     """Iterate, with a larger α if needed; return OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
     alpha, status = options.alpha, iterate_with(options.alpha, system)
@@ -179,12 +175,12 @@ def start(alpha, system):
             return False
         x[j] = root[j] * system.force[k]
         system.acceleration[k] = root[j] * x[j]
-    find_residual(x, system)
+    put_residual(x, system)
     return factorise(factor, alpha, factor.step)
 
 
 @inlined
-def find_residual(x, system):
+def put_residual(x, system):
     """Compute γ - D x into ``factor.residual`` and ``factor.step``, with x (c,) = M^(1/2) q̈.
 
     Both arrays are written in one loop, because a later copy would wait for the numbers stored last.

@@ -77,7 +77,7 @@ def no_stage(rates, t, h, y, y_new, k, memory):
 
 
 all_stages = stages_to(STAGES - 1)
-solution, third_order, fifth_order = (sum_with(weights) for weights in (B, ERROR3, ERROR5))
+eighth_order, third_order, fifth_order = (sum_with(weights) for weights in (B, ERROR3, ERROR5))
 
 
 @exchangeable(STEP)
@@ -89,7 +89,7 @@ def step(rates, t, h, y, y_rate, y_new, memory):
     if status != OK:
         return -float(status)
     for i in range(y.shape[0]):
-        y_new[i] = y[i] + h * solution(slopes, i)
+        y_new[i] = y[i] + h * eighth_order(slopes, i)
     share, error3, error5 = memory.loop.clock.share, 0.0, 0.0
     rtol, atol = share * control.rtol, share * control.atol
     for i in range(y.shape[0]):

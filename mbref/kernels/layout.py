@@ -138,23 +138,10 @@ class Symbolic(NamedTuple):
     update_right: Annotated[Unsigned, "updates"]
 
 
-class StaticRows(NamedTuple):
-    """Statically determined rows: each row keeps columns at rest; its multiplier balances the force on these
-    columns."""
-
-    row: Annotated[Unsigned, "h"]
-    start: Annotated[Unsigned, "h + 1"]  # first entry of each row
-    entry: Annotated[Unsigned, "e"]  # index of each entry in the blocks
-    column: Annotated[Unsigned, "e"]
-    other_start: Annotated[Unsigned, "e + 1"]  # first entry of other rows in the column
-    other: Annotated[Unsigned, "o"]
-
-
 class SparseFactor(NamedTuple):
     """D = Φ_q M^(-1/2) and the factor L Δ Lᵀ of S + I/α over the rows and columns of ``symbolic``."""
 
     symbolic: Symbolic
-    static: StaticRows
     d: Annotated[Vector, "nd"]
     l: Annotated[Vector, "nl"]
     scaled: Annotated[Vector, "nl"]  # L Δ, below the diagonal

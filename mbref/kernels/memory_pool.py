@@ -110,7 +110,7 @@ def fill(target: Any, source: Any) -> None:
             mine[...] = theirs
 
 
-def write(record: Any, values: Any) -> None:
+def write_record(record: Any, values: Any) -> None:
     """Write numbers to a record."""
     for name, value in zip(values._fields, values, strict=True):
         record[name] = value

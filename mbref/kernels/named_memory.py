@@ -33,7 +33,7 @@ from numba.np.numpy_support import from_dtype
 from mbref.kernels.aligned import Kind, aligned_zeros
 from mbref.kernels.compilation import INDEX_TABLE, INDICES, MATRIX, PLAIN, UNSIGNED, VECTOR
 from mbref.kernels.dimensions import Shapes, check_sizes, size_of
-from mbref.kernels.records import Numbers, dtype_of, is_record, numbers_of, record
+from mbref.kernels.records import Numbers, dtype_of, is_record, record, record_type_of
 
 Vector = Annotated[np.ndarray, VECTOR]  # float64 (k,)
 Matrix = Annotated[np.ndarray, MATRIX]  # float64 (k, l)
@@ -92,15 +92,15 @@ def fields_of(schema: type) -> Mapping[str, Field]:
         if shape:
             dtype = np.dtype(str(kind.dtype))
         elif isinstance(kind, types.Record):
-            dtype = numbers_of(hint)
+            dtype = record_type_of(hint)
         fields[name] = Field(name, f"{schema.__name__}.{name}", kind, shape, row, nested, dtype)
-        row += rows_of(nested) if nested else 1
+        row += table_rows(nested) if nested else 1
     return fields
 
 
-def rows_of(schema: type) -> int:
+def table_rows(schema: type) -> int:
     """Return the number of rows of a schema in a table of addresses."""
-    return sum(rows_of(field.schema) if field.schema else 1 for field in fields_of(schema).values())
+    return sum(table_rows(field.schema) if field.schema else 1 for field in fields_of(schema).values())
 
 
 def _kind_of(hint: Any) -> tuple[types.Type, tuple[str, ...]]:

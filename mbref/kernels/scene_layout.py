@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple
 
 from mbref.kernels.named_memory import IndexTable, Indices, Matrix, Vector
 
-POINT, DOT1, DOT2, DISTANCE, ANGLE, SLIDE = range(6)  # kinds of primitive constraints
+POINT, DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE = range(6)  # kinds of primitive constraints
 MOMENT, FORCE, SPRING, ABOUT_AXIS, ALONG_AXIS = range(5)  # kinds of loads; the last two: of joints
 
 
@@ -24,8 +24,8 @@ class Bodies(NamedTuple):
 class Primitives(NamedTuple):
     """Primitive constraints: bodies, first row, and vectors fixed in the first and the second body.
 
-    Two joint coordinates, ANGLE or SLIDE, share the row of a coupling. Each joint coordinate adds its value
-    times the factor in ``length`` to the row.
+    Two joint coordinates, COUPLED_ANGLE or COUPLED_SLIDE, share the row of a coupling. Each joint coordinate
+    adds its value times the factor in ``length`` to the row.
     """
 
     kind: Annotated[Indices, "p"]
@@ -94,8 +94,6 @@ class SceneData(NamedTuple):
     metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies
     primitives: Primitives
-    moving: Annotated[Indices, "moving"]  # primitives that are evaluated at every state
-    resting: Annotated[Indices, "resting"]  # rows at rest, which are evaluated for multipliers only
     row_bodies: Annotated[IndexTable, "m", "sides"]  # bodies of each row, padded with the fixed frame
     functions: Functions
     loads: Loads

@@ -16,26 +16,6 @@ if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 
-def dense_null_shares(matrix: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Return ``null_shares`` (…, r) of small matrices (…, m, n), whose rows may be zero."""
-    lengths = np.sqrt((matrix * matrix).sum(axis=-1, keepdims=True))
-    d = matrix / np.where(lengths > 0, lengths, 1.0)
-    unit = np.eye(matrix.shape[-2])
-    inverse = np.linalg.solve(ALPHA * (d @ d.swapaxes(-1, -2)) + unit, unit[:, rows])
-    return np.sum(inverse**2, axis=-2)
-
-
-def null_shares(solution: MinimumNorm, rows: np.ndarray) -> np.ndarray:
-    """Return the squared component of each of these rows in the left null space of the matrix of
-    ``solution``, from 0 to 1."""
-    shares = np.zeros(rows.size)
-    for k, row in enumerate(rows):
-        unit = np.zeros(solution.d.shape[0])
-        unit[row] = 1.0
-        shares[k] = np.sum((solution.regularised_solution(unit) / ALPHA) ** 2)
-    return shares
-
-
 class Redundancy:
     """Rank of a Jacobian (m, n), and squared components ``shares`` of its rows in the left null space.
 
@@ -44,8 +24,12 @@ class Redundancy:
 
     def __init__(self, jacobian: csr_array):
         self._solution = MinimumNorm(jacobian, np.ones(jacobian.shape[1]))
-        self.shares = null_shares(self._solution, np.arange(jacobian.shape[0]))
+        self.shares = np.array([self._share(unit) for unit in np.eye(jacobian.shape[0])])
         self.rank = jacobian.shape[0] - round(float(np.sum(self.shares)))
+
+    def _share(self, unit: np.ndarray) -> float:
+        """Return the squared component of a unit vector (m,) in the left null space, from 0 to 1."""
+        return float(np.sum((self._solution.regularised_solution(unit) / ALPHA) ** 2))
 
     def singular_values(self) -> tuple[float, float]:
         """Return the smallest nonzero and the largest singular value of unit rows."""

@@ -2,38 +2,36 @@
 
 The projection is mass-orthogonal: the correction is the least in the metric of M (Bayo & Ledesma, Nonlinear
 Dynamics 9, 1996). Positions are corrected by Newton's method, velocities with the factor of the last Newton
-step.  Only active coordinates are integrated (``equations.active_coordinates``,
-``equations.static_constraints``).  Near a singular position the pivots are sorted by size, largest first.
-With r independent rows, the r-th pivot falls with the distance from the singular position;
-``stepping.singular_crossing`` monitors this pivot.  A redundant row has a pivot of α^(-1/2); where two rows
-exchange their roles, the larger of their pivots is still about α^(-1/4).
+step.  Only active coordinates are integrated (``equations.active_coordinates``).  Near a singular position
+the pivots are sorted by size, largest first. With r independent rows, the r-th pivot falls with the distance
+from the singular position; ``stepping.singular_crossing`` monitors this pivot.  A redundant row has a pivot
+of α^(-1/2); where two rows exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from numpy import sqrt
+from numpy import inf, sqrt
 
 from mbref.equations.coordinates import contract, displace, expand
-from mbref.equations.evaluation import add_resting_rows, assemble_system, evaluate, violation_rate
+from mbref.equations.evaluation import assemble_system, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
-from mbref.linear_algebra.minimum_norm import NEVER, solve_fixed_iterations
+from mbref.linear_algebra.minimum_norm import ALPHA, LEAST, solve_fixed_iterations
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, regularised_factor
 from mbref.linear_algebra.vectors import copy, flush_denormals, largest, sort
-from mbref.stabilisation.all_coordinates import accelerate, write_rates
+from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
+from mbref.stabilisation.all_coordinates import write_rates
 from mbref.stabilisation.base import Stabilisation
 
-ALPHA = 1e10  # penalty of the iteration
-REPEATED, ALONE = 1, 2  # iterations of a correction that Newton's method repeats, and of a single correction
 INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # squared pivot above which a row counts as independent
 DEPENDENT = 3e-3  # pivot below which a row clearly depends on other rows
 CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
 MOST_ITERATIONS = 10  # largest number of Newton steps of a correction
-ROUNDING = 1e3  # violation / tolerance below which iterations may fail to reduce it further
+STUCK = 1e3  # violation / tolerance below which iterations may fail to reduce it further
 # violation, and its reduction by a step, below which the factor is used again
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2
 BENT = 1e-6  # last correction / distance from a singular position, below which the factor is used again
@@ -155,7 +153,7 @@ def newton_step(t, before, memory):
 def correct_positions(memory):
     """Remove Φ by changing the coordinates in ``memory.state``, with the last factor."""
     scratch = scratch_of(memory.chart)
-    remove_violation(memory.equations.rows.phi, REPEATED, memory.factor, scratch.correction)
+    remove_violation(memory.equations.rows.phi, 1, memory.factor, scratch.correction)
     displace(memory.state.coordinates, scratch.correction, scratch.change)
 
 
@@ -165,17 +163,17 @@ def project_positions(t, memory):
 
     Return OK, SINGULAR if no factor exists, or NOT_CONVERGED.
     """
-    system, before = memory.equations.system, NEVER
+    system, before = memory.equations.system, inf
     tolerance = system.settings.newton_tolerance
     for _ in range(MOST_ITERATIONS):
         system.counts.newton += 1
         violation = newton_step(t, before, memory)
         if violation < 0.0:
             return SINGULAR
-        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
+        if violation <= tolerance or before <= violation <= STUCK * tolerance:
             return OK
         before = violation
-    return OK if before <= ROUNDING * tolerance else NOT_CONVERGED
+    return OK if before <= STUCK * tolerance else NOT_CONVERGED
 
 
 @kernel
@@ -187,7 +185,7 @@ def project(t, y, memory):
     if status != OK or not follow_last_correction(t, memory):
         return SINGULAR if status == OK else status
     watch_pivots(memory)
-    project_velocities(ALONE, memory)
+    project_velocities(memory)
     contract(state.coordinates, state.velocities, memory.active, y)
     flush_denormals(y)
     return OK
@@ -208,11 +206,11 @@ def follow_last_correction(t, memory):
 
 
 @inlined
-def project_velocities(iterations, memory):
+def project_velocities(memory):
     """Remove Φ' = Φ_q v - ν by the least change of v, with the last factor."""
     velocities, equations = memory.state.velocities, memory.equations
     violation_rate(velocities, equations)
-    remove_violation(equations.rows.phi_rate, iterations, memory.factor, velocities)
+    remove_violation(equations.rows.phi_rate, LEAST, memory.factor, velocities)
 
 
 @exchangeable(ACCEPT)
@@ -283,15 +281,7 @@ def put_back_dependent_rows(memory):
             copy(kept[row[k]], system.blocks[row[k]])
 
 
-@exchangeable(RATES)
-def whole_rates(t, y, y_rate, memory):
-    """Compute ``rates`` with the multipliers of all rows."""
-    status = accelerate(t, y, y_rate, memory)
-    add_resting_rows(t, memory.factor.static, memory.equations)
-    return status
-
-
 PROJECTION = Stabilisation(
-    "projection", enter, rates, whole_rates, accept, memory=Scratch,
+    "projection", enter, rates, rates_of_all_rows, accept, memory=Scratch,
     projects=True, watches_rank=True, largest_turn=LARGEST_TURN,
 )  # fmt: skip

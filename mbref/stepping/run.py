@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -13,9 +13,7 @@ from mbref.equations.branches import Passed
 from mbref.equations.diagnosis import freedoms_left
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
-from mbref.equations.packing import Packs
 from mbref.equations.reduction import Reduction, reduction_of
-from mbref.equations.static_constraints import at_rest
 from mbref.kernels.layout import (
     Active,
     Kernels,
@@ -25,11 +23,11 @@ from mbref.kernels.layout import (
     State,
     Watch,
 )
-from mbref.kernels.memory_pool import Pooled, acquire, release, write
+from mbref.kernels.memory_pool import Pooled, acquire, release, write_record
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
-from mbref.linear_algebra.symbolic_factorisation import empty_factor, no_static_rows, unsigned
+from mbref.linear_algebra.symbolic_factorisation import empty_factor, unsigned
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
@@ -53,34 +51,6 @@ class Stepper(Protocol):
 
     def release(self) -> None:
         """Release the stepper's own memory."""
-
-    @property
-    def was_short(self) -> bool:
-        """True if one call of kernels completed the run."""
-
-    @property
-    def memory(self) -> Any:
-        """All memory that a run changes."""
-
-    def enter(self) -> None:
-        """Start from the time of the clock and the state in memory."""
-
-    def begin_again(self) -> None:
-        """Reset memory of the stepper to the start of the run."""
-
-    def parameters(
-        self, packs: Packs, q: np.ndarray, places: Sequence[int]
-    ) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Return (target array, values for each scene) for numbers of the stepper that differ between the
-        scenes of ``packs``.
-
-        q (s, 7 nb) are coordinates at the start. Also return the indices of scenes whose equations fit into
-        the memory.
-        """
-
-    def advance_once(self) -> tuple[int, float]:
-        """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone
-        (s)."""
 
 
 class Run:
@@ -128,25 +98,18 @@ class Run:
         q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
         start = replace(start, q=q[0], v=v[0])
         reduction, self._blocks = reduction_of(model, start)
-        return model, at_rest(start, reduction.held), reduction
+        return model, start, reduction
 
     def begin_again(self) -> None:
-        """Reset the memory to the scene's parameters and the initial state."""
+        """Reset the memory, except the stepper's own, to the scene's parameters and the initial state."""
         self.pooled.restore()
         self._put_numbers(self.memory, self.reduced(self.model.data))
         self.put_start()
-        self.stepper.begin_again()
 
-    def reduced(self, data: SceneData, axis: int = 0, all_move: bool = False) -> SceneData:
-        """Return the data of a scene with the primitives that the run needs.
-
-        ``axis`` is the axis that counts primitives. With ``all_move`` every primitive is evaluated at every
-        state.
-        """
+    def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
+        """Return the data of a scene with the primitives that the run needs; ``axis`` counts primitives."""
         sparse = self.method.formulation.linear_algebra.sparse
-        # other stabilisations read the gradients of all rows
-        all_move = all_move or not self.method.stabilisation.projects
-        return self.reduction.scene(data, all_move, axis) if self.reduction and sparse else data
+        return self.reduction.scene(data, axis) if self.reduction and sparse else data
 
     def _acquire_memory(self) -> Pooled:
         """Return memory with the numbers of this run."""
@@ -159,8 +122,8 @@ class Run:
     def _put_numbers(self, memory: Memory, data: SceneData) -> None:
         """Write the numbers of the scene, the method and the limits into memory."""
         self.model.put_numbers(memory.equations, data)
-        write(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
-        write(memory.control, self._control)
+        write_record(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
+        write_record(memory.control, self._control)
         memory.loop.times[:] = self.times
 
     def _identity(self) -> tuple[Any, ...]:
@@ -183,14 +146,11 @@ class Run:
         sizes["watched_rows"] = pivots if watched else 0
         sizes["watched_entries"] = factor.d.size if watched else 0
         sizes["watched_numbers"] = factor.l.size if watched else 0
-        # with resting rows, multipliers of static rows are computed at samples only
-        static = no_static_rows() if data.resting.size else factor.static
-        at_every_state = factor._replace(static=static)
         equations = model.equations(
             sizes,
             data,
             options=method.packed_options(formulation),
-            scratch=packed(algebra.scratch(model.m, model.n, at_every_state)),
+            scratch=packed(algebra.scratch(model.m, model.n, factor)),
         )
         return Memory(
             equations=equations,

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbref.taylor.numbers import Batch, Numbers, dot, largest, norm, root
+from mbref.taylor.numbers import ManyScenes, Numbers, dot, largest, norm, root
 
 PLAIN = st.floats(0.1, 10.0)
 VALUES = st.lists(st.tuples(PLAIN, PLAIN), min_size=2, max_size=5)
@@ -19,7 +19,7 @@ def mixed(x, y):
 
 @given(values=VALUES)
 def test_every_operation_has_the_bits_of_each_scene_alone(values):
-    batch = Batch(len(values))
+    batch = ManyScenes(len(values))
     x, y = batch.together(np.array(values))
     found = batch.spread(np.array([mixed(x, y)], dtype=object))[:, 0]
     assert found.tolist() == [mixed(*pair) for pair in values]
@@ -28,7 +28,7 @@ def test_every_operation_has_the_bits_of_each_scene_alone(values):
 
 @given(values=st.lists(st.lists(PLAIN, min_size=6, max_size=6), min_size=2, max_size=4))
 def test_vectors_have_the_bits_of_each_scene_alone(values):
-    rows, batch = np.array(values), Batch(len(values))
+    rows, batch = np.array(values), ManyScenes(len(values))
     numbers = batch.together(rows)
     found = np.array([dot(numbers[:3], numbers[3:]), norm(numbers[:3]), largest(numbers)], dtype=object)
     alone = [[dot(row[:3], row[3:]), norm(row[:3]), largest(row)] for row in rows]
@@ -36,25 +36,25 @@ def test_vectors_have_the_bits_of_each_scene_alone(values):
 
 
 def test_numbers_on_which_scenes_agree_are_floats():
-    together = Batch(2).together(np.array([[1.0, 2.0, 0.0], [1.0, 3.0, -0.0]]))
+    together = ManyScenes(2).together(np.array([[1.0, 2.0, 0.0], [1.0, 3.0, -0.0]]))
     assert isinstance(together[0], float) and isinstance(together[1], Numbers)
     assert isinstance(together[2], Numbers), "the signs of zeros differ"
-    assert Batch(2).together(np.array([[1.0, 2.0], [1.0, 2.0]])).dtype == float
+    assert ManyScenes(2).together(np.array([[1.0, 2.0], [1.0, 2.0]])).dtype == float
 
 
 def test_a_scene_that_decides_otherwise_leaves_the_batch():
-    batch = Batch(3)
+    batch = ManyScenes(3)
     number = Numbers(np.array([1.0, 2.0, -1.0]), batch)
     assert number > 0.0 and batch.agree.tolist() == [True, True, False]
     assert not number > 1.5 and batch.agree.tolist() == [True, False, False]
 
 
 def test_patterns_are_of_the_first_scene():
-    batch = Batch(2)
+    batch = ManyScenes(2)
     assert batch.pattern(np.array([[1.0, 0.0], [2.0, 1e-20]])).tolist() == [True, False]
     assert batch.agree.tolist() == [True, False]
 
 
 def test_rounded_numbers_are_those_of_python():
     values = [0.1234567885, 2.675, math.pi]
-    assert round(Numbers(np.array(values), Batch(3)), 9).values.tolist() == [round(v, 9) for v in values]
+    assert round(Numbers(np.array(values), ManyScenes(3)), 9).values.tolist() == [round(v, 9) for v in values]

@@ -1,11 +1,9 @@
-"""Statically determined rows: those found, and that motion and reactions are those of all equations."""
+"""Motion and reactions of mechanisms whose joints keep bodies at rest, and what is integrated of them."""
 
 import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
-from mbref.equations.active_coordinates import active_entries
-from mbref.equations.static_constraints import SMALL, _perpendicular, held_by_rows
 from mbref.method import Method
 from mbref.scene import Body, Driver, Fixed, Force, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES, find_scene
@@ -61,86 +59,6 @@ WELD = Scene(
 )
 
 
-def held(scene):
-    """The columns that rows hold, as body and axis: x, y, z of its position, a, b, c of its own frame."""
-    run = start_run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
-    moving, entries = active_entries(run.model, run.start.q, run.start.v)
-    found, left = held_by_rows(run.model, run.start, moving, entries)
-    columns = [column for each in found for column in each.columns]
-    assert all(len(each.rows) == len(each.columns) for each in found)
-    assert not set(columns) & set(run.memory.active.velocities), "what is held is not integrated"
-    assert not (left & ~entries).any()
-    return {f"{run.model.bodies[c // 6].name} {'xyzabc'[c % 6]}" for c in columns}
-
-
-SPATIAL = {"crank y", "crank a", "crank c", "slider x", "slider z"}
-SIDES = {f"slide {axis}" for axis in "yzabc"}
-
-
-@pytest.mark.parametrize(
-    ("scene", "expected"),
-    [
-        (SCENES["planar_slider_crank"](), {"slider y"}),
-        (SCENES["spatial_slider_crank"](), SPATIAL),
-        (SCENES["spatial_slider_crank_driven"](), SPATIAL),
-        (SCENES["spatial_slider_crank_gravity"](), SPATIAL),
-        (SCENES["four_bar"](), set()),
-        (RAIL, SIDES),
-        (WELD, {f"{body} {axis}" for body in "ab" for axis in "xyzabc"}),
-    ],
-    ids=lambda value: getattr(value, "name", ""),
-)
-def test_sides_of_guides_and_other_axes_of_cranks_are_held(scene, expected):
-    assert held(scene) == expected
-
-
-def test_a_driven_way_is_not_held_and_one_driven_to_rest_is():
-    driven, at_rest = (
-        RAIL.with_(driver=(Driver(joint="guide", polynomial=(0.0, speed)),)) for speed in (0.1, 0.0)
-    )
-    assert held(driven) == SIDES
-    assert held(at_rest) == {*SIDES, "slide x"}
-
-
-def test_redundant_rows_hold_nothing():
-    assert held(TWO_GUIDES) == set()
-
-
-def test_a_column_without_mass_is_not_held():
-    thin = RAIL.body[0].model_copy(update={"inertia": (0.0, 0.02, 0.02)})
-    assert held(RAIL.with_(body=(thin,))) == SIDES - {"slide a"}
-
-
-def test_a_sleeve_on_a_turning_arm_is_not_held():
-    assert not {column for column in held(SLEEVE) if column in ("sleeve x", "sleeve y", "sleeve c")}
-
-
-def test_rows_of_changing_length_or_at_an_angle_do_not_hold():
-    constant, changing = np.array([[1.0, 0], [0, 1], [1, 0]]), np.array([[0.0, 1], [1, 0], [0, 0.9]])
-    assert _perpendicular(np.array([constant, constant[:, ::-1]])) == [0, 1]
-    assert _perpendicular(np.array([constant, changing])) == [0]
-    assert _perpendicular(np.array([constant, constant[:, ::-1] + 1e-6])) == [0]
-    assert _perpendicular(np.array([1e-6 * constant, 1e-6 * constant[:, ::-1] + 1e-12])) == [0]
-    assert _perpendicular(np.array([0.1 * SMALL * constant])) == []
-    assert _perpendicular(np.array([constant, [[0, 0], [1, 0], [0, 1]]])) == [0], "a row that vanishes"
-
-
-@pytest.mark.parametrize(
-    "scene", [RAIL, SLEEVE, WELD, TWO_GUIDES, *map(random_mechanism, range(12))], ids=lambda scene: scene.name
-)
-def test_what_is_held_cannot_move_at_any_pose_of_the_motion(scene):
-    """Φ_q v = 0 has no solution that moves it: the null space has zeros there, wherever the rest goes."""
-    run = start_run(scene, Method.parse(METHOD), np.linspace(0.0, 0.05, 4), Limits())
-    moving, entries = active_entries(run.model, run.start.q, run.start.v)
-    found, _ = held_by_rows(run.model, run.start, moving, entries)
-    columns = [column for each in found for column in each.columns]
-    run.stepper.advance(None)
-    for q in run.memory.loop.samples.coordinates:
-        _, sizes, right = np.linalg.svd(run.model.terms(0.0, q, run.start.v).jacobian)
-        null_space = right[np.sum(sizes > 1e-9 * sizes[0]) :]
-        assert np.abs(null_space[:, columns]).max(initial=0.0) < 1e-8
-
-
 NAMES = ("planar_slider_crank_gravity", "spatial_slider_crank_gravity", "spatial_slider_crank_driven")
 MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDES)
 
@@ -156,7 +74,7 @@ MECHANISMS = (*(SCENES[name]() for name in NAMES), RAIL, SLEEVE, WELD, TWO_GUIDE
     ids=lambda value: value if isinstance(value, str) else value.name,
 )
 def test_accelerations_and_multipliers_satisfy_all_equations_of_motion(scene, method):
-    """M q̈ + Φ_qᵀ λ = g in every column, those held too, whose only equation this is."""
+    """M q̈ + Φ_qᵀ λ = g in every column, also in columns that rows keep at rest."""
     run = start_run(scene, Method.parse(method), np.linspace(0.0, 0.05, 6), Limits())
     run.stepper.advance(None)
     for t, q, v, acceleration, multipliers in zip(run.times, *run.memory.loop.samples, strict=True):
@@ -180,7 +98,7 @@ def test_motion_and_reactions_are_those_of_all_equations_solved_together(scene):
         np.testing.assert_allclose(reaction, other.reactions[joint], atol=1e-5 * size, err_msg=joint)
 
 
-def test_a_driver_that_works_against_what_would_be_held_is_not_passed_over():
+def test_a_driver_that_works_against_a_weld_does_not_complete():
     """Its rate is zero at the start, which is therefore consistent."""
     scene = Scene(
         name="against",
@@ -197,27 +115,6 @@ def test_a_driver_that_works_against_what_would_be_held_is_not_passed_over():
     assert run.outcome.name != "COMPLETED", "the driver cannot turn what is welded"
 
 
-def test_primitives_that_only_hold_columns_are_evaluated_at_samples():
-    scene, times = find_scene("spatial_slider_crank_gravity"), np.linspace(0.0, 0.1, 4)
-    run = start_run(scene, Method.parse(METHOD), times, Limits())
-    resting = run.memory.equations.scene.resting
-    assert resting.size == 4, "the directions of the revolute and of the translational joint hold columns"
-    found, dense = (
-        simulate(scene, f"{f}+projection", times, Limits(rtol=1e-11)) for f in ("alf-dual", "lm2")
-    )
-    for joint in scene.joint:
-        ours, theirs = found.reactions[joint.name], dense.reactions[joint.name]
-        assert np.abs(ours - theirs).max() < 1e-8 * np.abs(theirs).max(), joint.name
-
-
-@pytest.mark.parametrize("formulation", ["alf-dual", "lm2"])
-@pytest.mark.parametrize("stabilisation", ["none", "partitioning"])
-def test_all_primitives_are_evaluated_where_all_gradients_are_read(formulation, stabilisation):
-    scene = find_scene("spatial_slider_crank_gravity")
-    run = start_run(scene, Method.parse(f"{formulation}+{stabilisation}"), np.array([0.1]), Limits())
-    assert run.memory.equations.scene.resting.size == 0
-
-
 def entries(scene):
     """Coordinates and velocities that are integrated."""
     run = start_run(scene, Method.parse(METHOD), np.array([0.1]), Limits())
@@ -225,12 +122,12 @@ def entries(scene):
 
 
 def test_planar_mechanisms_keep_the_entries_of_their_plane():
-    assert entries(SCENES["planar_slider_crank"]()) == (9, 7)
+    assert entries(SCENES["planar_slider_crank"]()) == (10, 8)
     assert entries(SCENES["five_bar"]()) == (16, 12)
-    assert entries(SCENES["spatial_slider_crank"]()) == (12, 10), "its crank and its slider move in one way"
+    assert entries(SCENES["spatial_slider_crank"]()) == (17, 15)
     pushed = SCENES["planar_slider_crank"]()
     pushed = pushed.with_(load=(*pushed.load, Force(body="rod", point=(0.2, 0, 0), force=(0, 0, 1e-9))))
-    assert entries(pushed) == (16, 14), "redundant rows share a force across the plane, however small"
+    assert entries(pushed) == (17, 15), "redundant rows share a force across the plane, however small"
 
 
 def test_a_body_without_joints():
