@@ -1,4 +1,5 @@
-"""Batches: scenes that differ from a lead scene in numbers only, simulated one after another in its memory.
+"""Batches: scenes that differ from a lead scene in numbers only, simulated in its memory by `taylor`,
+one after another.
 
 All scenes are prepared at once, in arrays whose first axis is the scene. A scene of a batch must have the
 rank and the active rows and columns of the lead scene, must not start at a singular position, and must
@@ -24,19 +25,25 @@ from mbref.kernels.layout import Counts
 from mbref.kernels.memory_pool import SavedNumbers
 from mbref.motion import Motion
 from mbref.scene import Scene
-from mbref.simulation.comparison import may_leave
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, lazy_crossings, report_of
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import NEARLY, Run
 from mbref.stepping.singular_start import begins_at_rest, begins_in_motion
+from mbref.taylor.stepper import SeriesStepper
 
 
 def may_lead(run: Run) -> bool:
-    """Return whether a completed run may lead a batch: it started regularly, and one call of the stepper
-    completed it."""
-    ordinary = run.reduction is not None and run.model.m <= LARGE
-    completed = run.memory.loop.clock.sample == run.times.size and not run.limits.branches
-    return bool(ordinary and completed and run.stepper.was_short and run.ranks.least >= NEARLY)
+    """Return whether a completed run by `taylor` may lead a batch: it started regularly, and one call of the
+    stepper completed it."""
+    is_small = run.reduction is not None and run.model.m <= LARGE and run.ranks.least >= NEARLY
+    completed = run.memory.loop.clock.sample == run.times.size and _stepper(run).was_short
+    return bool(is_small and completed and not (begins_at_rest(run) or begins_in_motion(run)))
+
+
+def _stepper(run: Run) -> SeriesStepper:
+    """Return the stepper of a run by `taylor`."""
+    assert isinstance(run.stepper, SeriesStepper)
+    return run.stepper
 
 
 class BatchResult(NamedTuple):
@@ -90,32 +97,20 @@ def run_batch(run: Run, scenes: Sequence[Scene]) -> BatchResult:
 
 
 class Batch:
-    """Runs of scenes in the memory of one run."""
+    """Runs of scenes in the memory of one run, which is reset to its start."""
 
     def __init__(self, run: Run, candidates: Candidates):
-        self._run, self._candidates = run, candidates
-        self._rank = self._begin()
+        self._run, self._candidates, self._stepper = run, candidates, _stepper(run)
+        run.begin_again()
+        self._stepper.begin_again()
         count, memory = len(candidates.q), run.memory
         self._crossings: dict[int, Sequence[Crossing]] = {}
-        of_stepper, self._fit = run.stepper.parameters(candidates.packs, candidates.q, candidates.fit)
+        of_stepper, self._fit = self._stepper.parameters(candidates.packs, candidates.q, candidates.fit)
         parameters = [*candidates.parameters(run, memory), *of_stepper]
-        self._parameters = Parameters(parameters, SavedNumbers(run.stepper.memory))
+        self._parameters = Parameters(parameters, SavedNumbers(self._stepper.taylor))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
         self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
         self._seconds = np.zeros(count)
-
-    def _begin(self) -> int:
-        """Reset memory to the start of the run.
-
-        Returns the number of independent rows, -1 for a start that needs special treatment.
-        """
-        run = self._run
-        run.begin_again()
-        run.stepper.enter()
-        extraordinary = begins_at_rest(run) or begins_in_motion(run)
-        rank = int(run.memory.watch.generic_rank)
-        run.begin_again()
-        return -1 if extraordinary else rank
 
     def _keep(self, place: int) -> None:
         """Store samples and counts of the scene with the given index."""
@@ -126,15 +121,12 @@ class Batch:
 
     def run(self) -> list[int]:
         """Run the scenes of equal structure; returns the indices of those that completed in one call."""
-        run, stepper, completed = self._run, self._run.stepper, []
+        run, completed = self._run, []
         for k in self._fit:
             self._parameters.write(k)
             run.crossings = []
-            stepper.enter()
-            if run.memory.watch.generic_rank != self._rank:
-                continue
-            status, self._seconds[k] = stepper.advance_once()
-            if status == DONE and not may_leave(run):
+            status, self._seconds[k] = self._stepper.advance_once()
+            if status == DONE:
                 self._keep(k)
                 completed.append(k)
                 if run.crossings:

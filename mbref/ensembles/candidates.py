@@ -13,7 +13,6 @@ from mbref.ensembles.parameters import parameters_of
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.initial_state import Start
 from mbref.equations.packing import Packs
-from mbref.equations.reduction import Reduction
 from mbref.kernels.layout import Memory
 from mbref.scene import Scene
 from mbref.stepping.control import largest_violation
@@ -51,23 +50,18 @@ class Candidates(NamedTuple):
 def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     """Return the candidates for a batch of a lead run. A scene may join the batch if its structure equals the
     structure of the run and its start is regular."""
-    packs, decisions = Packs(scenes), _reduction(run).decisions
+    assert run.reduction is not None
+    packs, decisions = Packs(scenes), run.reduction.decisions
     evaluations = Evaluations(run.model, packs)
     starts, q, v = _starts(run, packs, evaluations)
     part, places, velocities = decisions.states(q, v)
     durations = np.array([scene.duration for scene in scenes])
     terms = evaluations.terms(np.arange(len(q)), durations[:, None] * part, places, velocities)
-    agree = decisions.which_agree(run.model, q, v, packs.mass, terms)
+    agree = decisions.which_agree(run.model, q, v, terms)
     symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.blocks[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
     return Candidates(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
-
-
-def _reduction(run: Run) -> Reduction:
-    """Return the reduction (independent rows and active columns) of a run that may lead a batch."""
-    assert run.reduction is not None
-    return run.reduction
 
 
 def _starts(
@@ -81,5 +75,4 @@ def _starts(
         places, starts = [*found], found.values()
         at, rates, given = (np.array([getattr(s, name) for s in starts]) for name in ("q", "v", "given"))
         q[places], v[places] = without_rounding(at, rates, given, packs.length[places])
-        v[:, _reduction(run).held] = 0.0
     return {k: replace(start, q=q[k], v=v[k]) for k, start in found.items()}, q, v

@@ -81,9 +81,8 @@ def _by_shape(scenes: Sequence[Scene]) -> Sequence[list[int]]:
 
 
 def _can_lead(method: Method, limits: Limits) -> bool:
-    """Return whether runs of a method may lead batches: only runs with projection or Taylor series may."""
-    held = limits.rank_tolerance <= DROPS and not limits.branches
-    return method.stabilisation.projects and held
+    """Return whether runs of a method may lead batches: runs by `taylor` along smooth branches."""
+    return method.is_series and limits.rank_tolerance <= DROPS and not limits.branches
 
 
 class _Runs:

@@ -3,14 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from typing import Any
+from collections.abc import Callable
 
-import numpy as np
-
-from mbref.equations.packing import Packs
-from mbref.kernels.layout import SINGULAR_AHEAD, Memory
-from mbref.stepping.control import STEPS_PER_CALL
+from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.stepping.loop import PAUSED, advance_to_end
 from mbref.stepping.pace import Pace
 from mbref.stepping.ranks import ranks_at
@@ -24,11 +19,6 @@ class ExplicitStepper:
     def __init__(self, run: Run):
         self.run = run
         self._pace = Pace(run)
-        self.enter()
-
-    def enter(self) -> None:
-        """Start from the time of the clock and the state in memory."""
-        run = self.run
         clock, enter = run.memory.loop.clock, run.method.stabilisation.enter.callable
         clock.y_size = enter(clock.time, run.memory.loop.y, run.packed.argument)
         clock.restart = run.memory.equations.system.counts.steps
@@ -47,31 +37,6 @@ class ExplicitStepper:
 
     def release(self) -> None:
         """Release no memory: the stepper has none of its own."""
-
-    @property
-    def was_short(self) -> bool:
-        """True if one call of kernels completed the run."""
-        return bool(self.run.memory.equations.system.counts.steps <= STEPS_PER_CALL)
-
-    @property
-    def memory(self) -> Memory:
-        """All memory that a run changes."""
-        return self.run.memory
-
-    def begin_again(self) -> None:
-        """Do nothing: the stepper has no memory of its own."""
-
-    def parameters(
-        self, packs: Packs, q: np.ndarray, places: Sequence[int]
-    ) -> tuple[list[tuple[Any, ...]], list[int]]:
-        """Return no numbers, because the stepper has no memory of its own, and all scene indices."""
-        return [], [*places]
-
-    def advance_once(self) -> tuple[int, float]:
-        """Advance by one call of kernels; return the status, and the process CPU time of the stepping alone
-        (s)."""
-        began = time.process_time()
-        return int(advance_to_end(self.run.packed.argument)), time.process_time() - began
 
     def _look_at_rows_again(self) -> None:
         """Clear the mark of nearly dependent rows once the run has left the start and the rows are

@@ -40,14 +40,13 @@ from mbref.taylor.driven import (
     follow_drivers,
 )
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.layout import Options, TaylorMemory
+from mbref.taylor.layout import Options
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
 SHARE = 0.05  # tolerance of the last terms / (rtol + atol), far from singular positions
-ROUNDING = 1e-16  # relative rounding of a singular value
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
 LEAST_ORDER, MOST_ORDER = 4, 30  # order of a series; rounding dominates higher terms
@@ -121,7 +120,7 @@ class SeriesStepper:
         """Set the rank tolerance so that elimination and singular values at the start count equal ranks."""
         settings, (_, least, rounding) = self.run.memory.equations.system.settings, self.run.ranks
         if settings.nearly_dependent:
-            settings.rank_tolerance = (least * max(rounding, ROUNDING)) ** 0.5
+            settings.rank_tolerance = (least * max(rounding, np.finfo(float).eps)) ** 0.5
 
     @property
     def _moving(self) -> np.ndarray:
@@ -148,14 +147,6 @@ class SeriesStepper:
     def was_short(self) -> bool:
         """Return whether one call of kernels completed the run."""
         return self._calls == 1
-
-    @property
-    def memory(self) -> TaylorMemory:
-        """Return all memory that a run changes."""
-        return self.taylor
-
-    def enter(self) -> None:
-        """Start from the state in memory: nothing to do, because the first step begins the series."""
 
     def begin_again(self) -> None:
         """Reset the memory of the stepper to the start of the run."""
