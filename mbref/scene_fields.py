@@ -14,6 +14,7 @@ from mbref.scene_units import angle, length, length_or_angle
 
 # limits of numbers, whose products and squares then stay within double precision
 LARGEST, SMALLEST = 1e40, 1e-40
+COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 OTHER_WORDS = {  # words of other programs and books → the words of scene files
     "hinge": "revolute",
     "pin": "revolute",

@@ -9,13 +9,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from mbref.scene import GROUND, Scene
+from mbref.scene_fields import COINCIDENT
 
 TURN = 2 * math.pi
 QUARTER = 90  # degrees; likely angles are multiples of it
 # ratio of neighbouring lengths in a sorted list above which one of them is probably in millimetres
 APART = 300.0
 GYRATION = 30.0  # largest plausible radius of gyration / length of the mechanism
-ROUNDING = 1e-14  # length of the mechanism / largest coordinate; a smaller length is of one point
 STRONGEST = 100.0  # m/s²; largest plausible gravity
 FURTHEST = 100.0  # rad; largest plausible angle of a driver (16 turns; an angle in degrees is usually larger)
 INSTANTS = 101  # number of times at which a driver's value is computed
@@ -77,7 +77,7 @@ def _lengths(scene: Scene) -> Iterator[str]:
 
 def _inertias(scene: Scene) -> Iterator[str]:
     """Yield bodies whose radius of gyration is many times the size of the mechanism."""
-    size, coincident = _size(scene), ROUNDING * np.abs(_points(scene)).max()
+    size, coincident = _size(scene), COINCIDENT * np.abs(_points(scene)).max()
     for body in scene.body:
         if not body.mass or body.inertia is None or size <= coincident:
             continue

@@ -23,9 +23,9 @@ from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
 # order of the Taylor series of the second run; other runs use at most order 22 at tolerances above 1e-13
 ORDER = 24
-RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12  # relative tolerances of the second run
+# relative tolerances of the second run, the larger one also of a further run of a motion with a warning
+RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
-TRIED = 1e-12  # relative tolerance of a further run of a motion with a warning
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and motion.error_estimate have no time limit"
 STEPS_PER_CALL = 500  # steps of a second run between two checks of its time limit
@@ -65,13 +65,13 @@ def estimate_error(
     second = _second_run(motion, by, finer, check)
     error, reason = second.distances(motion), second.reason if second.is_short(motion) else ""
     estimate = ErrorEstimate(motion.times, error, rtol, f"{by}, rtol {finer.rtol:g}", reason)
-    if not estimate.warning or limits.rtol <= TRIED:
+    if not estimate.warning or limits.rtol <= RTOL_EXPLICIT:
         return estimate
-    tighter = replace(limits, rtol=TRIED, atol=None, compared=False)
+    tighter = replace(limits, rtol=RTOL_EXPLICIT, atol=None, compared=False)
     tried = _run(lambda: motion.mechanism, method, motion.times, tighter, check)
     if tried.motion is None or tried.is_short(motion):
         return estimate
-    return replace(estimate, tighter=(TRIED, float(np.nanmax(second.distances(tried.motion)))))
+    return replace(estimate, tighter=(RTOL_EXPLICIT, float(np.nanmax(second.distances(tried.motion)))))
 
 
 def _none(motion: Motion, seconds: float) -> str:

@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[1]
-CHECKS = tuple(ROOT / "tests" / "mbref" / f"limits_of_{kind}.py" for kind in ("equations", "runs", "scenes"))
+CHECKS = tuple(
+    ROOT / "tests" / "mbref" / f"limits_of_{kind}.py" for kind in ("equations", "runs", "scenes", "solutions")
+)
 LEFT_OUT = (
     "cli/",
     "drawing/",
@@ -88,7 +90,6 @@ page from the constants and their comments. {count}
 |---|---|
 | yes | a decision is checked on both sides; the check fails if the number moves by a tenth, a count by one |
 | cost | the number changes time, memory or the size of an output only |
-| no | no check of its own |
 
 `tests/mbref/test_decisions.py` runs the checks.
 

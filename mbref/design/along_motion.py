@@ -16,12 +16,10 @@ from mbref.equations.model import Model, displaced
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
+from mbref.stepping.run import NEARLY
 from mbref.trajectory import Outcome
 
 SAMPLES = 61  # poses of a motion at which ranks are computed
-ROUNDING = (
-    1e-5  # singular value of unit rows: below it at every pose, rounding of the scene's numbers explains it
-)
 MOST_ROWS = 300  # constraint rows; for more, singular values at every pose take too long
 SAME = 1e-9  # relative difference below which two poses count as equal
 POSES = 5  # poses at which degrees of freedom are tested to second order
@@ -64,7 +62,7 @@ def along_motion(scene: Scene) -> AlongMotion:
     times = np.linspace(0.0, scene.duration, SAMPLES)
     motion = simulate(scene, None, times, Limits(most_steps=MOST_STEPS))
     if not motion.times.size:  # rounding of joint axes may be the cause
-        limits = Limits(most_steps=MOST_STEPS, rank_tolerance=ROUNDING)
+        limits = Limits(most_steps=MOST_STEPS, rank_tolerance=NEARLY)
         motion = simulate(scene, None, times, limits)
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
@@ -98,7 +96,7 @@ def _is_shaky(model: Model, motion: Motion) -> bool:
 
 def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
     times = motion.times
-    ranks = np.sum(values > ROUNDING, axis=1)
+    ranks = np.sum(values > NEARLY, axis=1)
     rank = int(ranks.max(initial=0))
     small = values[:, rank:].max(axis=0, initial=0.0)
     nearest = values[:, rank - 1] if rank else np.zeros(len(times))
@@ -126,7 +124,7 @@ def general_pose(model: Model, seed: int = 1) -> np.ndarray:
     for _ in range(5):
         jacobian = scaled_jacobian(model, 0.0, q)
         _, values, vt = np.linalg.svd(jacobian)
-        free = vt[int(np.sum(values > ROUNDING * values.max(initial=0.0))) :]
+        free = vt[int(np.sum(values > NEARLY * values.max(initial=0.0))) :]
         if not len(free):
             return q
         step = free.T @ random.normal(size=len(free))

@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.design.placed import placed
-from mbref.equations.initial_state import solve_positions
+from mbref.equations.initial_state import CLOSED, solve_positions
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
@@ -18,7 +18,6 @@ from mbref.scene import GROUND, Scene, SceneError
 
 Point = tuple[float, float, float]
 SHARES = 20  # parts into which a large change is divided, so that the loops stay on their branch
-CLOSED = 1e-10  # gap / mechanism's length; smaller gaps count as closed
 MOST_ITERATIONS = 50  # largest number of Gauss–Newton steps for the points of a link
 
 

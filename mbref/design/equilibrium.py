@@ -32,7 +32,6 @@ SAME = 1e-6  # distance / length of the mechanism, or rad, below which two poses
 STILL = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
 # acceleration × duration² / length of the mechanism below which a mechanism counts as free of forces
 NOTHING = 1e-9
-SEED = 1  # of the random directions in which starts lie
 # displayed vibration: largest displacement / length of the mechanism, and number of samples
 AMPLITUDE, FRAMES = 0.1, 49
 
@@ -213,7 +212,7 @@ def _rest(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
 def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
     """Yield the first pose, and further poses along the constraints in random directions with a fixed
     seed."""
-    rng, freedoms = np.random.default_rng(SEED), first.freedoms
+    rng, freedoms = np.random.default_rng(1), first.freedoms
     yield first
     there = back = first
     direction = rotations.unit(rng.standard_normal(freedoms))

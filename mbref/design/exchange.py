@@ -8,11 +8,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.design.along_motion import ROUNDING, general_pose
+from mbref.design.along_motion import general_pose
 from mbref.design.placed import placed
 from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
+from mbref.stepping.run import NEARLY
 
 WEAKER = {  # joint type → types that allow at least its motion, beginning with most rows
     "revolute": ("cylindrical", "universal", "spherical", "inline"),
@@ -72,7 +73,7 @@ Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining row
 def _dependences(rows: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int]:
     """Return a basis of the c vanishing linear combinations of rows (d, n), by joint (d, c), and c."""
     left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
-    null = left[:, int(np.sum(values > ROUNDING * values[0])) :]
+    null = left[:, int(np.sum(values > NEARLY * values[0])) :]
     ends = np.cumsum([len(r) for r in rows.values()])[:-1]
     return dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1]
 
@@ -145,7 +146,7 @@ def _rows(model: Model) -> dict[str, np.ndarray]:
 
 def _rank(rows: Iterable[np.ndarray]) -> int:
     values = np.linalg.svd(np.concatenate(list(rows)), compute_uv=False)
-    return int(np.sum(values > ROUNDING * values[0]))
+    return int(np.sum(values > NEARLY * values[0]))
 
 
 def _bearing(scene: Scene, name: str) -> list[str]:

@@ -10,8 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.design.turning import ANGLE, UNCHANGED, Turning
-from mbref.equations.initial_state import solve_positions
+from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
+from mbref.equations.initial_state import CLOSED, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 
@@ -20,7 +20,6 @@ RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as 
 STEP = 0.005
 SHORT = 0.04  # factor on STEP for differences of second order
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
-MET = 1e-10  # largest |Φ| / mechanism's length for a pose that satisfies the constraints
 
 
 class OffConstraints(Exception):
@@ -47,7 +46,7 @@ class Tangent:
         moved = displaced(self.q, self.units * (self.basis @ y))
         found, _ = solve_positions(self.model, 0.0, moved)
         phi = self.model.terms(0.0, found).phi
-        if np.abs(phi).max(initial=0.0) > MET * max(1.0, self.model.length):
+        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, self.model.length):
             raise OffConstraints
         return found
 
@@ -111,13 +110,13 @@ def unsteady(tangent: Tangent) -> str:
     except OffConstraints:
         q = tangent.q
     now = frame.velocities(model, q)
-    later, rates = frame.turned(model, q, ANGLE), frame.turned_rates(model, now, ANGLE)
-    t = ANGLE / frame.rate
+    later, rates = frame.turned(model, q, TURNED_BY), frame.turned_rates(model, now, TURNED_BY)
+    t = TURNED_BY / frame.rate
     phi = np.abs(model.terms(t, later, rates).phi)
     if phi.max(initial=0.0) > UNCHANGED * max(1.0, model.length):
         return f"joint {model.row_joint[int(phi.argmax())]!r} does not turn with it"
     before, after = accelerations(model, 0.0, q, now), accelerations(model, t, later, rates)
-    change = np.abs(frame.turned_rates(model, before, ANGLE) - after).max()
+    change = np.abs(frame.turned_rates(model, before, TURNED_BY) - after).max()
     return "the loads change while it turns" if change > UNCHANGED * np.abs(before).max() else ""
 
 

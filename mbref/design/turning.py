@@ -11,7 +11,7 @@ from mbref.equations.model import Model
 from mbref.scene import GROUND, Body, Scene, SceneError
 
 PARALLEL = 1e-12  # sine of the angle between gravity and the driver's axis
-ANGLE = 1.0  # rad; rotation after which the equations are compared with the start
+TURNED_BY = 1.0  # rad; rotation after which the equations are compared with the start
 UNCHANGED = 1e-9  # largest change of accelerations / scale of accelerations, and of |Φ| / mechanism's length
 
 

@@ -23,7 +23,7 @@ RANK = 1e-6  # relative singular value that counts as zero at a singular positio
 FLAT = 1e-7  # relative size of a quadratic form below which it counts as zero
 SAME = 1e-4  # rad; directions at a smaller angle count as equal
 BROAD = 0.05  # distance of multiple roots, to which Newton's method converges slowly
-ZERO, CONVERGED = 1e-12, 1e-10  # at a root: size of the forms, last change of the iteration
+ZERO = 1e-12  # size of the forms at a root
 # number of starts and iterations of Newton's method for more than two degrees of freedom
 STARTS, ITERATIONS = 200, 40
 
@@ -260,15 +260,13 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
 def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, bool]:
     """Return the end of Newton's method from a, the largest form there, and whether the end is a simple
     root."""
-    change = np.ones(1)
     for _ in range(ITERATIONS):
         a = a / np.linalg.norm(a)
-        change = np.linalg.lstsq(2.0 * forms @ a, _values(forms, a), rcond=None)[0]
-        a = a - change
+        a = a - np.linalg.lstsq(2.0 * forms @ a, _values(forms, a), rcond=None)[0]
     a = a / np.linalg.norm(a)
     full = np.linalg.matrix_rank(2.0 * forms @ a, tol=SAME) == len(a) - 1
     left = float(np.abs(_values(forms, a)).max())
-    return a, left, bool(full and np.linalg.norm(change) < CONVERGED)
+    return a, left, bool(full)
 
 
 def _direction(found: SecondOrder, v: np.ndarray) -> np.ndarray:

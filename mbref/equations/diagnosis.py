@@ -141,7 +141,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
         jacobian = scaled_jacobian(model, 0.0, start.q)
         left, values, _ = np.linalg.svd(jacobian)
         rank = rank_of(jacobian)
-        shared = np.linalg.norm(left[:, rank:], axis=1) > UNIQUE_TOLERANCE
+        shared = take_part(left[:, rank:])
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
     determined = _determined(model, start) if model.m <= MOST_ROWS else None
@@ -149,6 +149,12 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
     involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
     unique = tuple(name for name in total.rows_by_joint if name not in involved)
     return Diagnosis(total, dict(involved), unique, smallest, largest, determined)
+
+
+def take_part(left: np.ndarray) -> np.ndarray:
+    """Return which rows (m,) take part in the dependences given by left null vectors (m, c)."""
+    weights: np.ndarray = np.linalg.norm(left, axis=1)
+    return weights > UNIQUE_TOLERANCE
 
 
 def _determined(model: Model, start: Start) -> dict[str, tuple[str, ...]]:

@@ -17,17 +17,16 @@ from mbref.linear_algebra.clear_rank import least_norm
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import Body, SceneError
 
-# singular values below it (relative) are left uncorrected, because the rank may drop at the start
-RANK_TOLERANCE = 1e-5
+RANK_TOLERANCE = 1e-5  # relative; smaller singular values stay uncorrected: the rank may drop at the start
 LARGE = 40  # rows; for more, dense singular values take longer than sparse factors
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
+CLOSED = 1e-10  # largest |Φ| (m or rad) of positions that satisfy the constraints
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
 # weight of open velocities / weight of given velocities; number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
-# residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
-MET = 1e-13
+MET = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
@@ -183,12 +182,12 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     most = GROSS * np.maximum(1.0, scenes.length)
     q, before, terms = _solved(scenes, q, most)
     first, last = (np.abs(phi).max(axis=1, initial=0.0) for phi in (before, terms.phi))
-    if not (last > 1e-10).any():
+    if not (last > CLOSED).any():
         return q, first, faults, terms
     for k in np.flatnonzero(first > most).tolist():
         what = f"positions given to bodies violate it by {first[k]:.3g} m or rad"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
-    for k in np.flatnonzero((last > 1e-10) & (first <= most)).tolist():
+    for k in np.flatnonzero((last > CLOSED) & (first <= most)).tolist():
         what = f"no nearby positions satisfy it; {last[k]:.3g} m or rad remain"
         faults[k] = _fault(scenes.model, int(np.argmax(np.abs(terms.phi[k]))), what)
     return q, first, faults, terms

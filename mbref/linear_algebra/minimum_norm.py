@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy import sqrt
+from numpy import inf, sqrt
 
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
@@ -34,16 +34,13 @@ from mbref.linear_algebra.vectors import copy
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-TINY, NEVER = 1e-300, 1e300  # least divisor; size of a change that is not known yet
 # least number of iterations of ``solve_to_tolerance``; enough away from singular positions, so that it is
 # fixed there
 LEAST = 2
-ALPHA = 1e10  # penalty for systems that are solved once; singular values below 1e-5 are ignored
-ITERATIONS, ROUNDING = (
-    20,
-    1e-15,
-)  # largest number of iterations of a system that is solved once; relative change that ends them
-DEPENDENT = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
+ALPHA = 1e10  # penalty of projections and single solutions; singular values below 1e-5 are ignored
+# largest number of iterations of a system that is solved once; relative change that ends them
+ITERATIONS, LAST_CHANGE = 20, 1e-15
+DEPENDENT_ROW = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 
 
@@ -58,7 +55,7 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
     """
     row, step, total = factor.symbolic.row, factor.step, factor.total
     total[:] = 0.0
-    status, change, expected = NOT_CONVERGED, 0.0, NEVER
+    status, change, expected = NOT_CONVERGED, 0.0, inf
     for k in range(most):
         if k > 0:
             subtract_product(factor, factor.change, factor.residual)
@@ -67,7 +64,7 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
         last, change = change, change_by_step(factor, target)
         for i in range(row.shape[0]):
             total[i] -= step[i]
-        expected = min(expected, change * min(1.0, change / max(last, TINY)))
+        expected = min(expected, change * min(1.0, change / last if last > 0.0 else 1.0))
         if k + 1 >= min(LEAST, most) and expected <= epsilon:
             status = OK
             break
@@ -81,7 +78,7 @@ def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
     """Continue after ``solve_to_tolerance``, by Craig's method with S + I/α as preconditioner.
 
     A singular value that is small compared with α^(-1/2) takes about one direction (J. E. Craig, J. Math. and
-    Physics 34, 1955). Returns OK if only rounding, or rows dependent to DEPENDENT, remain; otherwise
+    Physics 34, 1955). Returns OK if only rounding, or rows dependent to DEPENDENT_ROW, remain; otherwise
     NOT_CONVERGED.
     """
     residual, step, change, direction = factor.residual, factor.step, factor.change, factor.direction
@@ -91,13 +88,13 @@ def go_on_by_conjugate_directions(factor, alpha, target, multipliers):
         copy(residual, step)
         solve(factor, step)
         along = product(residual, step)
-        if along <= alpha * (ROUNDING * size_of(target, factor)) ** 2:
+        if along <= alpha * (LAST_CHANGE * norm_of(target, factor)) ** 2:
             return OK
         for i in range(step.shape[0]):
             direction[i] = step[i] + along / before * direction[i]
         times_transpose(factor, direction, change)
         square, before = product(change, change), along
-        if along * alpha * DEPENDENT**2 >= square:
+        if along * alpha * DEPENDENT_ROW**2 >= square:
             return OK
         go_along(along / square, factor, target, multipliers)
     return NOT_CONVERGED
@@ -116,7 +113,7 @@ def go_along(length, factor, target, multipliers):
 
 
 @kernel
-def size_of(target, factor):
+def norm_of(target, factor):
     """Return the larger of 1 and the norm of M^(1/2) target (n,)."""
     column, root, square = factor.symbolic.column, factor.root, 1.0
     for j in range(root.shape[0]):
@@ -187,7 +184,7 @@ def find_least_multipliers(factor, force, multipliers):
     for j in range(column.shape[0]):
         x[j] = factor.root[j] * force[column[j]]
     total[:] = 0.0
-    before = NEVER
+    before = inf
     for _ in range(ITERATIONS):
         factor.residual[:] = 0.0
         subtract_product(factor, x, factor.residual)
@@ -199,7 +196,7 @@ def find_least_multipliers(factor, force, multipliers):
             total[i] -= step[i]
             change += step[i] * step[i]
             size += total[i] * total[i]
-        if not ROUNDING * ROUNDING * size < change < before:
+        if not LAST_CHANGE * LAST_CHANGE * size < change < before:
             break
         before = change
     for i in range(row.shape[0]):
@@ -257,7 +254,7 @@ class MinimumNorm:
         factor.residual[:] = (self._scale * rhs)[self._rows]
         for _ in range(ITERATIONS):
             iterate_once(x, self._factor.argument)
-            if np.linalg.norm(factor.change) <= ROUNDING * np.linalg.norm(x):
+            if np.linalg.norm(factor.change) <= LAST_CHANGE * np.linalg.norm(x):
                 break
         return self._root * x
 

@@ -17,7 +17,7 @@ from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_A
 from mbref.lazy import LazySequence
 from mbref.motion import Motion
 from mbref.scene import Scene
-from mbref.simulation.dead_position import is_at_dead_position
+from mbref.simulation.dead_position import ROUNDED, is_at_dead_position
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice
 from mbref.simulation.singular_position import Met, is_near, met_by
@@ -79,7 +79,6 @@ NEAR_SINGULAR = (
     "position, or at a pose with a singular value above {:g}"
 )
 REDUNDANT = "rows with a singular value of {:.1e} at the start count as redundant"
-ROUNDING = 1e-13  # relative; smaller singular values are not reported
 NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 
@@ -222,7 +221,7 @@ def report_of(start: Start, ranks: Ranks, crossings: int) -> str:
 
 
 def _rounded(ranks: Ranks) -> str:
-    return REDUNDANT.format(ranks.next) if ranks.next > ROUNDING else ""
+    return REDUNDANT.format(ranks.next) if ranks.next > ROUNDED else ""
 
 
 def _remedy(run: Run, status: int) -> str:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.diagnosis import counts, scaled_jacobian
+from mbref.equations.diagnosis import RANK_TOLERANCE, counts, scaled_jacobian
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.simulation.trial import trial_of
@@ -23,7 +23,6 @@ from mbref.stepping.loop import (
 from mbref.stepping.run import Run
 
 FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this motion"
-LOOSE = 1e-10  # singular value of rows of unit length; smaller ones are rounding
 BY_STATUS = {
     VIOLATED: "+projection corrects violations after every step",
     UNDECIDED: "a smaller rtol may determine the branch; --branch selects one",
@@ -73,7 +72,7 @@ def _undetermined(run: Run) -> str:
     columns = [6 * b + k for b in places for k in range(6)]
     rows = scaled_jacobian(run.model, 0.0, run.start.q)[:, columns]
     _, sizes, motions = np.linalg.svd(np.vstack([rows, np.zeros((len(columns), len(columns)))]))
-    if sizes[-1] > LOOSE:
+    if sizes[-1] > RANK_TOLERANCE:
         return ""
     moved = np.abs(motions[-1]).reshape(-1, 6).max(axis=1)
     return run.scene.body[places[int(moved.argmax())]].name

@@ -30,7 +30,7 @@ INTERVALS = {
 COUNTS = {"most_steps": (1, MOST)}
 
 
-Branches = Mapping[int, int] | tuple[tuple[int, int], ...]  # crossing → branch, or stored as pairs
+BranchChoice = Mapping[int, int] | tuple[tuple[int, int], ...]  # crossing → branch, or stored as pairs
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Limits:
     largest_turn: float = 0.0
     most_steps: int = 5_000_000
     compared: bool = True
-    branches: Branches = ()
+    branches: BranchChoice = ()
     code: str = AUTO
 
     def __post_init__(self) -> None:

@@ -8,7 +8,12 @@ import importlib
 import pytest
 
 from mbref.kernels.compilation import PLAIN
-from tests.mbref import limits_of_equations, limits_of_runs, limits_of_scenes  # noqa: F401 - they register checks
+from tests.mbref import (  # noqa: F401 - they register checks
+    limits_of_equations,
+    limits_of_runs,
+    limits_of_scenes,
+    limits_of_solutions,
+)
 from tests.mbref.threshold_checks import CHECKS
 
 

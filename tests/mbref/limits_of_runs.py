@@ -121,8 +121,18 @@ def zero_search(monkeypatch, pivot):
 
 @check("stepping.singular_crossing SEARCH")
 def _(monkeypatch):
-    monkeypatch.setattr(singular_crossing, "EXACT", 0.0)
+    monkeypatch.setattr(singular_crossing, "PLACE_ERROR", 0.0)
     return len(zero_search(monkeypatch, lambda part: math.copysign(abs(part - 0.3) ** 9, 0.3 - part))) == 30
+
+
+@check("stepping.singular_crossing PLACE_ERROR")
+def _(monkeypatch):
+    """A pivot that is nearly zero at the end of the step: the first place found is as far from the end."""
+
+    def ends_at_once(size):
+        return len(zero_search(monkeypatch, lambda part: -size if part == 1.0 else 1.0)) == 1
+
+    return flips(ends_at_once, 0.98e-9, 1.02e-9)
 
 
 @check("stepping.singular_start NEAR_SINGULAR")
@@ -279,7 +289,7 @@ def _(_):
 
 
 # --- taylor ---------------------------------------------------------------------------------------------
-@check("taylor.expressions ROUNDING")
+@check("taylor.expressions NEGLIGIBLE")
 def _(_):
     return flips(lambda value: len(expressions.cleaned({0: 1.0, 1: value})) == 1, 0.98e-12, 1.02e-12)
 
@@ -294,7 +304,7 @@ def _(_):
     return flips(vanishes, 0.98e-9, 1.02e-9)
 
 
-@check("taylor.expressions DEPENDENT")
+@check("taylor.expressions DEPENDENT_POLYNOMIAL")
 def _(_):
     def depends(value):
         polynomials = [{(0, 1): 1.0}, {(0, 1): 1.0, (1, 1): value}]

@@ -11,7 +11,7 @@ from mbref.ensembles import simulate_all
 from mbref.equations import branches
 from mbref.method import Method
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene, SceneError, Universal
-from mbref.simulation import comparison, outcome, start_run, trial
+from mbref.simulation import comparison, dead_position, outcome, start_run, trial
 from mbref.stepping.limits import Limits
 from mbref.stepping.ranks import Ranks
 from mbref.taylor import driven, mode, sample_completion, stepper
@@ -192,22 +192,6 @@ def _(_):
     return near(found.step, 0.005 * 2.0)
 
 
-@check("design.linearisation MET")
-def _(monkeypatch):
-    def meets(phi):
-        terms = SimpleNamespace(jacobian=np.zeros((0, 6)), phi=np.array([phi]))
-        model = SimpleNamespace(length=1.0, nb=1, n=6, terms=lambda *_: terms)
-        monkeypatch.setattr(linearisation, "solve_positions", lambda *_: (np.zeros(7), None))
-        monkeypatch.setattr(linearisation, "displaced", lambda *_: None)
-        try:
-            linearisation.Tangent(model, np.zeros(7), None).pose(np.zeros(6))
-        except linearisation.OffConstraints:
-            return False
-        return True
-
-    return flips(meets, 0.98e-10, 1.02e-10)
-
-
 @check("design.along_motion SAME")
 def _(_):
     def moves(far):
@@ -354,8 +338,9 @@ def _(monkeypatch):
     return limits_of(monkeypatch, trial, lambda: trial._made(run)).most_steps == 2000
 
 
-@check("simulation.outcome ROUNDING")
-def _(_):
+@check("simulation.dead_position ROUNDED")
+def _(monkeypatch):
+    monkeypatch.setattr(outcome, "ROUNDED", dead_position.ROUNDED)
     return flips(lambda value: outcome._rounded(Ranks(1, 1.0, value)) == "", 0.98e-13, 1.02e-13)
 
 

@@ -3,7 +3,12 @@
 from pathlib import Path
 
 from tests import thresholds
-from tests.mbref import limits_of_equations, limits_of_runs, limits_of_scenes  # noqa: F401 - what is checked
+from tests.mbref import (  # noqa: F401 - what is checked
+    limits_of_equations,
+    limits_of_runs,
+    limits_of_scenes,
+    limits_of_solutions,
+)
 from tests.mbref.test_thresholds import interpreted
 from tests.mbref.threshold_checks import CHECKS
 
@@ -20,6 +25,7 @@ def test_each_checked_decision_outside_crossings_changes_at_its_threshold():
 
 def test_the_page_lists_all_thresholds_with_their_comments():
     assert PAGE.read_text() == thresholds.page(), "python -m tests.thresholds docs/internals/thresholds.md"
+    assert "| no |" not in PAGE.read_text(), "give the threshold a check, or put its name in thresholds.COSTS"
 
 
 def test_a_constant_is_read_with_its_value_and_comment():

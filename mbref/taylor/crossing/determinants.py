@@ -10,13 +10,11 @@ and T₁ · T₀.
 
 from __future__ import annotations
 
-from numpy import log
+from numpy import inf, log
 
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
 from mbref.taylor.partition import evaluate_gradient, freedoms
-
-SMALLEST = 1e-300  # smaller numbers are replaced by SMALLEST before their logarithm is computed
 
 
 @kernel
@@ -162,7 +160,8 @@ def determinant_by_null_vectors(memory):
     along, solver, rank = null_vector_product(memory), memory.solver, memory.partition.rank
     _, before = product_of_pivots(solver.past, rank)
     _, after = product_of_pivots(solver.last, rank)
-    return minors_oppose(along, memory), before + after + log(max(abs(along), SMALLEST))
+    size = log(abs(along)) if along != 0.0 else -inf
+    return minors_oppose(along, memory), before + after + size
 
 
 @kernel
