@@ -16,7 +16,7 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
-from mbref.kernels.scene_layout import ANGLE
+from mbref.kernels.scene_layout import COUPLED_ANGLE
 from mbref.lazy import LazyMapping
 from mbref.scene import Scene
 
@@ -89,7 +89,7 @@ def _add_coupled(
         if not place.part or place.of not in names:
             continue
         x, y = primitives.direction_first[p], primitives.turning_first[p]
-        turns = place.kind == ANGLE
+        turns = place.kind == COUPLED_ANGLE
         axis = rotations.cross(x, y) if turns else x
         if place.first < model.nb:
             axis = rotations.rotate(q[:, place.first, 3:], axis[None])
@@ -153,7 +153,7 @@ def _singular_values(matrices: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.svd(matrices, compute_uv=False))
 
 
-class Places(NamedTuple):
+class JointPlaces(NamedTuple):
     """For every joint: the body in whose coordinates its wrench is computed, first or second body (0 or 1),
     and its rows."""
 
@@ -164,10 +164,10 @@ class Places(NamedTuple):
 
 
 @functools.lru_cache(maxsize=MOST_KEPT)
-def _places(structure: Structure, names: tuple[str, ...]) -> Places:
+def _places(structure: Structure, names: tuple[str, ...]) -> JointPlaces:
     """Return the places of the named joints, which are the first joints in the structure."""
     of = np.array([names.index(name) for name in structure.row_joint if name in names], dtype=int)
     starts = np.searchsorted(of, np.arange(len(names)))
     bodies = structure.row_bodies[starts]
     side = (bodies[:, 1] < structure.nb).astype(int)
-    return Places(bodies[np.arange(len(names)), side], side, of, starts)
+    return JointPlaces(bodies[np.arange(len(names)), side], side, of, starts)

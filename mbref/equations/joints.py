@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import dist, sqrt
 from typing import NamedTuple
 
-from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
+from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 from mbref.scene import JOINT_TYPES, Joint, SceneError
 from mbref.scene_joints import X, Y, Z
 
@@ -14,10 +14,10 @@ Vector = tuple[float, float, float]
 
 ZERO = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, ANGLE: 1, SLIDE: 1}
+ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, COUPLED_ANGLE: 1, COUPLED_SLIDE: 1}
 # directions of the first and of the second body that stay perpendicular: the first two pairs keep the axes
 # parallel, the third prevents rotation about them
-ABOUT_AXIS = ((X, Z), (Y, Z), (X, Y))
+AROUND_AXIS = ((X, Z), (Y, Z), (X, Y))
 WITHOUT_AXIS = ((X, Y), (Y, Z), (Z, X))
 
 
@@ -44,7 +44,7 @@ def primitives_of(joint: Joint) -> list[Primitive]:
         return [Primitive(DISTANCE, point_first=first, point_second=second, length=dist(first, second))]
     if facts.condition == "perpendicular axes":
         return [coincident(first), perpendicular(*map(unit, joint.directions))]
-    axes, pairs = (frame(joint.directions[0]), ABOUT_AXIS) if joint.directions else (AXES, WITHOUT_AXIS)
+    axes, pairs = (frame(joint.directions[0]), AROUND_AXIS) if joint.directions else (AXES, WITHOUT_AXIS)
     parallel = [perpendicular(axes[j], axes[k]) for j, k in pairs[: len(facts.forbidden_rotations)]]
     if len(facts.forbidden_translations) == len(axes):
         return [coincident(first), *parallel]
@@ -111,10 +111,10 @@ def driven_displacement(anchor: Vector, axis: Vector) -> Primitive:
 def coordinate_angle(axis: Sequence[float], factor: float) -> Primitive:
     """Return the angle of the second body about the axis, times a factor, as a part of a row."""
     x, y, _ = frame(axis)
-    return Primitive(ANGLE, first=x, turning=y, second=x, length=factor)
+    return Primitive(COUPLED_ANGLE, first=x, turning=y, second=x, length=factor)
 
 
 def coordinate_displacement(anchor: Vector, axis: Sequence[float], factor: float) -> Primitive:
     """Return the displacement of the second body's anchor along the axis, times a factor, as a part of a
     row."""
-    return Primitive(SLIDE, point_first=anchor, point_second=anchor, first=unit(axis), length=factor)
+    return Primitive(COUPLED_SLIDE, point_first=anchor, point_second=anchor, first=unit(axis), length=factor)

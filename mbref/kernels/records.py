@@ -38,7 +38,7 @@ def dtype_of(record: type) -> np.dtype:
 
 
 @functools.cache
-def numbers_of(schema: type) -> np.dtype:
+def record_type_of(schema: type) -> np.dtype:
     """Return the NumPy type of a record of numbers."""
     numbers = {name: _number(name) for name in dtype_of(schema).names or ()}
     return np.dtype((type(schema.__name__, (Numbers,), {"__slots__": (), **numbers}), dtype_of(schema)))
@@ -56,4 +56,4 @@ def _number(name: str) -> property:
 def record(values: Schema) -> Schema:
     """Return the numbers of a record in their own memory, to be read and written by name."""
     kind: Any = type(values)
-    return np.array([values], dtype=numbers_of(kind))[0]
+    return np.array([values], dtype=record_type_of(kind))[0]

@@ -1,8 +1,8 @@
 """Solutions of least norm, and the null space, of dense equations: by QR if the rank is certain.
 
-Aᵀ P = Q R with column pivoting.  The rank is certain if the last nonzero pivot is at least CLEAR, for rows of
-length one, and the remaining entries are rounding. If the rank is not certain, or equations contradict each
-other, singular values decide; these take four times as long.
+Aᵀ P = Q R with column pivoting.  The rank is certain if the last nonzero pivot is at least NONZERO_PIVOT, for
+rows of length one, and the remaining entries are rounding. If the rank is not certain, or equations
+contradict each other, singular values decide; these take four times as long.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from mbref.kernels.memory_pool import acquire, release
 from mbref.kernels.named_memory import Indices, Matrix, Named, Vector, allocate
 from mbref.linear_algebra.orthogonal_factorisations import apply_reflectors, minimum_norm, qr_pivoted
 
-CLEAR, ROUNDING = 1e-3, 1e-11  # pivot / longest row: nonzero above CLEAR, zero below ROUNDING
-MET = 1e-13  # residual of a consistent row / largest entry of the solution
+NONZERO_PIVOT, ZERO_PIVOT = 1e-3, 1e-11  # pivot / longest row: nonzero above, zero below
+CONSISTENT = 1e-13  # residual of a consistent row / largest entry of the solution
 UNCLEAR = -1
 
 
@@ -53,9 +53,9 @@ def solve_clearly(tolerance, scratch):
     A pivot is nonzero if it exceeds ``tolerance`` times the longest row.
     """
     rank, n = qr_pivoted(tolerance, scratch), scratch.x.shape[0]
-    if rank > 0 and abs(scratch.transposed[rank - 1, rank - 1]) < CLEAR:
+    if rank > 0 and abs(scratch.transposed[rank - 1, rank - 1]) < NONZERO_PIVOT:
         return UNCLEAR
-    if largest_left(rank, scratch.transposed) > ROUNDING:
+    if largest_left(rank, scratch.transposed) > ZERO_PIVOT:
         return UNCLEAR
     minimum_norm(rank, scratch)
     for i in range(n):
@@ -85,7 +85,7 @@ def least_norm(matrix: np.ndarray, rhs: np.ndarray, tolerance: float) -> tuple[n
     rank = int(solve_clearly(tolerance, memory.packed.argument))
     x, basis = scratch.solution.copy(), scratch.basis[: n - rank].T.copy()
     release(memory)
-    if rank == UNCLEAR or np.abs(matrix @ x - rhs).max() > MET * max(1.0, np.abs(x).max()):
+    if rank == UNCLEAR or np.abs(matrix @ x - rhs).max() > CONSISTENT * max(1.0, np.abs(x).max()):
         return _by_singular_values(matrix, rhs, tolerance)
     return x, basis
 

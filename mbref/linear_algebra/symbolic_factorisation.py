@@ -15,7 +15,7 @@ import numpy as np
 
 from mbref.kernels import checked_file
 from mbref.kernels.compilation import CACHE
-from mbref.kernels.layout import SparseFactor, StaticRows, Symbolic
+from mbref.kernels.layout import SparseFactor, Symbolic
 from mbref.kernels.named_memory import allocate
 
 if TYPE_CHECKING:
@@ -93,25 +93,19 @@ def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
     return array.astype(np.uint32)
 
 
-def no_static_rows() -> StaticRows:
-    """Return a StaticRows object without rows."""
-    nothing, start = unsigned([]), unsigned([0])
-    return StaticRows(nothing, start, nothing, nothing, start, nothing)
-
-
 def empty_factor() -> SparseFactor:
     """Return memory of a factor without rows."""
     nothing = np.zeros(0, dtype=np.int64)
     return sparse_factor(symbolic_factorisation(nothing, nothing, nothing, np.zeros(0, dtype=bool)))
 
 
-def sparse_factor(symbolic: Symbolic, static: StaticRows | None = None) -> SparseFactor:
+def sparse_factor(symbolic: Symbolic) -> SparseFactor:
     """Return memory for the factor of this pattern."""
     sizes = {
         "nd": symbolic.d_entry.size, "nl": symbolic.l_row.size, "r": symbolic.row.size,
         "c": symbolic.column.size,
     }  # fmt: skip
-    return allocate(SparseFactor, sizes, symbolic=symbolic, static=static or no_static_rows())
+    return allocate(SparseFactor, sizes, symbolic=symbolic)
 
 
 def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -16,15 +16,16 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from numpy import inf
+
 from mbref.equations.coordinates import coordinate_rates, copy_state
 from mbref.equations.evaluation import assemble_system, evaluate
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCEPT, CHANGED, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR_AHEAD
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
 from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
-from mbref.linear_algebra.minimum_norm import NEVER
 from mbref.stabilisation.base import Stabilisation
-from mbref.stabilisation.projection import ROUNDING
+from mbref.stabilisation.projection import STUCK
 
 MOST_ITERATIONS = 20  # largest number of Newton steps for the dependent coordinates
 SINGULAR_PIVOT = 1e-13  # pivot of Φ_u (1, or 1/m) below which Φ_u is singular to rounding
@@ -85,7 +86,7 @@ def jacobian_by_euler_parameters(q, equations, a):
 
 
 @kernel
-def choose_partition(memory):
+def choose_coordinates(memory):
     """Choose the partition at ``memory.state``, the state of the last evaluation."""
     q, scratch, system = memory.state.coordinates, scratch_of(memory.chart), memory.equations.system
     a = scratch.jacobian
@@ -116,7 +117,7 @@ def enter(t, y, memory):
     state = memory.state
     coordinate_rates(state.coordinates, state.velocities, state.coordinate_rates)
     evaluate(t, state.coordinates, state.velocities, memory.equations)
-    choose_partition(memory)
+    choose_coordinates(memory)
     copy_state(state, memory.previous)
     memory.watch.accepted_time = t
     return gather_independent(y, memory)
@@ -143,7 +144,7 @@ def factorise_dependent(memory):
 
 
 @kernel
-def find_residual(memory):
+def find_violation(memory):
     """Compute Φ and pᵀp - 1 of the active rows into the residual; return the largest."""
     q, phi, scratch = memory.state.coordinates, memory.equations.rows.phi, scratch_of(memory.chart)
     m, rank, size, b = phi.shape[0], scratch.partition.rank, 0.0, scratch.residual
@@ -180,17 +181,17 @@ def solve_dependent_coordinates(t, y, memory):
     """
     state, scratch = memory.state, scratch_of(memory.chart)
     order, rank, b = scratch.column_order, scratch.partition.rank, scratch.residual
-    system, before = memory.equations.system, NEVER
+    system, before = memory.equations.system, inf
     tolerance = system.settings.newton_tolerance
     predict_dependent(t, memory)
     for i in range(order.shape[0] - rank):
         state.coordinates[order[rank + i]] = y[i]
     for _ in range(MOST_ITERATIONS):
         evaluate(t, state.coordinates, state.velocities, memory.equations)
-        violation = find_residual(memory)
+        violation = find_violation(memory)
         if not factorise_dependent(memory):
             return NOT_CONVERGED
-        if violation <= tolerance or before <= violation <= ROUNDING * tolerance:
+        if violation <= tolerance or before <= violation <= STUCK * tolerance:
             return OK
         before = violation
         system.counts.newton += 1
@@ -278,7 +279,7 @@ def accept(t, y, memory):
         partition.chosen_pivot = partition.pivot
     if partition.pivot < options_of(memory.chart_options).kept * partition.chosen_pivot:
         rank = partition.rank
-        choose_partition(memory)
+        choose_coordinates(memory)
         if partition.rank < rank:
             return SINGULAR_AHEAD
         gather_independent(y, memory)

@@ -26,7 +26,7 @@ REACHED = 1e-3  # relative pivot below which a step has reached a singular posit
 # relative pivot inside a step below which it counts as zero, because the pose is interpolated
 VANISHED = 1e-2
 ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
-SEARCH, EXACT = 30, 1e-9  # evaluations that locate a zero, and accuracy of its place relative to the step
+SEARCH, PLACE_ERROR = 30, 1e-9  # evaluations that locate a zero, and error of its place / step
 
 
 @kernel
@@ -132,7 +132,7 @@ def zero_of_pivot(k, h, memory):
         else:
             low, at_low = high, at_high
         high, at_high = part, found
-        if abs(high - low) < EXACT or found == 0.0:
+        if abs(high - low) < PLACE_ERROR or found == 0.0:
             break
     return part
 

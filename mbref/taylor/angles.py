@@ -14,7 +14,7 @@ from mbref.kernels.compilation import inlined, kernel
 
 
 @inlined
-def direction(s, first, order, variables, torsions):
+def components(s, first, order, variables, torsions):
     """Return the three components, of order 0 or 1, of a direction; ``first`` is the index of the first
     component."""
     x, y, z = 0.0, 0.0, 0.0
@@ -43,9 +43,9 @@ def add_angles(memory):
     nz = memory.solver.pivot_columns.shape[0]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            f, near = direction(s, 6, 0, terms, torsions), memory.angles[s]
-            cosine = inner(direction(s, 0, 0, terms, torsions), f)
-            sine = inner(direction(s, 3, 0, terms, torsions), f)
+            f, near = components(s, 6, 0, terms, torsions), memory.angles[s]
+            cosine = inner(components(s, 0, 0, terms, torsions), f)
+            sine = inner(components(s, 3, 0, terms, torsions), f)
             angle = arctan2(sine, cosine)
             angle += 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
             phi[nz + torsions.row[s]] += torsions.factor[s] * angle
@@ -58,9 +58,9 @@ def add_angle_rates(memory):
     nz = memory.solver.pivot_columns.shape[0]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            e1, e1_rate = direction(s, 0, 0, terms, torsions), direction(s, 0, 1, terms, torsions)
-            e2, e2_rate = direction(s, 3, 0, terms, torsions), direction(s, 3, 1, terms, torsions)
-            f, f_rate = direction(s, 6, 0, terms, torsions), direction(s, 6, 1, terms, torsions)
+            e1, e1_rate = components(s, 0, 0, terms, torsions), components(s, 0, 1, terms, torsions)
+            e2, e2_rate = components(s, 3, 0, terms, torsions), components(s, 3, 1, terms, torsions)
+            f, f_rate = components(s, 6, 0, terms, torsions), components(s, 6, 1, terms, torsions)
             cosine, sine = inner(e1, f), inner(e2, f)
             cosine_rate = inner(e1_rate, f) + inner(e1, f_rate)
             sine_rate = inner(e2_rate, f) + inner(e2, f_rate)
@@ -75,8 +75,8 @@ def add_angle_gradients(variables, matrix, memory):
     form = torsions.form
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            e1, e2 = direction(s, 0, 0, variables, torsions), direction(s, 3, 0, variables, torsions)
-            f, at = direction(s, 6, 0, variables, torsions), 9 * s
+            e1, e2 = components(s, 0, 0, variables, torsions), components(s, 3, 0, variables, torsions)
+            f, at = components(s, 6, 0, variables, torsions), 9 * s
             cosine, sine = inner(e1, f), inner(e2, f)
             factor = torsions.factor[s] / (cosine * cosine + sine * sine)
             for i in range(form.shape[1]):

@@ -12,7 +12,7 @@ from mbref.equations.packing import Packs, row_of
 from mbref.kernels.scene_layout import Loads, Primitives, SceneData
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates, pose_of, unit_of_length
-from mbref.taylor.numbers import Batch
+from mbref.taylor.numbers import ManyScenes
 from mbref.taylor.polynomials import Geometry
 
 
@@ -31,7 +31,7 @@ class Models:
     Masses, gravity and forces of ``data`` are arrays whose first axis counts the scenes.
     """
 
-    def __init__(self, packs: Packs, places: Sequence[int], batch: Batch):
+    def __init__(self, packs: Packs, places: Sequence[int], batch: ManyScenes):
         first = Model(packs.scenes[places[0]], packs, places[0])
         self.nb, self.index, self.length = first.nb, first.index, first.length
         self.bodies = first.bodies
@@ -42,7 +42,7 @@ class Models:
         self.data = _numbers(row_of(packs.data, places), batch)
 
 
-def _joint(joints: Sequence[Any], batch: Batch) -> JointNumbers:
+def _joint(joints: Sequence[Any], batch: ManyScenes) -> JointNumbers:
     """Return one joint with the numbers of all scenes."""
     first = joints[0]
     directions, anchors = (
@@ -52,7 +52,7 @@ def _joint(joints: Sequence[Any], batch: Batch) -> JointNumbers:
     return JointNumbers(first.facts, first.bodies, tuple(directions), tuple(anchors))
 
 
-def _numbers(data: SceneData, batch: Batch) -> SceneData:
+def _numbers(data: SceneData, batch: ManyScenes) -> SceneData:
     """Return data with the numbers of all scenes."""
     loads = Loads(*map(batch.together, data.loads))._replace(force=data.loads.force)
     return data._replace(primitives=Primitives(*map(batch.together, data.primitives)), loads=loads)
@@ -69,7 +69,7 @@ def equations_of_all(
     """
     if not places:
         return [], []
-    batch, of_places = Batch(len(places)), [*places]
+    batch, of_places = ManyScenes(len(places)), [*places]
     unit = unit_of_length(packs.length[places[0]])
     batch.agree &= np.array([unit_of_length(length) == unit for length in packs.length[of_places]])
     models: Any = Models(packs, places, batch)
@@ -90,7 +90,7 @@ def equations_of_all(
     return varied, [place for place, agrees in zip(places, batch.agree, strict=True) if agrees]
 
 
-def _values_of_all(target: np.ndarray, source: np.ndarray, batch: Batch) -> np.ndarray | None:
+def _values_of_all(target: np.ndarray, source: np.ndarray, batch: ManyScenes) -> np.ndarray | None:
     """Return the values (s, …) of an array of the equations; None if the array has another structure."""
     if source.dtype == object:
         source = batch.spread(source)

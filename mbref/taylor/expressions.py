@@ -16,9 +16,9 @@ Expression = dict[int, float]
 Polynomial = dict[tuple[int, int], float]
 
 ONE = -1
-ROUNDING = 1e-12  # relative size below which coefficients count as zero
+NEGLIGIBLE = 1e-12  # relative size below which coefficients count as zero
 VANISHING = 1e-9  # an equation with smaller coefficients follows from other equations, within rounding
-DEPENDENT = 1e-9  # largest coefficient / original coefficient: a smaller polynomial is dependent
+DEPENDENT_POLYNOMIAL = 1e-9  # largest coefficient / original coefficient: a smaller polynomial is dependent
 
 
 def combination(*terms: tuple[float, Expression]) -> Expression:
@@ -32,7 +32,7 @@ def combination(*terms: tuple[float, Expression]) -> Expression:
 
 def cleaned(expression: dict[Key, float]) -> dict[Key, float]:
     """Return an expression without coefficients of round-off size."""
-    small = ROUNDING * largest(expression.values())
+    small = NEGLIGIBLE * largest(expression.values())
     return {key: value for key, value in expression.items() if abs(value) > small}
 
 
@@ -60,7 +60,7 @@ def significant(equation: dict[Key, float], constant: Key) -> dict[Key, float]:
     """Return a polynomial without coefficients of round-off size; only the constant if all other coefficients
     vanish."""
     size = largest(c for key, c in equation.items() if key != constant)
-    small = ROUNDING if size > VANISHING else VANISHING
+    small = NEGLIGIBLE if size > VANISHING else VANISHING
     return {key: c for key, c in equation.items() if abs(c) > small or key == constant}
 
 
@@ -134,7 +134,7 @@ def independent(polynomials: Sequence[Polynomial]) -> list[Polynomial]:
         for monomial, other in reduced.items():
             if monomial in rest:
                 _subtract(rest, rest[monomial], other)
-        rest = {k: v for k, v in rest.items() if abs(v) > DEPENDENT * size}
+        rest = {k: v for k, v in rest.items() if abs(v) > DEPENDENT_POLYNOMIAL * size}
         lead = max((k for k in rest if k != (ONE, ONE)), key=lambda k: abs(of_first(rest[k])), default=None)
         if lead is None:
             continue

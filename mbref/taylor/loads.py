@@ -10,20 +10,9 @@ from mbref.equations.functions import expand_function
 from mbref.kernels.compilation import inlined, kernel
 
 VALUE, COSINE, SINE = range(3)  # functions of a driver's value
-VECTOR_OF, LENGTH, INVERSE, RATE, PULL, SPRING_SERIES = 0, 3, 4, 5, 6, 7
-E1, E2, F, COS, SIN, ANGLE, MOMENT, MOMENT_COS, MOMENT_SIN, TORSION_SERIES = (
-    0,
-    3,
-    6,
-    9,
-    10,
-    11,
-    12,
-    13,
-    14,
-    15,
-)
-AXIS, BETWEEN, ALONG, FORCE, SLIDE_SERIES = 0, 3, 6, 7, 8
+SPRING_VECTOR, SPRING_LENGTH, SPRING_INVERSE, SPRING_RATE, SPRING_PULL, SPRING_SERIES = 0, 3, 4, 5, 6, 7
+E1, E2, F, COS, SIN, TURN, TORQUE, TORQUE_COS, TORQUE_SIN, TORSION_SERIES = 0, 3, 6, *range(9, 16)
+SLIDE_AXIS, SLIDE_VECTOR, SLID, PUSH, SLIDE_SERIES = 0, 3, 6, 7, 8
 
 
 @inlined
@@ -99,7 +88,7 @@ def grow_springs(k, memory):
         for c in range(3):
             grow_form(springs.constant[s, c], springs.form[3 * s + c], k, variables, of[c])
             square += product_order(of[c], of[c], k)
-        length, inverse = of[LENGTH], of[INVERSE]
+        length, inverse = of[SPRING_LENGTH], of[SPRING_INVERSE]
         if k == 0:
             length[0] = sqrt(square)
             inverse[0] = 1.0 / length[0] if has_direction(s, springs) else 0.0
@@ -111,7 +100,7 @@ def grow_springs(k, memory):
             for i in range(1, k + 1):
                 value -= length[i] * inverse[k - i]
             inverse[k] = value * inverse[0]
-            of[RATE, k - 1] = k * length[k]
+            of[SPRING_RATE, k - 1] = k * length[k]
 
 
 @kernel
@@ -121,11 +110,11 @@ def add_springs(k, memory):
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
-        pull = springs.damping[s] * product_order(of[RATE], of[INVERSE], k)
-        pull -= springs.stiffness[s] * springs.natural[s] * of[INVERSE, k]
-        of[PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
+        pull = springs.damping[s] * product_order(of[SPRING_RATE], of[SPRING_INVERSE], k)
+        pull -= springs.stiffness[s] * springs.natural[s] * of[SPRING_INVERSE, k]
+        of[SPRING_PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
         for c in range(3):
-            value, form = product_order(of[PULL], of[c], k), springs.form[3 * s + c]
+            value, form = product_order(of[SPRING_PULL], of[c], k), springs.form[3 * s + c]
             for i in range(nz):
                 sums[k, i] += value * form[i]
 
@@ -142,9 +131,9 @@ def time_to_no_length(memory):
     for s in range(springs.stiffness.shape[0]):
         of, speed = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)], 0.0
         for c in range(3):
-            speed += of[VECTOR_OF + c, 1] * of[VECTOR_OF + c, 1]
+            speed += of[SPRING_VECTOR + c, 1] * of[SPRING_VECTOR + c, 1]
         if has_direction(s, springs) and speed > 0.0:
-            shortest = min(shortest, of[LENGTH, 0] / sqrt(speed))
+            shortest = min(shortest, of[SPRING_LENGTH, 0] / sqrt(speed))
     return shortest
 
 
@@ -185,12 +174,12 @@ def grow_torsions(k, memory):
         of[COS, k], of[SIN, k] = cosine, sine
         if k == 0:
             angle, near = arctan2(sine, cosine), memory.angles[s]
-            of[ANGLE, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
+            of[TURN, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
         else:
             value = 0.0
             for i in range(1, k + 1):
                 value += i * (of[COS, k - i] * of[SIN, i] - of[SIN, k - i] * of[COS, i])
-            of[ANGLE, k] = value / k
+            of[TURN, k] = value / k
 
 
 @kernel
@@ -200,20 +189,20 @@ def add_torsions(k, memory):
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        angle = of[ANGLE, k] - torsions.natural[s] if k == 0 else of[ANGLE, k]
-        of[MOMENT, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[ANGLE, k + 1]
-        of[MOMENT, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
+        angle = of[TURN, k] - torsions.natural[s] if k == 0 else of[TURN, k]
+        of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TURN, k + 1]
+        of[TORQUE, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
         if torsions.row[s] >= 0:
-            of[MOMENT, k] = 0.0
+            of[TORQUE, k] = 0.0
             add_coupled_angle(s, k, of, memory)
-        of[MOMENT_COS, k] = product_order(of[MOMENT], of[COS], k)
-        of[MOMENT_SIN, k] = product_order(of[MOMENT], of[SIN], k)
+        of[TORQUE_COS, k] = product_order(of[TORQUE], of[COS], k)
+        of[TORQUE_SIN, k] = product_order(of[TORQUE], of[SIN], k)
         for c in range(3):
             on_e2, on_e1 = (
-                product_order(of[MOMENT_COS], of[F + c], k),
-                product_order(of[MOMENT_SIN], of[F + c], k),
+                product_order(of[TORQUE_COS], of[F + c], k),
+                product_order(of[TORQUE_SIN], of[F + c], k),
             )
-            on_f = product_order(of[MOMENT_COS], of[E2 + c], k) - product_order(of[MOMENT_SIN], of[E1 + c], k)
+            on_f = product_order(of[TORQUE_COS], of[E2 + c], k) - product_order(of[TORQUE_SIN], of[E1 + c], k)
             e1, e2 = torsions.form[9 * s + E1 + c], torsions.form[9 * s + E2 + c]
             f = torsions.form[9 * s + F + c]
             for i in range(nz):
@@ -231,9 +220,9 @@ def add_coupled_angle(s, k, of, memory):
     torsions, terms, sums = memory.polynomials.torsions, memory.series.terms, memory.series.sums
     lane, factor = memory.solver.pivot_columns.shape[0] + torsions.row[s], torsions.factor[s]
     if k > 0:
-        of[MOMENT, k - 1] = factor * terms[k + 1, lane]
-        of[MOMENT_COS, k - 1] = product_order(of[MOMENT], of[COS], k - 1)
-        of[MOMENT_SIN, k - 1] = product_order(of[MOMENT], of[SIN], k - 1)
+        of[TORQUE, k - 1] = factor * terms[k + 1, lane]
+        of[TORQUE_COS, k - 1] = product_order(of[TORQUE], of[COS], k - 1)
+        of[TORQUE_SIN, k - 1] = product_order(of[TORQUE], of[SIN], k - 1)
     order, cosine, sine = k + 2, 0.0, 0.0
     for c in range(3):
         for i in range(1, order):
@@ -255,8 +244,8 @@ def grow_slides(k, memory):
         for c in range(6):
             grow_form(slides.constant[s, c], slides.form[6 * s + c], k, variables, of[c])
         for c in range(3):
-            along += product_order(of[AXIS + c], of[BETWEEN + c], k)
-        of[ALONG, k] = along
+            along += product_order(of[SLIDE_AXIS + c], of[SLIDE_VECTOR + c], k)
+        of[SLID, k] = along
 
 
 @kernel
@@ -266,13 +255,13 @@ def add_slides(k, memory):
     slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(slides.stiffness.shape[0]):
         of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
-        along = of[ALONG, k] - slides.natural[s] if k == 0 else of[ALONG, k]
-        of[FORCE, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[ALONG, k + 1]
-        of[FORCE, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)
+        along = of[SLID, k] - slides.natural[s] if k == 0 else of[SLID, k]
+        of[PUSH, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[SLID, k + 1]
+        of[PUSH, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)
         for c in range(3):
-            on_vector = product_order(of[FORCE], of[AXIS + c], k)
-            on_axis = product_order(of[FORCE], of[BETWEEN + c], k)
-            axis, between = slides.form[6 * s + AXIS + c], slides.form[6 * s + BETWEEN + c]
+            on_vector = product_order(of[PUSH], of[SLIDE_AXIS + c], k)
+            on_axis = product_order(of[PUSH], of[SLIDE_VECTOR + c], k)
+            axis, between = slides.form[6 * s + SLIDE_AXIS + c], slides.form[6 * s + SLIDE_VECTOR + c]
             for i in range(nz):
                 sums[k, i] += on_vector * between[i] + on_axis * axis[i]
 

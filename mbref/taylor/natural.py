@@ -17,7 +17,7 @@ import numpy as np
 
 from mbref import rotations
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import ANGLE, DISTANCE, DOT1, DOT2, POINT, SLIDE
+from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
 from mbref.taylor.expressions import (
     ONE,
@@ -33,7 +33,7 @@ from mbref.taylor.expressions import (
     significant,
 )
 from mbref.taylor.loads import COSINE, SINE, VALUE
-from mbref.taylor.numbers import Batch, OneScene, largest, scalar
+from mbref.taylor.numbers import ManyScenes, OneScene, largest, scalar
 from mbref.taylor.orientations import Orientations, Triple
 
 MOST_TERMS = 40  # largest number of terms of an equation that eliminates a position
@@ -69,7 +69,9 @@ class NaturalCoordinates:
     rows.
     """
 
-    def __init__(self, model: Model, pose: Pose, moving: np.ndarray, driven: bool, numbers: OneScene | Batch):
+    def __init__(
+        self, model: Model, pose: Pose, moving: np.ndarray, driven: bool, numbers: OneScene | ManyScenes
+    ):
         self.model, self.nb, self.driven, self.numbers = model, model.nb, driven, numbers
         self.length = unit_of_length(model.length)
         self.place, axes = pose.centres / self.length, pose.axes
@@ -122,7 +124,7 @@ class NaturalCoordinates:
         self.eliminate.settle()
         kinds = self.model.data.primitives.kind
         rows, turned = [], set()
-        for p in np.flatnonzero((kinds != POINT) & (kinds != ANGLE) & (kinds != SLIDE)).tolist():
+        for p in np.flatnonzero(~np.isin(kinds, (POINT, COUPLED_ANGLE, COUPLED_SLIDE))).tolist():
             number = self._turned(p)
             if number is not None and number not in turned:
                 turned.add(number)
@@ -161,7 +163,7 @@ class NaturalCoordinates:
             size = largest(factors)
             angles = []
             for p, factor in zip(pair, factors, strict=True):
-                if primitives.kind[p] == ANGLE:
+                if primitives.kind[p] == COUPLED_ANGLE:
                     angles.append((p, factor / size))
                 else:
                     axis = self.direction(int(primitives.first[p]), primitives.direction_first[p])
@@ -175,7 +177,7 @@ class NaturalCoordinates:
 
     def _unit(self, p: int) -> float:
         """Return the unit of a joint coordinate: the unit of length (m), or one radian."""
-        return self.length if self.model.data.primitives.kind[p] == SLIDE else 1.0
+        return self.length if self.model.data.primitives.kind[p] == COUPLED_SLIDE else 1.0
 
     def _is_prescribed(self, row: Polynomial) -> bool:
         """Return whether a row has a driver; such a row eliminates nothing, because M would depend on

@@ -28,7 +28,7 @@ class OneScene:
         return np.asarray(values != 0.0)
 
 
-class Batch:
+class ManyScenes:
     """The scenes of a batch: ``agree`` (s,) are the scenes that made all decisions like the first scene."""
 
     number_type: type = object
@@ -73,7 +73,7 @@ class Numbers:
 
     __slots__ = ("batch", "values")
 
-    def __init__(self, values: np.ndarray, batch: Batch):
+    def __init__(self, values: np.ndarray, batch: ManyScenes):
         self.values, self.batch = values, batch
 
     def _with(self, values: np.ndarray) -> Numbers:

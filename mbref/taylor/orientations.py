@@ -12,7 +12,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.model import Model
 from mbref.taylor.direction_vectors import DirectionVectors, direction_forms
-from mbref.taylor.expressions import ONE, ROUNDING, Expression, Polynomial, cleaned, product_sum
+from mbref.taylor.expressions import NEGLIGIBLE, ONE, Expression, Polynomial, cleaned, product_sum
 from mbref.taylor.numbers import dot, norm, scalar
 
 PARALLEL = 1e-9  # sine of an angle between axes below which they are parallel
@@ -210,7 +210,7 @@ class Orientations:
             ]
             for one, other in itertools.combinations(anchors, 2):
                 arm = self._world_of(name, np.subtract(other, one))
-                if (length := norm(arm)) > ROUNDING:
+                if (length := norm(arm)) > NEGLIGIBLE:
                     yield arm / length
             yield from self._axes[b].T
 

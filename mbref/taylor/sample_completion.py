@@ -7,15 +7,13 @@ Multipliers balance the forces in the metric of a projection, so that bodies may
 
 from __future__ import annotations
 
-from mbref.equations.evaluation import add_static_multipliers, evaluate
+from mbref.equations.evaluation import evaluate
 from mbref.equations.functions import select_pieces
-from mbref.equations.primitives import constraints
 from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import OK, SINGULAR
-from mbref.linear_algebra.minimum_norm import find_least_multipliers
+from mbref.linear_algebra.minimum_norm import ALPHA, find_least_multipliers
 from mbref.linear_algebra.sparse_cholesky import regularised_factor
 from mbref.linear_algebra.vectors import copy
-from mbref.stabilisation.projection import ALPHA
 from mbref.stepping.loop import take_sample
 from mbref.taylor.layout import SAMPLE, SERIES
 from mbref.taylor.loads import expand_functions
@@ -121,9 +119,6 @@ def balance_forces(t, run):
     if not regularised_factor(factor, system.blocks.reshape(-1), equations.scene.metric_root, ALPHA):
         return SINGULAR
     find_least_multipliers(factor, system.force, system.multipliers)
-    if equations.scene.resting.shape[0] > 0:
-        constraints(t, equations.scene.resting, equations)
-    add_static_multipliers(factor.static, system)
     return OK
 
 

@@ -44,7 +44,7 @@ def find_poses(memory):
 
 
 @inlined
-def turning(a, a_rate, out):
+def put_axial_vector(a, a_rate, out):
     """Compute the axial vector (3,) of the skew part of Aᵀ A', from rotation matrices by rows (9,)."""
     for k in range(3):
         i, j = (k + 2) % 3, (k + 1) % 3
@@ -93,8 +93,8 @@ def put_state(memory):
             v[6 * b + k] = pose[1, place + k]
             acceleration[6 * b + k] = pose[2, place + k]
         put_quaternion(pose[0, axes], q[7 * b + 3 : 7 * b + 7])
-        turning(pose[0, axes], pose[1, axes], v[6 * b + 3 : 6 * b + 6])
-        turning(pose[0, axes], pose[2, axes], acceleration[6 * b + 3 : 6 * b + 6])
+        put_axial_vector(pose[0, axes], pose[1, axes], v[6 * b + 3 : 6 * b + 6])
+        put_axial_vector(pose[0, axes], pose[2, axes], acceleration[6 * b + 3 : 6 * b + 6])
 
 
 @kernel

@@ -35,7 +35,7 @@ class VectorType(types.Type):
         super().__init__(name="Vector")
 
 
-vector = VectorType()
+SIMD = VectorType()
 
 
 @register_model(VectorType)
@@ -59,14 +59,14 @@ def _operation(function: Callable, name: str) -> None:
         def generic(self, arguments, keywords):
             left, right = arguments
             if isinstance(right, VectorType) and isinstance(left, VectorType | types.Float):
-                return signature(vector, vector if isinstance(left, VectorType) else f8, vector)
+                return signature(SIMD, SIMD if isinstance(left, VectorType) else f8, SIMD)
             return None
 
-    @lower_builtin(function, vector, vector)
+    @lower_builtin(function, SIMD, SIMD)
     def of_vectors(context, builder, _, arguments):
         return getattr(builder, name)(*arguments, flags=("contract",))
 
-    @lower_builtin(function, f8, vector)
+    @lower_builtin(function, f8, SIMD)
     def of_number(context, builder, _, arguments):
         number, other = arguments
         return getattr(builder, name)(_repeated(builder, number), other, flags=("contract",))
@@ -88,7 +88,7 @@ def _load(typing, array, offset):
         loaded.align = WIDTH
         return loaded
 
-    return vector(array, i8), generate
+    return SIMD(array, i8), generate
 
 
 @intrinsic
@@ -98,7 +98,7 @@ def _store(typing, value, array, offset):
         builder.store(arguments[0], builder.bitcast(place, VECTOR.as_pointer())).align = WIDTH
         return context.get_dummy_value()
 
-    return types.void(vector, array, i8), generate
+    return types.void(SIMD, array, i8), generate
 
 
 @intrinsic
@@ -113,7 +113,7 @@ def _gather(typing, array, offset, lanes, first):
             value = builder.insert_element(value, number, ir.IntType(32)(k))
         return value
 
-    return vector(array, i8, lanes, i8), generate
+    return SIMD(array, i8, lanes, i8), generate
 
 
 @intrinsic
@@ -130,7 +130,7 @@ def _max_abs(typing, of):
             apart //= 2
         return builder.extract_element(largest, ir.IntType(32)(0))
 
-    return f8(vector), generate
+    return f8(SIMD), generate
 
 
 def _plain_max_abs(of):

@@ -31,7 +31,7 @@ def put_code(taylor: TaylorMemory) -> Code:
 
     Raises NoGeneratedCode if the functions would be too long, or without the JIT.
     """
-    names = functions_of(taylor)
+    names = names_of_functions(taylor)
     code = code_of(taylor, names)
     addresses: Any = taylor.code
     addresses.rank = rank_of_rows(taylor)
@@ -54,7 +54,7 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
     return code_at(CACHE / "scenes" / f"{_key(taylor, names)}.code", lambda: write_code(taylor, names))
 
 
-def functions_of(taylor: TaylorMemory) -> tuple[str, ...]:
+def names_of_functions(taylor: TaylorMemory) -> tuple[str, ...]:
     """Return the names of a scene's functions: loads that vary are no sums of products of series, and
     elimination of many rows is left to the kernels' loops."""
     has_constant_loads = not varies(taylor.polynomials)
