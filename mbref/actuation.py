@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
-from mbref.joint_motion import along, joint_motion, place_of, turned_since_start, velocity_of
+from mbref.joint_motion import along, joint_motion, position_of, turned_since_start, velocity_of
 from mbref.scene import JointLoad, Scene, Spring
 from mbref.scene_joints import ANGLE
 from mbref.trajectory import Trajectory
@@ -119,7 +119,7 @@ def _of_joint(scene: Scene, motion: Trajectory, place: int, load: JointLoad) -> 
 
 def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadMotion:
     ends = list(zip(load.bodies, load.points, strict=True))
-    start, stop = (place_of(scene, motion, *end) for end in ends)
+    start, stop = (position_of(scene, motion, *end) for end in ends)
     start_rate, stop_rate = (velocity_of(scene, motion, *end) for end in ends)
     length = np.linalg.norm(stop - start, axis=1)
     direction = (stop - start) / np.where(length > 0, length, 1.0)[:, None]

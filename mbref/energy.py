@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
-from mbref.joint_motion import along, joint_motion, place_of
+from mbref.joint_motion import along, joint_motion, position_of
 from mbref.scene import JointLoad, Scene
 from mbref.trajectory import Trajectory
 
@@ -42,7 +42,7 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
     total = -np.einsum("b,kbi,i->k", mass, motion.position, np.array(scene.gravity))
     for load in scene.load:
         if load.type == "spring":
-            ends = [place_of(scene, motion, b, p) for b, p in zip(load.bodies, load.points, strict=True)]
+            ends = [position_of(scene, motion, b, p) for b, p in zip(load.bodies, load.points, strict=True)]
             stretch = np.linalg.norm(ends[1] - ends[0], axis=1) - load.natural_length
             total = total + load.stiffness * stretch**2 / 2
         elif isinstance(load, JointLoad) and load.action.stiffness:

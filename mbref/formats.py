@@ -93,7 +93,7 @@ def add_options(parser: Any) -> None:
     )
 
 
-def options_of(arguments: argparse.Namespace) -> ImportOptions:
+def import_options(arguments: argparse.Namespace) -> ImportOptions:
     """Return the options that a command line gives."""
     kinds = [word.strip() for word in arguments.without.split(",") if word.strip()]
     pose = dict(arguments.pose)

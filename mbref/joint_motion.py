@@ -75,7 +75,7 @@ def along(found: JointMotion, coordinate: Coordinate) -> tuple[np.ndarray, np.nd
     return np.asarray(value), np.asarray(rate)
 
 
-def place_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
+def position_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
     """Return world positions (k, 3) of a point (world, t = 0) that moves with a body, or is fixed to the
     ground."""
     b = scene.body_index(name)
@@ -91,7 +91,7 @@ def velocity_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float,
     b = scene.body_index(name)
     if b < 0:
         return np.zeros((len(motion.times), 3))
-    arm = place_of(scene, motion, name, point) - motion.position[:, b]
+    arm = position_of(scene, motion, name, point) - motion.position[:, b]
     return np.asarray(motion.velocity[:, b] + rotations.cross(motion.angular_velocity[:, b], arm))
 
 
@@ -129,7 +129,7 @@ def _displacement(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return (r₂ - r₁)·axis (k,), m, of anchors and the axis that the first body carries, and its rate."""
     ends = list(zip(joint.bodies, joint.anchor_pair, strict=True))
-    places = [place_of(scene, motion, *end) for end in ends]
+    places = [position_of(scene, motion, *end) for end in ends]
     speeds = [velocity_of(scene, motion, *end) for end in ends]
     axis = rotations.rotate(first, rotations.unit(joint.directions[0])[None])
     turning = rotations.cross(_angular_velocity(scene, motion, joint.bodies[0]), axis)

@@ -21,7 +21,7 @@ from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.tuning import by_closure, by_error, tuned
-from mbref.formats import options_of
+from mbref.formats import import_options
 
 
 def compare(arguments: argparse.Namespace) -> int:
@@ -39,7 +39,7 @@ def compare(arguments: argparse.Namespace) -> int:
         asked.chosen.is_named,
     )
     found = collected(asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice)
-    words = options_of(arguments).words()
+    words = import_options(arguments).words()
     paths = {
         s.name: shlex.join([path, *words]) for s, path in zip(asked.scenes, arguments.scene, strict=True)
     }
@@ -61,7 +61,7 @@ def compare(arguments: argparse.Namespace) -> int:
 
 def tune(arguments: argparse.Namespace) -> int:
     """Print the cheapest settings of an engine that reach an error; returns 1 if no setting reaches it."""
-    reading = options_of(arguments)
+    reading = import_options(arguments)
     (scene,) = scene_request.find_scenes([arguments.scene], reading, notice)
     path = shlex.join([arguments.scene, *reading.words()])
     (name,) = request.find_engines([arguments.engine], notice)

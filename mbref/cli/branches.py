@@ -14,7 +14,7 @@ from mbref.trajectory import Outcome
 FRAMES = 101  # number of samples of a motion
 
 
-def chosen(smooth: Motion, number: int | None) -> int:
+def chosen_crossing(smooth: Motion, number: int | None) -> int:
     """Return the number, from 1, of the chosen singular position; without a choice, of the first position
     with several branches.
 

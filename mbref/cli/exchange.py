@@ -49,7 +49,7 @@ def _import(options: argparse.Namespace) -> int:
     out = Path(options.out or Path(options.file).with_suffix(".toml"))
     if out.suffix != ".toml":
         raise ValueError(f"--out: must end in .toml, got {str(out)!r}")
-    found = formats.read(options.file, formats.options_of(options))
+    found = formats.read(options.file, formats.import_options(options))
     found.scene.save(out)
     status = _report(out, found.left_out)
     for sentence in found.notes:

@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.branches import along_branches, chosen, of_several_branches, sentence
+from mbref.cli.branches import along_branches, chosen_crossing, of_several_branches, sentence
 from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, progress_bar, warn
 from mbref.drawing.film import png, write_film
@@ -93,7 +93,7 @@ def _animate(options: argparse.Namespace) -> int:
         motion = simulate(*run, progress)
         motions, picture = {"": motion}, partial(moving, scene, motion, view)
         if parted:
-            number = chosen(motion, options.crossing)
+            number = chosen_crossing(motion, options.crossing)
             motions = along_branches(simulate, motion, run.method, run.limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
     if path.suffix == ".svg":

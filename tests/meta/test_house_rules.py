@@ -101,6 +101,18 @@ def test_public_functions_say_what_they_do(package):
     assert not silent, silent
 
 
+def test_a_name_of_a_function_has_one_meaning_in_mbref():
+    """Or it is the name that each method, integrator, kind of array or file gives to one thing."""
+    interface = {"accelerate", "accept", "add", "enter", "first_step", "propose", "rates", "step"}
+    alike = {"cross", "dot", "iterate", "largest", "norm", "prepare", "read", "unit", "write"}
+    bodies: dict[str, set[str]] = {}
+    for node in (node for path in files("mbref") for node in parsed(path).body):
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+            bodies.setdefault(node.name, set()).add(ast.dump(node))
+    double = {word for word, different in bodies.items() if len(different) > 1}
+    assert double == interface | alike, double ^ (interface | alike)
+
+
 def test_the_guide_lists_every_method():
     text = (ROOT / "docs" / "methods.md").read_text()
     listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))

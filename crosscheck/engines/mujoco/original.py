@@ -22,7 +22,7 @@ from crosscheck.engines.mujoco.importing.loads import controlled, is_motor, moto
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
-from mbref.formats import ImportOptions, OriginalRun, add_options, options_of
+from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -224,4 +224,4 @@ class _Original:
 def _import_options(options: Mapping[str, Any]) -> ImportOptions:
     parser = argparse.ArgumentParser(add_help=False)
     add_options(parser)
-    return options_of(parser.parse_args(shlex.split(str(options.get("import", "")))))
+    return import_options(parser.parse_args(shlex.split(str(options.get("import", "")))))
