@@ -46,6 +46,7 @@ NUMBERS = {
 COSTS = {
     "MOST_KEPT",
     "MOST_NAMES",
+    "MOST_PARTS",
     "MOST_PATTERNS",
     "MOST_SHAPES",
     "MOST_CHECKED",

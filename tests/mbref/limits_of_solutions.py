@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from mbref import scene_fields, scene_slips
-from mbref.design import assemble, equilibrium, linearisation, turning
+from mbref.design import assemble, equilibrium, linearisation, offsets, turning
 from mbref.equations import diagnosis, initial_state
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
@@ -475,3 +475,40 @@ def _(monkeypatch):
     monkeypatch.setattr(linearisation, "UNCHANGED", turning.UNCHANGED)
     by_rows = flips(lambda phi: not turned(monkeypatch, phi=phi)[0], 0.98e-9, 1.02e-9)
     return by_rows and flips(lambda change: not turned(monkeypatch, change=change)[0], 0.98e-9, 1.02e-9)
+
+
+# --- offsets of couplings -------------------------------------------------------------------------------
+def displaced(monkeypatch, entry, residual=0.0):
+    """A function of a displacement: the function by which offsets are solved then moves an entry by it."""
+
+    def solve(size):
+        solved = lambda model, t, q, value: (q + size * np.eye(q.size)[entry], np.full(1, residual))  # noqa: E731
+        monkeypatch.setattr(offsets, "solve_positions", solved)
+
+    return solve
+
+
+@check("design.offsets PART")
+def _(monkeypatch):
+    """In metres of a mechanism's length, and in components of a quaternion, which are half a rotation."""
+    scene = pendulum()
+    length = Model(scene).length
+
+    def is_small(entry, size):
+        displaced(monkeypatch, entry)(size)
+        return offsets._is_small(scene, np.zeros(0))
+
+    places = flips(lambda size: is_small(0, size * length), 0.98 * 0.2, 1.02 * 0.2)
+    return places and flips(lambda size: is_small(4, size / 2), 0.98 * 0.2, 1.02 * 0.2)
+
+
+@check("design.offsets MET")
+def _(monkeypatch):
+    scene = pendulum()
+    longest = max(1.0, Model(scene).length)
+
+    def is_met(residual):
+        displaced(monkeypatch, 0, residual)(0.0)
+        return accepts(offsets.assembled.__wrapped__, scene)
+
+    return flips(is_met, 0.98e-12 * longest, 1.02e-12 * longest)
