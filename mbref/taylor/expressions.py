@@ -22,17 +22,24 @@ DEPENDENT_POLYNOMIAL = 1e-9  # largest coefficient / original coefficient: a sma
 
 
 def combination(*terms: tuple[float, Expression]) -> Expression:
-    """Return the sum of expressions times factors."""
+    """Return the sum of expressions times factors, without coefficients that cancel except for rounding."""
     total: Expression = {}
+    parts = []
     for factor, expression in terms:
         for variable, coefficient in expression.items():
-            total[variable] = total.get(variable, 0.0) + factor * coefficient
-    return cleaned(total)
+            parts.append(factor * coefficient)
+            total[variable] = total.get(variable, 0.0) + parts[-1]
+    return _larger(total, largest(parts))
 
 
 def cleaned(expression: dict[Key, float]) -> dict[Key, float]:
     """Return an expression without coefficients of round-off size."""
-    small = NEGLIGIBLE * largest(expression.values())
+    return _larger(expression, largest(expression.values()))
+
+
+def _larger(expression: dict[Key, float], size: float) -> dict[Key, float]:
+    """Return an expression without coefficients of round-off size, relative to a coefficient's size."""
+    small = NEGLIGIBLE * size
     return {key: value for key, value in expression.items() if abs(value) > small}
 
 
