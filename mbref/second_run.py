@@ -78,8 +78,6 @@ def _none(motion: Motion, seconds: float) -> str:
     """Return the reason why no second run is made; empty if a second run is made."""
     if not motion.times.size:
         return "the run has no sample"
-    if motion.settings.get("kernels") == "interpreted":
-        return "kernels were being compiled; run it again"
     spent = motion.cost.seconds
     return f"the run took {spent:.2g} s, more than {seconds:g} s{LONGER}" if spent > seconds else ""
 

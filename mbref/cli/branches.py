@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from mbref.cli.first_run import Simulate
 from mbref.equations.branches import SMOOTH
 from mbref.method import MethodError
 from mbref.motion import Motion
@@ -41,15 +40,15 @@ def of_several_branches(motion: Motion) -> list[int]:
     return [k for k, crossing in enumerate(motion.crossings or (), 1) if len(crossing.velocity) > 1]
 
 
-def along_branches(
-    simulate: Simulate, smooth: Motion, method: str, limits: Limits, number: int
-) -> dict[str, Motion]:
+def along_branches(smooth: Motion, method: str, limits: Limits, number: int) -> dict[str, Motion]:
     """Return the motions by title, from before a singular position of the smooth motion to after it."""
+    from mbref.simulation.simulate import simulate
+
     assert smooth.crossings is not None
     crossing = smooth.crossings[number - 1]
     times = crossing.instants(smooth.t_end, FRAMES)
     motions = [
-        simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}), _quiet)
+        simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}))
         for branch in range(1, len(crossing.velocity) + 1)
     ]
     return {_title(branch, motion): motion for branch, motion in enumerate(motions, SMOOTH)}
@@ -60,10 +59,6 @@ def sentence(motion: Motion, number: int) -> str:
     assert motion.crossings is not None
     crossing = motion.crossings[number - 1]
     return f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}"
-
-
-def _quiet(time: float) -> None:
-    """Ignore the progress: runs along branches are short."""
 
 
 def _title(branch: int, motion: Motion) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,12 +11,13 @@ import numpy as np
 from mbref.cli.output import warn
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.method import SERIES, SHORT, SPARSE, default_method
+from mbref.method import SERIES, SHORT, SPARSE, Method, default_method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
 
 if TYPE_CHECKING:
+    from mbref.motion import Motion
     from mbref.stepping.limits import Limits
 
 TEXT = argparse.RawDescriptionHelpFormatter
@@ -75,6 +76,15 @@ def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None =
     times, limits = sample_times(options, scene), limits_of(options, branches)
     warn(scene)
     return Request(scene, options.method or default_method(scene), times, limits)
+
+
+def simulator(method: str) -> Callable[..., Motion]:
+    """Return ``simulate``, after the kernels of the method are compiled unless this machine has them."""
+    from mbref.simulation.simulate import are_compiled, prepare, simulate
+
+    if not are_compiled(Method.parse(method)):
+        prepare(Method.parse(method))
+    return simulate
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:

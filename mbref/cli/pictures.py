@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mbref.cli.branches import along_branches, chosen_crossing, of_several_branches, sentence
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
 from mbref.cli.output import exit_status, progress_bar, warn
 from mbref.drawing.film import png, write_film
 from mbref.drawing.picture import moving, side_by_side, still
@@ -83,18 +83,17 @@ def _draw(options: argparse.Namespace) -> int:
 
 
 def _animate(options: argparse.Namespace) -> int:
-    from mbref.cli.first_run import simulator
-
     parted = options.branches or options.crossing is not None
     path = path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING)))
     run, view = request_of(options), _view(options)
     scene = run.scene
-    with simulator(run.method) as simulate, progress_bar("simulating", float(run.times[-1])) as progress:
+    simulate = simulator(run.method)
+    with progress_bar("simulating", float(run.times[-1])) as progress:
         motion = simulate(*run, progress)
         motions, picture = {"": motion}, partial(moving, scene, motion, view)
         if parted:
             number = chosen_crossing(motion, options.crossing)
-            motions = along_branches(simulate, motion, run.method, run.limits, number)
+            motions = along_branches(motion, run.method, run.limits, number)
             picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
     if path.suffix == ".svg":
         path.write_text(picture(), encoding="utf-8")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
 from mbref.cli.output import exit_status, progress_bar
 from mbref.cli.pictures import path_of
 from mbref.outputs import OUTPUTS
@@ -38,10 +38,9 @@ def add(commands: Any) -> None:
 
 
 def _plot(options: argparse.Namespace) -> int:
-    from mbref.cli.first_run import simulator
-
     path, run = path_of(options, "-plot", (".svg", ".png")), request_of(options)
-    with simulator(run.method) as simulate, progress_bar("simulating", float(run.times[-1])) as progress:
+    simulate = simulator(run.method)
+    with progress_bar("simulating", float(run.times[-1])) as progress:
         if options.columns:  # raises an error for unknown names
             simulate(*run._replace(times=run.times[:1]), progress).columns(*options.columns)
         motion = simulate(*run, progress)

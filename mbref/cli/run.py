@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
 from mbref.motion import Motion
 from mbref.outputs import UNITS
@@ -71,22 +71,20 @@ def add(commands: Any) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    from mbref.cli.first_run import simulator
-
     write, run = _writer(options.out), request_of(options, _branches(options.branch))
-    with simulator(run.method) as simulate:
-        with progress_bar("simulating", float(run.times[-1])) as progress:
-            if options.columns:  # raises an error for unknown names
-                first = simulate(*run._replace(times=run.times[:1]), progress)
-                _estimated(first, options.estimate).columns(*options.columns)
-            motion = simulate(*run, progress)
-        motion = _estimated(motion, options.estimate)
-        if options.out:
-            write(motion, options.out, *options.columns)
-        if options.json:
-            print(strict_json({"scene": run.scene.name, "records": [motion.to_record()]}), flush=True)
-        else:
-            show(run.scene, motion, options.columns)
+    simulate = simulator(run.method)
+    with progress_bar("simulating", float(run.times[-1])) as progress:
+        if options.columns:  # raises an error for unknown names
+            first = simulate(*run._replace(times=run.times[:1]), progress)
+            _estimated(first, options.estimate).columns(*options.columns)
+        motion = simulate(*run, progress)
+    motion = _estimated(motion, options.estimate)
+    if options.out:
+        write(motion, options.out, *options.columns)
+    if options.json:
+        print(strict_json({"scene": run.scene.name, "records": [motion.to_record()]}))
+    else:
+        show(run.scene, motion, options.columns)
     return 0 if motion.outcome.name == "COMPLETED" else 1
 
 
@@ -134,8 +132,7 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
         return
-    if "kernels" not in trajectory.settings:  # a first result must not wait for further kernels
-        out.print("\n".join(_largest(trajectory)))
+    out.print("\n".join(_largest(trajectory)))
     if columns:
         out.print(column_table(trajectory.columns(*columns)))
         return

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import pi
+from typing import Any
 
 from numpy import arctan2, cos, floor, inf, sin, sqrt
 
@@ -54,7 +55,7 @@ def add_loads(k, memory):
     add_timed_forces(k, memory)
 
 
-def varies(polynomials):
+def varies(polynomials: Any) -> bool:
     """Return whether a scene has loads other than constant forces and moments, or couplings of angles."""
     loads = polynomials.springs.damping.shape[0] + polynomials.torsions.damping.shape[0]
     return loads + polynomials.slides.damping.shape[0] + polynomials.timed.function.shape[0] > 0
