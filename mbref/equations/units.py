@@ -40,7 +40,8 @@ def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
     anchors (…, e, 3), relative to the centres of mass of their bodies, and (e, nb) one over the number of
     anchors on the body.
     """
-    lengths = np.sqrt((arms * arms).sum(axis=-1)) @ shares
+    # a product of matrices would round the lengths of one scene and of many differently
+    lengths = (np.sqrt((arms * arms).sum(axis=-1))[..., None] * shares).sum(axis=-2)
     has_arms = lengths > SMALLEST * lengths.max(axis=-1, keepdims=True, initial=0.0)
     if has_arms.all():
         return lengths
