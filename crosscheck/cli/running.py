@@ -21,7 +21,7 @@ from crosscheck.study.record_view import is_judged, public
 from crosscheck.study.sweep import QUICK_LIMIT, thinned
 from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
-from mbref.formats import options_of
+from mbref.formats import import_options
 from mbref.scene import Scene
 
 Document = dict[str, Any]
@@ -43,7 +43,7 @@ class Asked(NamedTuple):
 
 def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
     """Return the request of a command line; raises RequestError if it cannot be carried out."""
-    scenes = scene_request.find_scenes(arguments.scene, options_of(arguments), notice)
+    scenes = scene_request.find_scenes(arguments.scene, import_options(arguments), notice)
     engines = request.find_engines(arguments.engine, notice)
     named = [*(arguments.method or ()), *(arguments.setting or ())]
     is_quick = arguments.depth == "quick"
