@@ -14,10 +14,12 @@ from mbref.scene import Body, Driver, Revolute, Scene, Sine, Translational
 
 END = 0.1  # s
 COMPILING = ("mjx", "warp", "newton")  # compile code for each scene
-ENGINES = [
-    pytest.param(name, marks=[pytest.mark.slow] * (name in COMPILING))
+WHOLE, PYTHON, CXX = "all families", "families in Python", "families in C++"
+ENGINES = [  # names and parts; Pinocchio's C++ library takes a minute to compile
+    pytest.param(name, part, marks=[pytest.mark.slow] * (name in COMPILING or part == CXX))
     for name in BUILT_IN + OPTIONAL + ON_REQUEST
     if installed(name)
+    for part in ((PYTHON, CXX) if name == "pinocchio" else (WHOLE,))
 ]
 
 
@@ -67,19 +69,20 @@ def able(name: str, *scenes: Scene) -> Scene:
     return scenes[reasons.index(None)]
 
 
-def coarsest(name: str, scene: Scene) -> list[Setting]:
-    """The first setting of each family of an engine."""
-    return [settings[0] for settings in _families(name, scene)]
+def coarsest(name: str, scene: Scene, part: str) -> list[Setting]:
+    """The first setting of each family of an engine's part."""
+    return [settings[0] for settings in _families(name, scene, part)]
 
 
-def middle(name: str, scene: Scene) -> list[Setting]:
-    """The middle setting of each family of an engine."""
-    return [settings[len(settings) // 2] for settings in _families(name, scene)]
+def middle(name: str, scene: Scene, part: str) -> list[Setting]:
+    """The middle setting of each family of an engine's part."""
+    return [settings[len(settings) // 2] for settings in _families(name, scene, part)]
 
 
-def _families(name: str, scene: Scene) -> list[list[Setting]]:
+def _families(name: str, scene: Scene, part: str) -> list[list[Setting]]:
     families: dict[str, list[Setting]] = {}
     for setting in engine(name).settings(scene):
-        families.setdefault(setting.family, []).append(setting)
+        if part == WHOLE or (part == CXX) == setting.family.endswith("compiled"):
+            families.setdefault(setting.family, []).append(setting)
     engine(name).prepare(list(families))
     return list(families.values())

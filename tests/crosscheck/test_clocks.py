@@ -29,11 +29,11 @@ OTHER_TICKS = {  # building and stepping of families that look at the clock at o
 }
 
 
-@pytest.mark.parametrize("name", ENGINES)
-def test_seconds_are_ticks_of_the_cpu_clock(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("name", "part"), ENGINES)
+def test_seconds_are_ticks_of_the_cpu_clock(name: str, part: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The CPU clock gives 1, 2, 3, …; a wall clock gives fractions, an interval that counts twice more."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))
-    for setting in coarsest(name, scene):
+    for setting in coarsest(name, scene, part):
         own = OTHER_TICKS.get((name, setting.family))
         is_one_call = name in IN_ONE_CALL or setting.family.endswith("compiled")
         check(name, scene, setting, own or (BUILD, 1.0 if is_one_call else STEPPING), monkeypatch)

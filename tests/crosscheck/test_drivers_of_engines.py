@@ -15,8 +15,8 @@ SEEN = 8e-3
 ROUGH = ("cpodes",)  # off by more than SEEN on a prescribed motion; it runs the model of the other families
 
 
-@pytest.mark.parametrize("name", ENGINES)
-def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name):
+@pytest.mark.parametrize(("name", "part"), ENGINES)
+def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name, part):
     scene = able(name, driven_arm())
     angle, rate = TURN.value(TIMES), TURN.rate(TIMES)
     along, speed = 1.0 + SLIDE.value(TIMES), SLIDE.rate(TIMES)
@@ -26,7 +26,7 @@ def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name):
     slid = speed[:, None] * out + (along * rate)[:, None] * across
     velocity = np.stack([0.5 * rate[:, None] * across, slid], axis=1)
     spin = np.stack([0 * rate, 0 * rate, rate], axis=-1)[:, None].repeat(2, axis=1)
-    for setting in (s for s in middle(name, scene) if s.family not in ROUGH):
+    for setting in (s for s in middle(name, scene, part) if s.family not in ROUGH):
         run = engine(name).run(scene, TIMES, setting)
         assert run.outcome is Outcome.COMPLETED, (setting, run.message)
         assert abs(run.position - position).max() < WITHIN, setting
