@@ -87,6 +87,7 @@ class Mbref(Engine):
         return None
 
     def settings(self, scene: Scene) -> Sequence[Setting]:
+        self.prepare(())  # in two processes; the questions below would compile kernels in one process
         return [setting for family in _methods(scene) for setting in self.settings_of(scene, family)]
 
     def best_settings(self, scene: Scene) -> Sequence[Setting]:

@@ -88,44 +88,47 @@ def joint_reactions(
     ``closing`` has, for each closure of the tree, the wrench on its second link.
     """
     carried = _carried(scene, tree, motion, closing)
-    by_joint = {c.joint: w for c, w in zip(tree.closures, closing, strict=True) if c.kind == "point"}
+    by_joint = np.zeros((len(scene.joint), 6))
+    for closure, on_second in zip(tree.closures, closing, strict=True):
+        if closure.kind == "point":
+            by_joint[closure.joint] = on_second
+    second = [scene.body_index(joint.bodies[1]) for joint in scene.joint]
     for k, link in enumerate(tree.links):
         if link.joint >= 0:
-            second = scene.body_index(scene.joint[link.joint].bodies[1])
-            child_is_second = link.body == second and not link.ends
+            child_is_second = link.body == second[link.joint] and not link.ends
             by_joint[link.joint] = carried[k] if child_is_second else -carried[k]
-    return {
-        joint.name: _at_second_anchor(scene, tree, motion, j, by_joint[j])
-        for j, joint in enumerate(scene.joint)
-    }
+    at_anchors = _at_second_anchors(scene, tree, motion, by_joint)
+    return {joint.name: found for joint, found in zip(scene.joint, at_anchors, strict=True)}
 
 
-def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Return the wrench on every link through the joint that carries it."""
-    needed = [_inertial(scene, tree, motion, k) for k in range(len(tree.links))]
-    needed.append(np.zeros(6))  # the last entry, index -1, is the ground's
+def _carried(scene: Scene, tree: Tree, motion: LinkMotion, closing: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the wrench (n, 6) on every link through the joint that carries it."""
+    needed = np.vstack(
+        [_inertial(scene, tree, motion), np.zeros(6)]
+    )  # the last row, index -1, is the ground's
     for load in scene.load:
         for link, applied in _applied(scene, tree, motion, load):
-            needed[link] = needed[link] - applied
+            needed[link] -= applied
     for closure, applied in zip(tree.closures, closing, strict=True):
         first, second = closure.links
-        needed[first] = needed[first] + applied
-        needed[second] = needed[second] - applied
+        needed[first] += applied
+        needed[second] -= applied
     for k in reversed(range(len(tree.links))):
-        parent = tree.links[k].parent
-        needed[parent] = needed[parent] + needed[k]
+        needed[tree.links[k].parent] += needed[k]
     return needed[:-1]
 
 
-def _inertial(scene: Scene, tree: Tree, motion: LinkMotion, k: int) -> np.ndarray:
-    """Return the wrench that accelerates a link, without its weight."""
-    link, rotation, omega = tree.links[k], motion.rotation[k], motion.angular_velocity[k]
-    arm = rotation @ link.offset
-    angular = motion.angular_acceleration[k]
-    acceleration = motion.acceleration[k] + cross(angular, arm) + cross(omega, cross(omega, arm))
-    inertia = rotation @ link.inertia @ rotation.T
-    moment = inertia @ angular + cross(omega, inertia @ omega)
-    return wrench(link.mass * (acceleration - np.array(scene.gravity)), motion.position[k] + arm, moment)
+def _inertial(scene: Scene, tree: Tree, motion: LinkMotion) -> np.ndarray:
+    """Return the wrenches (n, 6) that accelerate the links, without their weights."""
+    rotation, omega, angular = motion.rotation, motion.angular_velocity, motion.angular_acceleration
+    mass = np.array([link.mass for link in tree.links])
+    arm = np.einsum("kij,kj->ki", rotation, np.array([link.offset for link in tree.links]))
+    acceleration = motion.acceleration + cross(angular, arm) + cross(omega, cross(omega, arm))
+    inertia = rotation @ np.array([link.inertia for link in tree.links]) @ rotation.transpose(0, 2, 1)
+    moment = np.einsum("kij,kj->ki", inertia, angular)
+    moment += cross(omega, np.einsum("kij,kj->ki", inertia, omega))
+    force = mass[:, None] * (acceleration - np.array(scene.gravity))
+    return np.concatenate([force, moment + cross(motion.position + arm, force)], axis=1)
 
 
 def _arm(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -182,25 +185,30 @@ def _along_joint(
     return [(child, on_child), (tree.links[child].parent, -on_child)]
 
 
-def _at_second_anchor(
-    scene: Scene, tree: Tree, motion: LinkMotion, j: int, on_second: np.ndarray
-) -> np.ndarray:
-    """Return a joint's wrench at the anchor on the second body; the end mass of a rod counts as part of the
-    body."""
-    joint = scene.joint[j]
-    link = tree.link_of(scene.body_index(joint.bodies[1]))
-    anchor, _ = _point(tree, motion, link, joint.anchor_pair[1])
-    force, moment = on_second[:3], on_second[3:] - cross(anchor, on_second[:3])
-    if isinstance(joint, Distance):
-        rod = next(
-            n
-            for n in tree.links
-            if n.ends
-            and np.array_equal(n.ends[1][1], joint.anchors[1])
-            and np.array_equal(n.ends[0][1], joint.anchors[0])
-        )
-        force = force + rod.mass / 2 * (_acceleration(tree, motion, link, joint.anchors[1]) - scene.gravity)
-    return np.concatenate([force, moment])
+def _at_second_anchors(scene: Scene, tree: Tree, motion: LinkMotion, on_second: np.ndarray) -> np.ndarray:
+    """Return the joints' wrenches (nj, 6) at the anchors on their second bodies; the end mass of a rod counts
+    as part of the body."""
+    links = [tree.link_of(scene.body_index(joint.bodies[1])) for joint in scene.joint]
+    pairs = zip(links, scene.joint, strict=True)
+    anchors = [_point(tree, motion, link, joint.anchor_pair[1])[0] for link, joint in pairs]
+    force = on_second[:, :3].copy()
+    moment = on_second[:, 3:] - cross(np.array(anchors).reshape(-1, 3), force)
+    for j, joint in enumerate(scene.joint):
+        if isinstance(joint, Distance):
+            force[j] += _force_on_end(scene, tree, motion, links[j], joint)
+    return np.concatenate([force, moment], axis=1)
+
+
+def _force_on_end(scene: Scene, tree: Tree, motion: LinkMotion, link: int, joint: Distance) -> np.ndarray:
+    """Return the force (3,) that accelerates the half mass of a rod at its second end, without its weight."""
+    rod = next(
+        n
+        for n in tree.links
+        if n.ends
+        and np.array_equal(n.ends[1][1], joint.anchors[1])
+        and np.array_equal(n.ends[0][1], joint.anchors[0])
+    )
+    return rod.mass / 2 * (_acceleration(tree, motion, link, joint.anchors[1]) - np.array(scene.gravity))
 
 
 def _acceleration(tree: Tree, motion: LinkMotion, link: int, point: Sequence[float]) -> np.ndarray:

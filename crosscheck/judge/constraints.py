@@ -7,6 +7,7 @@ the samples of a trajectory.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 import numpy as np
@@ -27,6 +28,7 @@ from mbref.scene_joints import DISPLACEMENT
 
 Residuals = dict[str, np.ndarray]
 
+KEPT = 64  # scenes whose initial velocities and length are kept: each run of a comparison asks for them
 COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 
 
@@ -187,6 +189,12 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     masses if the scene has none).  Raises SceneError naming the joint when given velocities contradict the
     joints by more than 5 % of the velocities' scale, or drivers by more than 0.1 %.
     """
+    velocity, angular_velocity = _initial_twists(scene)
+    return velocity.copy(), angular_velocity.copy()
+
+
+@functools.lru_cache(maxsize=KEPT)
+def _initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     pose = initial_poses(scene)
     scale = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     given, wanted = _given(scene, scale)
@@ -207,6 +215,7 @@ def initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     return twists[:, :3], twists[:, 3:]
 
 
+@functools.lru_cache(maxsize=KEPT)
 def scene_length(scene: Scene) -> float:
     """Return the characteristic length (m): the largest distance between two joint anchors or centres of mass
     at t = 0.

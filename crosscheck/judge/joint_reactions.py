@@ -133,10 +133,12 @@ def compare(scene: Scene, first: Trajectory, second: Trajectory) -> Comparison:
     scale = largest_reaction(scene, first)
     tables = [_at_sample(scene, first, second, int(k), scale) for k in chosen]
     joints = {
-        name: Reaction(*(max(found) for found in zip(*(joints[name] for joints, _ in tables), strict=True)))
+        name: Reaction(*(max(found) for found in zip(*(table[name] for table in tables), strict=True)))
         for name in first.reactions
     }
-    return Comparison(joints, max(resultant for _, resultant in tables))
+    units = np.repeat([1.0, scene_length(scene)], 3)
+    off = (resultants(scene, second, chosen) - resultants(scene, first, chosen)) / units / scale
+    return Comparison(joints, float(np.abs(off).max(initial=0.0)))
 
 
 def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> dict[str, dict[str, float]]:
@@ -156,18 +158,20 @@ def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> d
     }
 
 
-def resultants(scene: Scene, run: Trajectory, sample: int) -> np.ndarray:
-    """Return force and moment about the centre of mass (nb, 6), world, of all joints on every body."""
-    position, orientation = run.position[sample], run.orientation[sample]
-    total = np.zeros((len(scene.body), 6))
+def resultants(scene: Scene, run: Trajectory, samples: np.ndarray | int) -> np.ndarray:
+    """Return force and moment about the centre of mass (…, nb, 6), world, of all joints on every body, at
+    samples (…)."""
+    position, orientation = run.position[samples], run.orientation[samples]
+    total = np.zeros((*position.shape[:-1], 6))
     for joint in scene.joint:
-        wrench = (run.reactions or {})[joint.name][sample]
+        wrench = (run.reactions or {})[joint.name][samples]
         anchor = _anchor(scene, joint, position, orientation)
         for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True):
             if name != GROUND:
                 b = scene.body_index(name)
-                moment = wrench[3:] + np.cross(anchor - position[b], wrench[:3])
-                total[b] += sign * np.concatenate([wrench[:3], moment])
+                total[..., b, :3] += sign * wrench[..., :3]
+                arm = anchor - position[..., b, :]
+                total[..., b, 3:] += sign * (wrench[..., 3:] + rotations.cross(arm, wrench[..., :3]))
     return total
 
 
@@ -182,8 +186,8 @@ def largest_reaction(scene: Scene, run: Trajectory) -> float:
 
 def _at_sample(
     scene: Scene, first: Trajectory, second: Trajectory, k: int, scale: float
-) -> tuple[dict[str, tuple[int, float, float]], float]:
-    """Return (shared, unique, chosen) by joint and the difference of resultants, at one sample."""
+) -> dict[str, tuple[int, float, float]]:
+    """Return (shared, unique, chosen) by joint, at one sample."""
     assert first.reactions is not None and second.reactions is not None
     units = np.repeat([1.0, scene_length(scene)], 3)
     shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
@@ -192,8 +196,7 @@ def _at_sample(
         apart = (second.reactions[name][k] - first.reactions[name][k]) / units / scale
         inside = basis @ (basis.T @ apart)
         joints[name] = (basis.shape[1], float(np.linalg.norm(apart - inside)), float(np.linalg.norm(inside)))
-    off = (resultants(scene, second, k) - resultants(scene, first, k)) / units / scale
-    return joints, float(np.abs(off).max(initial=0.0))
+    return joints
 
 
 def on_second(
@@ -209,9 +212,9 @@ def on_second(
 
 
 def _anchor(scene: Scene, joint: Joint, position: np.ndarray, orientation: np.ndarray) -> np.ndarray:
-    """Return the anchor (3,) on the second body, world."""
+    """Return the anchor (…, 3) on the second body, world, at poses (…, nb, ·)."""
     body, local = attachment(scene, joint.bodies[1], joint.anchor_pair[1])
-    return local if body < 0 else position[body] + rotations.rotate(orientation[body], local)
+    return local if body < 0 else position[..., body, :] + rotations.rotate(orientation[..., body, :], local)
 
 
 def _span(vectors: np.ndarray, least: float) -> np.ndarray:

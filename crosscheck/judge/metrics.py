@@ -36,8 +36,8 @@ STATES = (
     "acceleration",
     "angular_acceleration",
 )
-KEPT = 8  # scenes whose exact reactions are kept
-_with_reactions: dict[Scene, Trajectory] = {}
+KEPT = 16  # exact motions whose reactions are kept
+_with_reactions: dict[Any, Trajectory] = {}  # keyed by scene and states
 
 
 @dataclass(frozen=True)
@@ -224,15 +224,14 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
 
 
 def _exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
-    """Return the exact motion with its reactions; all runs of a comparison are measured against equal
-    motions, so that the latest exact motion of each scene is kept."""
-    last = _with_reactions.get(scene)
-    if last is None or not all(np.array_equal(getattr(last, k), getattr(exact, k)) for k in STATES):
-        last = with_exact_reactions(scene, exact)
+    """Return the exact motion with its reactions; the runs of a comparison are measured against few exact
+    motions, which are kept."""
+    key = (scene, *(a if (a := getattr(exact, name)) is None else a.tobytes() for name in STATES))
+    if key not in _with_reactions:
         if len(_with_reactions) >= KEPT:
-            _with_reactions.clear()
-        _with_reactions[scene] = last
-    return last
+            del _with_reactions[next(iter(_with_reactions))]
+        _with_reactions[key] = with_exact_reactions(scene, exact)
+    return _with_reactions[key]
 
 
 def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:

@@ -7,6 +7,7 @@ that does not complete ends its child, and the next run gets a new one.
 from __future__ import annotations
 
 import atexit
+import functools
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -170,9 +171,12 @@ atexit.register(end_idle)
 os.register_at_fork(after_in_child=_idle.clear)  # idle children belong to the process that started them
 
 
+_known = functools.cache(engine_names)  # each run asks, and the answer is read from files of packages
+
+
 def _check(engine_name: str) -> None:
-    if ":" not in engine_name and engine_name not in engine_names():
-        raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(engine_names())}")
+    if ":" not in engine_name and engine_name not in _known():
+        raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(_known())}")
 
 
 def _observed(

@@ -24,6 +24,7 @@ from crosscheck.study.hurried import Hurried
 from crosscheck.study.ladder import Family, beyond, families, finest, first
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.scouting import scout, unasked
+from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
 from crosscheck.study.truths import truth_record
@@ -174,23 +175,23 @@ def _with_coarser(groups: Sequence[Family], records: dict[str, Record], path: Pa
 
 
 def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Record]:
-    """Return records by key.
-
-    The first engine starts first, because mbref may have to compile. Then the last engines follow, because
-    their runs take longest.
-    """
+    """Return records by key."""
     if not cases:
         return {}
-    first_engine = cases[0].engine
-    order = [c for c in cases if c.engine == first_engine] + [
-        case
-        for engine in reversed(_engines(cases))
-        for case in cases
-        if case.engine == engine != first_engine
-    ]
+    order = _long_first(cases)
     with shown(what, len(order)) as progress, Chains(record_of) as threads:
         found = study(order, threads, path, progress, Hurried().trajectory)
     return {record["key"]: record for record in found}
+
+
+def _long_first(cases: Sequence[Case]) -> list[Case]:
+    """Return the cases by engines: the first engine and engines with compiled families, which may have to
+    compile, then the other engines, of which the last ones take longest."""
+    engines = _engines(cases)
+    compiled = {case.engine for case in cases if case.setting.family.endswith(COMPILED)}
+    before = [name for name in engines if name in {engines[0], *compiled}]
+    after = [name for name in reversed(engines) if name not in before]
+    return [case for name in (*before, *after) for case in cases if case.engine == name]
 
 
 def _engines(cases: Sequence[Case]) -> list[str]:

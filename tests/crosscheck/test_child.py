@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import operator
 import os
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -123,3 +125,14 @@ def test_large_answers_arrive_whole(child: Child):
 def test_value_that_cannot_be_sent_is_a_failed_call(child: Child):
     with pytest.raises(ChildFailed, match="cannot pickle"):
         child.call(threading.Lock, (), 60.0)
+
+
+@pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
+def test_the_command_line_computes_with_one_thread_unless_the_user_wants_more(given, used):
+    known = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
+    code = "import os, sys, crosscheck; assert 'numpy' not in sys.modules; import crosscheck.cli\n"
+    code += "print(os.environ['OMP_NUM_THREADS'])"
+    done = subprocess.run(
+        [sys.executable, "-c", code], env={**known, **given}, capture_output=True, text=True, check=True
+    )
+    assert done.stdout == f"{used}\n"

@@ -14,3 +14,12 @@ def test_a_quick_comparison_has_mbref_at_its_default_method():
         default = default_method(scene).removesuffix("/dop853")
         assert default in families, (default, list(families))
         assert engine("mbref").best_settings(scene)[0].family == default
+
+
+def test_mbref_prepares_its_kernels_before_it_is_asked_for_settings(monkeypatch):
+    """`prepare` compiles in two processes; a question would compile in one process."""
+    mbref, done = engine("mbref"), []
+    monkeypatch.setattr(mbref, "prepare", lambda families: done.append("prepare"), raising=False)
+    monkeypatch.setattr(mbref, "serves", lambda scene, family: bool(done.append("serves")), raising=False)
+    assert mbref.settings(SCENES["four_bar"]()) == []
+    assert done[0] == "prepare" and done.count("prepare") == 1 and "serves" in done

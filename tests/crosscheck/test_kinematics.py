@@ -151,6 +151,16 @@ def test_initial_twists_obey_joints_and_what_the_scene_gives(name):
             assert np.abs(got).max() < 1e-13 * scale, f"{name}.{body.name}: {spin[k]} against given"
 
 
+def test_initial_twists_belong_to_the_caller():
+    """They are computed once for a scene, and a caller may change them."""
+    scene = SCENES["four_bar"]()
+    first = constraints.initial_twists(scene)
+    kept = [a.copy() for a in first]
+    for a in first:
+        a[:] = 1.0
+    assert all(map(np.array_equal, constraints.initial_twists(scene), kept))
+
+
 def test_what_is_left_open_has_the_least_kinetic_energy():
     """A rod pushed off at one end: the closed-form response of least energy is that to an impulse there."""
     rod = Body(name="rod", mass=2.0, inertia=(0.3, 0.3, 0.4), position=(0.5, 0.0, 0.0))

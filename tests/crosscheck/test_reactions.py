@@ -96,6 +96,9 @@ def test_choices_side_by_side_and_weight():
     assert set(shares) == {"low", "high"}, shares
     lifted = resultants(scene, motion, 0)[0, 2]
     assert lifted == pytest.approx(98.1, rel=1e-9), f"hinges carry {lifted} N of 98.1 N"
+    some = np.array([3, 0, 1])
+    one_by_one = [resultants(scene, motion, int(k)) for k in some]
+    assert np.array_equal(resultants(scene, motion, some), one_by_one), "samples in one call"
     moved = dict(motion.reactions)
     moved["low"] = moved["low"] + [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]
     moved["high"] = moved["high"] - [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]

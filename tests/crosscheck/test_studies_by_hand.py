@@ -168,6 +168,18 @@ def test_finer_settings_of_a_family_that_ran_out_of_time_are_not_started(monkeyp
     assert len(begun) == len(cases) - 1 and all(limit == 5.0 for *_, limit in begun)
 
 
+def test_engines_that_compile_run_first_and_the_last_engines_follow():
+    families = {"a": ["plain"], "b": ["plain"], "c": ["plain", "fast, compiled"], "d": ["plain"]}
+    cases = [
+        Case(still(), TIMES, engine, Setting(family, {}), 5.0)
+        for engine, names in families.items()
+        for family in names
+    ]
+    order = [(case.engine, case.setting.family) for case in comparison._long_first(cases)]
+    assert [engine for engine, _ in order] == ["a", "c", "c", "d", "b"]
+    assert order[1:3] == [("c", "plain"), ("c", "fast, compiled")], "an engine's cases keep their order"
+
+
 def collection(place: Path | None, notices: list[str], monkeypatch) -> comparison.Collection:
     """Collect the runs of two settings of a fake engine."""
     name, scene = "fake_engines:FAKE", still()
