@@ -16,6 +16,7 @@ import contextlib
 import gc
 import importlib
 import os
+import select
 import signal
 import socket
 import subprocess
@@ -31,7 +32,7 @@ from crosscheck.processes import serve
 
 # on other systems a forked process may lack threads of the system's libraries
 AVAILABLE = sys.platform == "linux"
-ENDING_SECONDS = 1.0  # s in which the server must end after its socket is closed
+ENDING_SECONDS = 1.0  # s in which the server, or a worker whose parent has ended, must end by itself
 Environment = Mapping[str, str]
 
 
@@ -175,20 +176,39 @@ def _is_child(requests: Connection[Any, Any]) -> bool:
 def _keep(channel: int, printed: int, news: int) -> None:
     """Fork once more and return in the fork; this process reports the exit status of the fork and ends."""
     signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGCHLD})
     with Connection(news, readable=False) as reports:
         if worker := os.fork():
             os.close(channel)
             os.close(printed)
-            _, status = os.waitpid(worker, 0)
+            status = _status(worker, news)
             with contextlib.suppress(BrokenPipeError):  # the parent has ended
                 reports.send(os.waitstatus_to_exitcode(status))
             os._exit(0)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGCHLD})
         os.setsid()
         reports.send(os.getpid())
     for descriptor, replaced in ((channel, (0,)), (printed, (1, 2))):
         for number in replaced:
             os.dup2(descriptor, number)
         os.close(descriptor)
+
+
+def _status(worker: int, news: int) -> int:
+    """Wait for the worker and return its status; a worker whose parent has ended is killed, with its child
+    processes, unless it ends by itself within a second.
+
+    The parent has ended if no process reads ``news``.
+    """
+    reader = select.poll()
+    reader.register(news, 0)
+    while not (ended := os.waitpid(worker, os.WNOHANG))[0]:
+        has_parent = not reader.poll(0)
+        signal.sigtimedwait({signal.SIGCHLD}, ENDING_SECONDS)
+        if not has_parent:
+            with contextlib.suppress(ProcessLookupError):  # the worker has ended
+                os.killpg(worker, signal.SIGKILL)
+    return ended[1]
 
 
 if __name__ == "__main__":

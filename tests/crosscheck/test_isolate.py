@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
+from crosscheck.processes import fork_server
 from crosscheck.processes.child import ChildFailed, stop_all
 from crosscheck.processes.pool import (
     ask,
@@ -278,7 +279,10 @@ def test_unknown_engine_is_refused_before_anything_starts():
         run_isolated("nosuch", still(), TIMES, PLAIN, 1.0)
 
 
-def test_interrupting_the_parent_ends_the_child(tmp_path: Path):
+@pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_the_end_of_the_parent_ends_the_child_within_a_call(sent: str, tmp_path: Path):
+    if sent != "SIGINT" and not fork_server.AVAILABLE:
+        pytest.skip("without a fork server the child ends itself after its limit")
     pid = tmp_path / "pid"
     script = (
         "import signal, sys; sys.path.insert(0, sys.argv[1])\n"
@@ -292,10 +296,10 @@ def test_interrupting_the_parent_ends_the_child(tmp_path: Path):
     while not (pid.exists() and pid.read_text()):
         assert parent.poll() is None, parent.communicate()
         time.sleep(0.05)
-    parent.send_signal(signal.SIGINT)
+    parent.send_signal(getattr(signal, sent))
     _, said = parent.communicate(timeout=30)
-    assert b"KeyboardInterrupt" in said, said
-    assert gone(int(pid.read_text())), "the grandchild survived the interrupt"
+    assert (b"KeyboardInterrupt" in said) is (sent == "SIGINT"), said
+    assert gone(int(pid.read_text())), f"the grandchild survived {sent}"
 
 
 def test_stop_all_ends_running_children(tmp_path: Path):
