@@ -7,7 +7,6 @@ that does not complete ends its child, and the next run gets a new one.
 from __future__ import annotations
 
 import atexit
-import functools
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -17,12 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Setting, engine_names
+from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Setting, engine_names
 from crosscheck.processes import fork_server, serve
 from crosscheck.processes.child import Child, ChildFailed, Observation
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
+OWN_ENGINES = (*BUILT_IN, *OPTIONAL, *ON_REQUEST)
 MOST_IDLE = 8  # idle children: about one for every engine
 NO_ENGINE = ""  # name of the engine-free child that computes metrics for the judge
 EVERY_ENGINE = "*"  # name of the child in which the runs of all engines take turns
@@ -171,12 +171,11 @@ atexit.register(end_idle)
 os.register_at_fork(after_in_child=_idle.clear)  # idle children belong to the process that started them
 
 
-_known = functools.cache(engine_names)  # each run asks, and the answer is read from files of packages
-
-
 def _check(engine_name: str) -> None:
-    if ":" not in engine_name and engine_name not in _known():
-        raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(_known())}")
+    if ":" in engine_name or engine_name in OWN_ENGINES:
+        return
+    if engine_name not in (known := engine_names()):  # reads files of installed packages
+        raise LookupError(f"unknown engine {engine_name!r}; known: {', '.join(known)}")
 
 
 def _observed(
