@@ -409,7 +409,7 @@ def _(monkeypatch):
 @check("design.equilibrium NOTHING")
 def _(monkeypatch):
     scene = SimpleNamespace(duration=2.0)
-    monkeypatch.setattr(equilibrium, "find_scene", lambda _: scene)
+    monkeypatch.setattr(equilibrium, "find_scene", lambda _: SimpleNamespace(assembled=lambda: scene))
     monkeypatch.setattr(equilibrium, "Model", lambda _: SimpleNamespace(length=3.0))
     monkeypatch.setattr(equilibrium, "consistent_start", lambda _: SimpleNamespace(q=None))
     for name in ("Tangent", "_frame", "_balanced", "unsteady"):
