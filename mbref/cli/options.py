@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from mbref.cli.output import warn
+from mbref.cli.output import progress_bar, warn
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
 from mbref.method import SERIES, SHORT, SPARSE, Method, default_method
@@ -66,6 +66,20 @@ class Request(NamedTuple):
     times: np.ndarray  # (k,), s
     limits: Limits
 
+    def motion(self, check: Callable[[Motion], object] | None = None) -> Motion:
+        """Return the motion; kernels that this machine has not are compiled first, in two processes.
+
+        ``check`` is called before, with the motion up to the first sample time.
+        """
+        from mbref.simulation.simulate import are_compiled, prepare, simulate
+
+        if not are_compiled(Method.parse(self.method)):
+            prepare(Method.parse(self.method))
+        with progress_bar("simulating", float(self.times[-1])) as progress:
+            if check:
+                check(simulate(*self._replace(times=self.times[:1]), progress))
+            return simulate(*self, progress)
+
 
 def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Request:
     """Return the run that the options request, with branches by crossing; prints warnings about its scene.
@@ -76,15 +90,6 @@ def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None =
     times, limits = sample_times(options, scene), limits_of(options, branches)
     warn(scene)
     return Request(scene, options.method or default_method(scene), times, limits)
-
-
-def simulator(method: str) -> Callable[..., Motion]:
-    """Return ``simulate``, after the kernels of the method are compiled unless this machine has them."""
-    from mbref.simulation.simulate import are_compiled, prepare, simulate
-
-    if not are_compiled(Method.parse(method)):
-        prepare(Method.parse(method))
-    return simulate
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:

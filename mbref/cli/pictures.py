@@ -1,21 +1,27 @@
-"""mbref draw and mbref animate: a picture or an animation of a scene."""
+"""mbref draw and mbref animate: a picture or an animation of a scene, also along branches that meet."""
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.branches import along_branches, chosen_crossing, of_several_branches, sentence
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
-from mbref.cli.output import exit_status, progress_bar, warn
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.output import exit_status, warn
 from mbref.drawing.film import png, write_film
 from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.view import View
+from mbref.equations.branches import SMOOTH
+from mbref.method import MethodError
+from mbref.motion import Motion
 from mbref.scenes import find_scene
+from mbref.stepping.limits import Limits
+from mbref.trajectory import Outcome
 
 MOVING = (".svg", ".gif", ".mp4")
+FRAMES = 101  # number of samples of a motion along a branch
 VIEW = """\
 xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
 default: perpendicular to the plane of a planar mechanism, otherwise oblique"""
@@ -87,14 +93,12 @@ def _animate(options: argparse.Namespace) -> int:
     path = path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING)))
     run, view = request_of(options), _view(options)
     scene = run.scene
-    simulate = simulator(run.method)
-    with progress_bar("simulating", float(run.times[-1])) as progress:
-        motion = simulate(*run, progress)
-        motions, picture = {"": motion}, partial(moving, scene, motion, view)
-        if parted:
-            number = chosen_crossing(motion, options.crossing)
-            motions = along_branches(motion, run.method, run.limits, number)
-            picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
+    motion = run.motion()
+    motions, picture = {"": motion}, partial(moving, scene, motion, view)
+    if parted:
+        number = chosen_crossing(motion, options.crossing)
+        motions = along_branches(motion, run.method, run.limits, number)
+        picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
     if path.suffix == ".svg":
         path.write_text(picture(), encoding="utf-8")
     else:
@@ -118,3 +122,57 @@ def path_of(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...])
     if path.suffix not in suffixes:
         raise ValueError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")
     return path
+
+
+def chosen_crossing(smooth: Motion, number: int | None) -> int:
+    """Return the number, from 1, of the chosen singular position; without a choice, of the first position
+    with several branches.
+
+    Raises MethodError if the method does not detect singular positions, ValueError if the motion passes none.
+    """
+    if smooth.crossings is None:
+        raise MethodError(
+            f"--branches: {smooth.method} does not detect singular positions; use --method taylor"
+        )
+    passed, until = len(smooth.crossings), f"up to t = {smooth.t_end:g} s"
+    if number is not None and not 1 <= number <= passed:
+        raise ValueError(
+            f"--crossing: must be at most {passed}, the singular positions {until}, got {number}"
+        )
+    several = of_several_branches(smooth)
+    if number is None and not several:
+        which = "; ".join(sentence(smooth, k) for k in range(1, passed + 1)) or "the motion passes none"
+        raise ValueError(f"--branches: no singular position {until} has several branches: {which}")
+    return number or several[0]
+
+
+def of_several_branches(motion: Motion) -> list[int]:
+    """Return the numbers, from 1, of the passed singular positions at which several branches meet."""
+    return [k for k, crossing in enumerate(motion.crossings or (), 1) if len(crossing.velocity) > 1]
+
+
+def along_branches(smooth: Motion, method: str, limits: Limits, number: int) -> dict[str, Motion]:
+    """Return the motions by title, from before a singular position of the smooth motion to after it."""
+    from mbref.simulation.simulate import simulate
+
+    assert smooth.crossings is not None
+    crossing = smooth.crossings[number - 1]
+    times = crossing.instants(smooth.t_end, FRAMES)
+    motions = [
+        simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}))
+        for branch in range(1, len(crossing.velocity) + 1)
+    ]
+    return {_title(branch, motion): motion for branch, motion in enumerate(motions, SMOOTH)}
+
+
+def sentence(motion: Motion, number: int) -> str:
+    """Return one sentence on a singular position."""
+    assert motion.crossings is not None
+    crossing = motion.crossings[number - 1]
+    return f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}"
+
+
+def _title(branch: int, motion: Motion) -> str:
+    """Return the branch's name, with the end time if its run ended early."""
+    name = f"branch {branch}{', smooth' * (branch == SMOOTH)}"
+    return name if motion.outcome is Outcome.COMPLETED else f"{name}, ended at {motion.t_end:.4g} s"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
-from mbref.cli.output import exit_status, progress_bar
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
 from mbref.outputs import OUTPUTS
 
@@ -39,11 +39,7 @@ def add(commands: Any) -> None:
 
 def _plot(options: argparse.Namespace) -> int:
     path, run = path_of(options, "-plot", (".svg", ".png")), request_of(options)
-    simulate = simulator(run.method)
-    with progress_bar("simulating", float(run.times[-1])) as progress:
-        if options.columns:  # raises an error for unknown names
-            simulate(*run._replace(times=run.times[:1]), progress).columns(*options.columns)
-        motion = simulate(*run, progress)
+    motion = run.motion((lambda first: first.columns(*options.columns)) if options.columns else None)
     try:
         figure = motion.plot(*options.columns)
     except ImportError:

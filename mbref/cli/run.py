@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of, simulator
+from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
 from mbref.motion import Motion
 from mbref.outputs import UNITS
@@ -72,13 +72,12 @@ def add(commands: Any) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     write, run = _writer(options.out), request_of(options, _branches(options.branch))
-    simulate = simulator(run.method)
-    with progress_bar("simulating", float(run.times[-1])) as progress:
-        if options.columns:  # raises an error for unknown names
-            first = simulate(*run._replace(times=run.times[:1]), progress)
-            _estimated(first, options.estimate).columns(*options.columns)
-        motion = simulate(*run, progress)
-    motion = _estimated(motion, options.estimate)
+    check = (
+        (lambda first: _estimated(first, options.estimate).columns(*options.columns))
+        if options.columns
+        else None
+    )
+    motion = _estimated(run.motion(check), options.estimate)
     if options.out:
         write(motion, options.out, *options.columns)
     if options.json:
