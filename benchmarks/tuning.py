@@ -119,8 +119,10 @@ def compared(scene: Scene, name: str, level: float, with_compiled: bool) -> list
 
 def as_records(mechanism: str, name: str, level: float, rows: Sequence[Row]) -> list[dict[str, Any]]:
     """A JSON object for each row: ratio is the work of tune over the least work found (None where tune gave
-    up), and shares is this with the CPU seconds of the answers."""
+    up); a family is missed where tune gave up, and the sweep found a run of less CPU time than all answers
+    of tune."""
     whose = engine(name).integrated_here
+    least = min((_seconds(row.tune) for row in rows if row.tune), default=math.inf)
     return [
         {
             "mechanism": mechanism,
@@ -131,11 +133,15 @@ def as_records(mechanism: str, name: str, level: float, rows: Sequence[Row]) -> 
             "tune": _said(row.tune),
             "sweep": _said(row.sweep),
             "ratio": row.tune and work(row.tune) / min(work(r) for r in (row.tune, row.sweep) if r),
-            "missed": row.tune is None and row.sweep is not None,
+            "missed": row.tune is None and row.sweep is not None and _seconds(row.sweep) < least,
             "runs": row.runs,
         }
         for row in rows
     ]
+
+
+def _seconds(record: Record) -> float:
+    return float(record["cost"]["seconds"])
 
 
 def _said(record: Record | None) -> str:

@@ -20,6 +20,9 @@ from mbref.scene import Scene
 
 NEAR = 1.12  # ratio of the work of two settings below which no setting between them is tried
 HALVINGS = 6  # largest number of bisections in a family
+# CPU seconds of a run that misses the error / of the cheapest success, from which a family is given up: the
+# seconds of two short runs differ by up to this factor on a busy machine
+TOO_MUCH = 2.0
 
 Run = Callable[[Sequence[Case]], list[Record]]
 
@@ -85,7 +88,7 @@ def tuned(
     the level of another ``measure``.
 
     The families with the cheapest coarsest run come first. The search in a family ends if a run is out of
-    time, or misses the error and costs more than the cheapest success so far. A success of a family
+    time, or misses the error and costs TOO_MUCH times the cheapest success so far. A success of a family
     ``integrated_here`` (by crosscheck) does not end the search in families of the engine's own integrators.
     ``advance`` receives the name of each finished family.
     """
@@ -149,7 +152,8 @@ class _Search:
         return min((_seconds(record) for _, record in self.cheapest()), default=math.inf)
 
     def carry_out(self, limit: float) -> None:
-        """Bracket the error and bisect, as long as runs that miss the error cost less than ``limit`` (s)."""
+        """Bracket the error and bisect, as long as runs that miss the error cost less than TOO_MUCH times
+        ``limit`` (s)."""
         [first] = self.made
         bracket = self._coarsened(first) if self._reaches(first[1]) else self._refined(first, limit)
         if bracket is not None:
@@ -178,7 +182,7 @@ class _Search:
         finer settings. None if no setting reaches the error or the search ends at its limit.
         """
         for case in self._settings[1:]:
-            if missed[1]["outcome"] == "TIMED_OUT" or _seconds(missed[1]) >= limit:
+            if missed[1]["outcome"] == "TIMED_OUT" or _seconds(missed[1]) >= TOO_MUCH * limit:
                 return None
             tried = self._tried(case.setting)
             if self._reaches(tried[1]):

@@ -105,6 +105,14 @@ def test_families_dearer_than_the_cheapest_are_given_up_before_they_reach():
     assert [h for family, h in engine.asked if family == "dear"] == [0.1], engine.asked
 
 
+def test_a_family_is_given_up_only_for_twice_the_cost():
+    """The cheap family reaches 1e-2 with a step of 0.1 in 0.1 s; a coarsest run of 0.19 s goes on, of 0.2 s does not."""
+    for cost, goes_on in ((0.019, True), (0.02, False)):
+        engine = Modelled(cheap=(2.0, 1.0, 0.01, 1.0), other=(2.0, 4.0, cost, 1.0))
+        found(engine, 1.001e-2, 0.1, 0.05)
+        assert ([family for family, _ in engine.asked].count("other") > 1) == goes_on, engine.asked
+
+
 def test_an_integrator_of_crosscheck_ends_no_search_of_the_engines_own():
     engine = Modelled(ours=(8.0, 1.0, 1e-6, 1.0), own=(2.0, 1.0, 1.0, 1.0), dearer=(1.0, 1.0, 1.0, 1.0))
     both = found(engine, 1e-4, 0.1, 0.01, 0.001, 0.0001, ours=("ours",))
