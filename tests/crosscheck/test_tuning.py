@@ -106,7 +106,7 @@ def test_families_dearer_than_the_cheapest_are_given_up_before_they_reach():
 
 
 def test_a_family_is_given_up_only_for_twice_the_cost():
-    """The cheap family reaches 1e-2 with a step of 0.1 in 0.1 s; a coarsest run of 0.19 s goes on, of 0.2 s does not."""
+    """The cheap family needs 0.1 s; after a coarsest run of 0.19 s a family goes on, after 0.2 s not."""
     for cost, goes_on in ((0.019, True), (0.02, False)):
         engine = Modelled(cheap=(2.0, 1.0, 0.01, 1.0), other=(2.0, 4.0, cost, 1.0))
         found(engine, 1.001e-2, 0.1, 0.05)
