@@ -196,7 +196,7 @@ def test_a_file_is_imported_to_a_scene_file(monkeypatch, tmp_path, capsys):
     read = SimpleNamespace(scene=pair(), left_out=["contacts"], notes=["closed"])
     asked = []
     monkeypatch.setattr(exchange.formats, "read", lambda *given: asked.append(given) or read)
-    monkeypatch.setattr(exchange.formats, "options_of", lambda options: "its options")
+    monkeypatch.setattr(exchange.formats, "import_options", lambda options: "its options")
     file = str(tmp_path / "robot.xml")
     for out, path in (
         (None, tmp_path / "robot.toml"),

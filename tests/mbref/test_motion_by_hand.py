@@ -12,7 +12,7 @@ from mbref import rotations
 from mbref.actuation import driver_motion, largest_force, load_motion
 from mbref.design.turning import Turning, turning
 from mbref.energy import kinetic, potential
-from mbref.joint_motion import joint_motion, place_of, velocity_of
+from mbref.joint_motion import joint_motion, position_of, velocity_of
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -130,9 +130,9 @@ def test_a_cylindrical_joint_has_both_and_a_ball_neither():
 
 def test_points_of_bodies_and_of_the_ground():
     point = tuple(2 * out(np.array(0.2)))
-    assert place_of(scene(), motion(), "arm", point) == pytest.approx(2 * out(ANGLE))
+    assert position_of(scene(), motion(), "arm", point) == pytest.approx(2 * out(ANGLE))
     assert velocity_of(scene(), motion(), "arm", point) == pytest.approx(8 * across(ANGLE))
-    assert place_of(scene(), motion(), "ground", (1.0, 2.0, 3.0)).tolist() == [[1.0, 2.0, 3.0]] * 3
+    assert position_of(scene(), motion(), "ground", (1.0, 2.0, 3.0)).tolist() == [[1.0, 2.0, 3.0]] * 3
     assert not velocity_of(scene(), motion(), "ground", (1.0, 2.0, 3.0)).any()
 
 
