@@ -141,7 +141,8 @@ def measured(
     scene: Scene, names: Sequence[str], worlds: int, count: int, exact: np.ndarray
 ) -> dict[str, tuple[float, float, float]]:
     """Worlds times steps a second, largest error (m) and s of compilation, by engine."""
-    runs, compiled, least, errors = {}, {}, dict.fromkeys(names, np.inf), dict.fromkeys(names, 0.0)
+    runs: dict[str, Run] = {}
+    compiled, least, errors = {}, dict.fromkeys(names, np.inf), dict.fromkeys(names, 0.0)
     for name in names:
         begun = time.perf_counter()
         runs[name] = ENGINES[name](scene, worlds, count)
