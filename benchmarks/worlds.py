@@ -1,4 +1,4 @@
-"""Many worlds at once: ``python benchmarks/worlds.py [--worlds N …] [ENGINE …]`` for mjx, warp and newton.
+"""Many worlds at once: ``python benchmarks/worlds.py [ENGINE …] [--worlds N …]`` for mjx, warp and newton.
 
 Copies of one four-bar, closed by a ball joint, take steps of 1 ms. Everything runs on the processor. The runs
 of the engines are interleaved, ROUNDS times. The table has worlds times steps a second of wall time of the

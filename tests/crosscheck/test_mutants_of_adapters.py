@@ -16,6 +16,7 @@ import pytest
 
 import crosscheck.engines
 from crosscheck.engine import Engine, Setting, engine
+from crosscheck.engines import kept
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import Truth, truth_for
 from mbref.scene import Force, Moment, Scene, TorsionSpring
@@ -25,7 +26,8 @@ from tests.crosscheck.tree_scenes import every_joint, ring
 
 FOLDER = Path(crosscheck.engines.__path__[0])
 # files that import models, in the order of their imports
-USERS = ("equations", "ida", "dynamic", "simulation", "adapter")
+USERS = ("equations", "ida", "dynamic", "simulation", "library", "adapter")
+GENERATORS = ("casadi", "heyoka")  # share the files of the folder symbolic, and keep compiled code
 TIMES = np.array([0.0, 0.05, 0.1])
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-3})
 # engine: its module, a setting, and the largest error of the adapter without defect
@@ -47,9 +49,11 @@ WAYS: dict[str, tuple[str, Setting, float]] = {
     "ondsel": ("pyondsel", Setting("kinematics", {"step": 1e-3}), 1e-6),
     "mjx": ("mujoco.mjx", Setting("stock", {"step": 1e-3}), 1e-3),
     "warp": ("mujoco_warp", Setting("stock", {"step": 1e-3}), 1e-3),
+    "casadi": ("casadi", Setting("projected, compiled", {"rtol": 1e-9, "min_step": 1e-3}), 1e-6),
+    "heyoka": ("heyoka", Setting("taylor", {"rtol": 1e-9}), 1e-6),
     "newton": ("newton", Setting("lox", {"step": 5e-4, "alpha": 0.01}), 5e-3),
 }
-SLOW = ("mjx", "warp", "newton")  # compile their code for minutes
+SLOW = ("mjx", "warp", "newton", *GENERATORS)  # compile their code for seconds or minutes
 # kinds of defects, which each adapter could have
 KINDS = LOAD, FRAME, ORDER, START, UNITS = (
     "sign of a load",
@@ -96,14 +100,15 @@ def is_installed(way: str) -> bool:
 @functools.cache
 def case(way: str) -> tuple[Scene, Truth]:
     """A mechanism that turns, and its truth: every joint and most loads, with two loops, if the engine maps
-    them. OndselSolver maps mechanisms whose whole motion is driven. The code of MJX and Warp is compiled for
-    each model, so that theirs is small."""
+    them. OndselSolver maps mechanisms whose whole motion is driven. The code of MJX, Warp and generators is
+    compiled for each model, so that theirs is small; generators map moments alone."""
     if way == "ondsel":
         scene = SCENES["spatial_slider_crank_driven"]().with_(duration=0.1)
-    elif way in ("mjx", "warp"):
+    elif way in ("mjx", "warp", *GENERATORS):
         pull = Force(body="c", point=(0.6, 0.4, 0.1), force=(9.0, 3.0, 0.0))
         moment = Moment(body="b", moment=(0.0, 0.0, 4.0))
-        scene = ring("spherical").with_(duration=0.1, load=(pull, moment))
+        load = (moment,) if way in GENERATORS else (pull, moment)
+        scene = ring("spherical").with_(duration=0.1, load=load)
     else:
         scene = every_joint(duration=0.1)
     if way == "newton":
@@ -121,7 +126,8 @@ def mutant(name: str, defect: dict[str, str], patch: pytest.MonkeyPatch) -> Engi
     wrong, text = place(name, defect["file"]), defect["text"]
     source = (FOLDER / f"{wrong.replace('.', '/')}.py").read_text()
     assert source.count(text) == 1, f"{wrong} has {source.count(text)} times {text!r}"
-    users = [f"{name}.{part}" for part in USERS if (FOLDER / name / f"{part}.py").exists()]
+    users = ["symbolic.generator"] if name in GENERATORS else []
+    users += [f"{name}.{part}" for part in USERS if (FOLDER / name / f"{part}.py").exists()]
     for part in dict.fromkeys((wrong, *users)):
         full = f"crosscheck.engines.{part}"
         own = importlib.import_module(full)
@@ -159,9 +165,10 @@ def test_adapters_without_defect_are_right(way):
 
 
 @pytest.mark.parametrize(("way", "defect"), CASES)
-def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch):
+def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
+    monkeypatch.setattr(kept, "_folder", lambda name: tmp_path / name)  # compiled code of the true sources
     assert not is_right(mutant(package(way), defect, monkeypatch), way)
 
 

@@ -25,13 +25,17 @@ def pulled() -> Scene:
     return DIFFICULTIES[0].make().with_(load=(pull,))
 
 
+def newton_world(setting: Setting) -> of_newton._World:
+    return of_newton._simulation(pulled(), np.array([0.0, COUNT * STEP]), setting).stepper
+
+
 @pytest.mark.parametrize("family", solvers.FAMILIES)
 def test_recorded_steps_of_newton_are_its_steps(family: str) -> None:
     pytest.importorskip("newton")
     if family == solvers.MUJOCO:
         pytest.importorskip("mujoco_warp")
     options = {"step": STEP, "alpha": solvers.ALPHAS.get(family, 0.0)}
-    recorded, plain = (of_newton._simulation(pulled(), Setting(family, options)).stepper for _ in range(2))
+    recorded, plain = (newton_world(Setting(family, options)) for _ in range(2))
     recorded.step(0.0, STEP, COUNT)
     mechanism = plain.mechanism
     for n in range(COUNT):

@@ -18,6 +18,7 @@ from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.newton import solvers
 from crosscheck.engines.newton.model import Mechanism, imported
 from crosscheck.engines.newton.solvers import FAMILIES
+from crosscheck.engines.sampling import step_count
 from crosscheck.engines.spanning_tree import spanning_tree
 from crosscheck.engines.tree_reactions import LinkMotion
 from crosscheck.engines.warp_graphs import recorded
@@ -94,13 +95,15 @@ class Newton(Engine):
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
         """Simulate a scene; raises ValueError for an unknown family."""
-        return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+        return simulated(self, scene, times, setting, lambda: _simulation(scene, times, setting))
 
 
-def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
-    tree = spanning_tree(scene, CLOSES.get(setting.family, JOINTS))
+def _simulation(scene: Scene, times: np.ndarray, setting: Setting) -> FixedSteps:
+    tree, longest = spanning_tree(scene, CLOSES.get(setting.family, JOINTS)), setting.options["step"]
     world = _World(Mechanism(scene, tree), setting)
-    return FixedSteps(scene, tree, world, setting.options["step"])
+    for end in times[times > 0.0][:1]:  # compile kernels and record a step before the timed run
+        world.record(end / step_count(0.0, end, longest))
+    return FixedSteps(scene, tree, world, longest)
 
 
 class _World:
@@ -111,9 +114,6 @@ class _World:
         self.loads = Loads(mechanism.scene, mechanism.tree, self.motion)
         newton, model = mechanism.newton, mechanism.model
         self.control, self.after = model.control(), model.state()
-        # a first step of another solver compiles the kernels before the timed run
-        first = solvers.make(newton, model, setting)
-        first.step(model.state(), model.state(), self.control, None, setting.options["step"])
         self.solver = solvers.make(newton, model, setting)
         self.once: dict[tuple[float, int], Callable[[], None]] = {}  # by single-precision step and state
 
@@ -123,15 +123,24 @@ class _World:
         for n in range(count):
             if mechanism.scene.load:
                 mechanism.push(self.loads.at(t + n * h))
-            self._recorded(float(np.float32(h)))()
-            mechanism.state, self.after = self.after, mechanism.state
+            self._recorded(h)()
+            self._swap()
+
+    def record(self, h: float) -> None:
+        """Record a step of length h (s) from each of the two states to the other."""
+        for _ in range(2):
+            self._recorded(h)
+            self._swap()
+
+    def _swap(self) -> None:
+        self.mechanism.state, self.after = self.after, self.mechanism.state
 
     def _recorded(self, h: float) -> Callable[[], None]:
         """Return a step of length h (s) from the present state to the other one."""
         before, after = self.mechanism.state, self.after
-        place = (h, id(before))
+        place = (float(np.float32(h)), id(before))
         if place not in self.once:
-            self.once[place] = recorded(lambda: self.solver.step(before, after, self.control, None, h))
+            self.once[place] = recorded(lambda: self.solver.step(before, after, self.control, None, place[0]))
         return self.once[place]
 
     def motion(self) -> LinkMotion:
