@@ -2,8 +2,8 @@
 other rotations.
 
 Positions q start at zero, with unit quaternions; velocities v are the velocities of the tree. Angular
-velocities of balls and the twists (v, ω) of free links are relative to the parent, in the axes of the parent
-or of the child, as the engine defines them.
+velocities of balls are relative to the parent, in the axes of the parent or of the child, as the engine
+defines them. The twists (v, ω) of free links are in world axes.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ class JointCoordinates:
 
     ``single`` (n,) are the velocities of slides and turns, and ``single_q`` their positions. ``quaternions``
     and ``places`` contain pairs of the first position and the first velocity of a quaternion or a free link's
-    displacement. ``in_child`` is True if velocities are in the axes of the child.
+    displacement. ``in_child`` is True if angular velocities of balls are in the axes of the child.
     """
 
     nv: int
@@ -54,12 +54,15 @@ class JointCoordinates:
         out[self.single_q] = v[self.single]
         for iq, iv in self.quaternions:
             unit, spin = _unit(q[iq : iq + 4]), np.concatenate([[0.0], v[iv : iv + 3]])
-            turned = rotations.multiply(unit, spin) if self.in_child else rotations.multiply(spin, unit)
-            out[iq : iq + 4] = turned / 2
+            out[iq : iq + 4] = self._turned(iv, unit, spin) / 2
         for iq, iv in self.places:
-            speed = v[iv : iv + 3]
-            out[iq : iq + 3] = rotations.rotate(_unit(q[iq + 3 : iq + 7]), speed) if self.in_child else speed
+            out[iq : iq + 3] = v[iv : iv + 3]
         return out
+
+    def _turned(self, iv: int, unit: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """Return the product of a quaternion and a turn in the axes of the velocity ``iv``."""
+        is_local = self.in_child and all(iv != free + 3 for _, free in self.places)
+        return rotations.multiply(unit, turn) if is_local else rotations.multiply(turn, unit)
 
     def normalised(self, q: np.ndarray) -> np.ndarray:
         """Return the positions with quaternions of unit length."""
@@ -75,9 +78,7 @@ class JointCoordinates:
         out = q + self.rates(q, step)
         for iq, iv in self.quaternions:
             turn, unit = rotations.from_vector(step[iv : iv + 3]), _unit(q[iq : iq + 4])
-            out[iq : iq + 4] = (
-                rotations.multiply(unit, turn) if self.in_child else rotations.multiply(turn, unit)
-            )
+            out[iq : iq + 4] = self._turned(iv, unit, turn)
         return out
 
 

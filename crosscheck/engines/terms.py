@@ -161,6 +161,8 @@ class Simulation:
         acting = self._forces(terms, motion_now) - terms.bias - terms.mass @ a
         gamma = -rows.drift - rows.jacobian @ a
         root = self._root(t, terms)
+        if not np.isfinite(acting).all():
+            raise Failed(Outcome.NOT_FINITE, t, f"the forces are not finite at {t:.6g} s")
         pushed = solve_triangular(root, acting[self.free], lower=True)
         spread = self._spread(t, root, rows.jacobian)
         held = np.linalg.lstsq(spread, gamma - spread @ pushed, rcond=REDUNDANT)[0]

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.moving import dead_end, moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.gauss_principle import gauss, stacked
@@ -74,7 +74,9 @@ def test_accelerations_of_terms_and_gauss_s_principle(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart")])
-@pytest.mark.parametrize("label", ["every joint", "driven", "spherical joint", "spinning loop"])
+@pytest.mark.parametrize(
+    "label", ["every joint", "driven", "spherical joint", "spinning loop", "tumbling body", "floating pair"]
+)
 def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
     scene = scenes()[label]
     run = simulate(name, scene, TERMS, 0.0, scene.duration / 2, scene.duration)
@@ -84,6 +86,15 @@ def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
     for measure in (balance, idle):
         left = measure(scene, run, exact)
         assert left < MARGIN * 1e3 * LATER, f"{name}, {label}: {measure.__name__} {left:.1e}"
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart")])
+def test_terms_at_a_dead_end(name: str) -> None:
+    """Drivers that demand poses which the mechanism does not have end a run with a reason."""
+    scene = dead_end()
+    run = engine(name).run(scene, np.linspace(0.0, scene.duration, 5), TERMS)
+    assert run.outcome in (Outcome.NOT_FINITE, Outcome.NOT_CONVERGED, Outcome.STEP_FAILED) and run.message
+    assert violation_series(scene, run).max() < 1e-6
 
 
 ONE_STEP, TINY = 2e-4, 1e-5  # relative error of accelerations by a step of TINY (s), of first order
