@@ -53,16 +53,22 @@ def pytest_itemcollected(item: pytest.Item) -> None:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Raise UsageError if all tests were collected and slow.toml lists a case that does not exist."""
-    if len(items) < MANY:
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Raise UsageError if slow.toml lists a case that a collected test does not have."""
+    if any("::" in argument for argument in config.args):
         return
-    listed = {(f, test, p) for f, tests in SLOW.items() for test, found in tests.items() for p in found}
+    found: dict[tuple[str, str], set[str]] = {}
     for item in items:
-        file, test = item.path.relative_to(HERE).as_posix(), getattr(item, "originalname", item.name)
-        listed -= {(file, test, p) for p in patterns(item) if fnmatchcase(case(item), p)}
-    if wrong := [each for each in sorted(listed) if not names_missing_engine(each[-1])]:
-        raise pytest.UsageError(f"tests/slow.toml lists cases that do not exist: {wrong}")
+        test = item.path.relative_to(HERE).as_posix(), getattr(item, "originalname", item.name)
+        found.setdefault(test, set()).add(case(item))
+    wrong = [
+        f"{file}::{name}[{pattern}]"
+        for (file, name), cases in found.items()
+        for pattern in SLOW.get(file, {}).get(name, [])
+        if not any(fnmatchcase(each, pattern) for each in cases) and not names_missing_engine(pattern)
+    ]
+    if wrong:
+        raise pytest.UsageError(f"tests/slow.toml lists cases that do not exist: {', '.join(wrong)}")
 
 
 def names_missing_engine(pattern: str) -> bool:
