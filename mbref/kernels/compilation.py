@@ -40,6 +40,8 @@ from mbref.kernels.file_lock import held, is_held
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
+# Only kernels call helpers: wrappers for calls from Python and C would take a sixth of the compilation.
+NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 CONFIG: Any = numba.config  # numba creates the names of this module when it is imported
 PLAIN = bool(CONFIG.DISABLE_JIT)
 Function = Callable[..., Any]
@@ -111,15 +113,21 @@ class Helper:
         functools.update_wrapper(self, function)
 
     def __call__(self, *arguments: object) -> object:
-        return self._dispatcher(*arguments)
+        return self._callable(*arguments)
 
     @property
     def _numba_type_(self) -> types.Type:
         """Return the type by which numba compiles calls of this kernel."""
-        return self._dispatcher._numba_type_
+        return self._called._numba_type_
 
     @functools.cached_property
-    def _dispatcher(self) -> Any:
+    def _called(self) -> Any:
+        """Return the dispatcher for calls from kernels."""
+        return njit(**self._options, **NO_WRAPPERS)(self.function)
+
+    @functools.cached_property
+    def _callable(self) -> Any:
+        """Return the dispatcher for calls from Python, as tests and benchmarks make them."""
         return njit(**self._options)(self.function)
 
 
