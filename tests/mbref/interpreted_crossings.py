@@ -180,6 +180,23 @@ def test_a_long_crossing_is_confirmed_by_a_perturbed_run(monkeypatch):
     assert ended(monkeypatch, OK + 1)[:2] == (UNDECIDED, False)
 
 
+@pytest.mark.parametrize("most", [1, 3])
+def test_a_crossing_takes_no_more_steps_than_a_run_may(monkeypatch, most):
+    state = memory(time=0.0)
+    counts = state.run.equations.system.counts
+    counts.steps = counts.crossings = 0
+    state.run.control.most_steps, state.progress.end, state.progress.is_clear = most, 1.0, 0
+
+    def step(_):
+        counts.steps += 1
+        return OK
+
+    state.kernels = SimpleNamespace(step=step)
+    for name in ("put_terms", "judge_clearance"):
+        monkeypatch.setattr(long_crossing, name, lambda *_: None)
+    assert (long_crossing.step_until_clear(state), counts.steps) == (TOO_MANY_STEPS, most)
+
+
 def test_regular_steps_follow_when_the_distance_grows_beyond_a_limit():
     for before, pivot, clear in ((0.0, 0.2, 1), (0.0, 0.05, 0), (3.0, 0.2, 0), (2.0, 0.2, 1)):
         state = memory(pivot=pivot)
