@@ -13,6 +13,7 @@ from mbref.kernels.layout import OK
 from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
 from mbref.stepping.singular_start import Leaving
 from mbref.taylor.crossing import (
+    acceptance,
     departure,
     determinants,
     location,
@@ -22,7 +23,8 @@ from mbref.taylor.crossing import (
     start,
     uniqueness,
 )
-from mbref.taylor.crossing.thresholds import DEPARTURE
+from mbref.taylor.crossing.thresholds import CROSSING_NOISE, DEPARTURE
+from mbref.taylor.mode import HIGH_ACCURACY, REGULAR
 from tests.mbref.threshold_checks import memory
 
 pytestmark = pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
@@ -180,6 +182,24 @@ def test_a_long_crossing_is_confirmed_by_a_perturbed_run(monkeypatch):
     assert ended(monkeypatch, OK + 1)[:2] == (UNDECIDED, False)
 
 
+@pytest.mark.parametrize(
+    ("kind", "approaching", "distance", "is_of_crossing"),
+    [
+        (HIGH_ACCURACY, 1, 1e-2, 1),
+        (REGULAR, 1, 1e-2, 0),
+        (HIGH_ACCURACY, 0, 1e-2, 0),
+        (HIGH_ACCURACY, 1, 0.9, 0),
+    ],
+)
+def test_steps_that_approach_a_position_get_the_tolerance_of_crossings(
+    kind, approaching, distance, is_of_crossing
+):
+    state = memory(kind=kind, approaching=approaching, start_pivot=distance)
+    found, of_steps = acceptance.crossing_tolerance(state), acceptance.step_tolerance(state)
+    assert found == (max(state.mode.tolerance, CROSSING_NOISE / distance) if is_of_crossing else of_steps)
+    assert state.mode.tolerance != of_steps
+
+
 @pytest.mark.parametrize("most", [1, 3])
 def test_a_crossing_takes_no_more_steps_than_a_run_may(monkeypatch, most):
     state = memory(time=0.0)
@@ -307,8 +327,21 @@ def test_a_start_in_motion_that_its_series_misses_is_undecided(monkeypatch):
     found, _, taken = leaving(monkeypatch, [0.0, 1e-4])
     assert found.from_start(moving) == PAUSED
     assert taken[0][2] == pytest.approx(0.5e-4), "at most half of the run"
-    found._misses = lambda *_: True
+    asked = []
+    found._misses = lambda *given: asked.append(given) or True
     assert found.from_start(moving) == UNDECIDED
+    (q, v, ahead), expected = asked[0], moving.coordinates
+    assert q is expected and v is moving.velocities and ahead == taken[0][2]
+
+
+@pytest.mark.parametrize(("moved", "changed", "far"), [(0.5, 0.0, 0), (0.51, 0.0, 1), (0.0, 0.1, 1)])
+def test_a_series_misses_a_start_from_which_it_is_further_than_a_distance(monkeypatch, moved, changed, far):
+    taylor, asked = SimpleNamespace(options=SimpleNamespace(start_distance=0.5)), []
+    found, v = departure.Departure(None, taylor, None, None), np.array([2.0, 0.0])
+    monkeypatch.setattr(departure, "displacement", lambda q, there: there - q)
+    found._state_at = lambda h: asked.append(h) or (np.array([0.0, 1.0 - moved]), v + changed)
+    assert found._misses(np.array([0.0, 1.0]), v, 0.25) == bool(far)
+    assert asked == [-0.25, 0.0], "the state at the series' beginning is put back"
 
 
 def test_a_state_behind_a_crossing_is_corrected_by_its_series_there(monkeypatch):
