@@ -26,10 +26,13 @@ def started(scene: Scene) -> Scene:
     found = scene.assembled()
     if found is scene:
         return scene
-    pose = initial_poses(found)
+    position, orientation = initial_poses(found)
     still = np.zeros((1, len(scene.body), 3))
-    gaps = {name: float(np.abs(rows).max(initial=0.0)) for name, rows in closure(scene, 0.0, *pose).items()}
-    coupled = coupling_gaps(scene, np.zeros(1), *(each[None] for each in pose), still)
+    gaps = {
+        name: float(np.abs(rows).max(initial=0.0))
+        for name, rows in closure(scene, 0.0, position, orientation).items()
+    }
+    coupled = coupling_gaps(scene, np.zeros(1), position[None], orientation[None], still)
     gaps |= {c.name: _up_to_turns(scene, c, coupled[c.name].item()) for c in scene.coupling}
     for name, gap in gaps.items():
         if not gap <= MET * max(1.0, scene_length(scene)):
@@ -46,6 +49,7 @@ def _up_to_turns(scene: Scene, coupling: Coupling, gap: float) -> float:
 def start_coordinates(scene: Scene) -> dict[str, np.ndarray]:
     """Return angle (rad, within half a turn) and displacement (m) (2,) of every joint with a coordinate at
     the start, counted from the poses of the scene."""
-    pose = (each[None] for each in initial_poses(started(scene)))
-    found = joint_coordinates(scene, np.zeros(1), *pose, np.zeros((1, len(scene.body), 3)))
+    position, orientation = initial_poses(started(scene))
+    still = np.zeros((1, len(scene.body), 3))
+    found = joint_coordinates(scene, np.zeros(1), position[None], orientation[None], still)
     return {name: both[0] for name, both in found.items()}
