@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.conformance.features import feature_scenes, undetermined
+from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -56,7 +56,8 @@ def of_features(engines: Sequence[str], ask: Ask | None = None) -> Support:
 
     Nothing is simulated, and the engines' packages are not needed. ``ask`` replaces the engines' ``cannot``.
     """
-    return _support(engines, {**feature_scenes(), "motion without masses": undetermined()}, ask or _ask)
+    further = {"massless link": massless_link(), "motion without masses": undetermined()}
+    return _support(engines, {**feature_scenes(), **further}, ask or _ask)
 
 
 def of_scenes(engines: Sequence[str], ask: Ask | None = None) -> Support:

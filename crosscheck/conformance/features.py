@@ -19,6 +19,7 @@ from mbref.scene import (
     JointTorque,
     Load,
     Moment,
+    Revolute,
     Scene,
     Sine,
     SlideSpring,
@@ -103,6 +104,18 @@ def feature_scenes() -> dict[str, Scene]:
 def undetermined() -> Scene:
     """Return a body without mass and driver. Its motion is undetermined, and every engine must refuse it."""
     return massless(_probe("undetermined", PIVOTED))
+
+
+def massless_link() -> Scene:
+    """Return a body on two crossing hinges with a link of mass 0 between them, which act as a universal
+    joint."""
+    link = Body(name="link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=PIVOT)
+    first, second = PLACES["axes"]
+    hinges = (
+        Revolute(name="J", bodies=("ground", "link"), anchor=PIVOT, axis=first),
+        Revolute(name="K", bodies=("link", "body"), anchor=PIVOT, axis=second),
+    )
+    return _probe("massless_link").with_(body=(link, BODY), joint=hinges)
 
 
 def is_undetermined(scene: Scene) -> bool:

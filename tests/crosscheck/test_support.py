@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from crosscheck.cli import support
-from crosscheck.conformance.features import JOINTS, LOADS, feature_scenes
+from crosscheck.conformance.features import JOINTS, LOADS, PIVOT, PLACES, feature_scenes, massless_link
 from crosscheck.engine import BUILT_IN, Cannot, Owner, engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.study.speed_sentences import COMPILED
-from mbref.scene import Joint, Load, Scene
+from mbref.scene import Joint, Load, Scene, Universal
 from mbref.scene_validation import DRIVABLE
 from mbref.trajectory import Outcome
 
@@ -49,6 +51,19 @@ def test_support_and_a_short_run(name):
             setting = [s for s in engine_here.settings(scene) if not s.family.endswith(COMPILED)][-1]
             run = engine_here.run(scene, np.array([0.0, scene.duration / 100]), setting)
             assert run.outcome is Outcome.COMPLETED, f"{feature} at {setting}: {run.outcome} {run.message}"
+
+
+@pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn", "dart"])
+def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
+    pytest.importorskip({"dart": "dartpy"}.get(name, name))
+    scene, simulator = massless_link(), engine(name)
+    joint = Universal(name="U", bodies=("ground", "body"), anchor=PIVOT, axes=PLACES["axes"])
+    whole = scene.with_(body=scene.body[1:], joint=[joint])
+    assert simulator.cannot(scene) is None
+    times = np.linspace(0.0, scene.duration, 5)
+    run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
+    exact = natural_motion(whole, times, EXTENDED, seconds=20.0).position
+    assert np.abs(run["body"].position - doubles(exact)[:, 0]).max() < 1e-6, run.message
 
 
 def test_gaps_and_their_sentences():
