@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
+from crosscheck.conformance.geared_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.scene import Scene
 from mbref.scenes import SCENES
@@ -56,7 +57,14 @@ def of_features(engines: Sequence[str], ask: Ask | None = None) -> Support:
 
     Nothing is simulated, and the engines' packages are not needed. ``ask`` replaces the engines' ``cannot``.
     """
-    further = {"massless link": massless_link(), "motion without masses": undetermined()}
+    further = {
+        "coupling of angles": gear_pair()[0],
+        "coupling of an angle and a displacement": rack()[0],
+        "coupling within a joint": screw()[0],
+        "armature": armature_pendulum()[0],
+        "massless link": massless_link(),
+        "motion without masses": undetermined(),
+    }
     return _support(engines, {**feature_scenes(), **further}, ask or _ask)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from crosscheck.conformance.changes import nudged, weighed
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.moving import dead_end, moving_probes
 from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.conformance.runners import Runner
@@ -101,17 +102,16 @@ class Specimen:
 
 
 def specimens(deep: bool = False) -> list[Specimen]:
-    """Return all scenes of the suite; ``deep`` applies the metamorphic relations to all of them."""
+    """Return all scenes of the suite; ``deep`` applies the metamorphic relations to all without couplings."""
     forms = [Specimen(*make(), deep or make.__name__ in RELATED) for make in CLOSED_FORMS]
     scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
-    known = {scene.name for scene in scenes}
     probes = {
-        name: scene.with_(name=name) for name, scene in feature_scenes().items() if scene.name not in known
+        name: scene.with_(name=name) for name, scene in feature_scenes().items() if scene.name not in SHORT
     }
     drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
     scenes += [*(probes | moving_probes()).values(), *drawn]
-    found = forms + [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
-    return [*found, Specimen(dead_end(), dead_end=True)]
+    forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
+    return [*forms, *(Specimen(*make()) for make in GEARED), Specimen(dead_end(), dead_end=True)]
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,13 @@ from rich.console import Console
 from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.relations import shaken
 from crosscheck.conformance.runners import InProcess, Isolated
 from crosscheck.conformance.trial import specimens
 from crosscheck.engine import engine
+from crosscheck.judge.arithmetic import EXTENDED, doubles
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
@@ -31,6 +34,17 @@ def test_closed_form_and_its_own_equation():
         written = trial.exact_motion(specimen, times)
         apart = trial.difference(specimen.scene, written, solved.poses(times))
         assert apart < 1e-12, f"{name}: formula and {solved.name} differ by {apart:.3g}, allowed 1e-12"
+
+
+@pytest.mark.parametrize("make", GEARED, ids=lambda make: make.__name__)
+def test_closed_form_of_couplings_and_the_reference(make):
+    scene, exact = make()
+    times = np.linspace(0, scene.duration, 4)
+    position, orientation = exact(times)
+    found = natural_motion(scene, times, EXTENDED, seconds=60.0)
+    assert np.abs(position - doubles(found.position)).max() < 1e-13
+    turned = np.abs(np.einsum("kbi,kbi->kb", orientation, doubles(found.orientation)))
+    assert np.abs(turned - 1).max() < 1e-13
 
 
 def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypatch):

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from crosscheck.conformance import suite, trial
+from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import BUILT_IN, engine
 
@@ -37,6 +38,13 @@ def known(name: str, scenes: tuple[str, ...]) -> set[tuple[str, str, str]]:
 def test_engine_and_moving_probes(name):
     found = violations(name, QUICK, related=False)
     assert set(found) == known(name, QUICK), found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", BUILT_IN)
+def test_engine_and_couplings(name):
+    found = violations(name, tuple(make()[0].name for make in GEARED), related=False)
+    assert not found, found
 
 
 @pytest.mark.slow
