@@ -41,7 +41,7 @@ from mbref.kernels.file_lock import held, is_held
 # no kernel can allocate, and none counts references to its arrays, which takes time.
 OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy", "_nrt": False}
 # Only kernels call helpers: wrappers for calls from Python and C would take a sixth of the compilation.
-NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+NO_WRAPPERS: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 CONFIG: Any = numba.config  # numba creates the names of this module when it is imported
 PLAIN = bool(CONFIG.DISABLE_JIT)
 Function = Callable[..., Any]
