@@ -38,6 +38,17 @@ def test_rates_oppose_where_the_motion_reverses_relative_to_the_null_vector(befo
     assert determinants.rates_oppose(state) == (before * after < 0.0)
 
 
+@pytest.mark.parametrize(("chosen", "expected"), [(1, (1, 2.0)), (2, (0, 3.0))])
+def test_pivots_of_the_start_give_its_determinant_unless_rows_have_changed(monkeypatch, chosen, expected):
+    state = memory(variables=1)
+    state.partition.partition_id = chosen
+    monkeypatch.setattr(determinants, "product_of_pivots", lambda *_: (1, 2.0))
+    monkeypatch.setattr(determinants, "square_determinant", lambda _: (0, 3.0))
+    monkeypatch.setattr(determinants, "evaluate_gradient", lambda *_: None)
+    determinants.save_start_determinant(state)
+    assert (state.step.start_negative, state.step.start_logarithm) == expected
+
+
 @pytest.mark.parametrize(
     ("rows", "chosen", "expected"), [(1, 1, True), (1, 2, True), (3, 1, True), (3, 2, False)]
 )
