@@ -10,7 +10,7 @@ import pytest
 from mbref.equations.branches import Branches, Passed
 from mbref.kernels.compilation import PLAIN
 from mbref.kernels.layout import OK
-from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
+from mbref.stepping.loop import DONE, PAUSED, SINGULAR_AHEAD, TOO_MANY_STEPS, UNDECIDED
 from mbref.stepping.singular_start import Leaving
 from mbref.taylor.crossing import (
     acceptance,
@@ -209,6 +209,28 @@ def test_steps_that_approach_a_position_get_the_tolerance_of_crossings(
     found, of_steps = acceptance.crossing_tolerance(state), acceptance.step_tolerance(state)
     assert found == (max(state.mode.tolerance, CROSSING_NOISE / distance) if is_of_crossing else of_steps)
     assert state.mode.tolerance != of_steps
+
+
+@pytest.mark.parametrize(
+    ("kind", "crossed", "pivot", "expected"),
+    [
+        (REGULAR, 1, 0.9, SINGULAR_AHEAD),
+        (REGULAR, 0, 0.2, SINGULAR_AHEAD),
+        (REGULAR, 0, 0.9, OK),
+        (HIGH_ACCURACY, 0, 0.9, OK),
+        (HIGH_ACCURACY, 0, 0.2, ("approach", 0.5, 0.2, "turned", 1)),
+        (HIGH_ACCURACY, 1, 0.9, ("crossing", 0.9, "turned", 1)),
+    ],
+)
+def test_steps_across_or_near_singular_positions_are_judged(monkeypatch, kind, crossed, pivot, expected):
+    state = memory(kind=kind, pivot=pivot)
+    state.kernels = SimpleNamespace(detect=lambda h, least, _: crossed * (h == 0.5) * (least == pivot))
+    monkeypatch.setattr(acceptance, "ends_near_singular", lambda least, _: least < 0.3)
+    monkeypatch.setattr(acceptance, "turns_back", lambda *_: "turned")
+    for name in ("crossing", "approach"):
+        monkeypatch.setattr(acceptance, f"judge_{name}", lambda *given, name=name: (name, *given[:-1]))
+    assert acceptance.judge_branch(0.5, 1, state) == expected
+    assert state.step.crossed == crossed
 
 
 @pytest.mark.parametrize("most", [1, 3])
