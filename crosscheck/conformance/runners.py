@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import math
+import signal
 import tempfile
+import threading
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,15 +90,42 @@ class Isolated:
         return [run_isolated(self.name, scene, times, setting, self.time_limit) for scene, setting in tasks]
 
 
+class _OutOfTime(BaseException):
+    """End of a run at its time limit; no ``except Exception`` of an engine catches it."""
+
+
+@contextlib.contextmanager
+def _within(seconds: float) -> Iterator[None]:
+    """Raise _OutOfTime after CPU seconds, as soon as a call into compiled code has returned; without effect
+    outside the main thread, and on systems without timers."""
+    in_main = threading.current_thread() is threading.main_thread()
+    if not (math.isfinite(seconds) and in_main and hasattr(signal, "setitimer")):
+        yield
+        return
+
+    def end(*_: object) -> None:
+        raise _OutOfTime
+
+    before = signal.signal(signal.SIGPROF, end)
+    try:
+        signal.setitimer(signal.ITIMER_PROF, seconds)
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
 @dataclass(frozen=True)
 class InProcess:
-    """Runner in this process, in an empty directory, without limits: for engines that are trusted to return.
+    """Runner in this process, in an empty directory: for engines that are trusted to return.
 
-    ``called`` is the engine's name in commands if it differs from its own name.
+    ``called`` is the engine's name in commands if it differs from its own name. A run ends after CPU time
+    ``time_limit`` (s), without the time in which the engine prepares its first run.
     """
 
     engine: Engine
     called: str = ""
+    time_limit: float = math.inf
 
     @property
     def name(self) -> str:
@@ -125,10 +155,15 @@ class InProcess:
         return [self.observe(scene, times, setting).value for scene, setting in tasks]
 
     def _run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Return a run; an exception or a malformed result becomes the outcome CRASHED with a message, as in
-        a child process."""
+        """Return a run; an exception, a malformed result or the end of the time becomes the outcome CRASHED
+        or TIMED_OUT with a message, as in a child process."""
         try:
-            return answered(self.engine, scene, times, setting)
+            if math.isfinite(self.time_limit):
+                self.engine.prepare([setting.family])
+            with _within(self.time_limit):
+                return answered(self.engine, scene, times, setting)
+        except _OutOfTime:
+            outcome, words = Outcome.TIMED_OUT, f"no result after {self.time_limit:g} s"
         except Exception as error:
-            words = f"{type(error).__name__}: {error}"
-            return serve.failed(self.name, self.engine.version(), scene, setting, Outcome.CRASHED, words)
+            outcome, words = Outcome.CRASHED, f"{type(error).__name__}: {error}"
+        return serve.failed(self.name, self.engine.version(), scene, setting, outcome, words)

@@ -83,10 +83,9 @@ def record_of(verdict: Verdict) -> dict[str, Any]:
 def runner(name: str, time_limit: float, in_process: bool = False) -> Runner:
     """Return a runner of an engine (a known name or ``module:attribute``).
 
-    Every run is in a child process with a ``time_limit`` (s), or in this process without a limit. Raises
-    LookupError.
+    Every run has a ``time_limit`` (s) and is in a child process, or in this process. Raises LookupError.
     """
-    return InProcess(engine(name), name) if in_process else Isolated(name, time_limit)
+    return InProcess(engine(name), name, time_limit) if in_process else Isolated(name, time_limit)
 
 
 def held_against(

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import json
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +23,7 @@ from crosscheck.engine import engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
+from mbref.trajectory import Outcome
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 
@@ -59,6 +62,28 @@ def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypat
     assert {"times", "unit", "run"}.isdisjoint(faulty), verdicts
     undone = [v for v in record["verdicts"] if v["scene"] == undetermined().name]
     assert [v["status"] for v in undone] == ["fail"], undone
+
+
+def test_a_run_in_this_process_ends_at_its_limit(monkeypatch):
+    """A loop that catches every Exception; the next run has its own time."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    from fake_engines import Fake
+
+    class Endless(Fake):
+        def misbehave(self, scene):
+            while scene.name == "endless":
+                with contextlib.suppress(Exception):
+                    sum(range(1000))
+
+    scene = SPECIMENS["free_fall"].scene
+    bench, times = InProcess(Endless(), "", 0.1), np.array([0.0, 0.1])
+    setting = Endless().settings(scene)[0]
+    before = signal.getsignal(signal.SIGPROF)
+    ended = bench.observe(scene.with_(name="endless"), times, setting).value
+    assert ended.outcome is Outcome.TIMED_OUT and ended.message == "no result after 0.1 s"
+    assert bench.observe(scene, times, setting).value.outcome is Outcome.COMPLETED
+    assert signal.getsignal(signal.SIGPROF) == before and signal.getitimer(signal.ITIMER_PROF) == (0.0, 0.0)
+    assert suite.runner("mbref", 7.0, in_process=True).time_limit == 7.0
 
 
 @pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
