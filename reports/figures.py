@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 import itertools
 import re
@@ -53,6 +54,7 @@ def canvas(width: float = 7.2, height: float = 4.0, rows: int = 1) -> tuple[Figu
     return figure, list(axes[:, 0])
 
 
+@functools.cache
 def colour(engine: str) -> str:
     """Return the engine's colour, equal in every picture; third-party engines share the last colours."""
     names = engine_names()

@@ -35,10 +35,12 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     runs = {engine: run.trajectory for engine, run in _best(scene_runs).items()}
     found: dict[str, Comparison] = {}
     sentences: list[Block] = []
+    solved: dict[bytes, Trajectory] = {}  # exact motions with reactions, by sample times
     for engine, run in runs.items():
         exact = scene_runs.exact(run.times)
         if exact is not None and exact.acceleration is not None and scene.has_mass():
-            true = with_exact_reactions(scene, exact)
+            key = exact.times.tobytes()
+            true = solved[key] = solved.get(key) or with_exact_reactions(scene, exact)
             found[engine] = compare(scene, true, run)
             sentences += [Text(f"{sentence}.") for sentence in absurd(scene, run, true)]
     if not found:
