@@ -35,11 +35,13 @@ from mbref.scene import (
     Driver,
     Fixed,
     Force,
+    JointForce,
     Moment,
     Planar,
     Revolute,
     Scene,
     Sine,
+    SlideSpring,
     Spherical,
     Spring,
     TorsionSpring,
@@ -475,3 +477,42 @@ def test_accelerations_of_bodies_on_joints_and_with_massless_links():
     longer = scene.with_(body=(link, scene.body[0]), joint=(pivot, weld))
     found = accelerations(longer, 0.0, at_state(longer))
     assert found[1] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)
+
+
+def test_springs_and_forces_along_a_slide():
+    """4 N/m · (0.3 - 0.1) m + 0.5 N s/m · 2 m/s = 1.8 N back, and 3 N times 1 + 2 t at 1 s."""
+    rail = Translational(name="J", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 5.0, 0.0))
+    spring = SlideSpring(joint="J", stiffness=4.0, damping=0.5, natural_displacement=0.1)
+    push = JointForce(joint="J", force=3.0, factor={"polynomial": [1.0, 2.0]})
+    scene = Scene(name="s", body=(body("a"), body("b")), joint=(rail,), load=(spring, push))
+    pose = np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]]), np.tile(UNIT, (2, 1))
+    twist = np.array([[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]), np.zeros((2, 3))
+    found = joint_wrenches(scene, 1.0, pose, twist, np.zeros(0))
+    assert found[:, 1] == pytest.approx([1.8 - 9.0, 9.0 - 1.8]) and not turning_loads(scene)
+    assert found[1, 3:] == pytest.approx(np.zeros(3)), "the force acts at the second body's anchor"
+
+
+def test_an_armature_resists_the_second_derivative_of_its_coordinate():
+    """0.25 kg m² about a hinge adds to 2.5 kg m²: the pendulum falls with 18 / 2.75 rad/s².
+
+    r = 2 m along an axis that turns at ω = 3 rad/s: (r · e)'' = 2 v · e' + r · e'' = 2 · 6 · 3 - 9 · 2 m/s².
+    """
+    scene = pendulum().with_(load=())
+    geared = scene.with_(joint=(scene.joint[0].model_copy(update={"armature": 0.25}),))
+    assert accelerations(geared, 0.0, at_state(geared))[0, 5] == pytest.approx(-18 / 2.75)
+    arm = Revolute(name="H", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=Z)
+    rail = Translational(name="J", bodies=("a", "b"), anchor=(2.0, 0.0, 0.0), axis=X, armature=0.4)
+    turning = Scene(name="s", body=(body("a"), body("b", position=(2.0, 0.0, 0.0))), joint=(arm, rail))
+    spin = np.array([[0.0, 0.0, 3.0]] * 2)
+    velocity = np.array([[0.0, 0.0, 0.0], [0.0, 6.0, 0.0]])
+    pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), np.tile(UNIT, (2, 1))
+    found = joint_coordinates.reflected(turning, *pose, velocity, spin)
+    assert found.joints == ("J",) and found.inertia.tolist() == [0.4]
+    row = np.zeros(12)
+    row[[0, 6]] = -1.0, 1.0
+    assert found.jacobian[0] == pytest.approx(row) and found.drift == pytest.approx([18.0])
+    outer = joint_coordinates.reflected(turning, *pose, velocity * [[0], [0]], spin)
+    assert outer.drift == pytest.approx([-18.0]), "at rest only the axis turns: -ω² r"
+    assert outer.force == pytest.approx(0.4 * 18.0 * row) and outer.mass == pytest.approx(
+        0.4 * np.outer(row, row)
+    )
