@@ -15,6 +15,7 @@ from mbref.stepping.singular_start import Leaving
 from mbref.taylor.crossing import (
     acceptance,
     departure,
+    detection,
     determinants,
     location,
     long_crossing,
@@ -169,6 +170,11 @@ def test_a_motion_keeps_moving_down_to_a_fiftieth_of_its_energy(monkeypatch):
     assert uniqueness.keeps_moving(1.0, 1.0, resting), "a motion from rest has no direction to reverse"
 
 
+def test_pivots_are_compared_with_the_largest_pivot():
+    state = memory(largest_pivot=2.0, start_pivot=1.0)
+    assert detection.is_near_singular(0.5, state) and not detection.is_near_singular(0.7, state)
+
+
 # --- crossings ------------------------------------------------------------------------------------------
 def ended(monkeypatch, status, agrees=True, rank=1):
     """Status after a crossing, whether a perturbed run was made, and the memory."""
@@ -248,6 +254,25 @@ def test_a_crossing_takes_no_more_steps_than_a_run_may(monkeypatch, most):
     for name in ("put_terms", "judge_clearance"):
         monkeypatch.setattr(long_crossing, name, lambda *_: None)
     assert (long_crossing.step_until_clear(state), counts.steps) == (TOO_MANY_STEPS, most)
+
+
+def test_a_crossing_ends_with_the_step_that_crosses(monkeypatch):
+    state, recorded = memory(time=0.0), []
+    counts = state.run.equations.system.counts
+    counts.steps = counts.crossings = 0
+    state.run.control.most_steps, state.progress.end, state.progress.is_clear = 9, 1.0, 0
+
+    def step(_):
+        counts.steps += 1
+        counts.crossings += counts.steps == 2
+        return OK
+
+    state.kernels = SimpleNamespace(step=step)
+    monkeypatch.setattr(long_crossing, "record_crossings", lambda _: recorded.append(counts.steps))
+    for name in ("put_terms", "judge_clearance"):
+        monkeypatch.setattr(long_crossing, name, lambda *_: None)
+    assert long_crossing.step_until_clear(state) == PAUSED
+    assert recorded == [2]
 
 
 def test_regular_steps_follow_when_the_distance_grows_beyond_a_limit():
@@ -375,6 +400,23 @@ def test_a_series_misses_a_start_from_which_it_is_further_than_a_distance(monkey
     found._state_at = lambda h: asked.append(h) or (np.array([0.0, 1.0 - moved]), v + changed)
     assert found._misses(np.array([0.0, 1.0]), v, 0.25) == bool(far)
     assert asked == [-0.25, 0.0], "the state at the series' beginning is put back"
+
+
+@pytest.mark.parametrize(("velocity", "expected"), [([0.0, 2.0], 7.0), ([0.0, 0.0], 5.0)])
+def test_the_sample_at_a_start_has_its_acceleration_only_at_rest(velocity, expected):
+    """In motion the series has it."""
+    system = SimpleNamespace(acceleration=np.full(2, 7.0))
+    clock, put = SimpleNamespace(sample=0), []
+    run = SimpleNamespace(
+        times=np.array([0.0, 0.1, 0.5]),
+        memory=SimpleNamespace(loop=SimpleNamespace(clock=clock), equations=SimpleNamespace(system=system)),
+    )
+    found = departure.Departure(run, SimpleNamespace(progress=SimpleNamespace(completed=0)), None, None)
+    found._state_at = lambda h: (np.full(2, h), np.full(2, 3.0))
+    found._put_sample = lambda k, q, v, acceleration: put.append((k, q[0], list(v), acceleration[0]))
+    found._put_samples_before(0.3, Leaving(np.ones(2), np.array(velocity), np.full(2, 5.0)))
+    assert put == [(0, 1.0, velocity, expected), (1, pytest.approx(-0.2), [3.0, 3.0], 7.0)]
+    assert clock.sample == 2
 
 
 def test_a_state_behind_a_crossing_is_corrected_by_its_series_there(monkeypatch):
