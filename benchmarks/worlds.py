@@ -81,8 +81,8 @@ def newton(scene: Scene, worlds: int, count: int) -> Run:
     builder.replicate(mechanism.builder, copy_count=worlds)
     model = builder.finalize(device="cpu", skip_validation_joints=True, skip_validation_inertia=True)
     states, control = [model.state(), model.state()], model.control()
-    solvers.make(mechanism.newton, model, KAMINO).step(*states, control, None, STEP)  # compiles
-    solver, states[0] = solvers.make(mechanism.newton, model, KAMINO), model.state()
+    solver = solvers.make(mechanism.newton, model, KAMINO)
+    solver.step(*states, control, None, STEP)  # compiles, and sets up the solver's memory
     start = {"body_q": states[0].body_q.numpy(), "joint_q": states[0].joint_q.numpy()}
     for name in ("joint_qd", "body_qd"):
         start[name] = np.concatenate([getattr(mechanism.state, name).numpy()] * worlds)

@@ -14,8 +14,7 @@ from mbref.scene import Force, Scene
 
 pytestmark = pytest.mark.slow  # kernels are compiled for minutes first
 STEP, COUNT = 1e-3, 20
-# distance (m) after COUNT steps, by rounding to single precision, or by iterations of LOX that end elsewhere
-APART, OF_LOX = 1e-6, 3e-5
+APART = 1e-6  # m; distance after COUNT steps, by rounding to single precision
 
 
 def pulled() -> Scene:
@@ -43,7 +42,7 @@ def test_recorded_steps_of_newton_are_its_steps(family: str) -> None:
         plain.solver.step(mechanism.state, plain.after, plain.control, None, STEP)
         mechanism.state, plain.after = plain.after, mechanism.state
     apart = np.abs(recorded.motion().position - plain.motion().position).max()
-    assert apart <= (OF_LOX if "lox" in family else APART)
+    assert apart <= APART
 
 
 @pytest.mark.parametrize("family", ["stock", "euler", "defaults"])

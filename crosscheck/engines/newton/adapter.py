@@ -101,7 +101,7 @@ class Newton(Engine):
 def _simulation(scene: Scene, times: np.ndarray, setting: Setting) -> FixedSteps:
     tree, longest = spanning_tree(scene, CLOSES.get(setting.family, JOINTS)), setting.options["step"]
     world = _World(Mechanism(scene, tree), setting)
-    for end in times[times > 0.0][:1]:  # compile kernels and record a step before the timed run
+    for end in times[times > 0.0][:1]:  # before the timed run
         world.record(end / step_count(0.0, end, longest))
     return FixedSteps(scene, tree, world, longest)
 
@@ -127,7 +127,11 @@ class _World:
             self._swap()
 
     def record(self, h: float) -> None:
-        """Record a step of length h (s) from each of the two states to the other."""
+        """Record a step of length h (s) from each of the two states to the other.
+
+        A first step from Python compiles kernels and sets up the solver's memory; a recording runs neither.
+        """
+        self.solver.step(self.mechanism.state, self.after, self.control, None, h)
         for _ in range(2):
             self._recorded(h)
             self._swap()
