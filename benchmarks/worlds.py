@@ -57,7 +57,8 @@ def warp(scene: Scene, worlds: int, count: int) -> Run:
     model = mujoco_warp.put_model(ported.model)
     mujoco_warp.step(model, mujoco_warp.put_data(ported.model, ported.data, nworld=worlds))  # compiles
     data = mujoco_warp.put_data(ported.model, ported.data, nworld=worlds)
-    once, start = recorded(lambda: mujoco_warp.step(model, data)), (data.qpos.numpy(), data.qvel.numpy())
+    once = recorded(lambda: mujoco_warp.step(model, data))
+    start = data.qpos.numpy().copy(), data.qvel.numpy().copy()  # the arrays of Warp share their memory
 
     def run() -> None:
         data.qpos.assign(start[0])
@@ -83,7 +84,7 @@ def newton(scene: Scene, worlds: int, count: int) -> Run:
     states, control = [model.state(), model.state()], model.control()
     solver = solvers.make(mechanism.newton, model, KAMINO)
     solver.step(*states, control, None, STEP)  # compiles, and sets up the solver's memory
-    start = {"body_q": states[0].body_q.numpy(), "joint_q": states[0].joint_q.numpy()}
+    start = {name: getattr(states[0], name).numpy().copy() for name in ("body_q", "joint_q")}
     for name in ("joint_qd", "body_qd"):
         start[name] = np.concatenate([getattr(mechanism.state, name).numpy()] * worlds)
 
