@@ -72,7 +72,6 @@ ROWS = (
     Row("mjx", "stock", "MJX's RK4 in double precision, stiffest documented closures"),
     Row("warp", "stock", "MuJoCo Warp's RK4 in single precision, stiffest documented closures"),
     Row("newton", "padmm, moreau", "Kamino with PADMM in single precision, Moreau's midpoint (order 2)"),
-    Row("newton", "lox, moreau", "Kamino with LOX in single precision, Moreau's midpoint (order 2)"),
     Row("newton", "lox", "Kamino with LOX in single precision, Euler (order 1)"),
     Row("newton", "mujoco", "SolverMuJoCo in single precision, default closures (order 1)"),
     Row("newton", "xpbd", "SolverXPBD in single precision"),

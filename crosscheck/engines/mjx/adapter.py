@@ -1,7 +1,7 @@
 """MuJoCo MJX: MuJoCo's model stepped by code in JAX, here on the processor, in double precision except in the
 family SINGLE.
 
-Code is compiled for each model before the timed run, which takes 5 to 30 s.
+Code is compiled for each structure of a model before the timed run, which takes 5 to 30 s.
 """
 
 from __future__ import annotations
