@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from mbref.cli import ensemble, exchange, output
+from mbref.cli import ensemble, exchange, main, output
 from mbref.cli.pictures import path_of
 from mbref.scene import Body, Distance, Driver, Moment, Revolute, Scene, Sine, TorsionSpring, Translational
 from mbref.scene_fields import SMALLEST, checked_length, checked_mass, checked_size, is_some, meant, shown
@@ -320,3 +320,56 @@ def test_a_progress_line_every_ten_seconds(capsys):
 def test_a_distance_joint_has_two_anchors():
     rod = Distance(name="D", bodies=("ground", "rod"), anchors=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
     assert link_lengths(pair(joint=(*pair().joint, rod)))["rod"] == {"A–B": 1.0, "A–D": 1.0, "B–D": 0.0}
+
+
+# --- whole command lines ----------------------------------------------------------------------------------
+def test_import_and_export_from_the_command_line(monkeypatch, tmp_path, capsys):
+    read = SimpleNamespace(scene=pair(), left_out=[], notes=[])
+    asked, written = [], []
+    monkeypatch.setattr(exchange.formats, "read", lambda *given: asked.append(given) or read)
+    monkeypatch.setattr(exchange.formats, "write", lambda *given: written.append(given) or [])
+    file, out = str(tmp_path / "r.xml"), str(tmp_path / "s.toml")
+    assert main(["import", file, "--out", out, "--keyframe", "home"]) == 0 and Scene.from_file(out) == pair()
+    [(path, options)] = asked
+    assert path == file and options.keyframe == "home"
+    assert main(["export", out, "--out", "x.xml"]) == 0 and written == [(pair(), "x.xml")]
+    assert capsys.readouterr().out == f"{out}\nx.xml\n"
+
+
+def test_an_ensemble_from_the_command_line(monkeypatch, tmp_path, capsys):
+    """Three of the variants complete; the scene's gravity is a probable mistake."""
+    scene = ONE.with_(gravity=(0.0, 0.0, -9810.0), duration=1.0)
+    scene.save(tmp_path / "s.toml")
+    given = []
+
+    def runs(scenes, times, method, limits, pool, out):
+        given.append((len(list(scenes)), times.tolist(), method, limits.rtol, out))
+        yield 1, run(2.0)
+        yield 0, run(1.0)
+        yield 2, run(6.0, Outcome.STEP_FAILED if len(given) > 1 else Outcome.COMPLETED, "why")
+
+    monkeypatch.setattr("mbref.ensembles.ensemble.ensemble", runs)
+    words = [
+        "ensemble",
+        str(tmp_path / "s.toml"),
+        "--vary",
+        "body[b].mass=1:2",
+        "--count",
+        "3",
+        "--workers",
+        "1",
+    ]
+    assert main([*words, "--samples", "3", "--rtol", "1e-6", "--json"]) == 0
+    printed = capsys.readouterr()
+    assert json.loads(printed.out)["mean_position"]["b"] == [3.0, 6.0, 0.0] and "mm/s²" in printed.err
+    assert given == [(3, [0.0, 0.5, 1.0], None, 1e-6, None)]
+    assert main([*words, "--out", "runs.jsonl"]) == 1
+    printed = capsys.readouterr()
+    assert (
+        "2 of 3 variants completed" in printed.out
+        and "STEP_FAILED: 1, the first of them variant 2" in printed.err
+    )
+    assert given[1][4] == "runs.jsonl" and len(given[1][1]) == 101
+    for fault in (["--count", "0"], ["--workers", "0"]):
+        assert main([*words, *fault]) == 2
+        assert "--count and --workers: must be at least 1" in capsys.readouterr().err
