@@ -52,7 +52,9 @@ def _mjx(is_single: bool = False) -> Any:
     import jax
 
     config: Any = jax.config
-    config.update("jax_enable_x64", not is_single)
+    if config.jax_enable_x64 == is_single:  # traces of the other precision fail
+        config.update("jax_enable_x64", not is_single)
+        jax.clear_caches()
     config.update("jax_platforms", "cpu")
     from mujoco import mjx
 
