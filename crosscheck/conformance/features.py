@@ -39,7 +39,8 @@ BODY = Body(
     orientation=tuple(rotations.from_vector(np.array([0.3, -0.2, 0.5])).tolist()),
 )
 ACROSS = (1.0, -1.0, 0.5)  # axis of joints that block rotation but let the body fall along the axis
-PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))}
+CROSSING = ((0.0, 0.0, 1.0), (1.0, 0.3, 0.0))  # two axes at a right angle
+PLACES = {"anchor": PIVOT, "anchors": (PIVOT, (0.4, -0.1, 0.1)), "axes": CROSSING}
 JOINTS: Mapping[str, Joint] = {
     name: kind.at("J", LINK, **PLACES, axis=AXIS if kind.facts.free_rotations else ACROSS)
     for name, kind in JOINT_TYPES.items()
@@ -110,7 +111,7 @@ def massless_link() -> Scene:
     """Return a body on two crossing hinges with a link of mass 0 between them, which act as a universal
     joint."""
     link = Body(name="link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=PIVOT)
-    first, second = PLACES["axes"]
+    first, second = CROSSING
     hinges = (
         Revolute(name="J", bodies=("ground", "link"), anchor=PIVOT, axis=first),
         Revolute(name="K", bodies=("link", "body"), anchor=PIVOT, axis=second),
