@@ -114,7 +114,7 @@ def _fitted(change: Change, d: Difference) -> tuple[float, Columns] | None:
         if abs(step) <= 1e-10 * abs(value):
             break
         value = value + step
-        if not value:
+        if not (np.isfinite(value) and value):
             return None
         columns = _moved(change, value, d)
     return None if columns is None else (value, columns)

@@ -130,6 +130,10 @@ PLANTED = {
         lambda t: of_other(SPRUNG, body=lighter("lower", 0.9)),
         "mass and inertia of body 'lower' times 0.9",
     ),
+    "missing body": (
+        lambda t: of_other(SPRUNG, body=lighter("upper", 1e-3)),
+        "body 'upper' has no mass",
+    ),
 }
 
 
@@ -139,7 +143,7 @@ def test_an_exact_motion_is_right_within_the_bound(table):
 
 
 # each finds its explanation among all others by references of changed scenes, which takes seconds
-SELDOM = ("mass", "damping", "millimetres", "inverse", "interpolation")
+SELDOM = ("mass", "missing body", "damping", "millimetres", "inverse", "interpolation")
 
 
 @pytest.mark.parametrize(
@@ -147,10 +151,16 @@ SELDOM = ("mass", "damping", "millimetres", "inverse", "interpolation")
 )
 def test_the_planted_difference_is_the_first_explanation(name, table):
     plant, says = PLANTED[name]
-    found = judge_motion(SPRUNG if name == "mass" else SCENE, plant(table))
+    found = judge_motion(SPRUNG if name in ("mass", "missing body") else SCENE, plant(table))
     assert not found.is_right
     assert found.explanations[0].sentence.startswith(says), found.explanations
     assert found.explanations[0].remains < 1e-3
+
+
+@pytest.mark.slow
+def test_a_motion_far_from_every_changed_scene_has_no_explanation():
+    """The changes' fits leave the range of numbers."""
+    assert not judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5))).explanations
 
 
 PAIRS = {
