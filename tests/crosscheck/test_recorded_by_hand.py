@@ -360,7 +360,7 @@ def test_an_error_begins_where_it_exceeds_a_hundredth_of_its_largest():
 
 
 def test_further_times_of_the_exact_motion_are_apart_from_the_samples():
-    """Of 401 times 0.01 apart those within 0.001 of a sample are left out."""
+    """The times are the samples, and times 0.01 apart that are no nearer than 0.001 to a sample."""
     found = _with_dense(np.array([0.5, 2.0009, 4.0]))
     assert len(found) == 401 and {0.5, 2.0009, 4.0} <= set(found) and found[0] == 0.0
     assert np.diff(found).min() > 0.009

@@ -64,8 +64,8 @@ def still(**parts: object) -> Trajectory:
 
 # --- reactions --------------------------------------------------------------------------------------------
 def test_a_door_on_two_hinges_shares_what_redundancy_leaves_open():
-    """Of ten rows five are unique: the force along the axis and the moments across it are shared, and the
-    forces across the axis, which differ by a couple."""
+    """Two hinges have ten rows, of which five are redundant. The hinges share the force along the axis, the
+    moments across it, and the forces across it, which differ by a couple."""
     door = scene(joint=(hinge("A"), hinge("B", z=2.0)))
     pose = np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
     bases = joint_reactions.shared_wrenches(door, 0.0, *pose)

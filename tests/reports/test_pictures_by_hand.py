@@ -86,7 +86,7 @@ def test_a_mark_has_the_numbers_of_its_run():
 
 
 def test_zones_and_ticks_of_the_speed_figure():
-    """Of 12 decades 4 are right (to 1e-8), 6 inaccurate (to 1e-2), 2 wrong; the last have no label."""
+    """The axis has 12 decades: 4 are right (to 1e-8), 6 inaccurate (to 1e-2), 2 wrong and without label."""
     inner = element().find("svg")
     zones = [(z.get("class"), z.get("x"), z.get("width")) for z in inner.findall("rect")]
     assert zones == [
