@@ -16,7 +16,10 @@ KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got 
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser whose commands report their own unknown options."""
+    """A parser whose commands report their own unknown options; line breaks of its texts are kept."""
+
+    def __init__(self, *args: Any, **names: Any):
+        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **names)
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the options; the command refuses an unknown option and names the option that was probably
@@ -48,11 +51,11 @@ def commands(parser: argparse.ArgumentParser, **names: Any) -> Any:
 
 
 class _Command(Parser):
-    """The parser of one command."""
+    """The parser of one command; its options have the function that makes the command as ``action``."""
 
-    def __init__(self, *args: Any, **names: Any):
+    def __init__(self, *args: Any, action: Any = None, **names: Any):
         super().__init__(*args, **names)
-        self.set_defaults(parser_of_command=self)
+        self.set_defaults(parser_of_command=self, action=action)
 
 
 def _known(found: re.Match[str]) -> str:

@@ -51,7 +51,6 @@ def parser() -> argparse.ArgumentParser:
         prog="crosscheck",
         description="Simulate a mechanism in several engines and compare each motion with the true motion.",
         epilog=FIRST + fill(EXIT, 79),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     found.add_argument(
         "--version", action="store_true", help="print the versions of crosscheck and the engines"
@@ -85,7 +84,6 @@ def _add(commands: Commands, name: str, about: str, example: str) -> argparse.Ar
         description=fill(about, 79),
         epilog=f"example:\n  {example}",
         allow_abbrev=False,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
 
 

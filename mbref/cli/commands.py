@@ -12,7 +12,6 @@ from mbref import __version__
 from mbref.cli.diagnose import add as add_diagnose
 from mbref.cli.ensemble import add as add_ensemble
 from mbref.cli.exchange import add as add_exchange
-from mbref.cli.options import TEXT
 from mbref.cli.pictures import add as add_pictures
 from mbref.cli.plotting import add as add_plotting
 from mbref.cli.run import add as add_run
@@ -75,7 +74,6 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     whole = Parser(
         prog="mbref",
-        formatter_class=TEXT,
         epilog=EPILOG,
         description="Reference implementation of the constraint-handling methods of multibody dynamics.",
     )

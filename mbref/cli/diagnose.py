@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mbref.cli.options import TEXT, add_scene
+from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
@@ -27,8 +27,8 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     diagnose = commands.add_parser(
         "diagnose",
+        action=_diagnose,
         help="links, redundant constraints, singular positions of a scene",
-        formatter_class=TEXT,
         description="Lengths of links and joints; counts, rank, redundant rows by joint and unique\n"
         "reactions at t = 0; redundancy along the motion, which exchange of joints\n"
         "removes it, and the nearest singular position.",
@@ -38,7 +38,6 @@ def add(commands: Any) -> None:
     add_scene(diagnose)
     diagnose.add_argument("--start", action="store_true", help="at t = 0 only, without simulating")
     diagnose.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-    diagnose.set_defaults(action=_diagnose)
 
 
 def _diagnose(options: argparse.Namespace) -> int:

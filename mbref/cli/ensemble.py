@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.options import add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
 from mbref.records import strict_json
 from mbref.scene import Scene
@@ -22,8 +22,8 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     many = commands.add_parser(
         "ensemble",
+        action=_ensemble,
         help="simulate variants of a scene on every core",
-        formatter_class=TEXT,
         description="Simulate variants of a scene with random parameters. Print the mean and the standard\n"
         "deviation of every body at the last time. --out stores finished runs; after an\n"
         "interrupt, the repeated command runs only the missing ones.",
@@ -44,7 +44,6 @@ def add(commands: Any) -> None:
     many.add_argument("--workers", type=int, help="number of processes (default: one for each core)")
     many.add_argument("--out", metavar="FILE", help="append every trajectory, one JSON line each")
     add_method_options(many)
-    many.set_defaults(action=_ensemble)
 
 
 def _ensemble(options: argparse.Namespace) -> int:

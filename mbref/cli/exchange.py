@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mbref import formats
-from mbref.cli.options import TEXT, add_scene
+from mbref.cli.options import add_scene
 from mbref.scenes import find_scene
 
 
@@ -16,8 +16,8 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     take = commands.add_parser(
         "import",
+        action=_import,
         help="a scene file from MJCF, URDF or SDF",
-        formatter_class=TEXT,
         description="Make a scene file from a MuJoCo model (.xml), a URDF or an SDF (.sdf). Open loops of\n"
         "MJCF and URDF are closed by moving the joints; mass matrix, bias forces and rows of loops are\n"
         "compared with MuJoCo's own at three poses. Joints of an SDF may close loops themselves. A part\n"
@@ -30,19 +30,17 @@ def add(commands: Any) -> None:
     take.add_argument("file", metavar="FILE", help="the .xml, .urdf or .sdf file")
     take.add_argument("--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
     formats.add_options(take)
-    take.set_defaults(action=_import)
 
     give = commands.add_parser(
         "export",
+        action=_export,
         help="a scene as MJCF",
-        formatter_class=TEXT,
         description="Write a scene as a MuJoCo model (.xml); lists everything that MJCF cannot describe.\n"
         "Needs the extra engines.",
         epilog="example:\n  mbref export four_bar_gravity --out four_bar.xml",
     )
     add_scene(give)
     give.add_argument("--out", metavar="FILE", required=True, help="the .xml file")
-    give.set_defaults(action=_export)
 
 
 def _import(options: argparse.Namespace) -> int:

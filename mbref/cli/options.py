@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from mbref.motion import Motion
     from mbref.stepping.limits import Limits
 
-TEXT = argparse.RawDescriptionHelpFormatter
-
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
     """Add the argument for the scene."""

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
-from mbref.drawing.film import png, write_film
-from mbref.drawing.picture import moving, side_by_side, still
+from mbref.drawing.film import MOVING, png, write_film
+from mbref.drawing.picture import side_by_side, still
 from mbref.drawing.view import View
 from mbref.equations.branches import SMOOTH
 from mbref.method import MethodError
@@ -20,7 +19,6 @@ from mbref.scenes import find_scene
 from mbref.stepping.limits import Limits
 from mbref.trajectory import Outcome
 
-MOVING = (".svg", ".gif", ".mp4")
 FRAMES = 101  # number of samples of a motion along a branch
 VIEW = """\
 xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
@@ -31,20 +29,19 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     draw = commands.add_parser(
         "draw",
+        action=_draw,
         help="a picture of a scene at t = 0",
-        formatter_class=TEXT,
         description="A picture of a scene at t = 0: bodies, joints by type, ground, loads and drivers.",
         epilog="examples:\n  mbref draw mechanism.toml\n  mbref draw bricard --view xz --out bricard.png",
     )
     add_scene(draw)
     draw.add_argument("--view", metavar="VIEW", help=VIEW)
     draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with .svg)")
-    draw.set_defaults(action=_draw)
 
     animate = commands.add_parser(
         "animate",
+        action=_animate,
         help="an animation of the mechanism as SVG, GIF or MP4",
-        formatter_class=TEXT,
         description="Simulate a scene and write its motion as an SVG that every browser plays,\n"
         "a GIF or an MP4.",
         epilog="examples:\n  mbref animate mechanism.toml\n"
@@ -72,11 +69,10 @@ def add(commands: Any) -> None:
         "branches meet)",
     )
     add_method_options(animate, json=False)
-    animate.set_defaults(action=_animate)
 
 
 def _draw(options: argparse.Namespace) -> int:
-    scene, view = find_scene(options.scene), _view(options)
+    scene, view = find_scene(options.scene), requested_view(options)
     path = path_of(options, "", (".svg", ".png"))
     warn(scene)
     picture = still(scene, view)
@@ -91,16 +87,14 @@ def _draw(options: argparse.Namespace) -> int:
 def _animate(options: argparse.Namespace) -> int:
     parted = options.branches or options.crossing is not None
     path = path_of(options, *(("-branches", (".svg",)) if parted else ("-moving", MOVING)))
-    run, view = request_of(options), _view(options)
-    scene = run.scene
-    motion = run.motion()
-    motions, picture = {"": motion}, partial(moving, scene, motion, view)
+    run, view = request_of(options), requested_view(options)
+    scene, motion = run.scene, run.motion()
+    motions = {"": motion}
     if parted:
         number = chosen_crossing(motion, options.crossing)
         motions = along_branches(motion, run.method, run.limits, number)
-        picture = partial(side_by_side, scene, motions, f"{scene.name}: {sentence(motion, number)}", view)
-    if path.suffix == ".svg":
-        path.write_text(picture(), encoding="utf-8")
+        title = f"{scene.name}: {sentence(motion, number)}"
+        path.write_text(side_by_side(scene, motions, title, view), encoding="utf-8")
     else:
         write_film(path, scene, motion, view)
     print(path)
@@ -109,7 +103,8 @@ def _animate(options: argparse.Namespace) -> int:
     return exit_status(*motions.values())
 
 
-def _view(options: argparse.Namespace) -> View | None:
+def requested_view(options: argparse.Namespace) -> View | None:
+    """Return the requested view, None for the default."""
     return View.parse(options.view) if options.view else None
 
 

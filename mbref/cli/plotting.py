@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
 from mbref.outputs import OUTPUTS
@@ -17,8 +17,8 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     plot = commands.add_parser(
         "plot",
+        action=_plot,
         help="numbers of a motion over time as PNG or SVG",
-        formatter_class=TEXT,
         description="Simulate a scene and plot columns of its motion over time, one panel for each\n"
         "quantity. Needs the extra report.",
         epilog="examples:\n  mbref plot mechanism.toml\n"
@@ -34,7 +34,6 @@ def add(commands: Any) -> None:
     )
     plot.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
     add_method_options(plot, json=False)
-    plot.set_defaults(action=_plot)
 
 
 def _plot(options: argparse.Namespace) -> int:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_method_options, add_scene, request_of
+from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
 from mbref.motion import Motion
 from mbref.outputs import UNITS
@@ -26,8 +26,8 @@ def add(commands: Any) -> None:
     """Add the command's parser."""
     run = commands.add_parser(
         "run",
+        action=_run,
         help="simulate a scene by one method",
-        formatter_class=TEXT,
         description="Simulate a scene by one method: formulation+stabilisation/integrator.",
         epilog="examples:\n"
         "  mbref run planar_slider_crank --method mpi-svd+projection --times 0.1,0.2,0.4 --rtol 1e-11\n"
@@ -67,7 +67,6 @@ def add(commands: Any) -> None:
         help="estimate the global error by a second run at a smaller tolerance: auto (default), unless it\n"
         f"takes longer than {ESTIMATE_SECONDS:g} s; yes, however long it takes; no",
     )
-    run.set_defaults(action=_run)
 
 
 def _run(options: argparse.Namespace) -> int:

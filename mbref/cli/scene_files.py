@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.options import TEXT, add_scene
+from mbref.cli.options import add_scene
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
@@ -19,19 +19,18 @@ def add(commands: Any) -> None:
     """Add the parsers of the three commands."""
     new = commands.add_parser(
         "new",
+        action=_new,
         help="a commented scene file to start from",
-        formatter_class=TEXT,
         description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
         epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
     )
     new.add_argument("out", metavar="FILE", help="the .toml file; an existing file is not changed")
     new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
-    new.set_defaults(action=_new)
 
     assemble = commands.add_parser(
         "assemble",
+        action=_assemble,
         help="close the loops of a scene with given lengths of its links",
-        formatter_class=TEXT,
         description="Move the joints and bodies of a scene, as little as possible, so that its links have\n"
         "the given lengths and every joint is satisfied; reports what moved.",
         epilog="example:\n  mbref assemble my.toml --length A-B=0.35 --length B-C=0.9 --out closed.toml",
@@ -45,18 +44,16 @@ def add(commands: Any) -> None:
         help="distance of the joints A and B of a link, m; may repeat",
     )
     assemble.add_argument("--out", metavar="FILE", help="write the closed scene")
-    assemble.set_defaults(action=_assemble)
 
-    schema = commands.add_parser(
+    commands.add_parser(
         "schema",
+        action=_schema,
         help="the JSON schema of scene files",
-        formatter_class=TEXT,
         description="The JSON schema of scene files, by which editors complete and check them. Editors with\n"
         "taplo (VS Code: Even Better TOML) take it from the file's first line:\n"
         "  #:schema ./scene.schema.json",
         epilog="example:\n  mbref schema > scene.schema.json",
     )
-    schema.set_defaults(action=_schema)
 
 
 def _new(options: argparse.Namespace) -> int:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.cli.options import TEXT, add_scene
+from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
-from mbref.cli.pictures import VIEW, path_of
-from mbref.drawing.film import write_film
-from mbref.drawing.picture import moving
-from mbref.drawing.view import View
+from mbref.cli.pictures import VIEW, path_of, requested_view
+from mbref.drawing.film import MOVING, write_film
 from mbref.records import strict_json
 from mbref.rotations import to_vector
 from mbref.scenes import find_scene
@@ -29,8 +26,8 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     rest = commands.add_parser(
         "equilibrium",
+        action=_equilibrium,
         help="static equilibria or steady motions of a mechanism, with forces and stability",
-        formatter_class=TEXT,
         description="Static equilibria under gravity, springs and constant loads, from several starts:\n"
         "pose, reactions and stability of each. With a driver that turns a body at a constant rate\n"
         "about an axis parallel to gravity: steady motions in which all bodies turn with it.\n" + LIMITS,
@@ -39,12 +36,11 @@ def add(commands: Any) -> None:
     )
     _add_search(rest)
     rest.add_argument("--out", metavar="FILE.toml", help="write the scene at an equilibrium, at rest")
-    rest.set_defaults(action=_equilibrium)
 
     shake = commands.add_parser(
         "modes",
+        action=_modes,
         help="eigenvalues and vibrations about an equilibrium or a steady motion",
-        formatter_class=TEXT,
         description="Eigenvalues, frequencies and damping ratios of small motions about an equilibrium or a\n"
         "steady motion (see `mbref equilibrium`), by default about the first stable one.\n"
         "--out writes one vibration as a moving picture.",
@@ -55,7 +51,6 @@ def add(commands: Any) -> None:
     shake.add_argument("--mode", type=int, default=1, help="vibration of --out, from the slowest (default 1)")
     shake.add_argument("--view", metavar="VIEW", help=VIEW)
     shake.add_argument("--out", metavar="FILE", help=".svg, .gif or .mp4 of one vibration")
-    shake.set_defaults(action=_modes)
 
 
 def _add_search(parser: argparse.ArgumentParser) -> None:
@@ -143,17 +138,13 @@ def _record(each: Equilibrium) -> dict[str, Any]:
 def _modes(options: argparse.Namespace) -> int:
     from mbref.design.equilibrium import motion_of_mode
 
-    path = path_of(options, "-mode", (".svg", ".gif", ".mp4")) if options.out else None
+    path = path_of(options, "-mode", MOVING) if options.out else None
     found = _found(options)
     stable = [k for k, each in enumerate(found, 1) if each.stability == "stable"]
     number = options.number or (stable or [1])[0]
     each = found[number - 1]
     if path is not None:
-        motion, view = motion_of_mode(each, options.mode), View.parse(options.view) if options.view else None
-        if path.suffix == ".svg":
-            Path(path).write_text(moving(each.scene, motion, view), encoding="utf-8")
-        else:
-            write_film(path, each.scene, motion, view)
+        write_film(path, each.scene, motion_of_mode(each, options.mode), requested_view(options))
     if options.json:
         print(strict_json({"number": number, **_record(each)}))
         return 0

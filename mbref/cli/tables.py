@@ -9,7 +9,6 @@ from typing import Any
 
 from rich.table import Table
 
-from mbref.cli.options import TEXT
 from mbref.cli.output import console
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
@@ -35,24 +34,22 @@ def add(commands: Any) -> None:
     """Add the parsers of both commands."""
     listing = commands.add_parser(
         "list",
+        action=_list,
         help="the built-in scenes, the methods, the outputs of a motion",
-        formatter_class=TEXT,
         description="The built-in scenes, the parts of a method with their options, or the numbers\n"
         "that a motion has over time.",
         epilog="examples:\n  mbref list\n  mbref list methods\n  mbref list outputs",
     )
     listing.add_argument("what", nargs="?", choices=list(TABLES), help="default: scenes and methods")
-    listing.set_defaults(action=_list)
 
     completion = commands.add_parser(
         "completion",
+        action=_complete,
         help="completion of commands and options by the shell",
-        formatter_class=TEXT,
         description="A script by which the shell completes commands and options of mbref.",
         epilog="example:\n  mbref completion bash > ~/.local/share/bash-completion/completions/mbref",
     )
     completion.add_argument("shell", choices=SHELLS)
-    completion.set_defaults(action=_complete)
 
 
 def _list(options: argparse.Namespace) -> int:

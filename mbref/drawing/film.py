@@ -1,4 +1,4 @@
-"""Pictures as PNG (by resvg), and animated mechanisms as GIF (by Pillow) or MP4 (by ffmpeg)."""
+"""Pictures as PNG (by resvg), and animated mechanisms as SVG, GIF (by Pillow) or MP4 (by ffmpeg)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from mbref.drawing.picture import frames
+from mbref.drawing.picture import frames, moving
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import View
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
+MOVING = (".svg", ".gif", ".mp4")  # suffixes of animations
 BLOCK = 16  # px; size of blocks of the video codec
 MISSING = "{} needs {}: pip install 'mbref[video]'; SVG needs nothing more"
 
@@ -33,12 +34,16 @@ def png(svg: str, zoom: int = 2) -> bytes:
 
 
 def write_film(path: Path, scene: Scene, motion: Trajectory, view: View | None = None) -> None:
-    """Write the motion as .gif or .mp4, in real time if one round of it takes 4 to 12 s.
+    """Write the motion as .svg, .gif or .mp4, in real time if one round of it takes 4 to 12 s.
 
     Raises ValueError if a library is not installed or the trajectory has no sample.
     """
-    writers = {".gif": _write_gif, ".mp4": _write_mp4}
+    writers = dict(zip(MOVING, (_write_svg, _write_gif, _write_mp4), strict=True))
     writers[path.suffix](path, scene, motion, view)
+
+
+def _write_svg(path: Path, scene: Scene, motion: Trajectory, view: View | None) -> None:
+    path.write_text(moving(scene, motion, view), encoding="utf-8")
 
 
 def _write_gif(path: Path, scene: Scene, motion: Trajectory, view: View | None) -> None:
