@@ -5,23 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mbref import rotations
 from mbref.design.linearisation import OffConstraints, Tangent, multipliers, unsteady
-from mbref.design.placed import placed
+from mbref.design.placed import placed_with_springs
 from mbref.design.turning import Turning, turning
 from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced, displacement
-from mbref.joint_motion import along, joint_motion
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
-from mbref.trajectory import Trajectory
 
 STARTS = 24  # number of poses from which an equilibrium is searched
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism
@@ -121,7 +118,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     SceneError
         If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
     """
-    scene = (scene if isinstance(scene, Scene) else find_scene(str(scene))).assembled()
+    scene = find_scene(scene).assembled()
     frame, model = _frame(scene), Model(scene)
     first = Tangent(model, consistent_start(model).q, frame)
     if reason := unsteady(first):
@@ -298,7 +295,7 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
     largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]
     q = tangent.q.reshape(1, model.nb, 7)
     forces = reactions(model, q, model.terms(np.zeros(1), q).blocks, multipliers(tangent)[None])
-    scene = _with_angles(placed(model, tangent.q), model, tangent.q)
+    scene = placed_with_springs(model, tangent.q)
     return Equilibrium(
         scene.with_(body=tangent.frame.bodies(scene)),
         values[order],
@@ -306,21 +303,3 @@ def _equilibrium(tangent: Tangent) -> Equilibrium:
         {name: wrench[0] for name, wrench in forces.items()},
         tangent.frame.rate,
     )
-
-
-def _with_angles(scene: Scene, model: Model, q: np.ndarray) -> Scene:
-    """Return the scene with springs of joints whose natural angles and displacements are measured from the
-    pose q."""
-    zeros = np.zeros((1, model.nb, 6))
-    names = tuple(body.name for body in model.scene.body)
-    own = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
-    motion = Trajectory(scene.name, "mbref", "", "", {}, np.zeros(1), names, **own)
-    return scene.with_(load=[_measured_from(load, model.scene, motion) for load in scene.load])
-
-
-def _measured_from(load: Any, scene: Scene, motion: Trajectory) -> Any:
-    """Return the load with its natural angle or displacement measured from the first pose of a motion."""
-    if load.type not in ("torsion_spring", "slide_spring"):
-        return load
-    moved, _ = along(joint_motion(scene, motion, load.joint), load.coordinate)
-    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - float(moved[0])})

@@ -6,13 +6,10 @@ import functools
 
 import numpy as np
 
-from mbref.design.placed import placed
+from mbref.design.placed import placed_with_springs
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.joint_motion import along, joint_motion
-from mbref.scene import Load, Scene, SceneError, SlideSpring, TorsionSpring
-from mbref.scene_joints import ANGLE
-from mbref.trajectory import Trajectory
+from mbref.scene import Scene, SceneError
 
 # largest rotation (rad), or displacement over the mechanism's length, in one of the equal parts of a change,
 # so that angles stay below half a turn and loops on their branch
@@ -35,7 +32,7 @@ def assembled(scene: Scene) -> Scene:
         q, residual = solve_positions(model, 0.0, model.start(), value / parts)
         if not np.abs(residual).max() <= MET * max(1.0, model.length):
             raise SceneError([_unmet(scene, model, residual, part / parts)])
-        found = _moved(model, q)
+        found = placed_with_springs(model, q)
     return found
 
 
@@ -45,25 +42,6 @@ def _is_small(scene: Scene, value: np.ndarray) -> bool:
     q, _ = solve_positions(model, 0.0, model.start(), value)
     moved = np.abs((q - model.start()).reshape(-1, 7))
     return bool(moved[:, :3].max() <= PART * model.length and moved[:, 3:].max() <= PART / 2)
-
-
-def _moved(model: Model, q: np.ndarray) -> Scene:
-    """Return the scene at coordinates q (7 nb,), with springs of joints as long or as twisted as before."""
-    found = placed(model, q)
-    position = np.array([[body.position for body in found.body]])
-    orientation = np.array([[body.orientation for body in found.body]])
-    still, names = np.zeros_like(position), tuple(body.name for body in found.body)
-    pose = Trajectory(found.name, "", "", "", {}, np.zeros(1), names, position, orientation, still, still)
-    return found.with_(load=[_with_natural(model.scene, pose, load) for load in found.load])
-
-
-def _with_natural(scene: Scene, pose: Trajectory, load: Load) -> Load:
-    """Return a load whose natural angle or displacement counts from a pose of the scene."""
-    if not isinstance(load, TorsionSpring | SlideSpring):
-        return load
-    moved = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
-    key = "natural_angle" if load.coordinate == ANGLE else "natural_displacement"
-    return load.model_copy(update={key: load.action.natural - moved})
 
 
 def _unmet(scene: Scene, model: Model, residual: np.ndarray, share: float) -> str:

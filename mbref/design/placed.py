@@ -7,8 +7,11 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
+from mbref.drawing.shapes import at_rest
 from mbref.equations.model import Model
-from mbref.scene import Joint, Scene
+from mbref.joint_motion import along, joint_motion
+from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
+from mbref.trajectory import Trajectory
 
 
 def placed(model: Model, q: np.ndarray) -> Scene:
@@ -26,6 +29,22 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     joints = [joint.model_copy(update=_carried(model, joint, q)) for joint in scene.joint]
     loads = [load.model_copy(update=_points(model, load, q)) for load in scene.load]
     return scene.with_(body=bodies, joint=joints, load=loads)
+
+
+def placed_with_springs(model: Model, q: np.ndarray) -> Scene:
+    """Return ``placed`` with springs of joints as long or as twisted as before: their natural angles and
+    displacements count from the new poses."""
+    found = placed(model, q)
+    pose = at_rest(found)
+    return found.with_(load=[_with_natural(model.scene, pose, load) for load in found.load])
+
+
+def _with_natural(scene: Scene, pose: Trajectory, load: Load) -> Load:
+    """Return a load whose natural angle or displacement counts from a pose of the scene."""
+    if not isinstance(load, TorsionSpring | SlideSpring):
+        return load
+    moved = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
+    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - moved})
 
 
 def _carried(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:

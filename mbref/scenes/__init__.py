@@ -73,14 +73,14 @@ CHAINS: dict[str, Callable[[int, str], Scene]] = {
 }
 
 
-def find_scene(name: str) -> Scene:
-    """Return a built-in scene or the scene in a file.
+def find_scene(name: Scene | str | Path) -> Scene:
+    """Return a built-in scene, the scene in a file, or a scene that is given itself.
 
     Parameters
     ----------
-    name : str
-        A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), or the path of a .toml
-        file.
+    name : Scene, str or path
+        A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), the path of a .toml file,
+        or a scene.
 
     Returns
     -------
@@ -91,6 +91,9 @@ def find_scene(name: str) -> Scene:
     SceneError
         If there is no such scene or file, or the file is faulty.
     """
+    if isinstance(name, Scene):
+        return name
+    name = str(name)
     if name in SCENES:
         return SCENES[name]()
     chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)

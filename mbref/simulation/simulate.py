@@ -72,7 +72,7 @@ def simulate(
         If the method is unknown, has no generated code, or crosses no singular position at which ``limits``
         request a branch.
     """
-    scene = scene if isinstance(scene, Scene) else find_scene(str(scene))
+    scene = find_scene(scene)
     if duration is not None:
         if times is not None:
             raise ValueError("give sample times or a duration, not both")
