@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Annotated, Any
 
-from pydantic import field_validator
+from pydantic import Field, ValidationInfo, field_validator
 
 from mbref.scene_fields import Entry, Mass, Measures, Name, Point, Quaternion, Vector, as_list
 from mbref.scene_functions import TimeFunction
@@ -57,7 +57,22 @@ class Driver(TimeFunction):
     """
 
     joint: Name
-    polynomial: Measures = (0.0,)
+    polynomial: Annotated[Measures, Field(validate_default=True)] = (0.0,)
+
+    @field_validator("polynomial")
+    @classmethod
+    def _motion_begins_at_zero(cls, polynomial: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if not {"sine", "table"} <= info.data.keys():
+            return polynomial  # a fault of another field is reported
+        sine, table = info.data["sine"], info.data["table"]
+        start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
+        what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
+        if table:
+            start += cls.model_construct(sine=None, table=table, polynomial=(0.0,)).pieces()[0].cubic[0]
+            what = "the value at t = 0 must be 0, because the motion is measured from its start"
+        if abs(start) > 1e-12:  # otherwise it is rounding
+            raise ValueError(f"{what}; got {start:g}")
+        return polynomial
 
     @property
     def coefficients(self) -> tuple[float, ...]:

@@ -1,15 +1,12 @@
-"""Faults of functions of time that concern several fields: gaps of tables, units, values at t = 0."""
+"""Faults of functions of time that concern several fields: gaps of tables, and units."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from pydantic import ValidationError
-
 from mbref.scene_fields import LARGEST, field_of
-from mbref.scene_functions import Factor
 from mbref.scene_units import dimension_of, in_si
 
 Faults = Iterator[tuple[str, str]]  # path and message
@@ -42,26 +39,6 @@ def rows_of(function: Any) -> list[tuple[float, float]]:
     rows = [tuple(row) for row in given if isinstance(row, list | tuple) and len(row) == 2]
     numbers = all(isinstance(x, int | float) for row in rows for x in row)
     return rows if numbers and len(rows) == len(given) else []
-
-
-def initial_value(driver: Any) -> float:
-    """Return value(0) of a driver; 0 if value(0) is a rounding error, or if a field of the driver is
-    faulty."""
-    polynomial, sine = field_of(driver, "polynomial"), field_of(driver, "sine")
-    first = polynomial[0] if isinstance(polynomial, list | tuple) and polynomial else 0.0
-    amplitude, phase = _number(field_of(sine, "amplitude")), _number(field_of(sine, "phase"))
-    start = _number(first) + amplitude * math.sin(phase) + _table_at_start(rows_of(driver))
-    return start if abs(start) > 1e-12 else 0.0
-
-
-def _table_at_start(rows: Sequence[tuple[float, float]]) -> float:
-    """Return the value of a table at t = 0; 0 if the table is faulty."""
-    if not rows:
-        return 0.0
-    try:
-        return Factor(table=tuple(rows)).pieces()[0].cubic[0]
-    except ValidationError:
-        return 0.0
 
 
 def _number(value: Any) -> float:

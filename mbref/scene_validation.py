@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import ValidationError
 
 from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, is_some, meant, shown
-from mbref.scene_function_faults import factor_faults, initial_value, rows_of, table_faults
+from mbref.scene_function_faults import factor_faults, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate, default_coordinates
 from mbref.scene_loads import LOAD_TYPES, JointLoad
 from mbref.scene_units import dimension_of
@@ -264,7 +264,7 @@ def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Ma
 
 
 def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
-    """Yield drivers of unknown or wrong joints, second drivers of a joint, values that do not begin at 0."""
+    """Yield drivers of unknown or wrong joints, and second drivers of a joint."""
     driven: set[str] = set()
     for i, driver in enumerate(_entries(data, "driver")):
         name = field_of(driver, "joint")
@@ -275,14 +275,6 @@ def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
             driven.add(name)
             yield from _unit_faults(f"driver[{i}]", driver, types.get(name))
         yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
-        if start := initial_value(driver):
-            message = f"c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0; got {start:g}"
-            if rows_of(driver):
-                message = (
-                    "the value at t = 0 must be 0, because the motion is measured from its "
-                    f"start; got {start:g}"
-                )
-            yield f"driver[{i}].polynomial", message
 
 
 def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:

@@ -7,7 +7,7 @@ import pytest
 
 import mbref
 from mbref.equations.model import Model
-from mbref.scene import Driver, Factor, JointForce, Scene, SceneError, Sine
+from mbref.scene import Factor, JointForce, Scene, SceneError, Sine
 from tests import loads_over_time as scenes
 from tests.loads_over_time import AXIS, CUBIC, WAVY
 
@@ -182,7 +182,7 @@ def test_table_that_is_switched_off_needs_no_rows_there():
 
 def test_driver_by_a_table_begins_at_zero():
     with pytest.raises(SceneError, match="value at t = 0 must be 0"):
-        scenes.wheel().with_(driver=[Driver(joint="J", table=scenes.TABLE)])
+        scenes.wheel().with_(driver=[{"joint": "J", "table": scenes.TABLE}])
 
 
 def test_loads_of_a_joint_need_its_coordinate():
