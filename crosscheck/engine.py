@@ -84,10 +84,6 @@ class Engine(ABC):
     def version(self) -> str:
         """Return the version of the engine; by default the version of ``package``.
 
-        Returns
-        -------
-        str
-
         Raises
         ------
         ImportError
@@ -101,10 +97,6 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
-
-        Returns
-        -------
-        Cannot or None
         """
         return self.supports.missing(scene) or self.refuses(scene)
 
@@ -114,10 +106,6 @@ class Engine(ABC):
         Parameters
         ----------
         scene : Scene
-
-        Returns
-        -------
-        Cannot or None
         """
         return None
 
@@ -157,10 +145,6 @@ class Engine(ABC):
         ----------
         scene : Scene
         family : str
-
-        Returns
-        -------
-        bool
         """
         return bool(self.settings_of(scene, family))
 
@@ -184,10 +168,6 @@ class Engine(ABC):
         Parameters
         ----------
         family : str
-
-        Returns
-        -------
-        bool
         """
         return False
 
@@ -255,12 +235,7 @@ ENTRY_POINTS = "crosscheck.engines"
 
 
 def engine_names() -> tuple[str, ...]:
-    """Return the names of crosscheck's engines and of the engines that installed packages register.
-
-    Returns
-    -------
-    tuple of str
-    """
+    """Return the names of crosscheck's engines and of the engines that installed packages register."""
     registered = (point.name for point in metadata.entry_points(group=ENTRY_POINTS))
     return (*BUILT_IN, *OPTIONAL, *ON_REQUEST, *registered)
 
@@ -269,10 +244,6 @@ def default_engines() -> tuple[str, ...]:
     """Return the names of the engines that run if the user names none.
 
     Engines that run on request only, and optional engines that are not installed, are left out.
-
-    Returns
-    -------
-    tuple of str
     """
     asked = (name for name in engine_names() if name not in ON_REQUEST)
     return tuple(name for name in asked if name not in OPTIONAL or installed(name))
@@ -300,10 +271,6 @@ def engine(name: str) -> Engine:
     name : str
         The name of an engine, or ``module:attribute`` of a module that can be imported or is in the working
         directory.
-
-    Returns
-    -------
-    Engine
 
     Raises
     ------

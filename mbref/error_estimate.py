@@ -155,10 +155,6 @@ class ErrorEstimate:
             Sample times of the motion, s, which the record does not contain.
         record : mapping
             Result of ``to_record``.
-
-        Returns
-        -------
-        ErrorEstimate
         """
         tighter = record["tighter"]
         return ErrorEstimate(

@@ -158,10 +158,6 @@ class Method:
             ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT. The
             stabilisation defaults to ``none``, the integrator to ``dop853``.
 
-        Returns
-        -------
-        Method
-
         Raises
         ------
         MethodError

@@ -50,10 +50,6 @@ class Motion(Trajectory):
             The scene that moves.
         trajectory : Trajectory
             Its motion, with the bodies in any order.
-
-        Returns
-        -------
-        Motion
         """
         return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
 
@@ -64,10 +60,6 @@ class Motion(Trajectory):
         ----------
         name : str
             Name of the joint.
-
-        Returns
-        -------
-        JointMotion
 
         Raises
         ------
@@ -100,10 +92,6 @@ class Motion(Trajectory):
         joint : str
             Name of the driven joint.
 
-        Returns
-        -------
-        DriverMotion
-
         Raises
         ------
         KeyError
@@ -118,10 +106,6 @@ class Motion(Trajectory):
         ----------
         place : int
             Index of the load in the scene, from 0.
-
-        Returns
-        -------
-        LoadMotion
 
         Raises
         ------
@@ -166,10 +150,6 @@ class Motion(Trajectory):
         progress : callable, optional
             Called with the time reached (s) between steps of the second run.
 
-        Returns
-        -------
-        Motion
-
         Raises
         ------
         ValueError
@@ -190,12 +170,7 @@ class Motion(Trajectory):
         return self.__dict__.get("error_estimate")
 
     def to_record(self) -> dict[str, Any]:
-        """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made.
-
-        Returns
-        -------
-        dict
-        """
+        """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made."""
         estimate = self.known_estimate
         return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
 
@@ -271,10 +246,6 @@ class Motion(Trajectory):
         path : str or path
             The file.
 
-        Returns
-        -------
-        Motion
-
         Raises
         ------
         OSError, ValueError
@@ -312,10 +283,6 @@ class Motion(Trajectory):
         ----------
         view : str, optional
             ``"xy"``, ``"xz"``, ``"yz"``, ``"oblique"`` or ``"AZIMUTH,ELEVATION"`` in degrees.
-
-        Returns
-        -------
-        str
 
         Raises
         ------

@@ -169,10 +169,6 @@ class Scene(Entry):
         name : str
             Name of the joint.
 
-        Returns
-        -------
-        Joint
-
         Raises
         ------
         KeyError
@@ -200,12 +196,7 @@ class Scene(Entry):
         return coupling.pairs((first, second))
 
     def has_mass(self) -> bool:
-        """Return whether every body has mass and inertia, as a dynamic analysis needs.
-
-        Returns
-        -------
-        bool
-        """
+        """Return whether every body has mass and inertia, as a dynamic analysis needs."""
         return all(body.mass is not None for body in self.body)
 
     def assembled(self) -> Scene:
@@ -216,10 +207,6 @@ class Scene(Entry):
         coordinates count from the new poses. Velocities, in world axes, are unchanged. A scene without
         offsets is returned as it is.
 
-        Returns
-        -------
-        Scene
-
         Raises
         ------
         SceneError
@@ -229,10 +216,6 @@ class Scene(Entry):
 
     def counts(self) -> Counts:
         """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0.
-
-        Returns
-        -------
-        Counts
 
         Raises
         ------
@@ -254,10 +237,6 @@ class Scene(Entry):
             The new value at the path, in SI units, or with a unit (``"300 mm"``).
         **changes : Any
             New values of top-level fields.
-
-        Returns
-        -------
-        Scene
 
         Raises
         ------
@@ -305,10 +284,6 @@ class Scene(Entry):
         ----------
         path : str or path
             The file.
-
-        Returns
-        -------
-        Scene
 
         Raises
         ------

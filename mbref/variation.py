@@ -43,10 +43,6 @@ class Variation:
         text : str
             ``PATH=LOW:HIGH`` or ``PATH=MEAN+-DEVIATION``, in SI units.
 
-        Returns
-        -------
-        Variation
-
         Raises
         ------
         ValueError

@@ -83,10 +83,6 @@ def judge_motion(
     seconds : float
         CPU time that the reference may take, s.
 
-    Returns
-    -------
-    Judgement
-
     Raises
     ------
     SceneError

@@ -82,10 +82,6 @@ def find_scene(name: Scene | str | Path) -> Scene:
         A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), the path of a .toml file,
         or a scene.
 
-    Returns
-    -------
-    Scene
-
     Raises
     ------
     SceneError

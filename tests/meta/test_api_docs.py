@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import importlib
+import importlib.util
 import inspect
 import re
 import textwrap
@@ -71,8 +72,13 @@ def of_function(name: str, function: Callable[..., Any]) -> Iterator[str]:
     yield from (f"{name}: no parameter {p}" for p in given if p not in wanted)
     result = str(signature.return_annotation)
     title = "Yields" if result.startswith(("Iterator", "Generator")) else "Returns"
-    if result != "None" and not any(parts.get(title, [])):
+    summary = " ".join(parts[""])
+    is_described = summary.startswith("Return ") and "ndarray" not in result
+    of_result = [line for line in parts.get(title, []) if line]
+    if result != "None" and not of_result and not is_described:
         yield f"{name}: no section {title}"
+    if is_described and len(of_result) == 1 and not SHAPE.search(of_result[0]):
+        yield f"{name}: the section {title} repeats the signature"
     described = {error for entry in entries(parts.get("Raises", [])) for error in entry.split()}
     yield from (f"{name}: raises {error}" for error in sorted(raised(function) - described))
     yield from without_shape(name, [*parts.get("Parameters", []), *parts.get(title, [])])
@@ -114,6 +120,21 @@ def test_public_names_describe_parameters_results_and_errors():
     assert not wrong, "\n".join(wrong)
 
 
+REPEATED = '''
+def name_of(scene) -> str:
+    """Return the name.
+
+    Parameters
+    ----------
+    scene : Scene
+        A scene.
+
+    Returns
+    -------
+    str
+    """
+    return scene.name
+'''
 COMPLETE = '''
 def scaled(values, factor: float) -> "np.ndarray":
     """Return values times a factor.
@@ -152,11 +173,25 @@ def scaled(values, factor: float) -> "np.ndarray":
         ("values : ndarray, shape (k,)", "values : ndarray", "no shape in"),
     ],
 )
-def test_an_incomplete_docstring_is_found(tmp_path, monkeypatch, old, new, fault):
-    path = tmp_path / "scaled_module.py"
-    path.write_text(COMPLETE.replace(old, new, 1))
-    spec = importlib.util.spec_from_file_location("scaled_module", path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+def test_an_incomplete_docstring_is_found(tmp_path, old, new, fault):
+    module = imported(tmp_path, COMPLETE.replace(old, new, 1))
     found = faults("scaled", module.scaled)
     assert any(fault in text for text in found) if fault else not found, found
+
+
+def test_a_section_that_repeats_the_signature_is_found(tmp_path):
+    described = REPEATED.replace("    str\n", "    str\n        In lower case.\n")
+    without = REPEATED.replace("    Returns\n    -------\n    str\n", "")
+    texts = REPEATED, described, without
+    found = [faults("name_of", imported(tmp_path, text).name_of) for text in texts]
+    assert found == [["name_of: the section Returns repeats the signature"], [], []]
+
+
+def imported(folder, text):
+    """The module of a text, in a file of its own."""
+    path = folder / f"module_{sum(1 for _ in folder.glob('*.py'))}.py"
+    path.write_text(text)
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
