@@ -26,30 +26,20 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-_MODULE_OF = {
-    "Cost": "mbref.trajectory",
-    "Diagnosis": "mbref.equations.diagnosis",
-    "Equilibrium": "mbref.design.equilibrium",
-    "ErrorEstimate": "mbref.error_estimate",
-    "Limits": "mbref.simulation.simulate",
-    "Method": "mbref.method",
-    "MethodError": "mbref.method",
-    "Motion": "mbref.motion",
-    "Outcome": "mbref.trajectory",
-    "SCENES": "mbref.scenes",
-    "Scene": "mbref.scene",
-    "SceneError": "mbref.scene",
-    "Trajectory": "mbref.trajectory",
-    "Variation": "mbref.variation",
-    "counts": "mbref.equations.diagnosis",
-    "diagnose": "mbref.equations.diagnosis",
-    "ensemble": "mbref.ensembles.ensemble",
-    "equilibria": "mbref.design.equilibrium",
-    "find_scene": "mbref.scenes",
-    "motion_of_mode": "mbref.design.equilibrium",
-    "simulate": "mbref.simulation.simulate",
-    "variants": "mbref.variation",
+_PUBLIC = {  # module → its public names
+    "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
+    "ensembles.ensemble": ("ensemble",),
+    "equations.diagnosis": ("Diagnosis", "counts", "diagnose"),
+    "error_estimate": ("ErrorEstimate",),
+    "method": ("Method", "MethodError"),
+    "motion": ("Motion",),
+    "scene": ("Scene", "SceneError"),
+    "scenes": ("SCENES", "find_scene"),
+    "simulation.simulate": ("Limits", "simulate"),
+    "trajectory": ("Cost", "Outcome", "Trajectory"),
+    "variation": ("Variation", "variants"),
 }
+_MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
 
 _SERVICES = {  # functions behind methods of Scene and Motion
     "assembled": "mbref.design.offsets",
