@@ -22,6 +22,9 @@ ARROW = 52.0  # px; length of an arrow
 FACING = 0.7  # cosine of the angle to the line of sight above which an axis is drawn as a point
 
 
+At = tuple[float, float, float]  # a point, world at t = 0
+
+
 class Stage(NamedTuple):
     """Scene, motion, page and timeline of a drawing; without a timeline the first sample is drawn."""
 
@@ -30,7 +33,7 @@ class Stage(NamedTuple):
     page: Page
     timeline: Timeline | None
 
-    def place(self, body: str, point: tuple[float, float, float]) -> np.ndarray:
+    def place(self, body: str, point: At) -> np.ndarray:
         """Return the pixels (k, 2) of a point (world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, [point])[:, 0])
 
@@ -38,13 +41,18 @@ class Stage(NamedTuple):
         """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
 
+    def along(self, body: str, point: At, axis: np.ndarray, px: float) -> np.ndarray:
+        """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
+        half = axis * px / self.page.scale
+        return self.points(body, np.array([np.array(point) - half, np.array(point) + half]))
 
-def _along(
-    stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray, px: float
-) -> np.ndarray:
-    """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
-    half = axis * px / stage.page.scale
-    return stage.points(body, np.array([np.array(point) - half, np.array(point) + half]))
+    def line(self, points: np.ndarray, look: str, closed: bool = False) -> str:
+        """Return a moving line, or an outline, through pixels (k, n, 2); it is not filled by default."""
+        return svg.line(points, look if "fill" in look else f'{look} fill="none"', self.timeline, closed)
+
+    def sign(self, body: str, point: At, content: str) -> str:
+        """Return content drawn about the origin, carried along a point (world, t = 0) of a body."""
+        return svg.follow(self.place(body, point), content, self.timeline)
 
 
 def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
@@ -52,9 +60,8 @@ def ground_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     side = joint.bodies.index(GROUND)
     point = joint.anchor_pair[side]
     if joint.facts.free_translations == 1 and joint.directions:
-        yield svg.line(
-            _guide(stage, joint, side), f'stroke="{GREY}" stroke-dasharray="6 5" fill="none"', None
-        )
+        look = f'stroke="{GREY}" stroke-dasharray="6 5" fill="none"'
+        yield svg.line(_guide(stage, joint, side), look, None)
         return
     x, y = stage.place(GROUND, point)[0]
     hatch = "".join(f"M{x + dx:.1f} {y + 16:.1f}l-5 6" for dx in (-9, -3, 3, 9))
@@ -78,44 +85,31 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     names, (first, second) = joint.bodies, joint.anchor_pair
     if joint.type == "distance":
         ends = np.stack([stage.place(names[0], first), stage.place(names[1], second)], axis=1)
-        yield svg.line(
-            ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3" fill="none"', stage.timeline
-        )
+        yield stage.line(ends, f'stroke="{INK}" stroke-width="2" stroke-dasharray="9 3 2 3"')
     if joint.type == "inline":
-        yield from _line(stage, names[0], first, rotations.unit(joint.directions[0]))
+        ends = stage.along(names[0], first, rotations.unit(joint.directions[0]), 34.0)
+        yield stage.line(ends, f'stroke="{GREY}" stroke-width="2" stroke-dasharray="6 5"')
     sliding = joint.facts.free_translations == 1 and joint.type != "inline" and bool(joint.directions)
     for k, axis in enumerate(map(rotations.unit, joint.directions)):
         body, point = (names[k], joint.anchor_pair[k]) if len(joint.directions) > 1 else (names[1], second)
         if sliding:
             yield from _sleeve(stage, body, point, axis)
         elif abs(axis @ stage.page.view.axes[2]) < 1 - 1e-9 and joint.type not in ("planar", "inline"):
-            ends = _along(stage, body, point, axis, STUB)
-            yield svg.line(
-                ends,
-                f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2" fill="none"',
-                stage.timeline,
-            )
+            ends = stage.along(body, point, axis, STUB)
+            yield stage.line(ends, f'stroke="{INK}" stroke-width="1.2" stroke-dasharray="7 2 1 2"')
     if joint.type == "planar":
         yield from _plane(stage, names[0], first, rotations.unit(joint.directions[0]))
-    yield svg.follow(stage.place(names[1], second), SIGNS[joint.type](), stage.timeline)
+    yield stage.sign(names[1], second, SIGNS[joint.type])
 
 
-def _sleeve(stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray) -> Iterator[str]:
-    ends = _along(stage, body, point, axis, 15.0)
-    butt = 'fill="none" stroke-linecap="butt"'
-    yield svg.line(ends, f'{butt} stroke="{INK}" stroke-width="15"', stage.timeline)
+def _sleeve(stage: Stage, body: str, point: At, axis: np.ndarray) -> Iterator[str]:
+    ends = stage.along(body, point, axis, 15.0)
     inner = ends + (ends.mean(axis=1, keepdims=True) - ends) * 0.11
-    yield svg.line(inner, f'{butt} stroke="{PAPER}" stroke-width="11.6"', stage.timeline)
+    yield stage.line(ends, f'fill="none" stroke-linecap="butt" stroke="{INK}" stroke-width="15"')
+    yield stage.line(inner, f'fill="none" stroke-linecap="butt" stroke="{PAPER}" stroke-width="11.6"')
 
 
-def _line(stage: Stage, body: str, point: tuple[float, float, float], axis: np.ndarray) -> Iterator[str]:
-    ends = _along(stage, body, point, axis, 34.0)
-    yield svg.line(
-        ends, f'stroke="{GREY}" stroke-width="2" stroke-dasharray="6 5" fill="none"', stage.timeline
-    )
-
-
-def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: np.ndarray) -> Iterator[str]:
+def _plane(stage: Stage, body: str, point: At, normal: np.ndarray) -> Iterator[str]:
     across = np.cross(normal, np.eye(3)[np.argmin(abs(normal))])
     across /= np.linalg.norm(across)
     other, half = np.cross(normal, across), 34 / stage.page.scale
@@ -123,23 +117,23 @@ def _plane(stage: Stage, body: str, point: tuple[float, float, float], normal: n
         [across + other, across - other, -across - other, other - across]
     )
     look = f'stroke="{GREY}" fill="{GREY}" fill-opacity="0.15"'
-    yield svg.line(stage.points(body, corners), look, stage.timeline, closed=True)
+    yield stage.line(stage.points(body, corners), look, closed=True)
 
 
 def _ball(fill: str, radius: float = 5.5) -> str:
     return f'<circle r="{radius:g}" fill="{fill}" stroke="{INK}" stroke-width="1.8"/>'
 
 
-SIGNS: dict[str, Callable[[], str]] = {
-    "fixed": lambda: f'<rect x="-5.5" y="-5.5" width="11" height="11" fill="{INK}"/>',
-    "revolute": lambda: _ball(PAPER),
-    "universal": lambda: _ball(PAPER, 6.5) + f'<path d="M-4 -4L4 4M-4 4L4 -4" stroke="{INK}"/>',
-    "spherical": lambda: _ball(INK),
-    "translational": lambda: "",
-    "cylindrical": lambda: _ball(PAPER, 4),
-    "planar": lambda: _ball(GREY, 4),
-    "inline": lambda: _ball(INK, 3.5),
-    "distance": lambda: _ball(PAPER, 3.5),
+SIGNS = {
+    "fixed": f'<rect x="-5.5" y="-5.5" width="11" height="11" fill="{INK}"/>',
+    "revolute": _ball(PAPER),
+    "universal": _ball(PAPER, 6.5) + f'<path d="M-4 -4L4 4M-4 4L4 -4" stroke="{INK}"/>',
+    "spherical": _ball(INK),
+    "translational": "",
+    "cylindrical": _ball(PAPER, 4),
+    "planar": _ball(GREY, 4),
+    "inline": _ball(INK, 3.5),
+    "distance": _ball(PAPER, 3.5),
 }
 
 
@@ -150,8 +144,8 @@ def coupling_mark(stage: Stage, coupling: Coupling) -> str:
     ends = [stage.place(joint.bodies[1], joint.anchor_pair[1]) for joint in joints]
     if coupling.joints[0] == coupling.joints[1]:
         return svg.follow(ends[0], _spiral(INK), stage.timeline)
-    look = f'stroke="{INK}" stroke-width="1.6" stroke-dasharray="1 5" stroke-linecap="round" fill="none"'
-    return svg.line(np.stack(ends, axis=1), look, stage.timeline)
+    look = f'stroke="{INK}" stroke-width="1.6" stroke-dasharray="1 5" stroke-linecap="round"'
+    return stage.line(np.stack(ends, axis=1), look)
 
 
 def driver_mark(stage: Stage, driver: Driver) -> str:
@@ -165,27 +159,21 @@ def driver_mark(stage: Stage, driver: Driver) -> str:
         sign = _turning(stage, axis * sense, 15.0)
     else:
         sign = _arrow_from_origin(stage, axis * sense)
-    return svg.follow(stage.place(joint.bodies[1], point), sign, stage.timeline)
+    return stage.sign(joint.bodies[1], point, sign)
 
 
 def load_mark(stage: Stage, load: Load) -> str:
     """Symbol of a load: a straight arrow, a curved arrow, a zigzag, or a spiral at its joint."""
     if load.type == "force":
-        return svg.follow(
-            stage.place(load.body, load.point),
-            _arrow_from_origin(stage, rotations.unit(load.force)),
-            stage.timeline,
-        )
+        return stage.sign(load.body, load.point, _arrow_from_origin(stage, rotations.unit(load.force)))
     if load.type == "moment":
         body = stage.scene.body[stage.scene.body_index(load.body)]
-        sign = _turning(stage, rotations.unit(load.moment), 20.0)
-        return svg.follow(stage.place(load.body, body.position), sign, stage.timeline)
+        return stage.sign(load.body, body.position, _turning(stage, rotations.unit(load.moment), 20.0))
     if load.type == "spring":
         first, second = (stage.place(*end) for end in attack(load))
-        look = f'stroke="{ACTION}" stroke-width="1.6" fill="none"'
-        return svg.line(_zigzag(first, second), look, stage.timeline)
+        return stage.line(_zigzag(first, second), f'stroke="{ACTION}" stroke-width="1.6"')
     joint = stage.scene.joint_named(load.joint)
-    at, axis = stage.place(joint.bodies[1], joint.anchor_pair[1]), rotations.unit(joint.directions[0])
+    axis = rotations.unit(joint.directions[0])
     sense = axis * np.copysign(1.0, load.action.amount)
     signs: dict[str, Callable[[], str]] = {
         "torsion_spring": _spiral,
@@ -193,14 +181,14 @@ def load_mark(stage: Stage, load: Load) -> str:
         "joint_torque": lambda: _turning(stage, sense, 15.0),
         "joint_force": lambda: _arrow_from_origin(stage, sense),
     }
-    return svg.follow(at, signs[load.type](), stage.timeline)
+    return stage.sign(joint.bodies[1], joint.anchor_pair[1], signs[load.type]())
 
 
 def _short_zigzag(stage: Stage, axis: np.ndarray) -> str:
     """Return a zigzag for a spring along an axis from the origin."""
     end = ARROW * stage.page.directions(axis)
-    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in _zigzag(np.zeros((1, 2)), end[None], 8)[0])
-    return f'<polyline points="{path}" stroke="{ACTION}" stroke-width="1.6" fill="none"/>'
+    zigzag = _zigzag(np.zeros((1, 2)), end[None], 8)
+    return svg.line(zigzag, f'stroke="{ACTION}" stroke-width="1.6" fill="none"', None)
 
 
 def _arrow_from_origin(stage: Stage, direction: np.ndarray) -> str:
@@ -230,9 +218,6 @@ def _zigzag(first: np.ndarray, second: np.ndarray, turns: int = 12) -> np.ndarra
 
 
 def _spiral(colour: str = ACTION) -> str:
-    angle = np.linspace(0, 4.5 * np.pi, 60)
-    radius = np.linspace(8, 17, 60)
-    points = " ".join(
-        f"{x:.1f},{y:.1f}" for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
-    )
-    return f'<polyline points="{points}" stroke="{colour}" stroke-width="1.5" fill="none"/>'
+    angle, radius = np.linspace(0, 4.5 * np.pi, 60), np.linspace(8, 17, 60)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    return svg.line(points[None], f'stroke="{colour}" stroke-width="1.5" fill="none"', None)
