@@ -14,8 +14,8 @@ from mbref import rotations
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
 from mbref.trajectory import Trajectory
 
-# suffix of the half's name; distance of the halves relative to the largest one that the inertia allows
-HALF, LIMIT = " half", 0.2
+HALF = " half"  # suffix of the second half's name
+LIMIT = 0.2  # part of the middle principal moment that is due to the distance of the halves; 0.5 is the most
 UNCHANGED = 1e-12  # fraction of the largest velocity: a smaller change is rounding
 
 
@@ -175,8 +175,7 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
 def _arm(body: Body) -> np.ndarray:
     """Return the vector from the centre of a body to the centre of its first half, in body axes."""
     moments, axes = np.linalg.eigh(_inertia(body))
-    spare = min(moments[1], moments[1] + moments[2] - moments[0]) * LIMIT
-    return np.sqrt(spare / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+    return np.sqrt(LIMIT * moments[1] / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
 
 
 def _inertia(body: Body) -> np.ndarray:
