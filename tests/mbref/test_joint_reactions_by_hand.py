@@ -1,0 +1,234 @@
+"""Joint reactions / forces and moments of bodies at rest, worked out by hand.
+
+The multipliers λ balance the forces that a test writes down: Φ_qᵀ λ = Q.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref import rotations
+from mbref.equations import joint_reactions
+from mbref.equations.joint_reactions import determined_components, open_dimensions, reactions
+from mbref.equations.model import Model
+from mbref.scene import Body, Coupling, Cylindrical, Distance, Fixed, Revolute, Scene, Spherical, Translational
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+ORIGIN = (0.0, 0.0, 0.0)
+ONE = (1.0, 0.0, 0.0, 0.0)
+HALF = math.sqrt(0.5)
+TURNED = {"about x": (HALF, HALF, 0.0, 0.0), "about y": (HALF, 0.0, HALF, 0.0), "not at all": ONE}
+
+
+def body(name: str, position: tuple[float, ...], orientation: tuple[float, ...] = ONE) -> Body:
+    return Body(name=name, mass=2.0, inertia=(0.3, 0.4, 0.5), position=position, orientation=orientation)
+
+
+def model(*bodies: Body, joint: tuple[Any, ...], **parts: Any) -> Model:
+    return Model(Scene(name="s", body=bodies, joint=joint, **parts))
+
+
+def poses(system: Model) -> np.ndarray:
+    """The coordinates (1, nb, 7) of the scene as it is given."""
+    return np.array([[[*b.position, *b.orientation] for b in system.scene.body]])
+
+
+def found(system: Model, **loads: tuple[tuple[float, ...], tuple[float, ...]]) -> dict[str, list[float]]:
+    """Reactions that balance a force and a moment (world axes) at the centre of each named body."""
+    q = poses(system)
+    forces = np.zeros((len(system.scene.body), 6))
+    for name, (force, moment) in loads.items():
+        b = system.scene.body_index(name)
+        own = rotations.rotate(rotations.conjugate(q[0, b, 3:]), np.array(moment, dtype=float))
+        forces[b] = [*force, *own]
+    terms = system.terms(np.zeros(1), q)
+    jacobian = system.structure.dense(terms.blocks)[0]
+    multipliers = np.linalg.lstsq(jacobian.T, forces.ravel(), rcond=None)[0]
+    assert np.abs(jacobian.T @ multipliers - forces.ravel()).max() < 1e-12, "the loads are balanced"
+    return {n: w[0].tolist() for n, w in reactions(system, q, terms.blocks, multipliers[None]).items()}
+
+
+def near(*values: float) -> Any:
+    return pytest.approx(list(values), abs=1e-12)
+
+
+@pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_weld_to_the_ground(sense, orientation):
+    """F = (1, 2, 3) N and M = (4, 5, 6) N m at (2, 0, 1), moved to the weld at (1, 1, 1): the arm (1, -1, 0)
+    turns F into (-3, -3, 3) N m. The weld exerts the opposite on the body."""
+    bodies = ("ground", "b") if sense > 0 else ("b", "ground")
+    weld = Fixed(name="W", bodies=bodies, anchor=(1.0, 1.0, 1.0))
+    wrench = found(model(body("b", (2.0, 0.0, 1.0), orientation), joint=(weld,)), b=((1, 2, 3), (4, 5, 6)))
+    assert wrench["W"] == near(*(-sense * x for x in (1, 2, 3, 1, 2, 9)))
+
+
+@pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_a_chain_of_two_welds(sense, orientation):
+    """Forces 3 N along y at (3, 0, 0) and 5 N along z at (1, 0, 0); joints at the origin and at (2, 0, 0)."""
+    near_end = Fixed(name="A", bodies=("ground", "b"), anchor=ORIGIN)
+    far_end = Fixed(name="B", bodies=("b", "c") if sense > 0 else ("c", "b"), anchor=(2.0, 0.0, 0.0))
+    system = model(body("b", X, orientation), body("c", (3.0, 0.0, 0.0)), joint=(near_end, far_end))
+    wrenches = found(system, b=((0, 0, 5), ORIGIN), c=((0, 3, 0), ORIGIN))
+    assert wrenches["B"] == near(0, -3 * sense, 0, 0, 0, -3 * sense)
+    assert wrenches["A"] == near(0, -3, -5, 0, 5, -9)
+
+
+def test_joints_give_only_what_they_forbid():
+    """A moment about the axis of the hinge is balanced by the weld behind it; a ball carries force alone."""
+    ball = Spherical(name="ball", bodies=("b", "c"), anchor=(2.0, 0.0, 0.0))
+    weld = Fixed(name="weld", bodies=("ground", "b"), anchor=ORIGIN)
+    system = model(body("b", X), body("c", (2.0, 0.0, 0.0)), joint=(weld, ball))
+    wrenches = found(system, b=(ORIGIN, (0, 0, 7)), c=((1, 2, 3), ORIGIN))
+    assert wrenches["ball"] == near(-1, -2, -3, 0, 0, 0)
+    assert wrenches["weld"] == near(-1, -2, -3, 0, 6, -4 - 7)
+
+
+@pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
+@pytest.mark.parametrize("frame", ["ground", "carrier"])
+def test_torques_of_coupled_shafts(frame, orientation):
+    """Shaft c turns 3 times as fast as shaft b: 6 N m on b balance -2 N m on c. The tooth forces are part of
+    the reactions, as moments about the axes, which the carrier has in its own frame."""
+    joints = (
+        Fixed(name="base", bodies=("ground", "carrier"), anchor=ORIGIN),
+        Revolute(name="B", bodies=(frame, "b"), anchor=X, axis=(0.0, 2.0, 0.0)),
+        Revolute(name="C", bodies=(frame, "c"), anchor=Z, axis=(0.0, 2.0, 0.0)),
+    )
+    coupling = (Coupling(name="gear", joints=("B", "C"), ratio=3.0),)
+    bodies = (body("carrier", ORIGIN, orientation), body("b", X, orientation), body("c", Z))
+    wrenches = found(
+        model(*bodies, joint=joints, coupling=coupling), b=(ORIGIN, (0, 6, 0)), c=(ORIGIN, (0, -2, 0))
+    )
+    assert wrenches["B"] == near(0, 0, 0, 0, -6, 0) and wrenches["C"] == near(0, 0, 0, 0, 2, 0)
+    assert list(wrenches) == ["base", "B", "C"], "the gear is no joint"
+
+
+@pytest.mark.parametrize("frame", ["ground", "carrier"])
+def test_the_force_of_a_rack(frame):
+    """The rack moves by 0.5 m/rad: 2 N along it balance -1 N m about the pinion."""
+    joints = (
+        Fixed(name="base", bodies=("ground", "carrier"), anchor=ORIGIN),
+        Revolute(name="pinion", bodies=(frame, "b"), anchor=X, axis=Z),
+        Translational(name="rack", bodies=(frame, "c"), anchor=Z, axis=(3.0, 0.0, 0.0)),
+    )
+    coupling = (Coupling(name="teeth", joints=("pinion", "rack"), ratio=0.5),)
+    bodies = (body("carrier", ORIGIN, TURNED["about y"]), body("b", X), body("c", Z))
+    wrenches = found(
+        model(*bodies, joint=joints, coupling=coupling), b=(ORIGIN, (0, 0, -1)), c=((2, 0, 0), ORIGIN)
+    )
+    assert wrenches["pinion"] == near(0, 0, 0, 0, 0, 1) and wrenches["rack"] == near(-2, 0, 0, 0, 0, 0)
+
+
+def test_a_screw_couples_the_coordinates_of_one_joint():
+    """5 N along the axis times 0.2 m/rad balance -1 N m about it."""
+    screw = Cylindrical(name="screw", bodies=("ground", "b"), anchor=ORIGIN, axis=(0.0, 0.0, 4.0))
+    coupling = (Coupling(name="thread", joints=("screw", "screw"), ratio=0.2),)
+    system = model(body("b", Z), joint=(screw,), coupling=coupling)
+    assert found(system, b=((0, 0, 5), (0, 0, -1)))["screw"] == near(0, 0, -5, 0, 0, 1)
+
+
+# --- what equilibrium leaves open -------------------------------------------------------------------------
+def door(*heights: float) -> Model:
+    hinges = [
+        Revolute(name=f"J{k}", bodies=("ground", "b"), anchor=(0.0, 0.0, z), axis=Z)
+        for k, z in enumerate(heights)
+    ]
+    free = Spherical(name="free", bodies=("ground", "c"), anchor=ORIGIN)
+    return model(body("b", X), body("c", Y), joint=(*hinges, free))
+
+
+def test_two_hinges_share_all_but_the_moment_about_their_axis():
+    system = door(0.0, 2.0)
+    q, blocks = poses(system), system.terms(np.zeros(1), poses(system)).blocks
+    assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {
+        "J0": [5],
+        "J1": [5],
+        "free": [0],
+    }
+    shared = [False] * 5 + [True]
+    assert {n: c.tolist() for n, c in determined_components(system, q, blocks).items()} == {
+        "J0": [shared],
+        "J1": [shared],
+        "free": [[True] * 6],
+    }
+    vanishing, lengths = joint_reactions.vanishing_combinations(system, blocks)
+    assert vanishing.shape == (1, 13, 5) and lengths.shape == (1, 13)
+    rows = system.structure.dense(blocks)[0] / lengths[0][:, None]
+    assert np.linalg.norm(rows, axis=1) == pytest.approx(np.ones(13))
+    assert np.abs(vanishing[0].T @ rows).max() < 1e-14
+    assert vanishing[0].T @ vanishing[0] == pytest.approx(np.eye(5), abs=1e-14)
+
+
+def test_a_single_hinge_leaves_nothing_open():
+    system = door(0.0)
+    blocks = system.terms(np.zeros(1), poses(system)).blocks
+    assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {"J0": [0], "free": [0]}
+    assert all(c.all() for c in determined_components(system, poses(system), blocks).values())
+
+
+def test_reactions_are_open_at_a_singular_position_only():
+    """A rod of 1 m along y stands across a slide along x at the second of three samples: the force along the
+    rod, and its moment of 2 m at the slide, are open there."""
+    slide = Translational(name="slide", bodies=("ground", "b"), anchor=ORIGIN, axis=X)
+    rod = Distance(name="rod", bodies=("ground", "b"), anchors=((2.0, 1.0, 0.0), (2.0, 0.0, 0.0)))
+    system = model(body("b", ORIGIN), joint=(slide, rod))
+    q = np.array([[[x, 0.0, 0.0, *ONE]] for x in (-0.3, 0.0, 0.5)])
+    blocks = system.terms(np.zeros(3), q).blocks
+    found = open_dimensions(system, blocks)
+    assert {name: k.tolist() for name, k in found.items()} == {"slide": [0, 1, 0], "rod": [0, 1, 0]}
+    components = determined_components(system, q, blocks)
+    assert components["slide"][1].tolist() == [True, False, True, True, True, False]
+    assert components["rod"][1].tolist() == [True, False, True, True, True, True]
+    assert all(c[[0, 2]].all() for c in components.values())
+    vanishing, _ = joint_reactions.vanishing_combinations(system, blocks)
+    assert vanishing.shape == (3, 6, 1) and not vanishing[[0, 2]].any(), "zeros where no combination vanishes"
+
+
+def test_sizes_of_matrices_with_one_column_or_more():
+    assert joint_reactions._singular_values(np.array([[[3.0], [4.0]]])).tolist() == [[5.0]]
+    assert joint_reactions._singular_values(np.zeros((2, 3, 0))).shape == (2, 0)
+    two = np.array([[[1.0, 1.0], [1.0, -1.0]]])
+    assert joint_reactions._singular_values(two)[0] == pytest.approx([math.sqrt(2)] * 2)
+
+
+# --- what a motion has ------------------------------------------------------------------------------------
+def lazy(scene: Scene, rows: int) -> dict[str, Any]:
+    return joint_reactions.lazy_reactions(scene, np.zeros(1), np.zeros((1, 1, 7)), np.zeros((1, rows)))
+
+
+@pytest.mark.parametrize(("rows", "has_open"), [(120, True), (121, False)])
+def test_open_reactions_are_found_of_up_to_120_rows(rows, has_open):
+    joint = (Revolute(name="J", bodies=("ground", "b"), anchor=ORIGIN, axis=Z),)
+    scene = Scene(name="s", body=(body("b", X),), joint=joint)
+    assert set(lazy(scene, rows)) == {"reactions"} | ({"open_reactions"} if has_open else set())
+    assert list(lazy(scene, rows)["reactions"]) == ["J"], "the names are known before the values"
+    massless = scene.with_(body=(Body(name="b", position=X),))
+    assert lazy(massless, 5) == {}
+
+
+def test_reactions_at_two_times():
+    """The body is 1 m from the axis and 0.5 m along it; 20 N pull it down, then towards the axis."""
+    joint = (Revolute(name="J", bodies=("ground", "b"), anchor=ORIGIN, axis=Z),)
+    system = model(body("b", (1.0, 0.0, 0.5)), joint=joint)
+    q = np.array([[[0.0, -1.0, 0.5, HALF, 0.0, 0.0, -HALF]], [[1.0, 0.0, 0.5, *ONE]]])
+    jacobians = system.structure.dense(system.terms(np.zeros(2), q).blocks)
+    forces = np.array([[0.0, -20.0, 0.0, 0.0, 0.0, 0.0], [-20.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
+    multipliers = np.array(
+        [np.linalg.lstsq(j.T, f, rcond=None)[0] for j, f in zip(jacobians, forces, strict=True)]
+    )
+    found = joint_reactions.lazy_reactions(system.scene, np.zeros(2), q, multipliers)
+    wanted = np.array([[0, 20, 0, -10, 0, 0], [20, 0, 0, 0, 10, 0.0]])
+    assert found["reactions"]["J"] == pytest.approx(wanted, abs=1e-12)
+    assert found["open_reactions"]["J"].tolist() == [0, 0]
+
+
+def test_a_body_without_joints_has_no_reactions():
+    free = model(body("b", X), joint=())
+    blocks = free.terms(np.zeros(1), poses(free)).blocks
+    assert reactions(free, poses(free), blocks, np.zeros((1, 0))) == {}
+    assert open_dimensions(free, blocks) == {} == determined_components(free, poses(free), blocks)
