@@ -175,7 +175,11 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
 def _arm(body: Body) -> np.ndarray:
     """Return the vector from the centre of a body to the centre of its first half, in body axes."""
     moments, axes = np.linalg.eigh(_inertia(body))
-    return np.sqrt(LIMIT * moments[1] / (body.mass or 1.0)) * axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+    return (
+        np.sqrt(LIMIT * moments[1] / (body.mass or 1.0))
+        * axes[:, 0]
+        * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+    )
 
 
 def _inertia(body: Body) -> np.ndarray:

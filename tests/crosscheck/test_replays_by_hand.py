@@ -1,7 +1,7 @@
 """Scenes made from a motion / places, directions, springs and functions of time worked out by hand.
 
-Body b turns from 90° to 180° about z, while its centre moves from (1, 2, 0) to (4, 0, 5): a vector on it turns
-by 90°. Body c moves by (0, 0, 1) without turning.
+Body b turns from 90° to 180° about z, while its centre moves from (1, 2, 0) to (4, 0, 5): a vector on it
+turns by 90°. Body c moves by (0, 0, 1) without turning.
 """
 
 from __future__ import annotations

@@ -15,7 +15,17 @@ from mbref import rotations
 from mbref.equations import joint_reactions
 from mbref.equations.joint_reactions import determined_components, open_dimensions, reactions
 from mbref.equations.model import Model
-from mbref.scene import Body, Coupling, Cylindrical, Distance, Fixed, Revolute, Scene, Spherical, Translational
+from mbref.scene import (
+    Body,
+    Coupling,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Revolute,
+    Scene,
+    Spherical,
+    Translational,
+)
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
