@@ -125,7 +125,7 @@ def _is_corrected(scene: Scene) -> bool:
     pairs = [(body.velocity, found) for body, found in zip(scene.body, linear, strict=True)]
     pairs += [(body.angular_velocity, found) for body, found in zip(scene.body, angular, strict=True)]
     apart = [np.abs(np.subtract(given, found)).max() for given, found in pairs if given is not None]
-    return max(apart, default=0.0) > UNCHANGED * max(np.abs(linear).max(), np.abs(angular).max())
+    return max(apart) > UNCHANGED * max(np.abs(linear).max(), np.abs(angular).max())
 
 
 def _in_halves(scene: Scene, body: Body) -> Scene:
@@ -175,11 +175,8 @@ def of_halves(scene: Scene, motion: Trajectory) -> Trajectory:
 def _arm(body: Body) -> np.ndarray:
     """Return the vector from the centre of a body to the centre of its first half, in body axes."""
     moments, axes = np.linalg.eigh(_inertia(body))
-    return (
-        np.sqrt(LIMIT * moments[1] / (body.mass or 1.0))
-        * axes[:, 0]
-        * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-    )
+    axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
+    return np.sqrt(LIMIT * moments[1] / (body.mass or 1.0)) * axis
 
 
 def _inertia(body: Body) -> np.ndarray:

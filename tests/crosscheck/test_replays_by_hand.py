@@ -115,6 +115,18 @@ def test_joints_at_a_sample(joint, places):
         assert np.array(getattr(found, name)) == pytest.approx(np.array(wanted, dtype=float), abs=1e-12), name
 
 
+def test_a_direction_on_a_body_that_turns_about_several_axes():
+    """Turned by 90° about x at the start, and by 90° about z at the sample: x of the body is X and becomes Y,
+    y is Z and becomes -X, -z is Y and becomes -Z."""
+    turned = scene().body[0].model_copy(update={"orientation": (HALF, HALF, 0.0, 0.0)})
+    run = motion()
+    run.orientation[1, 0] = (HALF, 0.0, 0.0, HALF)
+    carry = replays._Carry(scene().with_(body=(turned, scene().body[1])), run, 1)
+    for before, after in ((X, Y), (Z, (-1.0, 0.0, 0.0)), (Y, (0.0, 0.0, -1.0))):
+        assert carry.direction("b", before) == pytest.approx(np.array(after), abs=1e-15)
+        assert carry.direction("ground", before).tolist() == list(before)
+
+
 def test_springs_of_joints_at_a_sample():
     """The shaft has turned by 90° and has moved by 5 m, so much less is left to the natural position."""
     loads = (
@@ -260,6 +272,10 @@ def test_a_moment_about_an_axis_of_any_length(size):
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_a_moment_that_varies(size):
     assert "varies" in replayed(size, size * (1 + 1.1e-6)).reason
+
+
+def test_a_driver_without_a_moment():
+    assert replayed(0.0, 0.0).load[-1].moment == (0.0, 0.0, 0.0)
 
 
 def test_drivers_that_no_constant_moment_replaces():

@@ -202,8 +202,9 @@ def test_reactions_are_open_at_a_singular_position_only():
 def test_sizes_of_matrices_with_one_column_or_more():
     assert joint_reactions._singular_values(np.array([[[3.0], [4.0]]])).tolist() == [[5.0]]
     assert joint_reactions._singular_values(np.zeros((2, 3, 0))).shape == (2, 0)
-    two = np.array([[[1.0, 1.0], [1.0, -1.0]]])
-    assert joint_reactions._singular_values(two)[0] == pytest.approx([math.sqrt(2)] * 2)
+    two = np.array([[[3.0, 0.0], [4.0, 5.0]]])
+    assert joint_reactions._singular_values(two)[0] == pytest.approx([math.sqrt(45), math.sqrt(5)])
+    assert joint_reactions._singular_values(np.array([[[3.0, 4.0]]]))[0] == pytest.approx([5.0])
 
 
 # --- what a motion has ------------------------------------------------------------------------------------

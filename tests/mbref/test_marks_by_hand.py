@@ -194,6 +194,15 @@ def test_a_plane_across_its_normal():
     assert np.ptp(seen, axis=0) == pytest.approx([68.0, 68.0 * 0.8], abs=0.1)
 
 
+@pytest.mark.parametrize("kind", [Planar, Inline])
+def test_a_plane_and_a_line_move_with_the_first_body(kind):
+    line = Timeline(np.arange(3.0), np.arange(3), 4.0)
+    for bodies, moves in ((("b", "c"), True), (("c", "b"), False)):
+        joint = kind(name="J", bodies=bodies, anchor=PLACE, axis=X)
+        first, *_ = drawn(marks.joint_mark(stage(timeline=line, joint=(joint,)), joint))
+        assert bool(list(first)) is moves
+
+
 def test_a_joint_between_two_bodies_is_drawn_at_its_second_body():
     line = Timeline(np.arange(3.0), np.arange(3), 4.0)
     ball = Spherical(name="J", bodies=("c", "b"), anchor=PLACE)

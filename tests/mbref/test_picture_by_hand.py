@@ -1,7 +1,7 @@
 """Whole pictures / panels, titles, axes, scale bars, lines of time and bodies worked out by hand.
 
-A rod from (0, 0, 0) to (2, 0, 0) and a body from there to (2, 1, 0) on a page of 240 px with margins of 20 px:
-100 px a metre, (x, y, z) at (20 + 100 x, 120 - 100 y), 140 px high.
+A rod from (0, 0, 0) to (2, 0, 0) and a body from there to (2, 1, 0) on a page of 240 px with margins of
+20 px: 100 px a metre, (x, y, z) at (20 + 100 x, 120 - 100 y), 140 px high.
 """
 
 from __future__ import annotations

@@ -12,6 +12,11 @@ REASONS: dict[tuple[str, str, str], str] = {
     ("crosscheck/judge/metrics.py", ERRORS, "rotation_error_series(scene, exact, trajectory)"): (
         "The angle between two orientations is the same in both directions."
     ),
+    (
+        "mbref/equations/joint_reactions.py",
+        "if not place.part or place.of not in names:",
+        "(place.of not in names)",
+    ): "A primitive that is no part of a coupling or an armature names no joint in its field ``of``.",
 }
 """By file, the line of the source and the new text of the mutant."""
 
