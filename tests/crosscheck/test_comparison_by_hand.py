@@ -51,6 +51,7 @@ class Machine:
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.stages: list[tuple[str, list[tuple[str, str, float]]]] = []
         self.notices: list[str] = []
+        self.calls = 0
         self.timed: tuple[Any, ...] = ()
         monkeypatch.setattr(comparison, "_made", self.made)
         monkeypatch.setattr(comparison, "with_timings", self.timings)
@@ -59,6 +60,7 @@ class Machine:
 
     def made(self, what: str, chosen: list[Case], path: Any) -> dict[str, dict[str, Any]]:
         found = [(case.engine, case.setting.family, case.setting.options["step"]) for case in chosen]
+        self.calls += 1
         if chosen:
             self.stages.append((what, found))
         return {key(case): record(case) for case in chosen}
@@ -170,7 +172,7 @@ def test_coarser_settings_are_added_until_none_is_useful(machine, monkeypatch):
         ("running at coarser settings", [("e", "a", 0.32)]),
     ]
     assert [[c.setting.options["step"] for c in group] for group in groups] == [[0.32, 0.16, 0.08], [0.5]]
-    assert len(records) == 3 and records["k"] == 1
+    assert len(records) == 3 and records["k"] == 1 and machine.calls == 2, "nothing runs without settings"
 
 
 def test_coarser_settings_end_after_eight(machine, monkeypatch):
@@ -196,6 +198,28 @@ def test_gates_run_with_the_first_settings(machine, monkeypatch):
 
 def test_nothing_runs_for_no_cases():
     assert comparison._made("running", [], None) == {}
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_children_end_with_the_comparison(machine, monkeypatch, fails):
+    ended: list[str] = []
+    monkeypatch.setattr(comparison, "end_idle", lambda: ended.append("end"))
+    monkeypatch.setattr(comparison, "_truths", lambda *given: [{"truth": 1}])
+    monkeypatch.setattr(comparison, "scouted", lambda *given: ended.append("scouted"))
+
+    def plan() -> list[Case]:
+        if fails:
+            raise KeyboardInterrupt
+        return cases()
+
+    wanted = Wanted([TIMES], 7.0, True)
+    if fails:
+        with pytest.raises(KeyboardInterrupt):
+            comparison.collected([still()], ["e"], wanted, plan, machine.notices.append)
+    else:
+        found = comparison.collected([still()], ["e"], wanted, plan, machine.notices.append)
+        assert found.truths == [{"truth": 1}] and len(found.records) == 3
+    assert ended == ["scouted", "end"]
 
 
 # --- order ------------------------------------------------------------------------------------------------
