@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
@@ -57,6 +58,7 @@ class Comparison:
     errors: dict[str, float]  # largest relative difference of an acceleration from mbref's; inf if none
 
 
+@cache
 def random_mechanism(seed: int) -> Scene:
     """Return a movable mechanism of 3 to 8 bodies and 1 to 3 loops, with loads and velocities.
 

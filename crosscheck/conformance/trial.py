@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -101,17 +101,16 @@ class Specimen:
     dead_end: bool = False
 
 
-def specimens(deep: bool = False) -> list[Specimen]:
+@cache
+def specimens(deep: bool = False) -> tuple[Specimen, ...]:
     """Return all scenes of the suite; ``deep`` applies the metamorphic relations to all without couplings."""
     forms = [Specimen(*make(), deep or make.__name__ in RELATED) for make in CLOSED_FORMS]
     scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
-    probes = {
-        name: scene.with_(name=name) for name, scene in feature_scenes().items() if scene.name not in SHORT
-    }
+    features = {n: s.with_(name=n) for n, s in feature_scenes().items() if s.name not in SHORT}
     drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
-    scenes += [*(probes | moving_probes()).values(), *drawn]
+    scenes += [*(features | moving_probes()).values(), *drawn]
     forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
-    return [*forms, *(Specimen(*make()) for make in GEARED), Specimen(dead_end(), dead_end=True)]
+    return (*forms, *(Specimen(*make()) for make in GEARED), Specimen(dead_end(), dead_end=True))
 
 
 @dataclass(frozen=True)
