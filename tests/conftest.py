@@ -23,16 +23,6 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "check"))
 HERE = Path(__file__).parent
 SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
 MANY = 2000  # tests, among which every kernel is needed
-GENERAL = (
-    "alf-dual+projection",
-    "mpi-svd+partitioning",
-    "lm1+none/rk4",
-    "lm2+projection/adams",
-    "alf+none",
-    "mpi-gs+none",
-    "mpi-gs-literal+none",
-    "mpi-qr+none",
-)
 
 
 def patterns(item: pytest.Item) -> list[str]:
@@ -84,11 +74,6 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     worker = os.environ.get("PYTEST_XDIST_WORKER")
     if len(session.items) < MANY or worker is None:
         return
-    from mbref.kernels.compilation import prepare_all
-    from mbref.method import Method
-    from mbref.stepping.preparation import kernels_of
-    from mbref.taylor.preparation import KERNELS_OF_SERIES
+    from tests.kernels import prepare
 
-    general = dict.fromkeys(kernel for name in GENERAL for kernel in kernels_of(Method.parse(name)))
-    kernels = [*general, *KERNELS_OF_SERIES]
-    prepare_all(kernels if worker == "gw0" else kernels[::-1])
+    prepare(backwards=worker != "gw0")

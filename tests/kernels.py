@@ -1,0 +1,33 @@
+"""Compile the kernels that the tests need, before them: python -m tests.kernels"""
+
+from __future__ import annotations
+
+from mbref.kernels.compilation import prepare_all
+from mbref.method import Method
+from mbref.stepping.preparation import kernels_of
+from mbref.taylor.preparation import KERNELS_OF_SERIES
+
+METHODS = (
+    "alf-dual+projection",
+    "mpi-svd+partitioning",
+    "lm1+none/rk4",
+    "lm2+projection/adams",
+    "alf+none",
+    "mpi-gs+none",
+    "mpi-gs-literal+none",
+    "mpi-qr+none",
+)
+
+
+def prepare(backwards: bool = False) -> None:
+    """Compile or load the kernels of METHODS and of the series.
+
+    Processes that begin at the two ends share the work.
+    """
+    general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
+    kernels = [*general, *KERNELS_OF_SERIES]
+    prepare_all(kernels[::-1] if backwards else kernels)
+
+
+if __name__ == "__main__":
+    prepare()
