@@ -120,7 +120,8 @@ class InProcess:
     """Runner in this process, in an empty directory: for engines that are trusted to return.
 
     ``called`` is the engine's name in commands if it differs from its own name. A run ends after CPU time
-    ``time_limit`` (s), without the time in which the engine prepares its first run.
+    ``time_limit`` (s) and the engine's ``compile_seconds``, without the time in which the engine prepares its
+    first run.
     """
 
     engine: Engine
@@ -160,10 +161,13 @@ class InProcess:
         try:
             if math.isfinite(self.time_limit):
                 self.engine.prepare([setting.family])
-            with _within(self.time_limit):
+            with _within(self.time_limit + self.engine.compile_seconds):
                 return answered(self.engine, scene, times, setting)
         except _OutOfTime:
-            outcome, words = Outcome.TIMED_OUT, f"no result after {self.time_limit:g} s"
+            outcome, words = (
+                Outcome.TIMED_OUT,
+                f"no result after {self.time_limit + self.engine.compile_seconds:g} s",
+            )
         except Exception as error:
             outcome, words = Outcome.CRASHED, f"{type(error).__name__}: {error}"
         return serve.failed(self.name, self.engine.version(), scene, setting, outcome, words)

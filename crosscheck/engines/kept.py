@@ -22,7 +22,7 @@ def hashed(*parts: str) -> str:
 
 def kept(name: str, origin: str, suffix: str) -> Path | None:
     """Return the file of an origin in a folder of the cache; its name contains the hash of its content."""
-    for path in sorted(_folder(name).glob(f"{origin}-*{suffix}")):
+    for path in sorted(cache(name).glob(f"{origin}-*{suffix}")):
         with contextlib.suppress(OSError):
             if path.stem.partition("-")[2] == _hash(path.read_bytes()):
                 return path
@@ -32,7 +32,7 @@ def kept(name: str, origin: str, suffix: str) -> Path | None:
 def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
     """Store the file that ``make`` writes in the cache, or in a temporary folder if storing fails; no reader
     sees a part of the file."""
-    folder = _folder(name)
+    folder = cache(name)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         handle, place = tempfile.mkstemp(dir=folder)
@@ -47,7 +47,7 @@ def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> P
         os.replace(made, path)
     finally:
         made.unlink(missing_ok=True)
-    _remove_oldest(folder, suffix)
+    remove_oldest(folder, suffix)
     return path
 
 
@@ -56,7 +56,8 @@ def made_once(name: str, origin: str, suffix: str, make: Callable[[Path], None])
     return kept(name, origin, suffix) or keep(name, origin, suffix, make)
 
 
-def _folder(name: str) -> Path:
+def cache(name: str) -> Path:
+    """Return the folder of that name in the user's cache folder; it need not exist."""
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return root / "mbref" / name
 
@@ -65,8 +66,8 @@ def _hash(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()[:32]
 
 
-def _remove_oldest(folder: Path, suffix: str) -> None:
-    """Remove the oldest files; other processes may remove them at the same time."""
+def remove_oldest(folder: Path, suffix: str = "") -> None:
+    """Remove the oldest files of a folder larger than MOST; other processes may remove files meanwhile."""
     with contextlib.suppress(OSError):
         paths = sorted(folder.glob(f"*{suffix}"), key=lambda path: path.stat().st_mtime)
         left = sum(path.stat().st_size for path in paths)

@@ -46,8 +46,9 @@ def run_isolated(
     """Return the engine's trajectory at ``times`` (k,), computed in a child process.
 
     ``engine_name`` is a known engine or ``module:attribute``. ``time_limit`` is CPU time (s) of the run, or
-    of waiting, without imports and compilation. A crash, a hang, an exception or a missing package gives a
-    trajectory without states and with outcome CRASHED or TIMED_OUT. Raises LookupError for an unknown engine.
+    of waiting, without imports and compilation; the engine's ``compile_seconds`` extend it. A crash, a hang,
+    an exception or a missing package gives a trajectory without states and with outcome CRASHED or TIMED_OUT.
+    Raises LookupError for an unknown engine.
     """
     return _run_alone(serve.run_once, engine_name, scene, times, setting, time_limit)
 
@@ -192,8 +193,8 @@ def _observed(
     try:
         if child.ready is None or not in_copy:
             child.ready = _made_ready(child, engine_name, setting.family)
-        version, said, _ = child.ready
-        seen = child.call(question, (engine_name, scene, times, setting), time_limit, in_copy)
+        (version, more), said, _ = child.ready
+        seen = child.call(question, (engine_name, scene, times, setting), time_limit + more, in_copy)
     except ChildFailed as failure:
         outcome, message = failure.outcome, str(failure)
         return Observation(serve.failed(engine_name, version, scene, setting, outcome, message), "", ())
@@ -201,7 +202,7 @@ def _observed(
 
 
 def _made_ready(child: Child, engine_name: str, family: str) -> Observation:
-    """Return the engine's version after preparing the engine."""
+    """Return the engine's version and compile_seconds after preparing the engine."""
     with _starts(f"{engine_name} {family}", child), _alone_at_first(engine_name, family):
         return child.call(serve.get_ready, (engine_name, [family]), READY_SECONDS)
 

@@ -32,15 +32,19 @@ Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]
 
 
-def get_ready(engine_name: str, families: Sequence[str]) -> str:
-    """Import and compile what an engine needs once; returns its version, empty if its package is missing."""
+def get_ready(engine_name: str, families: Sequence[str]) -> tuple[str, float]:
+    """Import and compile what an engine needs once.
+
+    Returns its version, empty if its package is missing, and the CPU time (s) by which it extends the time
+    limit of its runs.
+    """
     simulator = engine(engine_name)
     try:
         version = simulator.version()
     except ImportError:  # the run reports the missing package
-        return ""
+        return "", 0.0
     simulator.prepare(families)
-    return str(version)
+    return str(version), float(simulator.compile_seconds)
 
 
 def run_once(engine_name: str, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:

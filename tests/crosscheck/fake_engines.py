@@ -181,6 +181,15 @@ class Compiling(Fake):
         time.sleep(0.5)
 
 
+class CompilingModels(Fake):
+    """Computes for 0.4 s of CPU time in each run, and says that it compiles for as long."""
+
+    compile_seconds = 10.0
+
+    def misbehave(self, scene: Scene) -> None:
+        computing(time.process_time() + 0.4)
+
+
 class Searching(Fake):
     """Compiles for its settings: writes to the file FAKE_LOG when that begins and ends, and waits a while for
     a second process that does so."""
@@ -294,6 +303,7 @@ KEEPING, HERALD = Keeping(), Herald()
 SLOW, STUCK, COMPILING, SEARCHING = Slow(), Stuck(), Compiling(), Searching()
 NO_SETTINGS, REFUSING = NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
+COMPILING_MODELS = CompilingModels()
 LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()
 
 

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import Setting
 from crosscheck.processes import fork_server
 from crosscheck.processes.child import ChildFailed, stop_all
@@ -87,6 +88,17 @@ def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, versio
     assert ended.position.shape == (0, 1, 3), ended.position.shape
     observed = observe(f"fake_engines:{fake}", still(), TIMES, PLAIN, 60.0)
     assert observed.value.to_record() == ended.to_record(), (observed.value, ended)
+
+
+def test_compilation_of_a_model_extends_the_time_limit():
+    from fake_engines import CompilingModels
+
+    runner = InProcess(CompilingModels(), time_limit=0.1)
+    for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
+        assert ended.outcome is Outcome.COMPLETED, ended.message
+    runner.engine.compile_seconds = 0.0
+    ended = runner.observe(still(), TIMES, PLAIN).value
+    assert ended.outcome is Outcome.TIMED_OUT and ended.message == "no result after 0.1 s"
 
 
 def test_observed_runs_and_a_process_for_each(tmp_path: Path):

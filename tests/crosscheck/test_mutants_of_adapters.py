@@ -168,7 +168,7 @@ def test_adapters_without_defect_are_right(way):
 def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
-    monkeypatch.setattr(kept, "_folder", lambda name: tmp_path / name)  # compiled code of the true sources
+    monkeypatch.setattr(kept, "cache", lambda name: tmp_path / name)  # compiled code of the true sources
     assert not is_right(mutant(package(way), defect, monkeypatch), way)
 
 

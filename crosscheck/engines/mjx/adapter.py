@@ -1,18 +1,21 @@
 """MuJoCo MJX: MuJoCo's model stepped by code in JAX, here on the processor, in double precision except in the
 family SINGLE.
 
-Code is compiled for each structure of a model before the timed run, which takes 5 to 30 s.
+JAX compiles code for each structure of a model before the timed run, for 5 to 70 s of CPU time, and stores it
+in the user's cache folder for later processes.
 """
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engines import kept
 from crosscheck.engines.fixed_steps import FixedSteps, simulated
 from crosscheck.engines.mujoco.ports import FAMILIES, OPTIONS, SUPPORTS, PortedModel, refusal, sweep
 from crosscheck.engines.tree_reactions import LinkMotion
@@ -30,6 +33,7 @@ class Mjx(Engine):
     supports = SUPPORTS
     families = FAMILIES | {SINGLE: "like stock, in single precision, which is JAX's default"}
     options = OPTIONS
+    compile_seconds = 300.0
 
     def prepare(self, families: Sequence[str]) -> None:
         _mjx()
@@ -49,13 +53,14 @@ class Mjx(Engine):
 
 def _mjx(is_single: bool = False) -> Any:
     """Return the modules jax and mujoco.mjx, set to double or single precision on the processor."""
-    import jax
-
-    config: Any = jax.config
+    jax: Any = import_module("jax")
+    config = jax.config
     if config.jax_enable_x64 == is_single:  # traces of the other precision fail
         config.update("jax_enable_x64", not is_single)
         jax.clear_caches()
     config.update("jax_platforms", "cpu")
+    if not config.jax_compilation_cache_dir:
+        config.update("jax_compilation_cache_dir", str(kept.cache("mjx")))
     from mujoco import mjx
 
     return jax, mjx
@@ -95,6 +100,7 @@ class _World:
 
         self.stepped = _stepped(is_single)
         self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
+        kept.remove_oldest(kept.cache("mjx"))
 
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s)."""
