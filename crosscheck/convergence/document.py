@@ -8,6 +8,7 @@ from crosscheck.closed_loops.records import REFUSED
 from crosscheck.convergence.ladders import (
     MECHANISMS,
     ROWS,
+    SLOW,
     TIME_LIMIT,
     VAIN,
     Row,
@@ -24,7 +25,8 @@ HEAD = f"""# Orders of convergence
 
 This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
 choose a step. Every run is made again at half of its step, or at a tenth of its tolerance, until the error no
-longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time.
+longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time; {SLOW:g} s in Newton's rows `dvi` and
+`defaults`, whose steps take about 0.1 s.
 
 ```sh
 crosscheck convergence                        # print the table; nothing is simulated
@@ -44,7 +46,8 @@ the engine chooses its steps, the mean step counts. Order 1 means that half the 
 - `3e-04 ↓ (1.0)`: the finest step within the limit has the least error; finer steps would lower it.
 - `<1e-12`: less than the bound on the truth's error.
 - Without a number in parentheses, no range of steps has a constant order.
-- `–`: the engine refuses the mechanism; the reason is below.
+- `–`: the mechanism is refused; the reason is below, and whether the adapter, the engine or the engine's
+  model lacks the feature.
 """
 
 
@@ -123,5 +126,5 @@ def _runs(records: Sequence[Record]) -> str:
     if not records:
         return "not measured"
     if records[0]["outcome"] == REFUSED:
-        return f"refused: {records[0]['message']}"
+        return f"refused: {records[0]['message']} ({records[0]['owner']})"
     return "; ".join(map(point, records))

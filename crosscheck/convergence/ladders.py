@@ -12,7 +12,7 @@ import numpy as np
 
 from crosscheck.closed_loops.mechanisms import Difficulty
 from crosscheck.closed_loops.records import REFUSED, kept, read, write
-from crosscheck.engine import Setting, engine
+from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
 from crosscheck.study.grid import Case, Record, default_cases, key, run_in_turn, study
@@ -21,7 +21,8 @@ from crosscheck.study.record_view import ended, error, error_bound, is_completed
 
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 11
-TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take a quarter of an hour
+TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take half an hour
+SLOW = 10.0  # s of CPU time of a run of a family whose step takes 0.1 s
 MOST_TIME = 120.0  # s of CPU time of a run with the compilation of its model
 HALVINGS = 16  # number of runs of a family at most
 VAIN = 2  # number of successive runs without a lower error after which finer ones are not made
@@ -40,11 +41,15 @@ MECHANISMS = (
 
 
 class Row(NamedTuple):
-    """A row of the table: a family of settings of an engine, and the order that its method has."""
+    """A row of the table: a family of settings of an engine, and the order that its method has.
+
+    ``time_limit`` is CPU time of a run (s) above which no finer run is made.
+    """
 
     engine: str
     family: str
     method: str
+    time_limit: float = TIME_LIMIT
 
     @property
     def name(self) -> str:
@@ -73,6 +78,9 @@ ROWS = (
     Row("warp", "stock", "MuJoCo Warp's RK4 in single precision, stiffest documented closures"),
     Row("newton", "padmm, moreau", "Kamino with PADMM in single precision, Moreau's midpoint (order 2)"),
     Row("newton", "lox", "Kamino with LOX in single precision, Euler (order 1)"),
+    Row("newton", "lox, moreau", "Kamino with LOX in single precision, Moreau's midpoint (order 2)"),
+    Row("newton", "dvi", "Kamino with DVI in single precision, Euler (order 1)", SLOW),
+    Row("newton", "defaults", "Kamino's defaults: PADMM in single precision, Euler (order 1)", SLOW),
     Row("newton", "mujoco", "SolverMuJoCo in single precision, default closures (order 1)"),
     Row("newton", "xpbd", "SolverXPBD in single precision"),
     Row("newton", "semi-implicit", "SolverSemiImplicit in single precision (order 1)"),
@@ -101,11 +109,13 @@ def ladder(row: Row, mechanism: Difficulty) -> list[Case]:
     return [case._replace(setting=Setting(row.family, o)) for case in offered[:1] for o in found]
 
 
-def climb(cases: Sequence[Case], run: Callable[[Case], Record]) -> list[Record]:
-    """Return records from coarse to fine, until finer runs are in vain or would take too long."""
+def climb(
+    cases: Sequence[Case], run: Callable[[Case], Record], time_limit: float = TIME_LIMIT
+) -> list[Record]:
+    """Return records from coarse to fine, until finer runs are in vain or would take more CPU time (s)."""
     records: list[Record] = []
     for case in cases:
-        if records and _would_take(case, records[-1]) > TIME_LIMIT:
+        if records and _would_take(case, records[-1]) > time_limit:
             break
         records.append(run(case))
         if in_vain(records) == VAIN:
@@ -165,7 +175,7 @@ def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], N
 
         for row in (row for row in ROWS if row.engine in engines):
             for mechanism in MECHANISMS:
-                if not climb(ladder(row, mechanism), run):
+                if not climb(ladder(row, mechanism), run, row.time_limit):
                     _refuse(row, mechanism, path)
     end_idle()
 
@@ -178,9 +188,10 @@ def short(record: Record) -> Record:
 
 def _refuse(row: Row, mechanism: Difficulty, path: Path) -> None:
     """Store the refusal of a mechanism by an engine or by its family."""
-    cannot = engine(row.engine).cannot(mechanism.make())
-    reason = cannot.reason if cannot else f"the family {row.family} does not serve this mechanism"
+    unserved = Cannot(Owner.ADAPTER, f"the family {row.family} does not serve this mechanism")
+    cannot = engine(row.engine).cannot(mechanism.make()) or unserved
     found = {"key": f"{row.name} {mechanism.scene}", "engine": row.engine, "family": row.family}
-    found |= {"scene": mechanism.scene, "outcome": REFUSED, "message": reason}
+    found |= {"scene": mechanism.scene, "outcome": REFUSED}
+    found |= {"message": cannot.reason, "owner": cannot.owner.value}
     found |= {"version": engine(row.engine).version(), "date": made_by()["date"]}
     write([*(r for r in read(path) if r["key"] != found["key"]), found], path)
