@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import pickle
 import signal
 import subprocess
@@ -251,6 +252,16 @@ def test_a_process_ends_as_its_copy(monkeypatch, status, ends):
     assert seen == ends
 
 
+def test_a_copy_answers_and_a_crash_of_it_is_passed_on(monkeypatch):
+    """The copies are forks of this process that end after their call."""
+    assert pickle.loads(serve._answer_of_copy(60.0, divmod, (7, 2))) == (True, (3, 1))
+    ends: list[int] = []
+    monkeypatch.setattr(serve, "_end_as", lambda status: ends.append(status) or b"ended")
+    assert serve._answer_of_copy(60.0, os._exit, (3,)) == b"ended"
+    assert serve._answer_of_copy(60.0, signal.raise_signal, (signal.SIGKILL,)) == b"ended"
+    assert ends == [3, -9]
+
+
 opened = ExitStack()  # files of a test
 
 
@@ -274,6 +285,7 @@ class Waiting(child.Child):
     def _poll(self, interval: float) -> bool:
         self.now += interval
         self.intervals.append(interval)
+        assert len(self.intervals) < 1000, "it waits without end"
         return len(self.intervals) > self._polls
 
     def _cpu_seconds(self) -> float:
@@ -306,6 +318,26 @@ def test_an_answer_that_comes_in_time(monkeypatch):
     is_there, made = waited(monkeypatch, 5.0, polls=3)
     assert is_there and made.intervals == [0.2] * 4
     assert waited(monkeypatch, 0.3)[1].intervals == pytest.approx([0.2, 0.1])
+
+
+@pytest.mark.parametrize(("copies", "seconds"), [(False, 3.0), (True, 10.0)])
+def test_cpu_time_of_a_process_and_of_its_copy(monkeypatch, copies, seconds):
+    def used(user: float, system: float, *children: Any) -> Any:
+        return SimpleNamespace(
+            cpu_times=lambda: SimpleNamespace(user=user, system=system), children=lambda: list(children)
+        )
+
+    made = Waiting()
+    made._process, made._copies = SimpleNamespace(pid=7), copies
+    tree = used(1.0, 2.0, used(3.0, 4.0, used(50.0, 60.0)))
+    monkeypatch.setattr(child.psutil, "Process", lambda pid: tree if pid == 7 else None)
+    assert child.Child._cpu_seconds(made) == seconds
+
+    def ended(pid: int) -> Any:
+        raise child.psutil.NoSuchProcess(pid)
+
+    monkeypatch.setattr(child.psutil, "Process", ended)
+    assert child.Child._cpu_seconds(made) == 0.0
 
 
 def test_the_last_line_that_was_printed():
