@@ -33,7 +33,7 @@ EXTREMES = {
     "cos": "sin",
 }
 UNCHANGED = {"min", "max", "minimum", "maximum", "hypot", "isclose", "allclose"}
-UNCHANGED |= {"logical_or", "logical_and", "dot", "inner"}
+UNCHANGED |= {"logical_or", "logical_and", "dot", "inner", "array_equal"}
 """Functions that give the same for arguments in any order."""
 KINDS = (
     "sign",

@@ -1,0 +1,332 @@
+"""Paths of closed forms / circles, signs of drivers, groups of bodies and refusals worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.truth import closed_form
+from crosscheck.judge.truth.crankshaft import _part, _without_shaft, crankshaft
+from crosscheck.judge.truth.free_body import free_body
+from crosscheck.judge.truth.locked import locked
+from crosscheck.judge.truth.one_dof import (
+    _torsion_angles_known,
+    circle,
+    freedoms_at,
+    initial_rate,
+    one_dof,
+    trajectory,
+    turned,
+)
+from crosscheck.judge.truth.parallelogram import _arm, parallelogram, pivots_of, turning_driver, unit
+from crosscheck.judge.truth.slider import slider
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Coupling,
+    Cylindrical,
+    Distance,
+    Driver,
+    Factor,
+    Fixed,
+    JointForce,
+    JointTorque,
+    Moment,
+    Revolute,
+    Scene,
+    Spherical,
+    TorsionSpring,
+    Translational,
+)
+
+X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
+def body(name: str, *place: float, **parts: Any) -> Body:
+    given = {"mass": 2.0, "inertia": (0.3, 0.4, 0.5), "position": place or X}
+    return Body(name=name, **{**given, **parts})
+
+
+def pin(name: str, first: str, second: str, *anchor: float, axis: tuple[float, ...] = Z) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), anchor=anchor, axis=axis)
+
+
+def scene(bodies: Any, joints: Any, **parts: Any) -> Scene:
+    return Scene(name="s", body=tuple(bodies), joint=tuple(joints), **{"gravity": O, **parts})
+
+
+PENDULUM = scene([body("bar", 0.0, -2.0, 0.5)], [pin("A", "ground", "bar", 0.0, 0.0, 0.5)])
+# cranks of 1 m at (0, 0, 0) and (3, 0, 0) that point upwards, and a coupler between their ends
+BOX = scene(
+    [body("left", 0.0, 0.5, 0.0), body("top", 1.5, 1.2, 0.0), body("right", 3.0, 0.5, 0.0)],
+    [
+        pin("A", "ground", "left", 0.0, 0.0, 0.0),
+        pin("B", "left", "top", 0.0, 1.0, 0.0),
+        pin("C", "top", "right", 3.0, 1.0, 0.0),
+        pin("D", "right", "ground", 3.0, 0.0, 0.0, axis=(0.0, 0.0, -2.0)),
+    ],
+)
+
+
+# --- circles and rotations --------------------------------------------------------------------------------
+def test_a_vector_on_a_circle():
+    """(1, 2, 3) by 90° about z is (-2, 1, 3); its derivatives by the angle turn by 90° each."""
+    now, rate, second = circle(np.array(Z), np.array([0.0, math.pi / 2]), np.array([1.0, 2.0, 3.0]))
+    assert now == pytest.approx(np.array([[1, 2, 3], [-2, 1, 3.0]]))
+    assert rate == pytest.approx(np.array([[-2, 1, 0], [-1, -2, 0.0]]))
+    assert second == pytest.approx(np.array([[-1, -2, 0], [2, -1, 0.0]]))
+
+
+@pytest.mark.parametrize("axis", [X, Y, Z, (1 / 3, 2 / 3, 2 / 3)])
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.1, math.pi])
+def test_rotation_matrices_about_an_axis(axis, angle):
+    wanted = rotations.to_matrix(rotations.from_vector(angle * np.array(axis)))
+    assert turned(np.array(axis), np.array([angle]))[0] == pytest.approx(wanted, abs=1e-14)
+
+
+def test_a_unit_vector_in_extended_precision():
+    assert unit((0.0, 3.0, -4.0)).dtype == np.longdouble
+    assert unit((0.0, 3.0, -4.0)).astype(float).tolist() == [0.0, 0.6, -0.8]
+
+
+# --- pendulums and parallelograms -------------------------------------------------------------------------
+def test_the_path_of_a_pendulum():
+    path = parallelogram(PENDULUM)
+    pose = path.poses(np.array([0.0, math.pi / 2]))
+    assert path.family == "pendulum"
+    assert pose.position[:, 0].astype(float) == pytest.approx(
+        np.array([[0, -2, 0.5], [2, 0, 0.5]]), abs=1e-15
+    )
+    assert pose.dposition[:, 0].astype(float) == pytest.approx(np.array([[2, 0, 0], [0, 2, 0.0]]), abs=1e-15)
+    assert pose.ddposition[:, 0].astype(float) == pytest.approx(
+        np.array([[0, 2, 0], [-2, 0, 0.0]]), abs=1e-15
+    )
+    assert pose.rotation[1, 0].astype(float) == pytest.approx(
+        np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), abs=1e-15
+    )
+    assert pose.turn[:, 0].tolist() == [0.0, math.pi / 2]
+    assert pose.spin[:, 0].tolist() == [list(Z)] * 2 and not pose.dspin.any()
+
+
+def test_the_path_of_a_parallelogram():
+    """After 90° both cranks point along -x; the coupler has moved by (-1, -1, 0) and has not turned."""
+    path = parallelogram(BOX)
+    pose = path.poses(np.array([math.pi / 2]))
+    assert path.family == "parallelogram"
+    wanted = np.array([[-0.5, 0, 0], [0.5, 0.2, 0], [2.5, 0, 0.0]])
+    assert pose.position[0].astype(float) == pytest.approx(wanted, abs=1e-15)
+    assert pose.turn[0].tolist() == [math.pi / 2, 0.0, math.pi / 2]
+    assert pose.rotation[0, 1].astype(float) == pytest.approx(np.eye(3))
+    assert pose.spin[0].tolist() == [list(Z), list(O), list(Z)]
+    assert one_dof(BOX, path).name == "parallelogram"
+
+
+@pytest.mark.parametrize(("joint", "sign"), [("A", 1.0), ("B", -1.0), ("C", 1.0), ("D", 1.0)])
+def test_drivers_of_a_parallelogram(joint, sign):
+    """The coupler turns by -q against the left crank, the right crank by q against the coupler; the ground
+    turns by -q against the right crank, about an axis that points downwards."""
+    assert parallelogram(BOX).driven_sign(Driver(joint=joint, polynomial=(0.0, 1.0))) == pytest.approx(sign)
+
+
+def test_drivers_that_do_not_turn_about_the_axis():
+    skew = pin("E", "ground", "left", 0.0, 0.0, 0.0, axis=(0.0, 0.1, 1.0))
+    slide = Translational(name="F", bodies=("ground", "left"), anchor=O, axis=Z)
+    screw = Cylindrical(name="G", bodies=("left", "ground"), anchor=O, axis=Z)
+    both = pin("H", "left", "right", 0.0, 0.0, 0.0)
+    path = parallelogram(BOX)
+    sign = turning_driver(
+        BOX.with_(joint=(*BOX.joint, skew, slide, screw, both)), path.axis, np.array([1.0, 0.0, 1.0])
+    )
+    found = [sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "EFGH"]
+    assert found == [None, None, -1.0, None]
+
+
+def test_bodies_of_a_parallelogram_and_their_arms():
+    assert {name: joint.name for name, joint in pivots_of(BOX).items()} == {"left": "A", "right": "D"}
+    pivots = pivots_of(BOX)
+    assert _arm(BOX, pivots, "left").tolist() == [0.0, 0.5, 0.0]
+    assert _arm(BOX, pivots, "top").tolist() == [0.0, 1.0, 0.0], "the crank pin of the first crank"
+    rod = Distance(name="R", bodies=("top", "left"), anchors=(X, Y))
+    alone = BOX.with_(joint=(BOX.joint[0], rod))
+    assert _arm(alone, pivots_of(alone), "top") is None
+    assert parallelogram(alone) is None, "a body that no crank carries"
+    assert parallelogram(BOX.with_(joint=BOX.joint[1:3])) is None, "no pivot"
+    tilted = pin("D", "right", "ground", 3.0, 0.0, 0.0, axis=(0.0, 1e-3, 1.0))
+    assert parallelogram(BOX.with_(joint=(*BOX.joint[:3], tilted))) is None, "axes that are not parallel"
+
+
+# --- sliders and crankshafts ------------------------------------------------------------------------------
+@pytest.mark.parametrize(("bodies", "sign"), [(("ground", "bar"), 1.0), (("bar", "ground"), -1.0)])
+def test_the_path_of_a_slider(bodies, sign):
+    guide = Translational(name="A", bodies=bodies, anchor=O, axis=(0.0, 3.0, 4.0))
+    sliding = scene([body("bar", 1.0, 2.0, 3.0)], [guide])
+    path = slider(sliding)
+    pose = path.poses(np.array([0.0, 5.0]))
+    assert pose.position[:, 0].astype(float).tolist() == [[1.0, 2.0, 3.0], [1.0, 5.0, 7.0]]
+    assert pose.dposition[:, 0].astype(float).tolist() == [[0.0, 0.6, 0.8]] * 2
+    assert not pose.ddposition.any() and not pose.spin.any() and not pose.turn.any() and not pose.dspin.any()
+    assert (pose.rotation[:, 0].astype(float) == np.eye(3)).all()
+    assert path.driven_sign(Driver(joint="A", polynomial=(0.0, 1.0))) == sign
+    assert slider(sliding.with_(joint=(guide, pin("B", "ground", "bar", *O)))) is None
+    assert slider(PENDULUM) is None and slider(sliding.with_(body=(body("bar"), body("other")))) is None
+
+
+def engine(shift: float, name: str) -> tuple[list[Body], list[Any]]:
+    """A crank of 0.3 m along x and a rod of 0.8 m to a slider, in a plane at z = shift."""
+    crank, rod, piston = f"crank{name}", f"rod{name}", f"piston{name}"
+    bodies = [body(crank, 0.15, 0.0, shift), body(rod, 0.7, 0.0, shift), body(piston, 1.1, 0.0, shift)]
+    joints = [
+        pin(f"A{name}", "ground", crank, 0.0, 0.0, shift),
+        pin(f"B{name}", crank, rod, 0.3, 0.0, shift),
+        pin(f"C{name}", rod, piston, 1.1, 0.0, shift),
+        Translational(name=f"D{name}", bodies=("ground", piston), anchor=(1.1, 0.0, shift), axis=X),
+    ]
+    return bodies, joints
+
+
+def test_the_groups_of_a_crankshaft():
+    (first, pins), (second, more) = engine(0.0, "1"), engine(0.5, "2")
+    shaft = Fixed(name="shaft", bodies=("crank1", "crank2"), anchor=O)
+    mixed = [first[0], second[0], first[1], second[1], first[2], second[2]]
+    both = scene(mixed, [*pins, *more, shaft])
+    groups = _without_shaft(both)
+    assert [group.tolist() for group in groups] == [[0, 2, 4], [1, 3, 5]]
+    part = _part(both.with_(driver=(Driver(joint="A1", polynomial=(0.0, 1.0)),)), groups[1])
+    assert [b.name for b in part.body] == ["crank2", "rod2", "piston2"] and not part.driver
+    assert [j.name for j in part.joint] == ["A2", "B2", "C2", "D2"], "the shaft has a crank of another group"
+    path = crankshaft(both)
+    pose = path.poses(np.array([math.pi / 2]))
+    assert path.family == "crankshaft"
+    found = pose.position[0].astype(float)
+    reach = math.sqrt(0.8**2 - 0.3**2)
+    assert found[[0, 1]] == pytest.approx(np.array([[0, 0.15, 0], [0, 0.15, 0.5]]), abs=1e-15)
+    assert found[[4, 5]] == pytest.approx(np.array([[reach, 0, 0], [reach, 0, 0.5]]), abs=1e-15)
+    assert path.driven_sign(Driver(joint="A2", polynomial=(0.0, 1.0))) == pytest.approx(1.0)
+    assert path.driven_sign(Driver(joint="B2", polynomial=(0.0, 1.0))) is None, (
+        "the rod turns by another angle"
+    )
+    assert crankshaft(scene(first, pins)) is None, "one slider-crank is no crankshaft"
+    hung = scene(
+        [*mixed, body("more", 9.0, 0.0, 0.0)], [*both.joint, pin("E", "ground", "more", 8.0, 0.0, 0.0)]
+    )
+    assert crankshaft(hung) is None, "a group that is no slider-crank"
+
+
+# --- which scenes have a closed form ----------------------------------------------------------------------
+def test_initial_rates_along_a_path():
+    def rate(**parts: Any) -> Any:
+        moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, **parts),))
+        return initial_rate(moving, parallelogram(moving))
+
+    assert rate() == 0.0
+    assert rate(angular_velocity=(0.0, 0.0, -3.0)) == pytest.approx(-3.0)
+    assert rate(velocity=(5.0, 0.0, 0.0)) == pytest.approx(2.5)
+    assert rate(velocity=(5.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.5)) == pytest.approx(2.5)
+
+
+def test_freedoms_of_poses():
+    place = np.array([[0.0, -2.0, 0.5]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    assert freedoms_at(PENDULUM, *place) == 1
+    assert (
+        freedoms_at(
+            PENDULUM.with_(joint=(Spherical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5)),)),
+            *place,
+        )
+        == 3
+    )
+
+
+@pytest.mark.parametrize(
+    ("joint", "is_known"),
+    [
+        (pin("T", "ground", "bar", 0.0, 0.0, 0.5, axis=(0.0, 0.0, -3.0)), True),
+        (Cylindrical(name="T", bodies=("bar", "ground"), anchor=O, axis=Z), True),
+        (pin("T", "ground", "bar", 0.0, 0.0, 0.5, axis=(0.0, 0.1, 1.0)), False),
+    ],
+)
+def test_torsion_springs_about_the_axis_of_a_path(joint, is_known):
+    sprung = PENDULUM.with_(joint=(*PENDULUM.joint, joint), load=(TorsionSpring(joint="T", stiffness=1.0),))
+    assert _torsion_angles_known(sprung, parallelogram(PENDULUM)) is is_known
+    assert _torsion_angles_known(PENDULUM, parallelogram(PENDULUM))
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"load": (Moment(body="bar", moment=Z, factor=Factor(start=0.5)),)},
+        {"load": (JointTorque(joint="A", torque=1.0),)},
+        {"load": (Moment(body="bar", moment=Z), JointForce(joint="B", force=1.0))},
+        {"driver": (Driver(joint="A", table=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (3.0, 1.0))),)},
+        {"joint": (PENDULUM.joint[0].model_copy(update={"armature": 0.5}),)},
+        {"coupling": (Coupling(name="G", joints=("B", "B"), ratio=1.0),)},
+    ],
+)
+def test_scenes_that_need_a_reference(parts):
+    sleeve = Cylindrical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5), axis=Z)
+    assert closed_form(PENDULUM).name == "pendulum"
+    given = PENDULUM.with_(joint=(*PENDULUM.joint, sleeve))
+    assert closed_form(given).name == "pendulum"
+    assert (
+        closed_form(
+            given.with_(**{**parts, **({"joint": (*parts["joint"], sleeve)} if "joint" in parts else {})})
+        )
+        is None
+    )
+
+
+def test_two_drivers_have_no_closed_form():
+    drivers = tuple(Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD")
+    assert closed_form(BOX.with_(driver=drivers[:1])).name == "parallelogram"
+    assert closed_form(BOX.with_(driver=drivers)) is None
+    plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
+    assert closed_form(BOX.with_(body=plain)) is None, "no masses and no driver"
+    assert closed_form(BOX.with_(body=plain, driver=drivers[:1])).name == "parallelogram"
+
+
+@pytest.mark.parametrize(("least", "has_truth"), [(0.9e-9, False), (1.1e-9, True)])
+def test_free_bodies(least, has_truth):
+    free = scene([body("bar", inertia=(least, 1.0, 1.0))], [])
+    assert (free_body(free) is not None) is has_truth
+    assert free_body(PENDULUM) is None
+    assert free_body(scene([body("a"), body("b")], [])) is None
+    assert free_body(scene([Body(name="a", position=X)], [])) is None
+
+
+def test_the_motion_of_a_free_body():
+    """It falls by half of g t² and turns about its principal axis z at 2 rad/s."""
+    falling = scene(
+        [body("bar", velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0))],
+        [],
+        gravity=(0.0, -10.0, 0.0),
+    )
+    found = free_body(falling).poses(np.array([0.0, 0.5]))
+    assert found.position[1, 0] == pytest.approx([1.5, -1.25, 0.0])
+    assert found.velocity[1, 0] == pytest.approx([1.0, -5.0, 0.0])
+    assert found.acceleration[1, 0] == pytest.approx([0.0, -10.0, 0.0])
+    assert found.angular_velocity[1, 0] == pytest.approx([0.0, 0.0, 2.0])
+    assert found.orientation[1, 0] == pytest.approx([math.cos(0.5), 0.0, 0.0, math.sin(0.5)])
+    pushed = falling.with_(load=(Moment(body="bar", moment=(0.0, 0.0, 1.5)),))
+    found = free_body(pushed).poses(np.array([0.5]))
+    assert found.angular_velocity[0, 0] == pytest.approx([0.0, 0.0, 3.5]), "1.5 N m on 0.5 kg m²"
+    assert found.angular_acceleration[0, 0] == pytest.approx([0.0, 0.0, 3.0])
+
+
+def test_mechanisms_that_cannot_move():
+    weld = Fixed(name="W", bodies=("ground", "bar"), anchor=O)
+    held = scene([body("bar", 1.0, 2.0, 3.0)], [weld])
+    found = locked(held).poses(np.array([0.0, 1.0]))
+    assert found.position.tolist() == [[[1.0, 2.0, 3.0]]] * 2 and not found.velocity.any()
+    assert found.orientation.tolist() == [[[1.0, 0.0, 0.0, 0.0]]] * 2 and not found.angular_acceleration.any()
+    assert found.t_end == 1.0 and found.method == "locked" and found.bodies == ("bar",)
+    assert locked(PENDULUM) is None
+    twice = held.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))
+    assert locked(twice) is None, "ten rows that leave one freedom"
+
+
+def test_a_trajectory_without_samples():
+    none, turn = np.zeros((0, 1, 3)), np.zeros((0, 1, 3, 3))
+    found = trajectory(PENDULUM, "f", np.zeros(0), none, turn, (none, none), (none, none))
+    assert found.t_end == 0.0 and found.method == "f" and found.engine == "truth"
