@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from crosscheck.judge.truth.picard import NoSolution
 from crosscheck.recorded import exact as exactly
 from crosscheck.recorded import explanations
 from crosscheck.recorded.changed_scenes import Change, _moved, changes
@@ -210,6 +212,21 @@ def test_the_exact_motion_of_a_body_that_turns_freely(monkeypatch):
     assert table["H.angle"] == pytest.approx([0.0, 0.75]) and table["a.position.x"][1] == pytest.approx(
         math.cos(0.75)
     )
+
+
+def test_an_exact_motion_that_ends_is_known_at_its_last_time(monkeypatch):
+    class Family:
+        accuracy = 1e-9
+
+        def poses(self, times: np.ndarray) -> Any:
+            if times[-1] > 0.5:
+                raise NoSolution.ending("it locks", 0.5)
+            return SimpleNamespace(times=times)
+
+    monkeypatch.setattr(exactly, "closed_form", lambda scene: Family())
+    found = exact(SCENE, (0.0, 0.5, 0.75))
+    assert found.motion.times.tolist() == [0.0, 0.5] and found.bound.tolist() == [1e-9] * 2
+    assert "it locks" in found.reason and exact(SCENE, (0.0, 0.5)).reason == ""
 
 
 def test_columns_of_a_recording_that_are_none_of_the_scene_are_left_out():
