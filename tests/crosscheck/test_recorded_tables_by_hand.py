@@ -220,7 +220,7 @@ def test_an_exact_motion_that_ends_is_known_at_its_last_time(monkeypatch):
 
         def poses(self, times: np.ndarray) -> Any:
             if times[-1] > 0.5:
-                raise NoSolution.ending("it locks", 0.5)
+                raise NoSolution("it locks", 0.5)
             return SimpleNamespace(times=times)
 
     monkeypatch.setattr(exactly, "closed_form", lambda scene: Family())
