@@ -24,6 +24,21 @@ def parsed(path: Path) -> ast.Module:
 
 
 @functools.cache
+def statements(path: Path) -> tuple[ast.AST, ...]:
+    """Return the statements of a file, nested ones and branches too, without their expressions."""
+    return _nested(parsed(path).body)
+
+
+def _nested(body: Sequence[ast.AST]) -> tuple[ast.AST, ...]:
+    found, left = [], list(body)
+    while left:
+        found.append(node := left.pop())
+        for part in ("body", "orelse", "finalbody", "handlers", "cases"):
+            left += getattr(node, part, ())
+    return tuple(found)
+
+
+@functools.cache
 def sources(package: str) -> dict[str, Path]:
     """Every module of a package and its file."""
     return {module_name(path): path for path in sorted((ROOT / package).rglob("*.py"))}
@@ -70,8 +85,7 @@ def _imports(path: Path) -> tuple[ast.Import | ast.ImportFrom, ...]:
     body = parsed(path).body
     if path.name == "__init__.py":
         body = [node for node in body if not _is_for_types(node)]
-    nodes = (node for statement in body for node in ast.walk(statement))
-    return tuple(node for node in nodes if isinstance(node, ast.Import | ast.ImportFrom))
+    return tuple(node for node in _nested(body) if isinstance(node, ast.Import | ast.ImportFrom))
 
 
 def _is_for_types(node: ast.stmt) -> bool:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import functools
+
 import pytest
 
 import crosscheck.cli.parser
 import mbref.cli.commands
 from tests.printed_commands import FOUND, ROOT
 
-PARSERS = {"mbref": mbref.cli.commands.parser, "crosscheck": crosscheck.cli.parser.parser}
+PARSERS = {
+    "mbref": functools.cache(mbref.cli.commands.parser),
+    "crosscheck": functools.cache(crosscheck.cli.parser.parser),
+}
 
 
 def test_commands_are_found():

@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from imports import parsed
+from imports import parsed, statements
 
 from mbref.integrators import INTEGRATORS
 from mbref.scenes import SCENES
@@ -25,8 +25,8 @@ MOST_SKIPS = 60  # marks in the repository that keep a layout from the formatter
 @functools.cache
 def imports(path, inside_functions=True):
     """Top-level names that a file imports; without those inside functions if asked."""
-    tree, names = parsed(path), set()
-    for node in ast.walk(tree) if inside_functions else tree.body:
+    names = set()
+    for node in statements(path) if inside_functions else parsed(path).body:
         if isinstance(node, ast.Import):
             names |= {alias.name.partition(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:

@@ -7,7 +7,7 @@ import statistics
 from pathlib import Path
 
 import pytest
-from imports import parsed, sources
+from imports import sources, statements
 
 PACKAGES = ("mbref", "crosscheck", "reports")
 MEDIAN, MOST, SHARE = 7, 20, 0.9  # lines of a function's body, and how many have at most MOST
@@ -24,7 +24,7 @@ def sizes(paths: list[Path]) -> dict[str, int]:
     return {
         f"{path.name}:{node.lineno} {node.name}": body_lines(node)
         for path in paths
-        for node in ast.walk(parsed(path))
+        for node in statements(path)
         if isinstance(node, ast.FunctionDef)
     }
 

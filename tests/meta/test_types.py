@@ -6,14 +6,14 @@ import ast
 import tomllib
 from pathlib import Path
 
-from imports import ROOT, parsed, sources
+from imports import ROOT, sources, statements
 
 DECORATORS = {"kernel", "inlined", "allocating", "entry", "exchangeable", "intrinsic", "njit", "cfunc"}
 
 
 def has_kernels(path: Path) -> bool:
     """Whether a file defines a function that numba compiles."""
-    functions = (node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef))
+    functions = (node for node in statements(path) if isinstance(node, ast.FunctionDef))
     decorators = (d.func if isinstance(d, ast.Call) else d for f in functions for d in f.decorator_list)
     return any(isinstance(d, ast.Name) and d.id in DECORATORS for d in decorators)
 

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from imports import parsed
+from imports import parsed, statements
 
 ROOT = Path(__file__).parents[2]
 FILES = [
@@ -25,7 +25,7 @@ CODE = re.compile(r"``.*?``|`.*?`|\"[^\"]*\"", re.S)  # names and quotations
 
 def docstrings(path: Path) -> Iterator[tuple[int, str]]:
     """Line and text of every docstring of a file."""
-    for node in ast.walk(parsed(path)):
+    for node in (parsed(path), *statements(path)):
         if isinstance(node, ast.FunctionDef | ast.ClassDef | ast.Module) and (
             text := ast.get_docstring(node)
         ):
