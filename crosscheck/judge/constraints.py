@@ -170,8 +170,7 @@ def jacobian(
     """
     n = 6 * len(scene.body)
     twists = np.vstack([np.zeros(n), np.eye(n)]).reshape(n + 1, -1, 6)
-    places, frames = (np.broadcast_to(a, (n + 1, *np.shape(a))) for a in (position, orientation))
-    rates = closure_rates(scene, np.full(n + 1, float(t)), places, frames, twists[..., :3], twists[..., 3:])
+    rates = closure_rates(scene, t, position, orientation, twists[..., :3], twists[..., 3:])
     rows = np.concatenate([np.zeros((n + 1, 0)), *rates.values()], axis=1)
     return (rows[1:] - rows[0]).T, -rows[0]
 

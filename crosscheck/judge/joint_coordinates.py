@@ -100,9 +100,8 @@ def coordinate_jacobian(scene: Scene, name: str, position: np.ndarray, orientati
     ``jacobian``)."""
     n = 6 * len(scene.body)
     joint = next(joint for joint in joint_frames(scene) if joint.name == name)
-    r, p = (np.broadcast_to(a, (n, *a.shape)) for a in with_ground(position, orientation))
-    unit = np.eye(n).reshape(n, -1, 6)
-    return coordinate_rates(joint, r, p, grounded(unit[..., :3]), grounded(unit[..., 3:])).T
+    pose, unit = with_ground(position, orientation), np.eye(n).reshape(n, -1, 6)
+    return coordinate_rates(joint, *pose, grounded(unit[..., :3]), grounded(unit[..., 3:])).T
 
 
 @dataclass(frozen=True)
