@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutants import __main__ as runner
-from tests.mutants import order
+from tests.mutants import order, workers
 from tests.mutants.equivalent import REASONS
 from tests.mutants.importers import SNAPSHOTS, importers
 from tests.mutants.operators import KINDS, Mutant, mutants
@@ -143,6 +143,18 @@ def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
     if expected[0] == runner.BY_TEXT:
         assert tree.result(planted(new), tests, with_texts=False) == (runner.SURVIVED, "")
     assert (tree.place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left"
+
+
+def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
+    """Imports take 7 s here; tests may take 5 s after them."""
+    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0}), [7.0]
+    monkeypatch.setattr(workers, "_cpu", lambda: now[0])
+    session.pytest_collection_finish()
+    now[0] = 11.9
+    session.pytest_runtest_logfinish("a")
+    now[0] = 12.1
+    with pytest.raises(pytest.exit.Exception, match="long enough"):
+        session.pytest_runtest_logfinish("a")
 
 
 def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():

@@ -45,8 +45,8 @@ class Session:
         self._end = 0.0  # CPU s
         self.failed = ""
 
-    def pytest_sessionstart(self) -> None:
-        """Begin the time of a file."""
+    def pytest_collection_finish(self) -> None:
+        """Begin the time of a file after its imports, which take seconds in a new process."""
         self._end = _cpu() + self._of_file
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
