@@ -18,6 +18,8 @@ from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import Judgement, judge_motion
 from crosscheck.recorded.reading import read
 
+SHOWN = 6  # number of headers that are printed of the columns that were not read
+
 
 def judge(arguments: argparse.Namespace) -> int:
     """Print the errors of a recorded table; returns 0 if all columns are right.
@@ -30,7 +32,7 @@ def judge(arguments: argparse.Namespace) -> int:
         recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
     except OSError as error:
         raise RequestError(f"{arguments.table}: {error.strerror}") from None
-    found = judge_motion(scene, recording, arguments.reference_time)
+    found = judge_motion(scene, recording, arguments.reference_time, arguments.tolerance)
     if arguments.json:
         print(json.dumps({**found.to_record(), "ignored": list(recording.ignored)}, allow_nan=False))
     else:
@@ -49,7 +51,8 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
-        verdict = "right within the bound on the reference" if c.is_right else "off"
+        within = "right within the bound on the reference" if c.largest <= c.bound else "right"
+        verdict = within if c.is_right else "off"
         unit = SI[kind_of(c.name)]
         table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", verdict, begins)
     console().print(table)
@@ -60,7 +63,8 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     for e in found.explanations:
         console().print(f"{e.sentence}: {100 * e.remains:.2g} % of the difference remains", soft_wrap=True)
     if ignored:
-        console().print(f"not read: {', '.join(ignored)}", soft_wrap=True)
+        rest = f" and {len(ignored) - SHOWN} more" if len(ignored) > SHOWN else ""
+        console().print(f"not read: {', '.join(ignored[:SHOWN])}{rest}", soft_wrap=True)
 
 
 def write_reference(arguments: argparse.Namespace) -> int:

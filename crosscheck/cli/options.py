@@ -103,7 +103,7 @@ def _number(text: str) -> float:
         raise argparse.ArgumentTypeError(f"must be a number, got {text!r}") from None
 
 
-def _not_negative(text: str) -> float:
+def not_negative(text: str) -> float:
     number = _number(text)
     if not 0 <= number < math.inf:
         raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
@@ -137,7 +137,7 @@ def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_
 def add_reference_time(parser: argparse.ArgumentParser) -> None:
     """Add the option for the CPU time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
-    parser.add_argument("--reference-time", type=_not_negative, default=SECONDS, metavar="T", help=about)
+    parser.add_argument("--reference-time", type=not_negative, default=SECONDS, metavar="T", help=about)
 
 
 def whole(text: str) -> int:

@@ -18,12 +18,14 @@ from crosscheck.cli.options import (
     add_stored_runs,
     digits,
     length,
+    not_negative,
     numbers,
     positive,
     whole,
 )
 from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
+from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, commands
 
@@ -120,6 +122,14 @@ def _add_judge(commands: Commands) -> None:
         default=[],
         metavar="U",
         help="unit of all columns of its quantity, such as mm, deg, mm/s or rpm; may repeat; default: SI",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=not_negative,
+        default=FLOOR,
+        metavar="E",
+        help="largest error of a right column, relative to the mechanism's length, 1 rad, or the largest "
+        "velocity of a body (default: %(default)g); 0: the bound on the reference alone",
     )
     parser.add_argument(
         "--quaternion", choices=("wxyz", "xyzw"), default="wxyz", help="order of quaternion columns"

@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
+from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.changed_scenes import changed
 from crosscheck.recorded.columns import kind_of, scales, start_columns, values
 from crosscheck.recorded.exact import Exact, exact
@@ -30,18 +31,20 @@ EXPLAINED = 1e-3  # fraction of the difference: pairs of causes are tried if sin
 
 @dataclass(frozen=True)
 class ColumnError:
-    """Largest error of a column, the bound below which an error means nothing, and the time (s) at
-    which the error first exceeds the part BEGINS of the largest error (None within the bound)."""
+    """Largest error of a column, the bound below which an error means nothing, the largest error that counts
+    as right, and the time (s) at which the error first exceeds the part BEGINS of the largest error (None for
+    a right column)."""
 
     name: str
     largest: float
-    bound: float
+    bound: float  # of the reference, plus the last digit of the table
+    allowed: float  # the bound, or the tolerance times the size of the quantity if that is larger
     begins: float | None
 
     @property
     def is_right(self) -> bool:
-        """Return whether the error is within the bound of the reference plus the last digit of the table."""
-        return self.largest <= self.bound
+        """Return whether the error is within the bound or within the tolerance."""
+        return self.largest <= self.allowed
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Judgement:
 
     @property
     def is_right(self) -> bool:
-        """Return whether every column is right within its bound."""
+        """Return whether every column is right."""
         return all(column.is_right for column in self.columns)
 
     def to_record(self) -> dict[str, Any]:
@@ -70,7 +73,10 @@ class Judgement:
 
 
 def judge_motion(
-    scene: Scene, motion: str | Path | Mapping[str, np.ndarray] | Recording, seconds: float = SECONDS
+    scene: Scene,
+    motion: str | Path | Mapping[str, np.ndarray] | Recording,
+    seconds: float = SECONDS,
+    tolerance: float = FLOOR,
 ) -> Judgement:
     """Return the errors of a recorded motion and their possible explanations.
 
@@ -82,6 +88,9 @@ def judge_motion(
         A table, or its columns in SI units: ``time`` and columns such as ``rod.position.x``.
     seconds : float
         CPU time that the reference may take, s.
+    tolerance : float
+        Largest error of a right column, relative to the size of its quantity: the mechanism's length, 1 rad,
+        the largest velocity or angular velocity of a body. 0 judges by the bound of the reference alone.
 
     Raises
     ------
@@ -93,7 +102,7 @@ def judge_motion(
     found = exact(scene, _with_dense(recording.times), seconds)
     if not len(found.motion.times):
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
-    return _judged(scene, recording, found)
+    return _judged(scene, recording, found, tolerance)
 
 
 def _with_dense(times: np.ndarray) -> np.ndarray:
@@ -122,7 +131,7 @@ def _from_start(scene: Scene, recording: Recording) -> Recording:
     return replace(recording, columns=columns)
 
 
-def _judged(scene: Scene, recording: Recording, found: Exact) -> Judgement:
+def _judged(scene: Scene, recording: Recording, found: Exact, tolerance: float) -> Judgement:
     known = recording.times <= found.motion.times[-1]
     times = recording.times[known]
     places = np.searchsorted(found.motion.times, times)
@@ -131,9 +140,10 @@ def _judged(scene: Scene, recording: Recording, found: Exact) -> Judgement:
     recorded = {n: c[known] for n, c in recording.columns.items() if n in whole}
     right = with_signs(recorded, {n: whole[n][places] for n in whole})
     scale = {n: size[kind_of(n)] for n in recorded}
+    known_to, digit = float(found.bound[places].max()), recording.resolution
     errors = tuple(
         _column(
-            n, recorded[n] - right[n], times, scale[n] * found.bound[places], recording.resolution.get(n, 0.0)
+            n, recorded[n] - right[n], times, scale[n] * known_to + digit.get(n, 0.0), tolerance * scale[n]
         )
         for n in recorded
     )
@@ -160,11 +170,11 @@ def _explanations(scene: Scene, difference: Difference, noise: float) -> list[Ex
     return found
 
 
-def _column(name: str, error: np.ndarray, times: np.ndarray, bound: np.ndarray, digit: float) -> ColumnError:
+def _column(name: str, error: np.ndarray, times: np.ndarray, bound: float, allowed: float) -> ColumnError:
     size = np.abs(error)
-    largest, allowed = float(size.max()), float(bound.max()) + digit
+    largest, allowed = float(size.max()), max(bound, allowed)
     begins = float(times[int(np.argmax(size > BEGINS * largest))]) if largest > allowed else None
-    return ColumnError(name, largest, allowed, begins)
+    return ColumnError(name, largest, bound, allowed, begins)
 
 
 def _splines(times: np.ndarray, whole: Mapping[str, np.ndarray]) -> Any:

@@ -22,6 +22,7 @@ SHORT = {  # last part of a header → column of the scene
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
 ORDERS = ("wxyz", "xyzw")
+WHOLE = 15  # number of significant digits of a column from which on the table has all digits
 LATE = 50.0  # multiples of the scene's duration: later times are probably in another unit
 
 
@@ -53,9 +54,10 @@ def read(
     table = _numbers(cells, len(headers), path)
     factors = {name: _factor(name, given.get(name, ""), units) for name in chosen}
     found = {name: table[:, k] * factors[name] for name, k in chosen.items()}
+    written = {name: [row[k] for row in cells] for name, k in chosen.items()}
+    whole = any(_digits(column) >= WHOLE for name, column in written.items() if name != "time")
     last = {
-        name: factors[name] * _last_digit([row[k] for row in cells], table[:, k])
-        for name, k in chosen.items()
+        name: factors[name] * _last_digit(written[name], table[:, k], whole) for name, k in chosen.items()
     }
     times = _checked_times(found.pop("time"), scene, path)
     if order != "wxyz":
@@ -174,12 +176,17 @@ def _numbers(rows: Sequence[Sequence[str]], count: int, path: Path) -> np.ndarra
     return found
 
 
-def _last_digit(cells: Sequence[str], numbers: np.ndarray) -> float:
-    """Return the coarsest last digit of a column if it is written with fewer than 15 digits."""
-    digits = [re.sub(r"[eE].*", "", cell).replace(".", "").lstrip("+-0") for cell in cells]
-    most = max(map(len, digits))
+def _digits(cells: Sequence[str]) -> int:
+    """Return the largest number of significant digits in a column."""
+    return max(len(re.sub(r"[eE].*", "", cell).replace(".", "").lstrip("+-0")) for cell in cells)
+
+
+def _last_digit(cells: Sequence[str], numbers: np.ndarray, whole: bool) -> float:
+    """Return the coarsest last digit of a column. Numbers of a table that is written with all digits
+    (``whole``) are rounded by the arithmetic alone: a column with 1.5 in each row has the number 1.5.
+    """
     size = float(np.abs(numbers).max(initial=0.0))
-    if most >= 15 or not size:
+    if whole or not size:
         return float(np.finfo(float).eps * size)
     point = [len(re.sub(r"[eE].*", "", c).partition(".")[2]) for c in cells]
     powers = [int((re.search(r"[eE]([-+]?\d+)", c) or ["", "0"])[1]) for c in cells]

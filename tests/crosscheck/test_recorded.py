@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
+from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.reference.reference import NoReference, reference
+from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded import exact as exactly
 from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
@@ -142,6 +144,19 @@ def test_an_exact_motion_is_right_within_the_bound(table):
     assert found.is_right and not found.explanations and len(found.columns) == 30
 
 
+@pytest.mark.parametrize(
+    ("tolerance", "right"), [(FLOOR, (True, False)), (2e-8, (True, True)), (0.0, (False, False))]
+)
+def test_a_column_is_right_within_the_tolerance_of_its_size(table, tolerance, right):
+    """The mechanism's length scales positions; the largest angular velocity of a body scales rates."""
+    spin = max(abs(table[f"{b}.angular_velocity.{a}"]).max() for b in ("upper", "lower") for a in "xyz")
+    errors = {"upper.position.x": 0.9e-8 * scene_length(SCENE), "upper.angular_velocity.z": 1.9e-8 * spin}
+    off = {"time": TIMES, **{name: table[name] + error for name, error in errors.items()}}
+    found = judge_motion(SCENE, off, tolerance=tolerance)
+    assert tuple(c.is_right for c in found.columns) == right
+    assert found.is_right == all(right) and (found.columns[0].begins is None) == right[0]
+
+
 # each finds its explanation among all others by references of changed scenes, which takes seconds
 SELDOM = ("mass", "missing body", "damping", "millimetres", "inverse", "interpolation")
 
@@ -262,6 +277,9 @@ def test_commands_write_and_judge(tmp_path, capsys):
     assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0
     assert "81 samples to t = 0.4 s, error at most" in capsys.readouterr().out
     assert main(["judge", scene, out]) == 0
+    for wrong in ("-1", "x"):
+        with pytest.raises(SystemExit, match="2"):
+            main(["judge", scene, out, "--tolerance", wrong])
     assert main(["judge", scene, out, "--quaternion", "xyzw"]) == 1
     printed = capsys.readouterr().out
     assert " off " in printed and "[bold]" not in printed and "quaternions in the order" in printed

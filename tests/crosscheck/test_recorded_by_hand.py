@@ -344,16 +344,19 @@ def test_values_of_columns_are_continuous_and_scaled():
 
 def test_an_error_begins_where_it_exceeds_a_hundredth_of_its_largest():
     error = np.array([0.0, 0.01, -0.0101, 0.0, 1.0])
-    found = _column("c", error, np.arange(5.0), np.array([0.1, 0.3, 0.2, 0.0, 0.0]), 0.5)
-    assert found == ColumnError("c", 1.0, 0.8, 2.0) and not found.is_right
-    within = _column("c", error, np.arange(5.0), np.full(5, 0.9), 0.1)
-    assert within == ColumnError("c", 1.0, 1.0, None) and within.is_right
+    found = _column("c", error, np.arange(5.0), 0.8, 0.9)
+    assert found == ColumnError("c", 1.0, 0.8, 0.9, 2.0) and not found.is_right
+    within = _column("c", error, np.arange(5.0), 1.0, 0.5)
+    assert within == ColumnError("c", 1.0, 1.0, 1.0, None) and within.is_right
+    tolerated = _column("c", error, np.arange(5.0), 0.5, 1.0)
+    assert tolerated == ColumnError("c", 1.0, 0.5, 1.0, None) and tolerated.is_right
     both = Judgement((found, within), (), 4.0, "r")
     assert not both.is_right and Judgement((within,), (), 4.0, "").is_right
     assert both.to_record()["columns"][0] == {
         "name": "c",
         "largest": 1.0,
         "bound": 0.8,
+        "allowed": 0.9,
         "begins": 2.0,
         "right": False,
     }
@@ -374,13 +377,31 @@ def test_further_times_of_the_exact_motion_are_apart_from_the_samples():
         (["12", "3"], 1.0),
         (["1.5e-3", "2.25e-3"], 1e-4),
         (["1.50e2", "2.00e2"], 1.0),
-        (["1.23456789012345"], np.finfo(float).eps * 1.23456789012345),
         (["0.00123456789012", "0.5"], 0.1),
         (["0.0"], 0.0),
     ],
 )
 def test_the_last_digit_of_a_column(cells, digit):
-    assert _last_digit(cells, np.array([float(c) for c in cells])) == pytest.approx(digit, rel=1e-12)
+    numbers = np.array([float(c) for c in cells])
+    assert _last_digit(cells, numbers, whole=False) == pytest.approx(digit, rel=1e-12)
+    rounding = np.finfo(float).eps * abs(numbers).max()
+    assert _last_digit(cells, numbers, whole=True) == pytest.approx(rounding, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("time", "angle", "digit"),
+    [
+        ("0.1", "1.23456789012345", np.finfo(float).eps * 1.5),
+        ("0.1", "1.2345678901234", 0.1),
+        ("0.123456789012345678", "1.2345678901234", 0.1),
+        ("0.1", "-0.00123456789012345e-3", np.finfo(float).eps * 1.5),
+    ],
+)
+def test_a_table_with_all_digits_has_exact_short_numbers(tmp_path, time, angle, digit):
+    path = tmp_path / "t.csv"
+    path.write_text(f"time,a.x,H.angle\n{time},1.5,{angle}\n")
+    found = read(path, two_bodies(), {}).resolution["a.position.x"]
+    assert found == pytest.approx(digit, rel=1e-12)
 
 
 def test_a_table_with_units_and_its_last_digits(tmp_path):
