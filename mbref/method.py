@@ -50,6 +50,11 @@ def default_method(scene: Scene) -> str:
     return SERIES if len(scene.body) <= MOST_BODIES else SPARSE
 
 
+def short_name(name: str) -> str:
+    """Return the short name of a method, such as ``taylor``; the given name if there is none."""
+    return next((short for short, long in SHORT.items() if long == name), name)
+
+
 class MethodError(Exception):
     """Error: a method is unknown, or a part of the method does not have an option."""
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
+from mbref.method import short_name
 from mbref.motion import Motion
 from mbref.outputs import UNITS
 from mbref.records import strict_json
@@ -115,7 +116,8 @@ def _writer(out: str | None) -> Any:
 def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
     """Print the end of a run, its error estimate and cost, and its last state or the requested columns."""
     out, cost = console(), trajectory.cost
-    out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
+    method = short_name(trajectory.method)
+    out.print(f"{scene.name} by {method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         out.print(trajectory.message)
     if trajectory.known_estimate is not None:

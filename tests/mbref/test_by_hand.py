@@ -107,13 +107,17 @@ def test_the_product_of_pivots(pivots):
     assert size == pytest.approx(np.sum(np.log(np.abs(pivots))))
 
 
-def test_cost_that_a_run_prints(capsys):
+@pytest.mark.parametrize(
+    ("method", "shown"),
+    [("alf-dual+projection/taylor", "taylor"), ("lm1+none/rk4[step=1e-4]", "lm1+none/rk4[step=1e-4]")],
+)
+def test_outcome_and_cost_that_a_run_prints(method, shown, capsys):
     cost = Cost(1.25, 2.5, steps=11, rejected=22, rhs=33, factorisations=44, newton=55)
     none = Trajectory.failed(
         scene="s",
         engine="e",
         version="1",
-        method="m",
+        method=method,
         settings={},
         bodies=("ball",),
         outcome=Outcome.TIMED_OUT,
@@ -121,7 +125,8 @@ def test_cost_that_a_run_prints(capsys):
     )
     scene = Scene(name="s", body=(BALL,))
     show(scene, Motion.of(scene, replace(none, cost=cost)))
-    assert capsys.readouterr().out.splitlines()[1:] == [
+    assert capsys.readouterr().out.splitlines() == [
+        f"s by {shown}: TIMED_OUT at t = 0 s",
         "11 steps, 22 rejected, 33 evaluations",
         "44 factorisations, 55 Newton iterations",
         "1.25 s of stepping, 2.5 s of building",
