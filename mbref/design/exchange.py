@@ -10,6 +10,7 @@ import numpy as np
 
 from mbref.design.along_motion import general_pose
 from mbref.design.placed import placed
+from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.diagnosis import scaled_jacobian
 from mbref.equations.model import Model
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
@@ -37,10 +38,11 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     If at most four joints suffice, the smallest sets are returned: at most ``most`` without and ``most`` with
     removed joints. If more joints are needed, one set is found joint by joint. The result is empty if nothing
     is redundant or no set is found. The rank is computed at a general pose, without drivers. A joint with a
-    driver or a torsion spring is exchanged only for a type that can have it, and is not removed.
+    driver, an armature, a coupling or a torsion spring is exchanged only for a type that can have it, and is
+    not removed.
     """
     scene = scene.assembled()
-    model = Model(scene.with_(driver=(), load=()))
+    model = Model(without_armatures(scene).with_(driver=(), load=()))
     if not model.m:
         return []
     at_pose = Model(placed(model, general_pose(model)))
@@ -150,11 +152,21 @@ def _rank(rows: Iterable[np.ndarray]) -> int:
 
 
 def _bearing(scene: Scene, name: str) -> list[str]:
-    """Return the joint types that can have the driver and the loads of the joint of that name."""
-    driven = scene.joint_named(name).facts.driven if name in {d.joint for d in scene.driver} else None
+    """Return the joint types that can have the driver, the armature, the loads and the couplings of the joint
+    of that name."""
+    joint = scene.joint_named(name)
+    couplings = [c for c in scene.coupling if name in c.joints]
+    coupled = {coordinate for c in couplings for end, coordinate in scene.coupled(c) if end.name == name}
+    by_default = any(c.coordinates is None for c in couplings)
+    prescribed = name in {d.joint for d in scene.driver} or joint.reflected_inertia or by_default
+    driven = joint.facts.driven if prescribed else None
     acting = {load.coordinate for load in scene.load if isinstance(load, JointLoad) and load.joint == name}
-    facts = {kind: joint.facts for kind, joint in JOINT_TYPES.items()}
-    return [k for k, f in facts.items() if driven in (None, f.driven) and acting <= {*f.loaded}]
+    facts = {kind: other.facts for kind, other in JOINT_TYPES.items()}
+    return [
+        kind
+        for kind, f in facts.items()
+        if driven in (None, f.driven) and acting <= {*f.loaded} and coupled <= {*f.coordinates}
+    ]
 
 
 def _choices(
@@ -171,7 +183,7 @@ def _choices(
             n for n in names if kind in WEAKER.get(scene.joint_named(n).type, ()) and kind in bearing[n]
         ]
         joints = tuple(_as(j, kind) if j.name in changed else j for j in model.scene.joint)
-        weaker_rows = _rows(Model(model.scene.with_(joint=joints))) if changed else {}
+        weaker_rows = _rows(Model(model.scene.with_(joint=joints, coupling=()))) if changed else {}
         for name in changed:
             found[name][kind] = _weaker(weaker_rows[name], rows[name], names[name])
     for name in names:

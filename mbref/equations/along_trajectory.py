@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.couplings import couplings_of
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
+from mbref.joint_motion import along, joint_motion
 from mbref.scene import Scene
 from mbref.scene_services import Violation
 from mbref.trajectory import Trajectory
@@ -16,11 +18,18 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     """Return the largest |Φ|, |Φ_q q' - ν| and |Φ_q q'' - γ| over the constraint rows at each sample.
 
     Rows are defined in ``equations.primitives``: metres, or cosines of axes that stay
-    perpendicular and sines of driven angles, which are radians to first order.
+    perpendicular and sines of driven angles, which are radians to first order. Angles in rows of couplings
+    count full turns along the trajectory.
     """
     model = Model(without_armatures(scene))
     q, v, a = coordinates(model, motion)
     terms = model.terms(motion.times, q, v)
+    for coupled in couplings_of(model.scene):
+        ends = zip(coupled.joints, coupled.coordinates, coupled.factors, strict=True)
+        terms.phi[:, model.row_joint.index(coupled.name)] = sum(
+            factor * along(joint_motion(model.scene, motion, joint.name), coordinate)[0]
+            for joint, coordinate, factor in ends
+        )
     velocity = np.einsum("kmn,kn->km", terms.jacobian, v) - terms.nu
     acceleration = None if a is None else np.einsum("kmn,kn->km", terms.jacobian, a) - terms.gamma
     model.release()

@@ -8,6 +8,7 @@ from scipy.special import ellipj, ellipk
 
 import mbref
 from mbref.ensembles.simulate_all import simulate_all
+from mbref.equations.along_trajectory import violations
 from mbref.equations.model import Model, displaced
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits
@@ -40,6 +41,14 @@ def test_gear_pair_turns_as_its_closed_form_over_many_turns(method):
     assert angle[-1] > 15 * 2 * np.pi
     agree(coordinates(gear_pair(), method, "A", times)[0], angle)
     agree(coordinates(gear_pair(), method, "B", times)[0], -0.5 * angle)
+
+
+def test_violation_counts_full_turns_of_coupled_angles():
+    motion = mbref.simulate(gear_pair(), times=np.linspace(0, 3, 61), rtol=1e-13)
+    turned = motion.joint("A").angle
+    assert turned[-1] > 15 * 2 * np.pi and motion.violation.position.max() < 1e-12
+    other = gear_pair().with_("coupling[teeth].ratio", -0.51)
+    assert violations(other, motion).position == pytest.approx(0.01 * turned, abs=1e-12)
 
 
 @pytest.mark.parametrize("method", METHODS)

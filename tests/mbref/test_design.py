@@ -15,7 +15,7 @@ from mbref.design.placed import placed
 from mbref.equations.diagnosis import counts
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
-from mbref.scene import Body, Driver, Revolute, Scene, SceneError, TorsionSpring, Translational
+from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SceneError, TorsionSpring, Translational
 from mbref.scenes import find_scene
 
 SPATIAL = ("bennett", "spatial_slider_crank", "sarrus", "andrews_squeezer")
@@ -148,6 +148,33 @@ def test_one_of_two_hinges_is_removed_unless_something_acts_on_it():
         assert exchanges(twice) == [*pairs, {"lower": "removed"}, {"upper": "removed"}]
         driven = twice.with_(driver=(Driver(joint="upper", polynomial=(0.0, 1.0)),))
         assert exchanges(driven) == [{"lower": "removed"}]
+
+
+@pytest.mark.parametrize(
+    ("change", "kinds"),
+    [
+        ({}, {"cylindrical", "universal", "spherical", "inline", "removed"}),
+        ({"armature": 0.1}, {"cylindrical"}),
+        ({"coupling": Coupling(name="gears", joints=("upper", "W"), ratio=2.0)}, {"cylindrical"}),
+    ],
+    ids=["free", "armature", "coupling"],
+)
+def test_a_joint_with_an_armature_or_a_coupling_keeps_its_angle(change, kinds):
+    """Doors on two hinges of one axis; the upper hinge of each is geared to a wheel in the second scene."""
+    bodies = [
+        Body(name=name, mass=1.0, inertia=(0.1, 0.2, 0.2), position=(0.5, 0.0, 0.0))
+        for name in ("door", "wheel")
+    ]
+    places = {"lower": ("door", 0.0, 0.0), "upper": ("door", 1.0, change.get("armature", 0.0))}
+    hinges = [
+        Revolute(name=name, bodies=("ground", body), anchor=(0.0, 0.0, z), axis=(0.0, 0.0, 1.0), armature=a)
+        for name, (body, z, a) in {**places, "W": ("wheel", 0.0, 0.0)}.items()
+    ]
+    coupling = tuple(c for key, c in change.items() if key == "coupling")
+    scene = Scene(name="doors", body=bodies, joint=hinges, coupling=coupling)
+    found = exchanges(scene, most=20)
+    assert {swap["upper"] for swap in found if "upper" in swap} <= kinds
+    assert {"lower": "removed"} in found and ({"upper": "removed"} in found) == ("removed" in kinds)
 
 
 @pytest.mark.parametrize("loops", [4, 20])
