@@ -246,8 +246,8 @@ class Coupling(Entry):
     A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
     of the second body relative to the first. Both coordinates are zero at the poses that the scene gives;
     with an ``offset`` the motion starts at other poses (see ``Scene.assembled``). ``coordinates`` names the
-    coordinate of each joint. The default is the coordinate that a driver of the joint would prescribe; for
-    one joint named twice, its angle and its displacement.
+    coordinate of each joint. The default is the only coordinate of the joint, or the angle of a cylindrical
+    joint; for one joint named twice, its angle and its displacement.
     """
 
     name: Name
@@ -276,5 +276,5 @@ def default_coordinates(facts: tuple[JointFacts, JointFacts], of_one: bool) -> C
     (``of_one``)."""
     if of_one:
         return ANGLE, DISPLACEMENT
-    first, second = (each.driven or ANGLE for each in facts)
+    first, second = (each.driven or (*each.coordinates, ANGLE)[0] for each in facts)
     return first, second

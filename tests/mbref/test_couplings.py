@@ -10,7 +10,7 @@ import mbref
 from mbref.ensembles.simulate_all import simulate_all
 from mbref.equations.along_trajectory import violations
 from mbref.equations.model import Model, displaced
-from mbref.scene import Scene, SceneError
+from mbref.scene import JOINT_TYPES, Scene, SceneError
 from mbref.simulation.simulate import Limits
 from tests import coupled_scenes
 from tests.coupled_scenes import EVERY, G, gear_pair, pendulum, rack, screw, slide_with_motor
@@ -144,6 +144,23 @@ def test_ensemble_of_ratios_and_armatures():
     assert [run.joint("A").angle[-1] for run in together] == pytest.approx(angles, rel=1e-12)
     for angle, ratio in zip(angles, (-0.5, -1.0, 2.0), strict=True):
         assert angle == pytest.approx(1.0 / (0.03 + ratio**2 * 0.2), rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "coordinate"),
+    [
+        ("revolute", "angle"),
+        ("cylindrical", "angle"),
+        ("planar", "angle"),
+        ("translational", "displacement"),
+        ("inline", "displacement"),
+    ],
+)
+def test_default_coordinate_of_a_coupled_joint(kind, coordinate):
+    axle = JOINT_TYPES[kind].at("A", ("ground", "disc"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    scene = gear_pair()
+    scene = scene.with_(joint=(axle.model_copy(update={"bodies": scene.joint[0].bodies}), scene.joint[1]))
+    assert [end for _, end in scene.coupled(scene.coupling[0])] == [coordinate, "angle"]
 
 
 @pytest.mark.parametrize(
