@@ -104,6 +104,7 @@ def _number(text: str) -> float:
 
 
 def not_negative(text: str) -> float:
+    """Parse a finite number that is not negative."""
     number = _number(text)
     if not 0 <= number < math.inf:
         raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
