@@ -59,7 +59,7 @@ PROBES := --scene "dead end" --scene "tumbling body" --scene "heavy top" --scene
 VERIFIED = $$($(BIN)/python -c "from crosscheck.engine import default_engines as names; print(*names())")
 
 ANEW := build/reference
-ON_REQUEST := dart drake
+ON_REQUEST := dart drake mjx
 KEPT := $(wildcard reports/reference/conformance/*_*.json) $(ON_REQUEST:%=reports/reference/conformance/%.json)
 
 reference: $(VENV)/ready ## the committed report with its records, anew, into reports/reference/
