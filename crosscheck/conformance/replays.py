@@ -99,17 +99,17 @@ class _Carry:
 
 def _later(driver: Driver, t: float) -> Driver:
     """Return the driver as a function of the time since t, measured from its value at t."""
-    later = _shifted(driver, t)
-    first, *others = later.polynomial
-    return replaced(later, polynomial=(first - float(value(driver, t)), *others))
+    later: Driver = _shifted(driver, t, float(value(driver, t)))
+    return later
 
 
-def _shifted(function: Any, t: float) -> Any:
-    """Return a function of time shifted to begin at time t."""
+def _shifted(function: Any, t: float, less: float = 0.0) -> Any:
+    """Return a function of time shifted to begin at time t; its polynomial is ``less`` lower."""
     if function.interval[1] <= t:
         return Factor(polynomial=(0.0,))
+    since = np.polynomial.Polynomial([t, 1.0])
     fields = {
-        "polynomial": lambda c: np.polynomial.Polynomial(c)(np.polynomial.Polynomial([t, 1.0])).coef,
+        "polynomial": lambda c: (np.polynomial.Polynomial(c)(since) - less).coef,
         "sine": lambda sine: replaced(sine, phase=sine.phase + sine.frequency * t),
         "table": lambda rows: tuple((time - t, x) for time, x in rows),
         "start": lambda start: max(start - t, 0.0),

@@ -120,7 +120,7 @@ def test_only_a_completed_motion_takes_time(monkeypatch, parts):
 class Paper:
     """An engine on paper that gives ``made``."""
 
-    name, package = "e", "e-package"
+    name, package, compile_seconds = "e", "e-package", 2.5
 
     def __init__(self, made: Trajectory | None = None, **parts: Any) -> None:
         self.made, self.parts = made or run(), parts
@@ -183,8 +183,8 @@ def paper(monkeypatch: pytest.MonkeyPatch) -> Any:
 
 def test_an_engine_gets_ready(paper):
     engine = paper()
-    assert serve.get_ready("e", ["plain"]) == "1" and engine.prepared == [["plain"]]
-    assert paper(missing="no e").prepared == [] and serve.get_ready("e", ["plain"]) == ""
+    assert serve.get_ready("e", ["plain"]) == ("1", 2.5) and engine.prepared == [["plain"]]
+    assert paper(missing="no e").prepared == [] and serve.get_ready("e", ["plain"]) == ("", 0.0)
 
 
 def test_a_missing_package_fails_a_run_with_what_to_install(paper):
@@ -419,7 +419,7 @@ class Kept:
     def call(self, function: Any, arguments: Any, limit: float, in_copy: bool = False) -> Observation:
         self.calls.append((function, arguments, limit, in_copy))
         if function is serve.get_ready:
-            return Observation("1", "ready ", ())
+            return Observation(("1", 0.5), "ready ", ())
         if self.fails:
             raise ChildFailed(self.fails, "no result")
         return Observation(self.value, "seen", ("file",))
@@ -464,7 +464,7 @@ def test_an_isolated_run_and_its_estimate(idle):
     [(name, used)] = idle
     ready, question = used.calls
     assert ready == (serve.get_ready, ("m:e", ["plain"]), 600.0, False) and name == "m:e"
-    assert question == (serve.run_once, ("m:e", SCENE, TIMES, PLAIN), 20.0, False)
+    assert question == (serve.run_once, ("m:e", SCENE, TIMES, PLAIN), 20.5, False), "with its compilation"
     pool.run_estimated("m:e", SCENE, TIMES, PLAIN, 20.0)
     estimate = used.calls[-1][0]
     assert estimate.func is serve.run_estimated and estimate.keywords == {"seconds": 2.0}

@@ -429,7 +429,7 @@ def test_functions_that_begin_later():
         (-0.2 * math.sin(8.0), 5.0, 0.5)
     ) and later.sine.phase == pytest.approx(8.0)
     table = Driver(joint="A", table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
-    assert _shifted(table, 0.5).table[1] == (0.5, 1.0)
+    assert _later(table, 0.5).table[1] == (0.5, 1.0)
     factor = Factor(polynomial=(1.0, 2.0), start=1.0, stop=3.0)
     assert _shifted(factor, 0.5).interval == (0.5, 2.5) and _shifted(factor, 2.0).interval == (0.0, 1.0)
     assert _shifted(factor, 3.0) == Factor(polynomial=(0.0,)) and _shifted(factor, 2.9).stop == pytest.approx(
