@@ -31,6 +31,11 @@ finds it:"""
 DEFAULTS = "Solver parameters as the library has them, with a fine step:"
 # engines whose families of settings are solvers of their own
 SEVERAL = {"newton": "Newton's solvers"}
+REMARKS = {
+    "newton": "On Bennett's linkage over 1 s a finer step does not help `lox`: a fifth of its steps do not "
+    "converge, and it magnifies roundings of single precision a thousandfold "
+    "([finding](findings.md#newton-lox-finer-steps))."
+}
 Cells = Mapping[str, Mapping[str, Cell]]
 
 
@@ -42,7 +47,7 @@ def page(records: Sequence[Record]) -> str:
     parts = [HEAD, *_legend(), BEST, "", *_table(cells, True), *missing, DEFAULTS, "", *_table(cells, False)]
     for name in (name for name in SEVERAL if name in cells):
         parts += [f"{SEVERAL[name]} (families of settings of `{name}`), each by its best run:", ""]
-        parts += [*_by_family(cells[name])]
+        parts += [*_by_family(cells[name]), REMARKS[name], ""]
     parts += ["## The mechanisms", "", *_mechanisms(), "## The runs", ""]
     parts += [line for name, row in cells.items() for line in _engine(name, row)]
     return "\n".join(parts).rstrip() + "\n"
