@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import rotations
+from mbref.rotations import cross
 from mbref.trajectory import Cost, Outcome, Trajectory
 
 # axes of the first frame that displacement keeps off, and pairs of axes kept at right angles
@@ -286,12 +287,6 @@ def driven(driver, t):
     if wave:
         value -= wave.amplitude * wave.frequency**2 * np.sin(wave.frequency * t + wave.phase)
     return value
-
-
-def cross(a, b):
-    """Vector product of vectors (3,) or rows of them (m, 3)."""
-    (p, q, r), (x, y, z) = a.T, b.T
-    return np.array([q * z - r * y, r * x - p * z, p * y - q * x]).T
 
 
 ENGINE = Spatial()
