@@ -279,10 +279,10 @@ def test_recorded_columns_are_compared_where_the_motion_is_known(monkeypatch):
     monkeypatch.setattr(judgement, "_explanations", lambda scene, d, noise: asked.append((d, noise)) or [])
     asked: list = []
     columns = {"b.position.x": np.array([1.0, 4.5, 9.0]), "b.position.y": np.array([0.0, 0.001, 9.0])}
-    found = judgement._judged(
-        scene(), Recording(np.array([0.0, 1.0, 2.0]), columns, {"b.position.y": 0.1}), known
-    )
+    recording = Recording(np.array([0.0, 1.0, 2.0]), columns, {"b.position.y": 0.1})
+    found = judgement._judged(scene(), recording, known, 0.01)
     first, second = found.columns
+    assert (first.allowed, second.allowed) == pytest.approx((0.01, 0.102)), "of the length, or the bound"
     assert (first.name, first.largest, first.begins) == ("b.position.x", 0.5, 1.0)
     assert first.bound == pytest.approx(0.002) and second.bound == pytest.approx(0.102)
     assert found.until == 1.0 and found.reason == "why" and second.is_right and not found.is_right
@@ -292,7 +292,9 @@ def test_recorded_columns_are_compared_where_the_motion_is_known(monkeypatch):
         "b.position.x"
     ] == pytest.approx([2.0])
     right = Recording(np.array([0.0, 1.0]), {"b.position.x": np.array([1.0, 4.0])})
-    assert judgement._judged(scene(), right, known).is_right and len(asked) == 1
+    assert judgement._judged(scene(), right, known, 0.0).is_right and len(asked) == 1
+    assert judgement._judged(scene(), recording, known, 0.5).is_right and len(asked) == 1
+    assert not judgement._judged(scene(), recording, known, 0.49).is_right
 
 
 @pytest.mark.parametrize(
