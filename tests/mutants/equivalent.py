@@ -13,6 +13,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "The angle between two orientations is the same in both directions."
     ),
     (
+        "crosscheck/engines/mujoco/importing/agreement.py",
+        'self._same(ours, data.qfrc_bias - data.qfrc_passive, "bias forces")',
+        "self._same(data.qfrc_bias - data.qfrc_passive, ours, 'bias forces')",
+    ): "The comparison treats both arrays alike.",
+    (
         "crosscheck/judge/truth/crankshaft.py",
         'return Path("crankshaft", poses, paths[0].axis, turning_driver(scene, paths[0].axis, turns))',
         "1",
