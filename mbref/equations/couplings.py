@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from mbref.equations.joints import AXES, Primitive, coordinate_angle, coordinate_displacement
+from mbref.equations.joints import AXES, Primitive, of_coordinate
+from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE
 from mbref.scene import Body, Joint, Revolute, Scene, Translational
 from mbref.scene_joints import ANGLE, Coordinate
 
@@ -83,12 +84,6 @@ def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
 
 def coordinate_primitives(coupled: Coupled) -> tuple[Primitive, Primitive]:
     """Return the two primitives of a coupling, which share one row."""
-    first, second = map(_primitive, coupled.joints, coupled.coordinates, coupled.factors)
+    kinds, pairs = (COUPLED_ANGLE, COUPLED_SLIDE), zip(*coupled[1:], strict=True)
+    first, second = (of_coordinate(joint, name, kinds, factor) for joint, name, factor in pairs)
     return first, second
-
-
-def _primitive(joint: Joint, coordinate: Coordinate, factor: float) -> Primitive:
-    axis, anchor = joint.directions[0], joint.anchor_pair[0]
-    if coordinate == ANGLE:
-        return coordinate_angle(axis, factor)
-    return coordinate_displacement(anchor, axis, factor)

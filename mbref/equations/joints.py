@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 from mbref.scene import JOINT_TYPES, Joint, SceneError
-from mbref.scene_joints import X, Y, Z
+from mbref.scene_joints import ANGLE, Coordinate, X, Y, Z
 
 Vector = tuple[float, float, float]
 
@@ -55,8 +55,7 @@ def driver_primitive(joint: Joint) -> Primitive:
     """Return the row of a driver of the joint; raises SceneError if the joint cannot be driven."""
     if joint.facts.driven is None:
         raise SceneError([f"joint {joint.name!r}: joints of type {joint.type!r} cannot be driven"])
-    axis, anchor = joint.directions[0], joint.anchor_pair[0]
-    return driven_angle(axis) if joint.facts.driven == "angle" else driven_displacement(anchor, axis)
+    return of_coordinate(joint, joint.facts.driven, (DOT1, DOT2), driven=True)
 
 
 def unit(v: Sequence[float]) -> Vector:
@@ -96,25 +95,16 @@ def in_plane(anchor: Vector, normal: Vector) -> Primitive:
     return Primitive(DOT2, point_first=anchor, point_second=anchor, first=normal)
 
 
-def driven_angle(axis: Vector) -> Primitive:
-    """Return the constraint that the second body turns about the axis by the driver's angle."""
-    x, y, _ = frame(axis)
-    return Primitive(DOT1, first=x, turning=y, second=x, driven=True)
+def of_coordinate(
+    joint: Joint, coordinate: Coordinate, kinds: tuple[int, int], factor: float = 0.0, driven: bool = False
+) -> Primitive:
+    """Return the primitive of a joint's angle about, or displacement along, its axis.
 
-
-def driven_displacement(anchor: Vector, axis: Vector) -> Primitive:
-    """Return the constraint that the second body's anchor moves along the axis by the driver's
-    displacement."""
-    return Primitive(DOT2, point_first=anchor, point_second=anchor, first=unit(axis), driven=True)
-
-
-def coordinate_angle(axis: Sequence[float], factor: float) -> Primitive:
-    """Return the angle of the second body about the axis, times a factor, as a part of a row."""
-    x, y, _ = frame(axis)
-    return Primitive(COUPLED_ANGLE, first=x, turning=y, second=x, length=factor)
-
-
-def coordinate_displacement(anchor: Vector, axis: Sequence[float], factor: float) -> Primitive:
-    """Return the displacement of the second body's anchor along the axis, times a factor, as a part of a
-    row."""
-    return Primitive(COUPLED_SLIDE, point_first=anchor, point_second=anchor, first=unit(axis), length=factor)
+    ``kinds`` are the kinds of primitives for an angle and for a displacement. A driver prescribes the
+    coordinate (``driven``); a coupling adds the coordinate times a factor to its row.
+    """
+    x, y, z = frame(joint.directions[0])
+    if coordinate == ANGLE:
+        return Primitive(kinds[0], first=x, turning=y, second=x, length=factor, driven=driven)
+    anchor = joint.anchor_pair[0]
+    return Primitive(kinds[1], anchor, anchor, first=z, length=factor, driven=driven)
