@@ -13,7 +13,7 @@ from mbref.equations.branches import MOST_ROWS, velocities_along
 from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
 from mbref.equations.units import row_lengths
-from mbref.linear_algebra.clear_rank import least_norm
+from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import Body, SceneError
 
@@ -245,7 +245,7 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
         return np.array([MinimumNorm(model.structure.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
     unit, rhs = _unit_rows(model.structure.dense(blocks) * inverse_root[:, None], rhs)
-    return inverse_root * [least_norm(*each, RANK_TOLERANCE)[0] for each in zip(unit, rhs, strict=True)]
+    return inverse_root * least_norm(unit, rhs, RANK_TOLERANCE)
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -278,12 +278,12 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     if not (wanted.any() or nu.any()):
         return np.zeros(scenes.model.n), 0.0, not given.all()
     unit, rhs = _unit_rows(jacobian, nu)
-    x, open_ = least_norm(unit, rhs, RANK_TOLERANCE)
+    x, open_ = least_norm_and_null_space(unit, rhs, RANK_TOLERANCE)
     off = np.abs(unit @ x - rhs)
     if off.max(initial=0.0) > CONTRADICTED * np.abs(x).max(initial=0.0):
         raise _contradiction(scenes.model, int(np.argmax(off)))
     if open_.size and wanted.size:
-        step, still_open = least_norm(open_[given], wanted - x[given], RANK_TOLERANCE)
+        step, still_open = least_norm_and_null_space(open_[given], wanted - x[given], RANK_TOLERANCE)
         x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted

@@ -109,21 +109,13 @@ def minimum_norm(rank, scratch):
         for i in range(k):
             value -= b[i, k] * x[i]
         x[k] = value / b[k, k]
-    apply_reflectors(rank, scratch)
-
-
-@kernel
-def apply_reflectors(rank, scratch):
-    """Compute ``scratch.x`` (n,) := Q x, with the first reflectors of ``qr_pivoted``."""
-    b, tau, x = scratch.transposed, scratch.tau, scratch.x
-    n = b.shape[0]
-    for k in range(rank - 1, -1, -1):
+    for k in range(rank - 1, -1, -1):  # x := Q x
         value = x[k]
-        for i in range(k + 1, n):
+        for i in range(k + 1, x.shape[0]):
             value += b[i, k] * x[i]
-        value *= tau[k]
+        value *= scratch.tau[k]
         x[k] -= value
-        for i in range(k + 1, n):
+        for i in range(k + 1, x.shape[0]):
             x[i] -= value * b[i, k]
 
 

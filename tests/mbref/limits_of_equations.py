@@ -17,7 +17,7 @@ from mbref.equations.model import Model
 from mbref.formulations import alf_dual, lm1, lm2
 from mbref.integrators import one_step
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
-from mbref.linear_algebra import clear_rank, minimum_norm
+from mbref.linear_algebra import minimum_norm
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene
 from mbref.stabilisation import projection
 from mbref.taylor import orientations
@@ -147,37 +147,6 @@ def _(_):
 
 
 # --- linear algebra and formulations --------------------------------------------------------------------
-def by_pivots(monkeypatch, matrix, rhs):
-    """Whether pivots decide the rank, not singular values."""
-    used = []
-    usual = clear_rank._by_singular_values
-    monkeypatch.setattr(clear_rank, "_by_singular_values", lambda *a: used.append(1) or usual(*a))
-    clear_rank.least_norm(matrix, rhs, 1e-6)
-    monkeypatch.setattr(clear_rank, "_by_singular_values", usual)
-    return not used
-
-
-@check("linear_algebra.clear_rank NONZERO_PIVOT")
-def _(monkeypatch):
-    def is_clear(pivot):
-        matrix = np.array([[1.0, 0.0], [math.sqrt(1.0 - pivot**2), pivot]])
-        return by_pivots(monkeypatch, matrix, np.zeros(2))
-
-    return flips(lambda pivot: not is_clear(pivot), 0.98e-3, 1.02e-3)
-
-
-@check("linear_algebra.clear_rank ZERO_PIVOT")
-def _(monkeypatch):
-    rest = lambda value: by_pivots(monkeypatch, np.array([[1.0, 0.0], [1.0, value]]), np.zeros(2))  # noqa: E731
-    return flips(rest, 0.98e-11, 1.02e-11)
-
-
-@check("linear_algebra.clear_rank CONSISTENT")
-def _(monkeypatch):
-    met = lambda off: by_pivots(monkeypatch, np.array([[1.0], [1.0]]), np.array([1.0, 1.0 + off]))  # noqa: E731
-    return flips(met, 0.98e-13, 1.02e-13)
-
-
 @check("formulations.lm2 SINGULAR_PIVOT")
 def _(_):
     def is_singular(sine):
