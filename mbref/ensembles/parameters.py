@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from mbref.equations.packing import Packs
 from mbref.kernels.layout import Equations
-from mbref.kernels.memory_pool import SavedNumbers
+from mbref.kernels.memory_pool import SavedNumbers, arrays_in
 from mbref.kernels.scene_layout import SceneData
 
 
@@ -37,14 +35,5 @@ def parameters_of(equations: Equations, data: SceneData, packs: Packs) -> list[t
     values of all scenes. No kernel changes these arrays."""
     system = equations.system
     masses = (system.mass, packs.mass), (system.inverse_root, packs.inverse_root)
-    pairs = [*zip(_arrays_of(equations.scene), _arrays_of(data), strict=True), *masses]
+    pairs = [*zip(arrays_in(equations.scene), arrays_in(data), strict=True), *masses]
     return [(array, of_all) for array, of_all in pairs if (array != of_all).any()]
-
-
-def _arrays_of(values: Sequence[Any]) -> Iterator[np.ndarray]:
-    """Yield all arrays in nested tuples."""
-    for value in values:
-        if isinstance(value, np.ndarray):
-            yield value
-        else:
-            yield from _arrays_of(value)

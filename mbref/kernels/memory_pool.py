@@ -103,11 +103,8 @@ def release(memory: Pooled) -> None:
 
 def fill(target: Any, source: Any) -> None:
     """Copy the arrays of one instance of a schema into another instance."""
-    for mine, theirs in zip(target, source, strict=True):
-        if isinstance(theirs, tuple):
-            fill(mine, theirs)
-        else:
-            mine[...] = theirs
+    for mine, theirs in zip(arrays_in(target), arrays_in(source), strict=True):
+        mine[...] = theirs
 
 
 def write_record(record: Any, values: Any) -> None:
@@ -118,7 +115,7 @@ def write_record(record: Any, values: Any) -> None:
 
 def shapes_of(values: Any) -> tuple[Any, ...]:
     """Return the shapes of the arrays of a schema."""
-    return tuple(shapes_of(value) if isinstance(value, tuple) else value.shape for value in values)
+    return tuple(array.shape for array in arrays_in(values))
 
 
 def copied(values: Any) -> Any:

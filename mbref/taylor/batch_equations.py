@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs, row_of
+from mbref.kernels.memory_pool import arrays_in
 from mbref.kernels.scene_layout import Loads, Primitives, SceneData
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates, pose_of, unit_of_length
@@ -79,7 +80,7 @@ def equations_of_all(
     found = geometry.polynomials(models), geometry.pose_maps, geometry.tableau
     targets = memory.polynomials, memory.pose_maps, (memory.solver.linear, memory.solver.place)
     varied = []
-    for target, source in zip(_arrays(targets), _arrays(found), strict=True):
+    for target, source in zip(arrays_in(targets), arrays_in(found), strict=True):
         values = _values_of_all(target, source, batch)
         if values is None:
             return [], []
@@ -101,12 +102,3 @@ def _values_of_all(target: np.ndarray, source: np.ndarray, batch: ManyScenes) ->
     if target.dtype != float and not np.array_equal(source[0], target):
         return None
     return source
-
-
-def _arrays(values: Any) -> Iterator[np.ndarray]:
-    """Yield all arrays of nested tuples."""
-    for value in values:
-        if isinstance(value, tuple):
-            yield from _arrays(value)
-        else:
-            yield value

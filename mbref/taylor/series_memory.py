@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -40,7 +40,8 @@ def acquire_memory(run: Run, geometry: Geometry, polynomials: Polynomials, order
         "slides": polynomials.slides.function.size, "timed": polynomials.timed.function.size,
         **run.model.sizes,
     }  # fmt: skip
-    shapes = shapes_of_equations(geometry, polynomials)
+    # memory for one scene fits all scenes whose equations have equal shapes
+    shapes = shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
     key = (TaylorMemory, *sizes.values(), shapes, run.limits.branches)
     memory = acquire(key, lambda: _allocate(run, geometry, polynomials, sizes), run.pooled)
     put_equations(memory.values, geometry, polynomials)
@@ -71,13 +72,7 @@ def _allocate(
     )
 
 
-def shapes_of_equations(geometry: Geometry, polynomials: Polynomials) -> Hashable:
-    """Return the shapes of the equations of a scene: memory for one scene fits all scenes of equal shapes."""
-    return shapes_of((polynomials, geometry.pose_maps, geometry.tableau))
-
-
 def put_equations(memory: TaylorMemory, geometry: Geometry, polynomials: Polynomials) -> None:
     """Put the equations of a scene into memory."""
-    fill(memory.polynomials, polynomials)
-    fill(memory.pose_maps, geometry.pose_maps)
-    memory.solver.linear[:], memory.solver.place[:] = geometry.tableau
+    targets = memory.polynomials, memory.pose_maps, (memory.solver.linear, memory.solver.place)
+    fill(targets, (polynomials, geometry.pose_maps, geometry.tableau))

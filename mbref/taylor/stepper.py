@@ -15,7 +15,7 @@ from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.packing import Packs
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.kernels.memory_pool import release
+from mbref.kernels.memory_pool import release, write_record
 from mbref.stepping.limits import AUTO, GENERATED, GENERIC
 from mbref.stepping.loop import DONE, PAUSED, UNDECIDED
 from mbref.stepping.pace import Pace
@@ -135,8 +135,7 @@ class SeriesStepper:
 
     def _put_options(self) -> None:
         """Put the numbers of the method into memory."""
-        for name, value in self._options._asdict().items():
-            self.taylor.options[name] = value
+        write_record(self.taylor.options, self._options)
         self.taylor.progress.end = self.run.times[-1]
         mode, options = self.taylor.mode, self._options
         mode.kind, mode.tolerance, mode.order = REGULAR, options.regular_tolerance, options.regular_order

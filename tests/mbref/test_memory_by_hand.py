@@ -186,7 +186,7 @@ def test_copies_of_schemas():
     source = Outer(*nested)
     made = copied(source)
     assert type(made) is Outer and made.inner.second.tolist() == [[3]] and made.line.tolist() == [4.0]
-    assert shapes_of(made) == (((2,), (1, 1)), (1,)) and made.line is not source.line
+    assert shapes_of(made) == ((2,), (1, 1), (1,)) and made.line is not source.line
     made.inner.first[:] = made.line[:] = 0.0
     assert source.inner.first.tolist() == [1.0, 2.0]
     fill(made, source)
