@@ -14,7 +14,7 @@ from numpy import sqrt
 
 from mbref.integrators.base import Integrator
 from mbref.integrators.dop853_tableau import ERROR3, ERROR5, STAGES, A, B, C
-from mbref.integrators.one_step import propose_by_trend
+from mbref.integrators.one_step import propose
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK, STEP
 from mbref.kernels.named_memory import Matrix, Vector, opener
@@ -103,4 +103,4 @@ def step(rates, t, h, y, y_rate, y_new, memory):
     return abs(h) * error5 * error5 / sqrt(error5 * error5 + 0.01 * error3 * error3)
 
 
-DOP853 = Integrator("dop853", 8, step, propose_by_trend, Stages, adaptive=True)
+DOP853 = Integrator("dop853", 8, step, propose, Stages, adaptive=True)

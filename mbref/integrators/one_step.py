@@ -34,12 +34,6 @@ def next_step(h, suggested, ratio, trend, control):
     return max(suggested, h * factor) if h < suggested else h * factor
 
 
-@exchangeable(PROPOSE)
-def propose(h, suggested, ratio, y, y_rate, memory):
-    control = memory.control
-    return first_step(y, y_rate, control) if h == 0.0 else next_step(h, suggested, ratio, 1.0, control)
-
-
 @kernel
 def trend(h, ratio, memory):
     """Return the factor, at most 1, by which growing errors shorten the step after a step of length h.
@@ -55,8 +49,8 @@ def trend(h, ratio, memory):
 
 
 @exchangeable(PROPOSE)
-def propose_by_trend(h, suggested, ratio, y, y_rate, memory):
-    """Propose a step by ``propose`` with the trend of errors, which halves the number of refused steps."""
+def propose(h, suggested, ratio, y, y_rate, memory):
+    """Propose a step by the last error and the trend of errors, which halves the number of refused steps."""
     control = memory.control
     if h == 0.0:
         return first_step(y, y_rate, control)

@@ -7,15 +7,9 @@ least cost at the tolerance.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from mbref.integrators.base import Integrator
-
-
-class NoScratch(NamedTuple):
-    """The series have memory of their own."""
-
+from mbref.kernels.records import NoNumbers
 
 TAYLOR = Integrator(
-    "taylor", 30, None, None, NoScratch, adaptive=True, options={"order": 0.0}, crosses="by series"
+    "taylor", 30, None, None, NoNumbers, adaptive=True, options={"order": 0.0}, crosses="by series"
 )
