@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 from mbref.scene_fields import meant
 
 CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")
-NUMBER = re.compile(r"invalid (float|int) value: ")
+NUMBER_FAULT = re.compile(r"invalid (float|int) value: ")
 KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got "}
 
 
@@ -19,7 +19,8 @@ class Parser(argparse.ArgumentParser):
     """A parser whose commands report their own unknown options; line breaks of its texts are kept."""
 
     def __init__(self, *args: Any, **names: Any):
-        super().__init__(*args, formatter_class=argparse.RawDescriptionHelpFormatter, **names)
+        super().__init__(*args, **names)
+        self.formatter_class = argparse.RawDescriptionHelpFormatter
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Return the options; the command refuses an unknown option and names the option that was probably
@@ -41,7 +42,7 @@ class Parser(argparse.ArgumentParser):
         if message.endswith("required: COMMAND"):
             self.print_help(sys.stderr)
             self.exit(2)
-        super().error(NUMBER.sub(lambda kind: KINDS[kind[1]], CHOICE.sub(_known, message)))
+        super().error(NUMBER_FAULT.sub(lambda kind: KINDS[kind[1]], CHOICE.sub(_known, message)))
 
 
 def commands(parser: argparse.ArgumentParser, **names: Any) -> Any:
