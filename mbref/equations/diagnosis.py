@@ -131,7 +131,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
     SceneError
         If the scene is faulty, or its initial positions contradict the joints.
     """
-    model = Model(scene if isinstance(scene, Scene) else find_scene(str(scene)))
+    model = Model(find_scene(scene))
     start = consistent_start(model)
     if model.m > LARGE:
         found = _redundancy(model, start)

@@ -18,7 +18,7 @@ def shape_of(scene: Scene) -> Hashable:
     """Return everything of a scene except its numbers: scenes of equal shape are packed together."""
     return (
         scene.ground,
-        tuple((body.name, _shape_of_inertia(body)) for body in scene.body),
+        tuple((body.name, body.inertia and isinstance(body.inertia[0], tuple)) for body in scene.body),
         tuple((j.name, j.type, j.bodies, j.reflected_inertia > 0.0) for j in scene.joint),
         tuple((coupling.name, coupling.joints, coupling.coordinates) for coupling in scene.coupling),
         tuple((driver.joint, *_shape_of_function(driver)) for driver in scene.driver),
@@ -32,11 +32,6 @@ def shape_of(scene: Scene) -> Hashable:
 def _shape_of_function(function: TimeFunction | None) -> tuple[int, ...]:
     """Return the numbers of coefficients and of pieces; an empty result without a function."""
     return (len(function.coefficients), len(function.pieces())) if function else ()
-
-
-def _shape_of_inertia(body: Body) -> bool | None:
-    """Return whether a body has products of inertia; None without mass."""
-    return None if body.inertia is None else isinstance(body.inertia[0], tuple)
 
 
 class Parts(NamedTuple):

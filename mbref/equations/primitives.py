@@ -32,7 +32,6 @@ from mbref.linear_algebra.vectors import (
     cross,
     dot,
     put,
-    put_negative,
     scale,
     subtract,
     to_body,
@@ -168,7 +167,7 @@ def dot2(p, t, equations):
         rows.phi[row] -= value
         rows.nu[row] = rate
         rows.gamma[row] += acceleration
-    put_negative(blocks, row, 0, a_world)
+    put(blocks, row, 0, scale(-1.0, a_world))
     put(blocks, row, 3, cross(a, add(to_body(rotation, i, d), s_i)))
     put(blocks, row, 6, a_world)
     put(blocks, row, 9, cross(s_j, to_body(rotation, j, a_world)))
@@ -187,8 +186,8 @@ def distance(p, equations):
     rows.phi[row] = (dot(d, d) - length * length) / (2.0 * length)
     rows.nu[row] = 0.0
     rows.gamma[row] = -(dot(rate, rate) + dot(d, second)) / length
-    put_negative(blocks, row, 0, along)
-    put_negative(blocks, row, 3, cross(s_i, to_body(rotation, i, along)))
+    put(blocks, row, 0, scale(-1.0, along))
+    put(blocks, row, 3, scale(-1.0, cross(s_i, to_body(rotation, i, along))))
     put(blocks, row, 6, along)
     put(blocks, row, 9, cross(s_j, to_body(rotation, j, along)))
 

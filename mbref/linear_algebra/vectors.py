@@ -128,14 +128,6 @@ def put(table, row, column, a):
 
 
 @kernel
-def put_negative(table, row, column, a):
-    """Write the negative of a three-vector into a row."""
-    table[row, column] = -a[0]
-    table[row, column + 1] = -a[1]
-    table[row, column + 2] = -a[2]
-
-
-@kernel
 def accumulate(values, start, a):
     """Add a three-vector to three consecutive entries of a vector."""
     values[start] += a[0]

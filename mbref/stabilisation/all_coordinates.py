@@ -21,12 +21,6 @@ def enter(t, y, memory):
 
 @exchangeable(RATES)
 def rates(t, y, y_rate, memory):
-    return accelerate(t, y, y_rate, memory)
-
-
-@inlined
-def accelerate(t, y, y_rate, memory):
-    """Compute y' at time t (s) by the formulation; return its status."""
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
     assemble_system(t, state.coordinates, state.velocities, equations)

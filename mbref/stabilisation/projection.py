@@ -55,12 +55,6 @@ scratch_of = opener(Scratch)
 
 @exchangeable(ENTER)
 def enter(t, y, memory):
-    """Copy the active entries of ``memory.state`` into y; return their number."""
-    return put_active(t, y, memory)
-
-
-@kernel
-def put_active(t, y, memory):
     """Copy the active entries of ``memory.state`` into y, and monitor the pivots; return the number of
     entries."""
     state, active = memory.state, memory.active
@@ -176,9 +170,8 @@ def project_positions(t, memory):
     return OK if before <= STUCK * tolerance else NOT_CONVERGED
 
 
-@kernel
-def project(t, y, memory):
-    """Project y; return OK, SINGULAR or NOT_CONVERGED."""
+@exchangeable(ACCEPT)
+def accept(t, y, memory):
     state = memory.state
     expand(y, memory.active, state)
     status = project_positions(t, memory)
@@ -211,11 +204,6 @@ def project_velocities(memory):
     velocities, equations = memory.state.velocities, memory.equations
     violation_rate(velocities, equations)
     remove_violation(equations.rows.phi_rate, LEAST, memory.factor, velocities)
-
-
-@exchangeable(ACCEPT)
-def accept(t, y, memory):
-    return project(t, y, memory)
 
 
 @exchangeable(RATES)

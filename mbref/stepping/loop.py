@@ -98,13 +98,6 @@ def share(suggested, memory):
 
 
 @kernel
-def proposed_or_first_step(suggested, memory):
-    """Return the user's first step if the limits give a first step, otherwise the integrator's proposal."""
-    first = memory.control.first_step
-    return first if memory.equations.system.counts.steps == 0 and first > 0.0 else suggested
-
-
-@kernel
 def step_within(interval, h):
     """Return the next step towards the end of an interval: the interval, its half, or h."""
     if h * (1.0 + 1e-9) >= interval:
@@ -156,13 +149,6 @@ def evaluate_state(y, y_rate, memory):
 
 
 @kernel
-def attempt(t, h, y, y_rate, y_new, memory):
-    """Attempt a step; return its error ratio, or minus the status of a failed evaluation."""
-    step, kernels = memory.kernels.step, memory.kernels
-    return step(kernels.rates, t, h, y, y_rate, y_new, memory)
-
-
-@kernel
 def accept_step(now, h, suggested, ratio, memory):
     """Correct and keep the new state; return OK, CHANGED (new coordinates), or the status of the failure.
 
@@ -195,19 +181,21 @@ def advance(target, y, y_rate, memory):
     end of a piece of a function of time, where a new smooth piece of the motion begins.
     """
     loop, control, counts = memory.loop, memory.control, memory.equations.system.counts
-    propose, clock, end = memory.kernels.propose, loop.clock, end_of_pieces(memory.equations)
+    propose, take_step = memory.kernels.propose, memory.kernels.step
+    clock, end = loop.clock, end_of_pieces(memory.equations)
     target = min(target, end)
     t, interval, y_new = clock.time, target - clock.time, loop.y_new[: clock.y_size]
     suggested = propose(clock.length, clock.suggested, clock.ratio, y, y_rate, memory)
     clock.share = share(suggested, memory)
-    suggested = proposed_or_first_step(suggested, memory)
+    if counts.steps == 0 and control.first_step > 0.0:
+        suggested = control.first_step
     suggested = min(max(suggested, control.forced_step), largest_step(memory))
     while True:
         if control.fixed_step > 0.0:
             h = interval / max(1.0, -(-(interval / control.fixed_step - 1e-6) // 1.0))
         else:
             h = step_within(interval, suggested)
-        ratio = attempt(t, h, y, y_rate, y_new, memory)
+        ratio = take_step(memory.kernels.rates, t, h, y, y_rate, y_new, memory)
         status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
         if status == OK and h <= control.forced_step:
             ratio = min(ratio, 1.0)

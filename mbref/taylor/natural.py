@@ -10,6 +10,7 @@ Linear equations eliminate variables (see ``expressions``).
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -88,16 +89,14 @@ class NaturalCoordinates:
         self.rows = self._rows()
         gone = self.eliminate.expressed
         kept = (v for v in range(len(self.direction_vectors)) if v not in gone and v not in self.given)
-        self.kept = sorted(kept, key=lambda v: -self._products_of(v))
+        products = Counter(v for row in self.rows for pair in row if ONE not in pair for v in {*pair})
+        self.kept = sorted(kept, key=lambda v: -products[v])
 
     # --- variables ----------------------------------------------------------------------------------------
     def _may_go(self, variable: int, others: int) -> bool:
         of_directions = MOST_KINEMATIC if self.driven else MOST_FACTORS
         most = MOST_TERMS if variable in self._positions else of_directions
         return others <= most and variable not in self.given
-
-    def _products_of(self, variable: int) -> int:
-        return sum(variable in pair and ONE not in pair for row in self.rows for pair in row)
 
     def direction(self, body: int, local: np.ndarray) -> Triple:
         """Return a direction fixed in a body, given in its principal frame."""

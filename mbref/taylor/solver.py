@@ -134,26 +134,14 @@ def solve_reduced(memory):
         last[rank + f] = reduced[f, f]
         factor = inverse_or_zero(reduced[f, f])
         multiply_row(response, columns[rank + f], factor)
-        multiply_numbers(reduced, f, factor)
+        for e in range(reduced.shape[1]):
+            reduced[f, e] *= factor
         for g in range(columns.shape[0] - rank):
             entry = reduced[g, f]
             if g != f and entry != 0.0:
                 subtract_multiple(response, columns[rank + g], entry, columns[rank + f])
-                subtract_numbers(reduced, g, entry, f)
-
-
-@inlined
-def multiply_numbers(matrix, f, factor):
-    """Multiply row f of a matrix without blocks by a factor."""
-    for g in range(matrix.shape[1]):
-        matrix[f, g] *= factor
-
-
-@inlined
-def subtract_numbers(matrix, g, factor, f):
-    """Subtract row f of a matrix without blocks, times a factor, from row g."""
-    for e in range(matrix.shape[1]):
-        matrix[g, e] -= factor * matrix[f, e]
+                for e in range(reduced.shape[1]):
+                    reduced[g, e] -= entry * reduced[f, e]
 
 
 @inlined

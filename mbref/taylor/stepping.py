@@ -202,13 +202,6 @@ def expand_at(h, last, memory):
     return status
 
 
-@kernel
-def attempt_step(h, last, memory):
-    """Step to a distance h (s), expand there, and judge the step."""
-    status = expand_at(h, last, memory)
-    return judge_step(h, last, memory) if status == OK else status
-
-
 @exchangeable(STEP)
 def take_step(memory):
     """Take one step in as many attempts as it needs, and its samples; return OK or the failure status."""
@@ -227,7 +220,10 @@ def take_step(memory):
         clock.attempt_end = clock.time + h
         return SINGULAR_AHEAD
     while True:
-        status = attempt_step(h, is_last(h, stop, memory), memory)
+        last = is_last(h, stop, memory)
+        status = expand_at(h, last, memory)
+        if status == OK:
+            status = judge_step(h, last, memory)
         if status == OK and (state.crossed or h <= regular):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):

@@ -19,12 +19,6 @@ from mbref.taylor.step_start import return_to_start
 
 
 @kernel
-def may_be_short(memory):
-    """Return whether the motion has no degree of freedom, or one degree of freedom and no drivers."""
-    return freedoms(memory) <= is_undriven(memory)
-
-
-@kernel
 def switches_branch(crossing, memory):
     """Return whether another branch than the smooth branch is requested at a crossing, counted from 1."""
     for number in memory.branch_switches:  # noqa: SIM110 - no generators in kernels
@@ -51,9 +45,9 @@ def switches_branch_in_pair(before, memory):
 @kernel
 def cross_briefly(memory):
     """Cross the singular position ahead of the start of the last step; if that fails, restore the state and
-    return False."""
+    return False. The crossing fails with a degree of freedom beside drivers, and with more than one."""
     clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
-    if not may_be_short(memory) or is_full(memory):
+    if freedoms(memory) > is_undriven(memory) or is_full(memory):
         return False
     time, sample, attempt_end = clock.time, clock.sample, clock.attempt_end
     steps, crossings = counts.steps, counts.crossings

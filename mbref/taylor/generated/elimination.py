@@ -201,7 +201,7 @@ class Elimination:
 
     def _inner(self, momentum: Row, motion: Row) -> ir.Value:
         parts = [self._write.product(momentum[vector], motion[vector]) for vector in self._of_variables]
-        return self._write.added_up(self._write.total(parts))
+        return self._write.first(self._write.summed(self._write.total(parts)))
 
     def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
         """Return a motion in the lanes of variables, and minus its momentum times N in the lanes of

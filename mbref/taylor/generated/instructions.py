@@ -116,10 +116,6 @@ class Instructions:
         first = self._builder.insert_element(none, number, PLACE(0))
         return self._shuffled(first, none, [0] * WIDTH)
 
-    def added_up(self, vector: ir.Value) -> ir.Value:
-        """Return the sum of the numbers of a vector."""
-        return self.first(self.summed(vector))
-
     def first(self, vector: ir.Value) -> ir.Value:
         """Return the first number of a vector."""
         return self._builder.extract_element(vector, PLACE(0))

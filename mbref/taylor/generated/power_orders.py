@@ -19,9 +19,9 @@ import numpy as np
 from llvmlite import ir
 
 from mbref.taylor.generated.instructions import WHOLE, Instructions, Vectors, constant, levels
-from mbref.taylor.generated.orders import Factors, Orders, Sums, terms_of_rows
+from mbref.taylor.generated.orders import Factors, Orders, Sums, Term, terms_of_rows
 from mbref.taylor.layout import TaylorMemory
-from mbref.taylor.polynomial_layout import Inertia, Products
+from mbref.taylor.polynomial_layout import Inertia
 from mbref.taylor.polynomials import products_of_lanes
 from mbref.taylor.simd import WIDTH, padded_size
 
@@ -45,12 +45,6 @@ def serves(taylor: TaylorMemory) -> bool:
     return bool(of_rows + padded_size(nz) <= products.weight.size)
 
 
-def products_of_rows(taylor: TaylorMemory) -> Products:
-    """Return minus the products of rows, a row in each lane."""
-    terms, nr = terms_of_rows(taylor), taylor.solver.pivot_rows.size
-    return products_of_lanes([*terms, *[[]] * (padded_size(nr) - nr)])
-
-
 def moments_of(inertia: Inertia, nz: int) -> np.ndarray:
     """Return the matrix (nz, nz) of the forces that are linear in the variables."""
     matrix = np.zeros((nz, nz))
@@ -69,7 +63,8 @@ class PowerOrders(Orders):
 
     def __init__(self, taylor: TaylorMemory, write: Instructions):
         self._nr, self._nz = taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
-        products = products_of_rows(taylor)
+        unused: list[list[Term]] = [[]] * (padded_size(self._nr) - self._nr)
+        products = products_of_lanes([*terms_of_rows(taylor), *unused])
         self._power = range(products.weight.size, products.weight.size + padded_size(self._nz), WIDTH)
         super().__init__(taylor, write, products, self._power.stop)
         self._sums = write.pointers[4]
