@@ -17,7 +17,7 @@ import numpy as np
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import Limits, simulate
-from mbref.method import SERIES, SPARSE
+from mbref.method import SERIES_METHOD, SPARSE_METHOD
 from mbref.scenes import find_scene
 
 LOOPS, REPEATS, RTOL = (2, 5, 10, 15, 20, 30, 40), 5, 1e-8
@@ -32,7 +32,10 @@ def main() -> None:
             scene = find_scene(f"{family}[{loops}]")
             times, truth = np.linspace(0.0, end, 5), truth_for(scene)
             runs = [
-                [simulate(scene, method, times, Limits(rtol=RTOL)) for method in (SERIES, SPARSE)]
+                [
+                    simulate(scene, method, times, Limits(rtol=RTOL))
+                    for method in (SERIES_METHOD, SPARSE_METHOD)
+                ]
                 for _ in range(REPEATS)
             ]
             cells = []

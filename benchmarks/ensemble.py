@@ -24,7 +24,7 @@ import numpy as np
 from mbref.ensembles.ensemble import MOST_AT_ONCE, ensemble
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import run_all
-from mbref.method import SERIES
+from mbref.method import SERIES_METHOD
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
@@ -87,7 +87,7 @@ def _together(scenes: Sequence[Scene]) -> tuple[float, float]:
     began, stepping = time.process_time(), 0.0
     for first in range(0, len(scenes), MOST_AT_ONCE):
         given = scenes[first : first + MOST_AT_ONCE]
-        runs = run_all(given, SERIES, TIMES, LIMITS).motions(given)
+        runs = run_all(given, SERIES_METHOD, TIMES, LIMITS).motions(given)
         stepping += sum(run.cost.seconds for _, run in runs)
     return stepping, time.process_time() - began
 

@@ -23,7 +23,7 @@ from crosscheck.judge.truth.one_dof import Path, initial_rate
 from mbref import __version__, rotations
 from mbref.integrators import INTEGRATORS
 from mbref.integrators.dop853 import STAGES, Stages
-from mbref.kernels.layout import OK, Clock, Control, Counts
+from mbref.kernels.layout import OK, Clock, Control, OperationCounts
 from mbref.kernels.named_memory import Address, Vector, allocate, packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.vectors import copy
@@ -44,7 +44,7 @@ class Stepping(NamedTuple):
 class Counting(NamedTuple):
     """Counts that the step control reads."""
 
-    counts: Counts
+    counts: OperationCounts
 
 
 class Counted(NamedTuple):

@@ -11,7 +11,8 @@ import numpy as np
 
 from mbref import rotations
 
-RATIO, LEAST = 1e3, 1e-6  # error / relative tolerance, and error: a warning is given if both are exceeded
+# error / relative tolerance, and error: a warning is given if both are exceeded
+RATIO, LEAST_WARNED = 1e3, 1e-6
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ class ErrorEstimate:
 
     def _warned_from(self) -> float | None:
         """Time, s, of the first sample whose error the warning reports; None without a warning."""
-        return None if self.rtol is None else self.exceeds_from(max(RATIO * self.rtol, LEAST))
+        return None if self.rtol is None else self.exceeds_from(max(RATIO * self.rtol, LEAST_WARNED))
 
     @property
     def warning(self) -> str:

@@ -28,12 +28,13 @@ if TYPE_CHECKING:
     from mbref.scene import Scene
 
 MOST_NAMES = 256  # names whose parsed methods are cached
-SERIES, SPARSE = "taylor", "alf-dual+projection/dop853"  # default methods for few and for many bodies
+# default methods for few and for many bodies
+SERIES_METHOD, SPARSE_METHOD = "taylor", "alf-dual+projection/dop853"
 # Up to this number of bodies `taylor` is the default, because it crosses singular positions. Its matrix is
 # dense. By ``benchmarks/default_method.py`` it takes 6.3 times as long as the sparse method on a chain of
 # four-bars with 81 bodies, and 0.05 times as long on a chain of slider-cranks with 90 bodies.
 MOST_BODIES = 100
-SHORT = {
+SHORT_NAMES = {
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
 
@@ -47,12 +48,12 @@ def default_method(scene: Scene) -> str:
     The default is ``taylor``, which crosses singular positions. For more than MOST_BODIES bodies the default
     is the sparse method ``alf-dual+projection/dop853``, which ends at a singular position.
     """
-    return SERIES if len(scene.body) <= MOST_BODIES else SPARSE
+    return SERIES_METHOD if len(scene.body) <= MOST_BODIES else SPARSE_METHOD
 
 
 def short_name(name: str) -> str:
     """Return the short name of a method, such as ``taylor``; the given name if there is none."""
-    return next((short for short, long in SHORT.items() if long == name), name)
+    return next((short for short, long in SHORT_NAMES.items() if long == name), name)
 
 
 class MethodError(Exception):
@@ -160,7 +161,7 @@ class Method:
         Parameters
         ----------
         name : str
-            ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT. The
+            ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT_NAMES. The
             stabilisation defaults to ``none``, the integrator to ``dop853``.
 
         Raises
@@ -169,7 +170,7 @@ class Method:
             If a part or an option is unknown (the message lists the known ones), or parts cannot be combined.
         """
         short, bracket, rest = name.strip().partition("[")
-        name = SHORT[short] + bracket + rest if short in SHORT else name
+        name = SHORT_NAMES[short] + bracket + rest if short in SHORT_NAMES else name
         head, _, integrator = name.partition("/")
         formulation, plus, stabilisation = _split_outside_brackets(head)
         if not plus:

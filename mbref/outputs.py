@@ -26,9 +26,9 @@ ACCELERATIONS = "accelerations, which the engine does not give"
 SECOND_RUN = "a second run: mbref run without --estimate no, or motion.error_estimate before"
 TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
-ABOUT_AXIS = "a load about a joint's axis"
-ALONG_AXIS = "a load along a joint's axis"
-PULLING = f"a spring, or {ALONG_AXIS}"
+LOAD_ABOUT_AXIS = "a load about a joint's axis"
+LOAD_ALONG_AXIS = "a load along a joint's axis"
+PULLING = f"a spring, or {LOAD_ALONG_AXIS}"
 
 
 class Output(NamedTuple):
@@ -103,11 +103,11 @@ OUTPUTS = (
     Output("load", "length", "m", "", "length of a spring", "a spring"),
     Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
     Output("load", "force", "N", "", "pull of a spring; force on the second body along an axis", PULLING),
-    Output("load", "angle", "rad", "", "angle of its joint since t = 0", ABOUT_AXIS),
-    Output("load", "rate", "rad/s", "", "rate of the angle of its joint", ABOUT_AXIS),
-    Output("load", "displacement", "m", "", "displacement of its joint since t = 0", ALONG_AXIS),
-    Output("load", "displacement_rate", "m/s", "", "rate of the displacement of its joint", ALONG_AXIS),
-    Output("load", "torque", "N m", "", "torque on the second body about the axis", ABOUT_AXIS),
+    Output("load", "angle", "rad", "", "angle of its joint since t = 0", LOAD_ABOUT_AXIS),
+    Output("load", "rate", "rad/s", "", "rate of the angle of its joint", LOAD_ABOUT_AXIS),
+    Output("load", "displacement", "m", "", "displacement of its joint since t = 0", LOAD_ALONG_AXIS),
+    Output("load", "displacement_rate", "m/s", "", "rate of the displacement of its joint", LOAD_ALONG_AXIS),
+    Output("load", "torque", "N m", "", "torque on the second body about the axis", LOAD_ABOUT_AXIS),
     Output("load", "power", "W", "", "power into the bodies", "a spring or a load of a joint"),
     Output("mechanism", "position_violation", "m or rad", "", "largest violation of a constraint row"),
     Output("mechanism", "velocity_violation", "m/s or rad/s", "", "largest violation at velocity level"),
@@ -125,7 +125,7 @@ OUTPUTS = (
     Output("mechanism", "energy", "J", "", "kinetic plus potential energy", MASSES),
     Output("mechanism", "error_estimate", "", "", "estimated error, relative or rad", SECOND_RUN),
 )
-UNITS = {output.name: output.unit for output in OUTPUTS}
+UNIT_OF = {output.name: output.unit for output in OUTPUTS}
 
 
 def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
@@ -176,7 +176,7 @@ def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> 
 
 def quantity_of(column: str) -> str:
     """Return the quantity of a column: ``position`` of ``rod.position.x``, ``angle`` of ``A.angle``."""
-    return next(part for part in reversed(column.split(".")) if part in UNITS)
+    return next(part for part in reversed(column.split(".")) if part in UNIT_OF)
 
 
 def _hint(columns: Sequence[str], name: str) -> str:

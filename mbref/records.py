@@ -17,7 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-INFINITE = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
+INFINITE_MARKS = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
 
 
 class RecordsError(ValueError):
@@ -90,7 +90,7 @@ def strict_json(value: Any) -> str:
     """Return the value as JSON that any reader accepts: NaN becomes null, an infinite number becomes
     1e999."""
     text = json.dumps(_finite(value), allow_nan=False)
-    for number, mark in INFINITE.items():
+    for number, mark in INFINITE_MARKS.items():
         text = text.replace(json.dumps(mark), f"{math.copysign(1, number):.0f}e999")
     return text
 
@@ -100,7 +100,7 @@ def _finite(value: Any) -> Any:
         return {key: _finite(v) for key, v in value.items()}
     if isinstance(value, list | tuple):
         return [_finite(v) for v in value]
-    return INFINITE.get(value) if isinstance(value, float) and not math.isfinite(value) else value
+    return INFINITE_MARKS.get(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _record(line: bytes) -> dict[str, Any] | None:

@@ -9,10 +9,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+Vector3 = tuple[float, float, float]  # a point or a vector
 # A rotation matrix is 2 (a b ± c d) for the components a, b, c, d of a quaternion (0: w); 1 minus this on the
 # diagonal. Few operations on whole arrays take less time than many operations on single components.
-A, B = np.array([[2, 1, 1, 1, 1, 2, 1, 2, 1], [2, 2, 3, 2, 1, 3, 3, 3, 1]])
-C, D = np.array([[3, 0, 0, 0, 3, 0, 0, 0, 2], [3, 3, 2, 3, 3, 1, 2, 1, 2]])
+FACTOR_PLACES = np.array(
+    [
+        [2, 1, 1, 1, 1, 2, 1, 2, 1],
+        [2, 2, 3, 2, 1, 3, 3, 3, 1],
+        [3, 0, 0, 0, 3, 0, 0, 0, 2],
+        [3, 3, 2, 3, 3, 1, 2, 1, 2],
+    ]
+)
 PLUS = np.array([1.0, -1.0, 1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0])
 DIAGONAL, TWICE = np.eye(3).ravel(), np.where(np.eye(3).ravel() > 0, -2.0, 2.0)
 
@@ -20,7 +27,7 @@ DIAGONAL, TWICE = np.eye(3).ravel(), np.where(np.eye(3).ravel() > 0, -2.0, 2.0)
 def to_matrix(p: np.ndarray) -> np.ndarray:
     """Return rotation matrices (…, 3, 3) of unit quaternions (…, 4)."""
     p = np.asarray(p, dtype=float)
-    a, b, c, d = (p.take(which, axis=-1) for which in (A, B, C, D))
+    a, b, c, d = (p.take(which, axis=-1) for which in FACTOR_PLACES)
     entries = DIAGONAL + TWICE * (a * b + PLUS * (c * d))
     return entries.reshape(*p.shape[:-1], 3, 3)
 

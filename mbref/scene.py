@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, Strict, ValidationError, model_validator
 
 from mbref.scene_bodies import Body, Driver
-from mbref.scene_fields import Entry, Name, Positive, Vector
+from mbref.scene_fields import Name, Positive, SceneEntry, VectorValue
 from mbref.scene_functions import Factor, Sine, TimeFunction
 from mbref.scene_joints import (
     JOINT_TYPES,
@@ -86,7 +86,7 @@ __all__ = [
 ]
 
 
-class Scene(Entry):
+class Scene(SceneEntry):
     """A mechanism: ``body``, ``joint``, ``coupling``, ``driver`` and ``load`` tuples, gravity and end time.
 
     ``ground = "body"`` models the ground as a body with six constraint rows, as the paper counts; the default
@@ -115,7 +115,7 @@ class Scene(Entry):
     """
 
     name: Name
-    gravity: Vector = (0.0, 0.0, 0.0)
+    gravity: VectorValue = (0.0, 0.0, 0.0)
     duration: Positive = 1.0
     ground: Literal["frame", "body"] = "frame"
     body: Annotated[tuple[Body, ...], Field(min_length=1), Strict(False)]
@@ -132,7 +132,7 @@ class Scene(Entry):
         try:
             scene = handler(data)
         except ValidationError as error:
-            for path, message in field_faults(error, TABLES):
+            for path, message in field_faults(error, FIELDS_OF_TABLES):
                 faults.setdefault(path, message)
         if isinstance(data, Mapping):
             for path, message in reference_faults(data):
@@ -297,6 +297,6 @@ class Scene(Entry):
             raise SceneError(with_lines(text, error.faults)) from None
 
 
-TABLES = {"": tuple(Scene.model_fields)} | {
+FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {
     table.__name__.lower(): tuple(table.model_fields) for table in (Body, Coupling, Driver, Sine, Factor)
 }

@@ -7,17 +7,17 @@ from typing import Annotated, Any
 
 from pydantic import Field, ValidationInfo, field_validator
 
-from mbref.scene_fields import Entry, Mass, Measures, Name, Point, Quaternion, Vector, as_list
+from mbref.scene_fields import Mass, Measures, Name, PointValue, Quaternion, SceneEntry, VectorValue, as_list
 from mbref.scene_functions import TimeFunction
 from mbref.scene_validation import checked_inertia
 
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 
 
-Inertia = tuple[float, float, float] | tuple[Vector, Vector, Vector] | None
+InertiaValue = tuple[float, float, float] | tuple[VectorValue, VectorValue, VectorValue] | None
 
 
-class Body(Entry):
+class Body(SceneEntry):
     """A rigid body; its frame sits at the centre of mass.
 
     ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
@@ -29,13 +29,13 @@ class Body(Entry):
 
     name: Name
     mass: Mass | None = None
-    inertia: Inertia = None
-    position: Point
+    inertia: InertiaValue = None
+    position: PointValue
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
-    velocity: Vector | None = None
-    angular_velocity: Vector | None = None
+    velocity: VectorValue | None = None
+    angular_velocity: VectorValue | None = None
 
-    @field_validator("inertia", mode="plain", json_schema_input_type=Inertia)
+    @field_validator("inertia", mode="plain", json_schema_input_type=InertiaValue)
     @classmethod
     def _inertia_is_physical(cls, value: Any) -> Any:
         return None if value is None else checked_inertia(as_list(value))

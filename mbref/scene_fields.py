@@ -119,11 +119,11 @@ Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
 Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterValidator(checked_mass)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
-Vector = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(as_list)]
+VectorValue = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(as_list)]
 Name = Annotated[str, Field(min_length=1)]
 Pair = Annotated[tuple[Name, Name], Strict(False)]
-VectorPair = Annotated[tuple[Vector, Vector], Strict(False), BeforeValidator(as_list)]
+VectorPair = Annotated[tuple[VectorValue, VectorValue], Strict(False), BeforeValidator(as_list)]
 Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
 
 
@@ -132,8 +132,8 @@ Angle = Annotated[Real, BeforeValidator(angle, json_schema_input_type=float | st
 LengthOrAngle = Annotated[Real, BeforeValidator(length_or_angle, json_schema_input_type=float | str)]
 Measures = Annotated[tuple[LengthOrAngle, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
 Extent = Annotated[NotNegative, BeforeValidator(length, json_schema_input_type=float | str)]
-Point = Annotated[tuple[Length, Length, Length], Strict(False), BeforeValidator(as_list)]
-PointPair = Annotated[tuple[Point, Point], Strict(False), BeforeValidator(as_list)]
+PointValue = Annotated[tuple[Length, Length, Length], Strict(False), BeforeValidator(as_list)]
+PointPair = Annotated[tuple[PointValue, PointValue], Strict(False), BeforeValidator(as_list)]
 
 
 def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
@@ -144,7 +144,7 @@ def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:
     return v
 
 
-class Entry(BaseModel):
+class SceneEntry(BaseModel):
     """Base class of the entries of a scene: a frozen table without unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -14,7 +14,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import BeforeValidator, Strict, field_validator
 
-from mbref.scene_fields import Angle, Entry, LengthOrAngle, NotNegative, Positive, Real, Reals, as_list
+from mbref.scene_fields import Angle, LengthOrAngle, NotNegative, Positive, Real, Reals, SceneEntry, as_list
 
 FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
@@ -24,7 +24,7 @@ Cubic = tuple[float, float, float, float]
 ZEROS: Cubic = (0.0, 0.0, 0.0, 0.0)
 
 
-class Sine(Entry):
+class Sine(SceneEntry):
     """amplitude · sin(frequency · t + phase); frequency in rad/s."""
 
     amplitude: LengthOrAngle = 0.0
@@ -40,7 +40,7 @@ class Piece(NamedTuple):
     cubic: Cubic
 
 
-class TimeFunction(Entry):
+class TimeFunction(SceneEntry):
     """polynomial + sine + table; each part is optional.
 
     ``table`` has rows (time in s, value), times increasing.

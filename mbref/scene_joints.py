@@ -10,16 +10,16 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import Discriminator, field_validator
 
 from mbref.scene_fields import (
-    Entry,
     LengthOrAngle,
     Name,
     NotNegative,
     Pair,
-    Point,
     PointPair,
+    PointValue,
     Real,
-    Vector,
+    SceneEntry,
     VectorPair,
+    VectorValue,
     checked_length,
     direction,
 )
@@ -80,7 +80,7 @@ class JointFacts:
         return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
 
 
-class JointEntry(Entry):
+class JointEntry(SceneEntry):
     """Fields and facts that all joints have."""
 
     facts: ClassVar[JointFacts]
@@ -94,12 +94,12 @@ class JointEntry(Entry):
         return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
 
     @property
-    def anchor_pair(self) -> tuple[Vector, Vector]:
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
         """Anchors on the first and on the second body, world at t = 0 (m)."""
         raise NotImplementedError
 
     @property
-    def directions(self) -> tuple[Vector, ...]:
+    def directions(self) -> tuple[VectorValue, ...]:
         """Axes of the joint, world at t = 0, of any length: no axis, one axis of both bodies, or one axis of
         each body."""
         return ()
@@ -111,20 +111,20 @@ class JointEntry(Entry):
 
 
 class _AnchorJoint(JointEntry):
-    anchor: Point
+    anchor: PointValue
 
     @property
-    def anchor_pair(self) -> tuple[Vector, Vector]:
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
         return self.anchor, self.anchor
 
 
 class _AxisJoint(_AnchorJoint):
-    axis: Vector
+    axis: VectorValue
 
     _axis = field_validator("axis")(direction)
 
     @property
-    def directions(self) -> tuple[Vector, ...]:
+    def directions(self) -> tuple[VectorValue, ...]:
         return (self.axis,)
 
 
@@ -155,7 +155,7 @@ class Universal(_AnchorJoint):
 
     @field_validator("axes")
     @classmethod
-    def _axes_have_length_and_are_perpendicular(cls, axes: tuple[Vector, Vector]) -> tuple[Vector, ...]:
+    def _axes_are_perpendicular(cls, axes: tuple[VectorValue, VectorValue]) -> tuple[VectorValue, ...]:
         """Return the first axis, and the part of the second that is perpendicular to it."""
         lengths = [math.hypot(*direction(axis)) for axis in axes]
         cosine = sum(a / lengths[0] * (b / lengths[1]) for a, b in zip(*axes, strict=True))
@@ -173,7 +173,7 @@ class Universal(_AnchorJoint):
         )
 
     @property
-    def directions(self) -> tuple[Vector, ...]:
+    def directions(self) -> tuple[VectorValue, ...]:
         return self.axes
 
 
@@ -221,13 +221,13 @@ class Distance(JointEntry):
 
     @field_validator("anchors")
     @classmethod
-    def _anchors_are_apart(cls, anchors: tuple[Vector, Vector]) -> tuple[Vector, Vector]:
+    def _anchors_are_apart(cls, anchors: tuple[VectorValue, VectorValue]) -> tuple[VectorValue, VectorValue]:
         if math.dist(*anchors) == 0:
             raise ValueError("must be two different points (for coincident points use a spherical joint)")
         return anchors
 
     @property
-    def anchor_pair(self) -> tuple[Vector, Vector]:
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
         return self.anchors
 
 
@@ -240,7 +240,7 @@ JOINT_TYPES: dict[str, type[Joint]] = {
 }
 
 
-class Coupling(Entry):
+class Coupling(SceneEntry):
     """q₂ = offset + ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
 
     A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),

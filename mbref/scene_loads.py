@@ -8,22 +8,22 @@ from pydantic import Discriminator, ValidationInfo, field_validator
 
 from mbref.scene_fields import (
     Angle,
-    Entry,
     Extent,
     Length,
     Name,
     NotNegative,
     Pair,
-    Point,
     PointPair,
+    PointValue,
     Real,
-    Vector,
+    SceneEntry,
+    VectorValue,
 )
 from mbref.scene_functions import Factor
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
 
-class LoadEntry(Entry):
+class LoadEntry(SceneEntry):
     """Facts that all loads have: the field that names the body, the two bodies or the joint on which a load
     acts."""
 
@@ -46,7 +46,7 @@ class Moment(LoadEntry):
     acts_on = "body"
     type: Literal["moment"] = "moment"
     body: Name
-    moment: Vector
+    moment: VectorValue
     factor: Factor | None = None
 
 
@@ -56,8 +56,8 @@ class Force(LoadEntry):
     acts_on = "body"
     type: Literal["force"] = "force"
     body: Name
-    point: Point
-    force: Vector
+    point: PointValue
+    force: VectorValue
     factor: Factor | None = None
 
 

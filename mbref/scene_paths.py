@@ -9,7 +9,7 @@ from typing import Any
 from mbref.scene_fields import meant
 from mbref.scene_validation import SceneError
 
-STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
+PATH_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
 
 
 def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], Any]) -> dict[str, Any]:
@@ -25,8 +25,8 @@ def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], An
 
 def _steps(fields: Mapping[str, Any], path: str) -> list[str]:
     """Return the fields and entries along a path."""
-    found = [name or entry for name, entry in STEP.findall(path)]
-    if STEP.sub("", path) or not found or found[0] not in fields:
+    found = [name or entry for name, entry in PATH_STEP.findall(path)]
+    if PATH_STEP.sub("", path) or not found or found[0] not in fields:
         raise SceneError([f"{path}: is not a path of a scene, such as body[0].mass or joint[B].anchor[0]"])
     return found
 

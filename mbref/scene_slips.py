@@ -14,13 +14,13 @@ from mbref.scene_fields import COINCIDENT
 TURN = 2 * math.pi
 QUARTER = 90  # degrees; likely angles are multiples of it
 # ratio of neighbouring lengths in a sorted list above which one of them is probably in millimetres
-APART = 300.0
+OTHER_UNIT = 300.0
 GYRATION = 30.0  # largest plausible radius of gyration / length of the mechanism
 STRONGEST = 100.0  # m/s²; largest plausible gravity
 FURTHEST = 100.0  # rad; largest plausible angle of a driver (16 turns; an angle in degrees is usually larger)
 INSTANTS = 101  # number of times at which a driver's value is computed
 # distance of a point from a plane / size of the mechanism that counts as zero; also cosine of a right angle
-FLAT = 1e-6
+FLAT_MECHANISM = 1e-6
 
 
 def probable_slips(scene: Scene) -> list[str]:
@@ -71,7 +71,7 @@ def _lengths(scene: Scene) -> Iterator[str]:
         if length > 0
     )
     for (short, first), (long, second) in itertools.pairwise(every):
-        if long >= APART * short:
+        if long >= OTHER_UNIT * short:
             yield f"{second} is {long:g} m, {first.partition(': ')[2]} {short:g} m; is one in millimetres?"
 
 
@@ -132,17 +132,17 @@ def _is_in_loop(scene: Scene, name: str) -> bool:
 
 
 def _is_one(cosine: float) -> bool:
-    return cosine > 1 - FLAT
+    return cosine > 1 - FLAT_MECHANISM
 
 
 def _is_zero(cosine: float) -> bool:
-    return cosine < FLAT
+    return cosine < FLAT_MECHANISM
 
 
 def _is_flat(scene: Scene, normal: np.ndarray) -> bool:
     """Return whether anchors and centres of mass lie in one plane normal to a direction."""
     heights = np.array(_points(scene)) @ normal
-    return float(np.ptp(heights)) <= FLAT * _size(scene)
+    return float(np.ptp(heights)) <= FLAT_MECHANISM * _size(scene)
 
 
 def _unit(axis: tuple[float, float, float]) -> np.ndarray:

@@ -16,9 +16,9 @@ TABLE = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 KEY = re.compile(r"\s*([\w-]+|\"[^\"]*\")\s*=")
 NAME = re.compile(r"\s*(?:name|joint)\s*=\s*[\"']([^\"']*)[\"']")
 SINGLE = re.compile(r"\s*\[\s*(body|joint|coupling|driver|load)\s*\]")
-LINE = re.compile(r" \(line \d+\)$")
+LINED = re.compile(r" \(line \d+\)$")
 AT = re.compile(r"at line (\d+)")
-PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
+FAULT_PATH = re.compile(r"(\w+)(?:\[([^\]]*)\])?(?:\.(\w+))?")
 FIRST = ("name", "type", "joint", "joints", "bodies", "body")  # keys that come first in a written entry
 
 Line = tuple[int, str, int, str]  # number from 1, table, index in the table, key (empty for a header)
@@ -47,7 +47,7 @@ def with_lines(text: str, faults: Sequence[str]) -> list[str]:
     lines = list(_lines(text))
     names = _names(text, lines)
     return [
-        fault if LINE.search(fault) else f"{fault}{_said(_line_of(lines, names, fault))}" for fault in faults
+        fault if LINED.search(fault) else f"{fault}{_said(_line_of(lines, names, fault))}" for fault in faults
     ]
 
 
@@ -92,7 +92,7 @@ def _names(text: str, lines: Sequence[Line]) -> dict[tuple[str, str], int]:
 def _line_of(lines: Sequence[Line], names: dict[tuple[str, str], int], fault: str) -> int | None:
     """Return the line of the field, or of its entry's header if the field is missing; None if the file has
     neither line."""
-    match = PATH.match(fault)
+    match = FAULT_PATH.match(fault)
     if not match:
         return None
     table, entry, key = match.groups()

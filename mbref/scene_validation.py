@@ -11,13 +11,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, is_some, meant, shown
-from mbref.scene_function_faults import factor_faults, table_faults
+from mbref.scene_function_faults import Faults, factor_faults, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate, default_coordinates
 from mbref.scene_loads import LOAD_TYPES, JointLoad
 from mbref.scene_units import dimension_of
 
 GROUND = "ground"
-Faults = Iterator[tuple[str, str]]  # path and message
 RESERVED = (GROUND, "the fixed frame")  # names that no body can have
 DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
 LOADED = {  # load type → joint types along whose coordinate it can act

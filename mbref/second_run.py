@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbref.error_estimate import ErrorEstimate, distances
-from mbref.method import MOST_BODIES, SERIES, Method, MethodError, default_method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import checked_run, finish_run
@@ -28,14 +28,14 @@ RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and motion.error_estimate have no time limit"
-STEPS_PER_CALL = 500  # steps of a second run between two checks of its time limit
+STEPS_PER_CHECK = 500  # steps of a second run between two checks of its time limit
 
 
-Progress = Callable[[float], None]
+ProgressCallback = Callable[[float], None]
 
 
 def estimate_error(
-    motion: Motion, seconds: float = np.inf, progress: Progress | None = None
+    motion: Motion, seconds: float = np.inf, progress: ProgressCallback | None = None
 ) -> ErrorEstimate:
     """Estimate the global error of a motion of mbref by a second run.
 
@@ -114,7 +114,7 @@ def perturbed(scene: Scene) -> Scene:
 def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits]:
     """Return method and limits of the more accurate second run, from which the error is estimated."""
     if method.is_series or len(scene.body) <= MOST_BODIES:
-        by = Method.parse(f"{SERIES}[order={ORDER}]")
+        by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]")
     elif method.integrator.adaptive and method.stabilisation.projects:
         by = method
     else:
@@ -164,7 +164,7 @@ class _TooLong(Exception):
 class _Check:
     """Progress callback of second runs; raises _TooLong after a number of CPU seconds."""
 
-    def __init__(self, seconds: float, progress: Progress | None):
+    def __init__(self, seconds: float, progress: ProgressCallback | None):
         self._seconds, self._progress = seconds, progress
         self._end = time.process_time() + seconds
 
@@ -182,7 +182,7 @@ def _run(
     """Return a run within the time limit of second runs."""
     try:
         run = checked_run(scene(), method, times, limits)
-        run.memory.control.steps_per_call = STEPS_PER_CALL
+        run.memory.control.steps_per_call = STEPS_PER_CHECK
         motion = finish_run(run, check)
     except (SceneError, MethodError, ValueError, _TooLong) as error:
         return _Made(None, 1.0, str(error))

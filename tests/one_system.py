@@ -8,7 +8,7 @@ import numpy as np
 
 from mbref.formulations.base import Formulation
 from mbref.kernels.compilation import entry, pointer_to
-from mbref.kernels.layout import ACCELERATE, Counts, Settings, SparseFactor, System
+from mbref.kernels.layout import ACCELERATE, OperationCounts, Settings, SparseFactor, System
 from mbref.kernels.named_memory import packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
@@ -42,7 +42,7 @@ def solve(
         rhs=np.ascontiguousarray(gamma, dtype=float),
         multipliers=np.zeros(m),
         settings=record(Settings(rank_tolerance=rank_tolerance)),
-        counts=record(Counts()),
+        counts=record(OperationCounts()),
         options=packed(record(formulation.numbers(**chosen))) if chosen else None,
         scratch=packed(algebra.scratch(m, n, _factor(numbers) if algebra.sparse else None)),
     )

@@ -7,9 +7,9 @@ from typing import Any, TypeVar
 
 from crosscheck.judge.tolerances import ROUNDING
 from mbref.scene import Scene
-from mbref.scene_fields import Entry
+from mbref.scene_fields import SceneEntry
 
-Item = TypeVar("Item", bound=Entry)
+Item = TypeVar("Item", bound=SceneEntry)
 
 
 def mapped(item: Item, fields: Mapping[str, Callable[[Any], Any]]) -> Item:
@@ -25,7 +25,7 @@ def replaced(item: Item, **fields: Any) -> Item:
     return type(item)(**{**fields_of(item), **{name: _plain(value) for name, value in fields.items()}})
 
 
-def fields_of(item: Entry) -> dict[str, Any]:
+def fields_of(item: SceneEntry) -> dict[str, Any]:
     """Return the fields of a body, joint, driver or load as a dictionary."""
     return {name: getattr(item, name) for name in type(item).model_fields}
 

@@ -11,7 +11,7 @@ import numpy as np
 from mbref.cli.output import progress_bar, warn
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.method import SERIES, SHORT, SPARSE, Method, default_method
+from mbref.method import SERIES_METHOD, SHORT_NAMES, SPARSE_METHOD, Method, default_method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
@@ -30,9 +30,9 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     """Add options for method, times and limits of a run, and --json if the command prints its result."""
     parser.add_argument(
         "--method",
-        help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT)};\n"
+        help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT_NAMES)};\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
-        f"integrators: {', '.join(INTEGRATORS)} (default: {SERIES},\nfor many bodies {SPARSE})",
+        f"integrators: {', '.join(INTEGRATORS)} (default: {SERIES_METHOD},\nfor many bodies {SPARSE_METHOD})",
     )
     add_time_options(parser)
     parser.add_argument("--rtol", type=float, default=1e-9, help="relative tolerance per step (default 1e-9)")

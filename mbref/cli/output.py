@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from rich.console import Console
 
-from mbref.outputs import UNITS, quantity_of
+from mbref.outputs import UNIT_OF, quantity_of
 from mbref.scene import Scene
 from mbref.scene_slips import probable_slips
 
@@ -31,7 +31,8 @@ QUANTITIES = {  # column of a body in a table → field of a trajectory
 }
 
 
-SMALL = ("violation", "error_estimate")  # columns in which numbers of the size of rounding errors are printed
+# columns in which numbers of the size of rounding errors are printed
+SMALL_COLUMNS = ("violation", "error_estimate")
 
 
 def console() -> Console:
@@ -87,9 +88,9 @@ def column_table(columns: Mapping[str, np.ndarray]) -> Table:
 
     table = Table()
     for name in columns:
-        unit = TIME if name == "time" else UNITS[quantity_of(name)]
+        unit = TIME if name == "time" else UNIT_OF[quantity_of(name)]
         table.add_column(f"{name}\n{unit}", justify="right", overflow="fold")
-    shown = [values if name.endswith(SMALL) else rounded(values) for name, values in columns.items()]
+    shown = [values if name.endswith(SMALL_COLUMNS) else rounded(values) for name, values in columns.items()]
     for row in zip(*shown, strict=True):
         table.add_row(*(f"{x:.6g}" for x in row))
     return table

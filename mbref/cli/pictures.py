@@ -19,7 +19,7 @@ from mbref.scenes import find_scene
 from mbref.stepping.limits import Limits
 from mbref.trajectory import Outcome
 
-FRAMES = 101  # number of samples of a motion along a branch
+BRANCH_SAMPLES = 101  # number of samples of a motion along a branch
 VIEW = """\
 xy, xz, yz, oblique, or AZIMUTH,ELEVATION in degrees (write --view=-60,20);
 default: perpendicular to the plane of a planar mechanism, otherwise oblique"""
@@ -152,7 +152,7 @@ def along_branches(smooth: Motion, method: str, limits: Limits, number: int) -> 
 
     assert smooth.crossings is not None
     crossing = smooth.crossings[number - 1]
-    times = crossing.instants(smooth.t_end, FRAMES)
+    times = crossing.instants(smooth.t_end, BRANCH_SAMPLES)
     motions = [
         simulate(smooth.mechanism, method, times, replace(limits, branches={number: branch}))
         for branch in range(1, len(crossing.velocity) + 1)

@@ -10,7 +10,7 @@ from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
 from mbref.outputs import OUTPUTS
 
-NAMES = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
+COLUMN_LIST = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
 
 
 def add(commands: Any) -> None:
@@ -23,7 +23,7 @@ def add(commands: Any) -> None:
         "quantity. Needs the extra report.",
         epilog="examples:\n  mbref plot mechanism.toml\n"
         "  mbref plot four_bar_gravity rocker.position A.angle --out run.png\n"
-        '  mbref plot spatial_slider_crank slider.position "driver(A).torque"\n\n' + NAMES,
+        '  mbref plot spatial_slider_crank slider.position "driver(A).torque"\n\n' + COLUMN_LIST,
     )
     add_scene(plot)
     plot.add_argument(

@@ -14,13 +14,13 @@ from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
 from mbref.method import short_name
 from mbref.motion import Motion
-from mbref.outputs import UNITS
+from mbref.outputs import UNIT_OF
 from mbref.records import strict_json
 from mbref.scene import Scene
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
-SHOWN = 10  # number of singular positions in the text; --json prints all
+SHOWN_POSITIONS = 10  # number of singular positions in the text; --json prints all
 
 
 def add(commands: Any) -> None:
@@ -127,7 +127,7 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"
         f"{cost.seconds:.3g} s of stepping, {cost.build_seconds:.2g} s of building"
     )
-    for number, crossing in enumerate((trajectory.crossings or ())[:SHOWN], 1):
+    for number, crossing in enumerate((trajectory.crossings or ())[:SHOWN_POSITIONS], 1):
         taken = f"number {crossing.taken} taken" if crossing.taken else "none taken"
         out.print(f"singular position {number} at t = {crossing.time:.6g} s: {crossing.sentence}, {taken}")
     if not trajectory.times.size:
@@ -147,7 +147,7 @@ def _largest(motion: Motion) -> Iterator[str]:
     """Yield sentences on the largest violations of constraint rows, and on the largest reaction with its
     joint and time."""
     levels = [
-        f"{float(rows.max()):.2g} {UNITS[f'{level}_violation']}"
+        f"{float(rows.max()):.2g} {UNIT_OF[f'{level}_violation']}"
         for level, rows in motion.violation._asdict().items()
         if rows is not None
     ]

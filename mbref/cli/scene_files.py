@@ -12,7 +12,7 @@ from mbref.cli.options import add_scene
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
-STILL = 1e-12  # m or rad; smaller displacements are not reported
+UNMOVED = 1e-12  # m or rad; smaller displacements are not reported
 
 
 def add(commands: Any) -> None:
@@ -83,11 +83,11 @@ def _assemble(options: argparse.Namespace) -> int:
     for pair, (before, after) in found.lengths.items():
         print(f"length {pair}: {before:.6g} m, now {after:.6g} m")
     for name, distance in found.joints.items():
-        if distance > STILL:
+        if distance > UNMOVED:
             print(f"joint {name}: moved by {distance:.3g} m")
     for name, (distance, angle) in found.bodies.items():
-        if max(distance, angle) > STILL:
-            turned = f", turned by {angle:.3g} rad" if angle > STILL else ""
+        if max(distance, angle) > UNMOVED:
+            turned = f", turned by {angle:.3g} rad" if angle > UNMOVED else ""
             print(f"body {name}: moved by {distance:.3g} m{turned}")
     if options.out:
         found.scene.save(options.out)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mbref.crossing import Crossing
 from mbref.equations.along_trajectory import poses
-from mbref.equations.branches import MOST_ROWS as MOST_BRANCHED
+from mbref.equations.branches import MOST_BRANCHED_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.initial_state import consistent_start, solve_positions
@@ -19,11 +19,11 @@ from mbref.simulation.simulate import Limits, simulate
 from mbref.stepping.run import NEARLY
 from mbref.trajectory import Outcome
 
-SAMPLES = 61  # poses of a motion at which ranks are computed
-MOST_ROWS = 300  # constraint rows; for more, singular values at every pose take too long
-SAME = 1e-9  # relative difference below which two poses count as equal
+POSES_ALONG = 61  # poses of a motion at which ranks are computed
+MOST_ROWS_ALONG = 300  # constraint rows; for more, singular values at every pose take too long
+SAME_POSE = 1e-9  # relative difference below which two poses count as equal
 POSES = 5  # poses at which degrees of freedom are tested to second order
-MOST_STEPS = 20_000  # steps of the diagnosis; of a longer motion only the first part is diagnosed
+MOST_STEPS_ALONG = 20_000  # steps of the diagnosis; of a longer motion only the first part is diagnosed
 
 
 @dataclass(frozen=True)
@@ -57,12 +57,12 @@ def along_motion(scene: Scene) -> AlongMotion:
     Raises SceneError if the scene cannot be simulated, or has more than 300 rows.
     """
     model = Model(scene)
-    if model.m > MOST_ROWS:
+    if model.m > MOST_ROWS_ALONG:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
-    times = np.linspace(0.0, scene.duration, SAMPLES)
-    motion = simulate(scene, None, times, Limits(most_steps=MOST_STEPS))
+    times = np.linspace(0.0, scene.duration, POSES_ALONG)
+    motion = simulate(scene, None, times, Limits(most_steps=MOST_STEPS_ALONG))
     if not motion.times.size:  # rounding of joint axes may be the cause
-        limits = Limits(most_steps=MOST_STEPS, rank_tolerance=NEARLY)
+        limits = Limits(most_steps=MOST_STEPS_ALONG, rank_tolerance=NEARLY)
         motion = simulate(scene, None, times, limits)
     if not motion.times.size:
         raise SceneError([f"scene: the motion could not begin: {motion.message}"])
@@ -100,11 +100,11 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
     rank = int(ranks.max(initial=0))
     small = values[:, rank:].max(axis=0, initial=0.0)
     nearest = values[:, rank - 1] if rank else np.zeros(len(times))
-    at = int(np.argmax(nearest <= nearest.min() * (1 + SAME)))
+    at = int(np.argmax(nearest <= nearest.min() * (1 + SAME_POSE)))
     moved = np.ptp(motion.position, axis=0).max() / model.length, np.ptp(motion.orientation, axis=0).max()
     return AlongMotion(
         end=float(times[-1]),
-        moves=bool(max(moved) > SAME),
+        moves=bool(max(moved) > SAME_POSE),
         rank=rank,
         redundant=model.m - rank,
         by_rounding=tuple(small[small > RANK_TOLERANCE].tolist()),
@@ -119,7 +119,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
 def general_pose(model: Model, seed: int = 1) -> np.ndarray:
     """Return coordinates (7 nb,) of a random pose near the start that satisfies the joints."""
     q, random = consistent_start(model).q, np.random.default_rng(seed)
-    if model.m > MOST_ROWS:
+    if model.m > MOST_ROWS_ALONG:
         return q
     for _ in range(5):
         jacobian = scaled_jacobian(model, 0.0, q)

@@ -14,11 +14,11 @@ from mbref.equations.initial_state import CLOSED, solve_positions
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
+from mbref.rotations import Vector3
 from mbref.scene import GROUND, Scene, SceneError
 
-Point = tuple[float, float, float]
 SHARES = 20  # parts into which a large change is divided, so that the loops stay on their branch
-MOST_ITERATIONS = 50  # largest number of Gauss–Newton steps for the points of a link
+MOST_LINK_STEPS = 50  # largest number of Gauss–Newton steps for the points of a link
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Assembled:
 class _Reshaped(Packs):
     """A scene in which some body-fixed points (world, t = 0) are moved, by body and point."""
 
-    def __init__(self, scene: Scene, elsewhere: Mapping[tuple[str, Point], np.ndarray]):
+    def __init__(self, scene: Scene, elsewhere: Mapping[tuple[str, Vector3], np.ndarray]):
         self._elsewhere = elsewhere
         super().__init__([scene])
 
@@ -91,17 +91,17 @@ def _shared(scene: Scene, first: str, second: str) -> str:
     return next((b for b in both if b != GROUND), GROUND)
 
 
-def _anchor(scene: Scene, joint: str, body: str) -> Point:
+def _anchor(scene: Scene, joint: str, body: str) -> Vector3:
     found = scene.joint_named(joint)
     return found.anchor_pair[found.bodies.index(body)]
 
 
 def _shifts(
     scene: Scene, lengths: Mapping[tuple[str, str], float], pairs: Mapping[tuple[str, str], str]
-) -> dict[tuple[str, Point], np.ndarray]:
+) -> dict[tuple[str, Vector3], np.ndarray]:
     """Return the displacements (3,) of the points of each link that give it its lengths, with the least sum
     of squares."""
-    found: dict[tuple[str, Point], np.ndarray] = {}
+    found: dict[tuple[str, Vector3], np.ndarray] = {}
     for body in set(pairs.values()):
         own = {pair: lengths[pair] for pair, b in pairs.items() if b == body}
         points = list(dict.fromkeys(_anchor(scene, joint, body) for pair in own for joint in pair))
@@ -116,7 +116,7 @@ def _with_distances(
 ) -> np.ndarray:
     """Return points (n, 3) near the given ones with given distances: Gauss–Newton steps of least norm."""
     x, wanted = points.copy(), np.array(lengths)
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MOST_LINK_STEPS):
         apart = np.array([x[b] - x[a] for a, b in ends])
         now = np.linalg.norm(apart, axis=1)
         if np.abs(now - wanted).max() <= 1e-14 * wanted.max():

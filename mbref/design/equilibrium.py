@@ -22,15 +22,15 @@ from mbref.scenes import find_scene
 
 STARTS = 24  # number of poses from which an equilibrium is searched
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism
-LONGEST = 0.3  # largest step towards an equilibrium / length of the mechanism
-MOST_STEPS = 60  # largest number of Newton steps from a start
+LONGEST_STEP = 0.3  # largest step towards an equilibrium / length of the mechanism
+MOST_NEWTON_STEPS = 60  # largest number of Newton steps from a start
 BALANCED = 1e-11  # largest acceleration at an equilibrium / scale of accelerations
-SAME = 1e-6  # distance / length of the mechanism, or rad, below which two poses count as equal
-STILL = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
+SAME_EQUILIBRIUM = 1e-6  # distance / length of the mechanism, or rad, below which two poses count as equal
+STILL_EIGENVALUE = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
 # acceleration × duration² / length of the mechanism below which a mechanism counts as free of forces
-NOTHING = 1e-9
+FORCE_FREE = 1e-9
 # displayed vibration: largest displacement / length of the mechanism, and number of samples
-AMPLITUDE, FRAMES = 0.1, 49
+AMPLITUDE, MODE_SAMPLES = 0.1, 49
 
 
 @dataclass(frozen=True, repr=False)
@@ -64,9 +64,9 @@ class Equilibrium:
     def stability(self) -> str:
         """``stable``, ``unstable`` or ``indifferent``, by the largest real part of the eigenvalues."""
         size = float(np.abs(self.eigenvalues).max(initial=0.0))
-        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL * size:
+        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL_EIGENVALUE * size:
             return "indifferent"
-        return "unstable" if self.eigenvalues.real.max() > STILL * size else "stable"
+        return "unstable" if self.eigenvalues.real.max() > STILL_EIGENVALUE * size else "stable"
 
     @property
     def frequencies(self) -> np.ndarray:
@@ -84,7 +84,7 @@ class Equilibrium:
         """Numbers (indices from 0) of the eigenvalues with positive imaginary part, slowest vibration
         first."""
         size = float(np.abs(self.eigenvalues).max(initial=0.0))
-        return np.flatnonzero(self.eigenvalues.imag > STILL * size)
+        return np.flatnonzero(self.eigenvalues.imag > STILL_EIGENVALUE * size)
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{f:.6g} Hz" for f in self.frequencies)
@@ -125,7 +125,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
         raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
     poses = list(_starts(first, starts))
     scale = _scale(poses)
-    if scale <= NOTHING * model.length / scene.duration**2:
+    if scale <= FORCE_FREE * model.length / scene.duration**2:
         return [_equilibrium(poses[0])]
     found: list[Tangent] = []
     for tangent in poses:
@@ -165,15 +165,15 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
     model, shape = Model(without_armatures(equilibrium.scene)), equilibrium.shapes[which]
     q = model.start()
     turned = rotations.conjugate(q.reshape(model.nb, 7)[: len(shape), 3:])
-    poses, phases = [], np.linspace(0.0, 2 * np.pi, FRAMES)
+    poses, phases = [], np.linspace(0.0, 2 * np.pi, MODE_SAMPLES)
     for phase in phases:
         x = np.zeros((model.nb, 6))
         x[: len(shape)] = amplitude * (shape * np.exp(1j * phase)).real
         x[: len(shape), 3:] = rotations.rotate(turned, x[: len(shape), 3:])
         poses.append(solve_positions(model, 0.0, displaced(q, x.ravel()))[0])
     times = phases / abs(equilibrium.eigenvalues[which])
-    places = np.array(poses).reshape(FRAMES, model.nb, 7)
-    still = np.zeros((FRAMES, model.nb, 6))
+    places = np.array(poses).reshape(MODE_SAMPLES, model.nb, 7)
+    still = np.zeros((MODE_SAMPLES, model.nb, 6))
     found = model.motion(places, still, still)
     names = tuple(body.name for body in equilibrium.scene.body)
     return Motion(
@@ -234,7 +234,7 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
     found."""
     freedoms, damping = tangent.freedoms, 0.0
     off = tangent.accelerations(*_rest(tangent))
-    for _ in range(MOST_STEPS):
+    for _ in range(MOST_NEWTON_STEPS):
         if np.linalg.norm(off) <= BALANCED * scale:
             return _refined(tangent, off)
         try:
@@ -243,7 +243,7 @@ def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
             return None
         weight = damping * float(np.linalg.norm(slope)) ** 2 + 1e-300
         step = -np.linalg.lstsq(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off, rcond=None)[0]
-        size = float(np.linalg.norm(step)) / (LONGEST * tangent.model.length)
+        size = float(np.linalg.norm(step)) / (LONGEST_STEP * tangent.model.length)
         moved = _moved(tangent, step / max(1.0, size))
         after = off if moved is None else moved.accelerations(*_rest(moved))
         if moved is None or moved.freedoms != freedoms or np.linalg.norm(after) >= np.linalg.norm(off):
@@ -276,7 +276,7 @@ def _moved(tangent: Tangent, y: np.ndarray) -> Tangent | None:
 
 def _is_same(first: Tangent, second: Tangent) -> bool:
     apart = displacement(first.q, second.q) / first.units
-    return bool(np.abs(apart).max(initial=0.0) < SAME * first.model.length)
+    return bool(np.abs(apart).max(initial=0.0) < SAME_EQUILIBRIUM * first.model.length)
 
 
 def _equilibrium(tangent: Tangent) -> Equilibrium:

@@ -15,10 +15,10 @@ from mbref.equations.initial_state import CLOSED, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import row_lengths
 
-RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
+TANGENT_RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
-STEP = 0.005
-SHORT = 0.04  # factor on STEP for differences of second order
+DIFFERENCE_STEP = 0.005
+SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
 
 
@@ -33,7 +33,7 @@ class Tangent:
         self.model, self.q, self.frame = model, q, frame
         length = max(model.length, 1e-12)
         self.units = np.tile(np.repeat([1.0, 1.0 / length], 3), model.nb)
-        self.step = STEP * length
+        self.step = DIFFERENCE_STEP * length
         self.basis = _null_space(model.terms(0.0, q).jacobian * self.units)
 
     @property
@@ -82,7 +82,9 @@ def accelerations(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> np.nd
     """Return q'' (n,) at time t (s): of all that the rows allow, the one of Gauss's principle."""
     terms = model.terms(t, q, v)
     free = _null_space(terms.jacobian)
-    bound = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=RANK)[0] if model.m else np.zeros(model.n)
+    bound = np.zeros(model.n)
+    if model.m:
+        bound = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=TANGENT_RANK)[0]
     mass = free.T @ (terms.mass[:, None] * free)
     push = free.T @ (terms.force - terms.mass * bound)
     return np.asarray(bound + free @ np.linalg.solve(mass, push))
@@ -94,7 +96,7 @@ def multipliers(tangent: Tangent) -> np.ndarray:
     v = tangent.frame.velocities(model, q)
     terms = model.terms(0.0, q, v)
     left = terms.force - terms.mass * accelerations(model, 0.0, q, v)
-    return np.asarray(np.linalg.lstsq(terms.jacobian.T, left, rcond=RANK)[0])
+    return np.asarray(np.linalg.lstsq(terms.jacobian.T, left, rcond=TANGENT_RANK)[0])
 
 
 def unsteady(tangent: Tangent) -> str:
@@ -125,4 +127,4 @@ def _null_space(jacobian: np.ndarray) -> np.ndarray:
     if not len(jacobian):
         return np.eye(jacobian.shape[1])
     _, values, vectors = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None])
-    return np.asarray(vectors[int(np.sum(values > RANK * values[0])) :].T)
+    return np.asarray(vectors[int(np.sum(values > TANGENT_RANK * values[0])) :].T)

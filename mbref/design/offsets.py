@@ -13,9 +13,9 @@ from mbref.scene import Scene, SceneError
 
 # largest rotation (rad), or displacement over the mechanism's length, in one of the equal parts of a change,
 # so that angles stay below half a turn and loops on their branch
-PART = 0.2
+LARGEST_PART = 0.2
 MOST_PARTS = 1024  # limit of time: some seconds
-MET = 1e-12  # residual (rad), or over the mechanism's length (m), that rounding may leave
+MET_OFFSET = 1e-12  # residual (rad), or over the mechanism's length (m), that rounding may leave
 
 
 @functools.lru_cache(maxsize=64)
@@ -30,18 +30,18 @@ def assembled(scene: Scene) -> Scene:
     for part in range(parts):
         model = Model(found)
         q, residual = solve_positions(model, 0.0, model.start(), value / parts)
-        if not np.abs(residual).max() <= MET * max(1.0, model.length):
+        if not np.abs(residual).max() <= MET_OFFSET * max(1.0, model.length):
             raise SceneError([_unmet(scene, model, residual, part / parts)])
         found = placed_with_springs(model, q)
     return found
 
 
 def _is_small(scene: Scene, value: np.ndarray) -> bool:
-    """Return whether Φ = value (m,) is obeyed by poses near the scene's, up to PART."""
+    """Return whether Φ = value (m,) is obeyed by poses near the scene's, up to LARGEST_PART."""
     model = Model(scene)
     q, _ = solve_positions(model, 0.0, model.start(), value)
     moved = np.abs((q - model.start()).reshape(-1, 7))
-    return bool(moved[:, :3].max() <= PART * model.length and moved[:, 3:].max() <= PART / 2)
+    return bool(moved[:, :3].max() <= LARGEST_PART * model.length and moved[:, 3:].max() <= LARGEST_PART / 2)
 
 
 def _unmet(scene: Scene, model: Model, residual: np.ndarray, share: float) -> str:

@@ -10,7 +10,7 @@ from mbref import rotations
 from mbref.equations.model import Model
 from mbref.scene import GROUND, Body, Scene, SceneError
 
-PARALLEL = 1e-12  # sine of the angle between gravity and the driver's axis
+PARALLEL_TO_GRAVITY = 1e-12  # sine of the angle between gravity and the driver's axis
 TURNED_BY = 1.0  # rad; rotation after which the equations are compared with the start
 UNCHANGED = 1e-9  # largest change of accelerations / scale of accelerations, and of |Φ| / mechanism's length
 
@@ -110,7 +110,7 @@ def turning(scene: Scene) -> Turning:
             ]
         )
     axis = rotations.unit(joint.directions[0])
-    if np.linalg.norm(np.cross(scene.gravity, axis)) > PARALLEL * np.linalg.norm(scene.gravity):
+    if np.linalg.norm(np.cross(scene.gravity, axis)) > PARALLEL_TO_GRAVITY * np.linalg.norm(scene.gravity):
         raise SceneError(
             [f"driver[{driver.joint}]: its axis is not parallel to gravity, so the motion is not steady"]
         )

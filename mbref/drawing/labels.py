@@ -13,7 +13,7 @@ from mbref.drawing.marks import Stage
 from mbref.drawing.shapes import anchors, moved, shapes
 from mbref.drawing.svg import COLOURS, INK
 
-LETTER, LINE = 7.4, 15.0  # px; mean width of a letter, and height of a line
+LETTER, LINE_HEIGHT = 7.4, 15.0  # px; mean width of a letter, and height of a line
 SIGN = 8.0  # px; half the width of a joint's symbol
 # cost of the area by which a name covers a name, a symbol or a bar
 OVER_NAME, OVER_SIGN, OVER_BAR = 8.0, 3.0, 1.0
@@ -37,7 +37,7 @@ class Label(NamedTuple):
     @property
     def half(self) -> np.ndarray:
         """Half the width and height (2,), px."""
-        return np.array([LETTER * len(self.words), LINE]) / 2
+        return np.array([LETTER * len(self.words), LINE_HEIGHT]) / 2
 
 
 def names(stage: Stage) -> Iterator[str]:
@@ -80,7 +80,7 @@ def _outside(label: Label, size: np.ndarray) -> np.ndarray:
     """Return the area (c,), px², by which each position of a label leaves the page, summed over frames."""
     low, high = label.half - label.places, label.places + label.half - size
     beyond: np.ndarray = np.clip(np.maximum(low, high), 0.0, None).max(axis=2).sum(axis=1)
-    return LINE * beyond
+    return LINE_HEIGHT * beyond
 
 
 def _of_joints(stage: Stage) -> Iterator[Label]:
@@ -91,7 +91,7 @@ def _of_joints(stage: Stage) -> Iterator[Label]:
         place = next(iter(places.values()))
         near = [n for n, other in places.items() if other is place or np.abs(place - other).max() < LETTER]
         words = ", ".join(near)
-        reach = np.array([LETTER * len(words) / 2, LINE / 2])
+        reach = np.array([LETTER * len(words) / 2, LINE_HEIGHT / 2])
         offsets = [np.array(side) * (reach + ring * ANCHOR) for ring in RINGS for side in AROUND]
         yield Label(words, f'fill="{INK}" font-weight="600"', np.stack([place + o for o in offsets]))
         places = {name: other for name, other in places.items() if name not in near}
@@ -107,7 +107,7 @@ def _of_bodies(stage: Stage) -> Iterator[Label]:
 
 def _places(name: str, is_plate: bool, frames: np.ndarray) -> np.ndarray:
     """Return the possible centres (c, k, 2), px, of the name of a body with points (k, n, 2)."""
-    half = np.array([LETTER * len(name), LINE]) / 2
+    half = np.array([LETTER * len(name), LINE_HEIGHT]) / 2
     if frames.shape[1] == 1:
         side = half[0] + 25.0
         offsets = [(0.0, 26.0), (0.0, -26.0), (side, 0.0), (-side, 0.0), (0.0, 44.0)]

@@ -13,6 +13,7 @@ from mbref.drawing.shapes import attached, attack
 from mbref.drawing.svg import GREY, INK, PAPER
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page
+from mbref.rotations import Vector3
 from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
 
@@ -20,9 +21,6 @@ ACTION = "#b3261e"  # colour of loads and drivers
 STUB = 20.0  # px; half the length of an axis drawn at a joint
 ARROW = 52.0  # px; length of an arrow
 FACING = 0.7  # cosine of the angle to the line of sight above which an axis is drawn as a point
-
-
-At = tuple[float, float, float]  # a point, world at t = 0
 
 
 class Stage(NamedTuple):
@@ -33,7 +31,7 @@ class Stage(NamedTuple):
     page: Page
     timeline: Timeline | None
 
-    def place(self, body: str, point: At) -> np.ndarray:
+    def place(self, body: str, point: Vector3) -> np.ndarray:
         """Return the pixels (k, 2) of a point (world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, [point])[:, 0])
 
@@ -41,7 +39,7 @@ class Stage(NamedTuple):
         """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
         return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
 
-    def along(self, body: str, point: At, axis: np.ndarray, px: float) -> np.ndarray:
+    def along(self, body: str, point: Vector3, axis: np.ndarray, px: float) -> np.ndarray:
         """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
         half = axis * px / self.page.scale
         return self.points(body, np.array([np.array(point) - half, np.array(point) + half]))
@@ -50,7 +48,7 @@ class Stage(NamedTuple):
         """Return a moving line, or an outline, through pixels (k, n, 2); it is not filled by default."""
         return svg.line(points, look if "fill" in look else f'{look} fill="none"', self.timeline, closed)
 
-    def sign(self, body: str, point: At, content: str) -> str:
+    def sign(self, body: str, point: Vector3, content: str) -> str:
         """Return content drawn about the origin, carried along a point (world, t = 0) of a body."""
         return svg.follow(self.place(body, point), content, self.timeline)
 
@@ -102,14 +100,14 @@ def joint_mark(stage: Stage, joint: Joint) -> Iterator[str]:
     yield stage.sign(names[1], second, SIGNS[joint.type])
 
 
-def _sleeve(stage: Stage, body: str, point: At, axis: np.ndarray) -> Iterator[str]:
+def _sleeve(stage: Stage, body: str, point: Vector3, axis: np.ndarray) -> Iterator[str]:
     ends = stage.along(body, point, axis, 15.0)
     inner = ends + (ends.mean(axis=1, keepdims=True) - ends) * 0.11
     yield stage.line(ends, f'fill="none" stroke-linecap="butt" stroke="{INK}" stroke-width="15"')
     yield stage.line(inner, f'fill="none" stroke-linecap="butt" stroke="{PAPER}" stroke-width="11.6"')
 
 
-def _plane(stage: Stage, body: str, point: At, normal: np.ndarray) -> Iterator[str]:
+def _plane(stage: Stage, body: str, point: Vector3, normal: np.ndarray) -> Iterator[str]:
     across = np.cross(normal, np.eye(3)[np.argmin(abs(normal))])
     across /= np.linalg.norm(across)
     other, half = np.cross(normal, across), 34 / stage.page.scale

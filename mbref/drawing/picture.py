@@ -227,7 +227,7 @@ def _drawn(
     ground = [part for part in _ground(Stage(scene, shown, grid.page, None))]
     for k, panel in enumerate(panels):
         x, y = grid.corner(k)
-        parts = [*ground, *(svg.line(grid.page.pixels(path)[None], PATH, None) for path in panel.paths)]
+        parts = [*ground, *(svg.line(grid.page.pixels(path)[None], PATH_LOOK, None) for path in panel.paths)]
         for layer in panel.layers:
             stage = Stage(scene, layer.motion, grid.page, timeline)
             parts += _bodies(stage, layer.look)
@@ -236,7 +236,7 @@ def _drawn(
         yield f'<svg x="{x:g}" y="{y + grid.head:.1f}" {size}>{"".join(parts)}</svg>'
 
 
-PATH = f'fill="none" stroke="{GREY}" stroke-width="0.8"'
+PATH_LOOK = f'fill="none" stroke="{GREY}" stroke-width="0.8"'
 
 
 def _ground(stage: Stage) -> Iterator[str]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from mbref.drawing.svg import COLOURS, GREY
-from mbref.outputs import UNITS, chosen, quantity_of
+from mbref.outputs import UNIT_OF, chosen, quantity_of
 
 DEFAULT = ("angle", "displacement", "energy")
 
@@ -30,7 +30,7 @@ def plot(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> Any:
             axes.plot(columns["time"], columns[name], color=COLOURS[i % len(COLOURS)], label=name)
         if quantity.endswith("violation"):
             axes.set_yscale("log")
-        axes.set_ylabel(f"{quantity.replace('_', ' ')}, {UNITS[quantity]}".strip(", "))
+        axes.set_ylabel(f"{quantity.replace('_', ' ')}, {UNIT_OF[quantity]}".strip(", "))
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(color=GREY, alpha=0.25)
         axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -21,7 +21,7 @@ from mbref.ensembles.parameters import Parameters
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import motion_of
-from mbref.kernels.layout import Counts
+from mbref.kernels.layout import OperationCounts
 from mbref.kernels.memory_pool import SavedNumbers
 from mbref.motion import Motion
 from mbref.scene import Scene
@@ -109,7 +109,7 @@ class Batch:
         parameters = [*candidates.parameters(run, memory), *of_stepper]
         self._parameters = Parameters(parameters, SavedNumbers(self._stepper.taylor))
         self._samples = [np.empty((count, *each.shape)) for each in memory.loop.samples]
-        self._counts = np.empty((count, len(Counts._fields)), dtype=np.int64)
+        self._counts = np.empty((count, len(OperationCounts._fields)), dtype=np.int64)
         self._seconds = np.zeros(count)
 
     def _keep(self, place: int) -> None:

@@ -18,20 +18,20 @@ from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 
 SMOOTH = 1  # number of the smooth branch, which is taken unless another is requested
-MOST_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
+MOST_BRANCHED_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
 RANK = 1e-6  # relative singular value that counts as zero at a singular position
-FLAT = 1e-7  # relative size of a quadratic form below which it counts as zero
+ZERO_FORM = 1e-7  # relative size of a quadratic form below which it counts as zero
 SAME = 1e-4  # rad; directions at a smaller angle count as equal
 BROAD = 0.05  # distance of multiple roots, to which Newton's method converges slowly
-ZERO = 1e-12  # size of the forms at a root
+ZERO_AT_ROOT = 1e-12  # size of the forms at a root
 # number of starts and iterations of Newton's method for more than two degrees of freedom
-STARTS, ITERATIONS = 200, 40
+ROOT_STARTS, ROOT_ITERATIONS = 200, 40
 
 NO_OTHER = "the smooth branch only"
 ALONE = "one branch"
-OPEN = "all directions agree with the constraints to second order"
+ALL_AGREE = "all directions agree with the constraints to second order"
 TANGENT = "branches with a common tangent, which second order does not separate"
-NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_ROWS} rows are not computed"
+NOT_LOOKED_FOR = f"branches of scenes with more than {MOST_BRANCHED_ROWS} rows are not computed"
 MULTIPLE = " and others that second order does not determine"
 CONE = "infinitely many directions (a cone); the smooth one is listed"
 
@@ -84,7 +84,7 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
     if freedoms < 2:
         return Branches(v[None], NO_OTHER)
     if not len(found.forms):
-        return Branches(v[None], OPEN)
+        return Branches(v[None], ALL_AGREE)
     roots, sort = _lines(found)
     if sort == CONE:
         return Branches(v[None], CONE)
@@ -191,7 +191,7 @@ def _independent(forms: np.ndarray) -> np.ndarray:
     if not forms.size:
         return np.zeros((0, d, d))
     _, sizes, right = np.linalg.svd(forms.reshape(count, d * d), full_matrices=False)
-    return right[sizes > FLAT * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)
+    return right[sizes > ZERO_FORM * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)
 
 
 def _values(forms: np.ndarray, a: np.ndarray) -> np.ndarray:
@@ -247,10 +247,10 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
     d, random = forms.shape[1], np.random.default_rng(0)
     simple: list[np.ndarray] = []
     multiple: list[np.ndarray] = []
-    for _ in range(STARTS if len(forms) >= d - 1 else 0):
+    for _ in range(ROOT_STARTS if len(forms) >= d - 1 else 0):
         a, left, is_simple = _root_from(forms, np.asarray(random.normal(size=d)))
         known, near = (simple, SAME) if is_simple else (multiple, BROAD)
-        if left <= ZERO and all(_angle(a, b) >= near for b in known):
+        if left <= ZERO_AT_ROOT and all(_angle(a, b) >= near for b in known):
             known.append(a)
         if len(simple) + len(multiple) > 2 ** (d - 1):
             return None
@@ -260,7 +260,7 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
 def _root_from(forms: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, float, bool]:
     """Return the end of Newton's method from a, the largest form there, and whether the end is a simple
     root."""
-    for _ in range(ITERATIONS):
+    for _ in range(ROOT_ITERATIONS):
         a = a / np.linalg.norm(a)
         a = a - np.linalg.lstsq(2.0 * forms @ a, _values(forms, a), rcond=None)[0]
     a = a / np.linalg.norm(a)
@@ -293,7 +293,7 @@ def branches_passed(model: Model, passed: Passed) -> Branches:
     Raises ValueError if the requested branch does not exist.
     """
     t, q, v, taken = passed
-    found = Branches(v[None], NOT_LOOKED_FOR) if model.m > MOST_ROWS else branches(model, t, q, v)
+    found = Branches(v[None], NOT_LOOKED_FOR) if model.m > MOST_BRANCHED_ROWS else branches(model, t, q, v)
     if taken > len(found.velocities):
         raise ValueError(f"branches: the crossing at t = {t:.6g} s has no branch {taken}: {found.sentence}")
     return found

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from mbref.equations.joints import AXES, Primitive, of_coordinate
+from mbref.equations.joints import AXES, ORIGIN, Primitive, of_coordinate
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE
 from mbref.scene import Body, Joint, Revolute, Scene, Translational
 from mbref.scene_joints import ANGLE, Coordinate
-
-ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Coupled(NamedTuple):

@@ -22,7 +22,7 @@ RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled J
 UNIQUE_TOLERANCE = 1e-8
 UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
 PERTURBATION = 1e-2  # rad; rotation of the fastest body away from a singular start
-MOST_ROWS = 300  # rows; for more, a dense singular value decomposition takes more than about 0.1 s
+MOST_DIAGNOSED_ROWS = 300  # rows; for more, a dense singular value decomposition takes more than about 0.1 s
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
 
@@ -144,7 +144,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
         shared = take_part(left[:, rank:])
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
-    determined = _determined(model, start) if model.m <= MOST_ROWS else None
+    determined = _determined(model, start) if model.m <= MOST_DIAGNOSED_ROWS else None
     total = _counts(model, rank)
     involved = Counter(name for name, part in zip(model.row_joint, shared, strict=True) if part)
     unique = tuple(name for name in total.rows_by_joint if name not in involved)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref import rotations
-from mbref.equations.branches import MOST_ROWS, velocities_along
+from mbref.equations.branches import MOST_BRANCHED_ROWS, velocities_along
 from mbref.equations.coordinates import displace_all
 from mbref.equations.model import Model, Terms
 from mbref.equations.units import row_lengths
@@ -17,7 +17,7 @@ from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_spac
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import Body, SceneError
 
-RANK_TOLERANCE = 1e-5  # relative; smaller singular values stay uncorrected: the rank may drop at the start
+START_RANK_TOLERANCE = 1e-5  # smaller singular values stay uncorrected: the rank may drop at the start
 LARGE = 40  # rows; for more, dense singular values take longer than sparse factors
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
@@ -139,7 +139,7 @@ def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray)
     """Return velocities (6 nb,) along a branch of a singular start that agree with the given entries of v.
 
     None if v is along a branch, or if no branch agrees."""
-    if not model.closed_loops or model.m > MOST_ROWS:
+    if not model.closed_loops or model.m > MOST_BRANCHED_ROWS:
         return None
     along = velocities_along(model, q, v, given)
     return _best_met(model, q, along) if along else None
@@ -245,7 +245,7 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
         return np.array([MinimumNorm(model.structure.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
     unit, rhs = _unit_rows(model.structure.dense(blocks) * inverse_root[:, None], rhs)
-    return inverse_root * least_norm(unit, rhs, RANK_TOLERANCE)
+    return inverse_root * least_norm(unit, rhs, START_RANK_TOLERANCE)
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -278,12 +278,12 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     if not (wanted.any() or nu.any()):
         return np.zeros(scenes.model.n), 0.0, not given.all()
     unit, rhs = _unit_rows(jacobian, nu)
-    x, open_ = least_norm_and_null_space(unit, rhs, RANK_TOLERANCE)
+    x, open_ = least_norm_and_null_space(unit, rhs, START_RANK_TOLERANCE)
     off = np.abs(unit @ x - rhs)
     if off.max(initial=0.0) > CONTRADICTED * np.abs(x).max(initial=0.0):
         raise _contradiction(scenes.model, int(np.argmax(off)))
     if open_.size and wanted.size:
-        step, still_open = least_norm_and_null_space(open_[given], wanted - x[given], RANK_TOLERANCE)
+        step, still_open = least_norm_and_null_space(open_[given], wanted - x[given], START_RANK_TOLERANCE)
         x, open_ = x + open_ @ step, open_ @ still_open
     as_given = x.copy()
     as_given[given] = wanted
@@ -293,7 +293,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
         raise _fault(scenes.model, int(np.argmax(residual)), what)
     if open_.size:
         weight = np.sqrt(scenes.mass[k]) * scale
-        x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=RANK_TOLERANCE)[0]
+        x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=START_RANK_TOLERANCE)[0]
     return x * scale, float(residual.max(initial=0.0)), bool(open_.size)
 
 

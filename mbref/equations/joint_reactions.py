@@ -20,7 +20,7 @@ from mbref.kernels.scene_layout import COUPLED_ANGLE
 from mbref.lazy import LazyMapping
 from mbref.scene import Scene
 
-MOST_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
+MOST_OPEN_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
 OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes
 SHARE = 1e-6  # weight of a joint in such a combination below which it does not take part
 
@@ -34,7 +34,7 @@ def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: 
         return {}
     names = tuple(joint.name for joint in scene.joint)
     found = {"reactions": LazyMapping(names, _reactions, scene, times, q, multipliers)}
-    if multipliers.shape[1] <= MOST_ROWS:
+    if multipliers.shape[1] <= MOST_OPEN_ROWS:
         found["open_reactions"] = LazyMapping(names, _open_dimensions, scene, times, q)
     return found
 

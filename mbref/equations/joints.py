@@ -7,12 +7,11 @@ from math import dist, sqrt
 from typing import NamedTuple
 
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
+from mbref.rotations import Vector3
 from mbref.scene import JOINT_TYPES, Joint, SceneError
 from mbref.scene_joints import ANGLE, Coordinate, X, Y, Z
 
-Vector = tuple[float, float, float]
-
-ZERO = (0.0, 0.0, 0.0)
+ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 ROWS_OF = {POINT: 3, DOT1: 1, DOT2: 1, DISTANCE: 1, COUPLED_ANGLE: 1, COUPLED_SLIDE: 1}
 # directions of the first and of the second body that stay perpendicular: the first two pairs keep the axes
@@ -26,11 +25,11 @@ class Primitive(NamedTuple):
     body."""
 
     kind: int
-    point_first: Vector = ZERO
-    point_second: Vector = ZERO
-    first: Vector = ZERO
-    second: Vector = ZERO
-    turning: Vector = ZERO  # for drivers: direction in the first body, perpendicular to `first`
+    point_first: Vector3 = ORIGIN
+    point_second: Vector3 = ORIGIN
+    first: Vector3 = ORIGIN
+    second: Vector3 = ORIGIN
+    turning: Vector3 = ORIGIN  # for drivers: direction in the first body, perpendicular to `first`
     length: float = 0.0  # length of a distance constraint, or the factor of a joint coordinate
     driven: bool = False
 
@@ -58,19 +57,19 @@ def driver_primitive(joint: Joint) -> Primitive:
     return of_coordinate(joint, joint.facts.driven, (DOT1, DOT2), driven=True)
 
 
-def unit(v: Sequence[float]) -> Vector:
+def unit(v: Sequence[float]) -> Vector3:
     """Return v / |v|."""
     x, y, z = map(float, v)
     length = sqrt(x * x + y * y + z * z)
     return x / length, y / length, z / length
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def cross(a: Vector3, b: Vector3) -> Vector3:
     """Return a × b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def frame(axis: Sequence[float]) -> tuple[Vector, Vector, Vector]:
+def frame(axis: Sequence[float]) -> tuple[Vector3, Vector3, Vector3]:
     """Return a right-handed triad (x, y, z) with z along the axis."""
     z = unit(axis)
     sizes = [abs(c) for c in z]
@@ -79,17 +78,17 @@ def frame(axis: Sequence[float]) -> tuple[Vector, Vector, Vector]:
     return x, cross(z, x), z
 
 
-def coincident(anchor: Vector) -> Primitive:
+def coincident(anchor: Vector3) -> Primitive:
     """Return the constraint that the points of both bodies at the anchor coincide."""
     return Primitive(POINT, point_first=anchor, point_second=anchor)
 
 
-def perpendicular(first: Vector, second: Vector) -> Primitive:
+def perpendicular(first: Vector3, second: Vector3) -> Primitive:
     """Return the constraint that a direction of each body stays perpendicular to the other."""
     return Primitive(DOT1, first=first, second=second)
 
 
-def in_plane(anchor: Vector, normal: Vector) -> Primitive:
+def in_plane(anchor: Vector3, normal: Vector3) -> Primitive:
     """Return the constraint that the second body's anchor stays in the plane through the first body's anchor
     with that normal."""
     return Primitive(DOT2, point_first=anchor, point_second=anchor, first=normal)

@@ -18,7 +18,7 @@ from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.packing import Packs, row_of
 from mbref.equations.structure import Structure
-from mbref.kernels.layout import Counts, Equations, Frames, Settings, System
+from mbref.kernels.layout import Equations, Frames, OperationCounts, Settings, System
 from mbref.kernels.memory_pool import Pooled, acquire, copied, release
 from mbref.kernels.named_memory import allocate
 from mbref.kernels.records import record
@@ -103,7 +103,7 @@ class Model:
         sizes, data = sizes or self.sizes, data or self.data
         defaults = {
             "settings": record(Settings()),
-            "counts": record(Counts()),
+            "counts": record(OperationCounts()),
             "options": None,
             "scratch": None,
         }

@@ -17,7 +17,7 @@ from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
 from mbref.equations.joints import Primitive, driver_primitive, frame, primitives_of
-from mbref.equations.parts import FRAME, NONE, all_parts
+from mbref.equations.parts import FRAME, ORIGIN, all_parts
 from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
 from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
@@ -49,7 +49,7 @@ from mbref.scene_joints import ANGLE
 
 Values = tuple[float, ...]
 # parameters of the fixed frame, in the form of ``_of_body``
-AT_ORIGIN = (*NONE, 1.0, *NONE, 1.0, 1.0, 1.0, 1.0)
+AT_ORIGIN = (*ORIGIN, 1.0, *ORIGIN, 1.0, 1.0, 1.0, 1.0)
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
 
@@ -168,7 +168,7 @@ class Packs:
         return np.array([*rows], dtype=float).reshape(len(self.scenes), -1, width)
 
     def _gravity(self) -> np.ndarray:
-        return np.array([NONE if self.kinematic else scene.gravity for scene in self.scenes], dtype=float)
+        return np.array([ORIGIN if self.kinematic else scene.gravity for scene in self.scenes], dtype=float)
 
     def _bodies(self) -> Bodies:
         """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""
@@ -317,12 +317,12 @@ def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
     """Return seven world vectors at t = 0, stiffness, damping, and natural length or angle of a load; unused
     vectors are zero. Vectors are force, two points, axis, x and y on the first body, and x on the second."""
     if isinstance(load, Moment):
-        return *load.moment, *NONE * 7
+        return *load.moment, *ORIGIN * 7
     if isinstance(load, Force):
-        return *load.force, *load.point, *NONE * 6
+        return *load.force, *load.point, *ORIGIN * 6
     if isinstance(load, Spring):
         first, second = load.points
-        return *NONE, *first, *second, *NONE * 4, load.stiffness, load.damping, load.natural_length
+        return *ORIGIN, *first, *second, *ORIGIN * 4, load.stiffness, load.damping, load.natural_length
     joint, action = scene.joint_named(load.joint), load.action
     x, y, z = frame(joint.directions[0])
     numbers = action.stiffness, action.damping, action.natural

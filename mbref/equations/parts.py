@@ -7,11 +7,11 @@ from collections.abc import Hashable
 from typing import NamedTuple
 
 from mbref.equations.couplings import Coupled, rotors_of
+from mbref.equations.joints import ORIGIN
 from mbref.scene import GROUND, Body, Fixed, Joint, Scene, TimeFunction
 
 # name of the frame to which a modelled ground and the rotors of armatures are joined
 FRAME = "the fixed frame"
-NONE = (0.0, 0.0, 0.0)
 
 
 def shape_of(scene: Scene) -> Hashable:
@@ -50,8 +50,8 @@ def all_parts(scene: Scene) -> Parts:
     if scene.ground == "frame":
         return Parts(bodies, joints, rotors.couplings)
     inertia = (1.0, 1.0, 1.0) if scene.has_mass() else None
-    body = Body(name=GROUND, position=NONE, mass=1.0 if inertia else None, inertia=inertia)
-    hold = Fixed.model_construct(name=GROUND, bodies=(FRAME, GROUND), anchor=NONE, type="fixed")
+    body = Body(name=GROUND, position=ORIGIN, mass=1.0 if inertia else None, inertia=inertia)
+    hold = Fixed.model_construct(name=GROUND, bodies=(FRAME, GROUND), anchor=ORIGIN, type="fixed")
     return Parts((*bodies, body), (*joints, hold), rotors.couplings)
 
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 SPREAD = 0.5  # radius of gyration / body length; 0.58 for a slender rod about its end
-SMALLEST = 1e-9  # length / largest length; shorter lengths are rounding
+SHORTEST_LENGTH = 1e-9  # length / largest length; shorter lengths are rounding
 
 
 def metric(mass: np.ndarray, lengths: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """
     # a product of matrices would round the lengths of one scene and of many differently
     lengths = (np.sqrt((arms * arms).sum(axis=-1))[..., None] * shares).sum(axis=-2)
-    has_arms = lengths > SMALLEST * lengths.max(axis=-1, keepdims=True, initial=0.0)
+    has_arms = lengths > SHORTEST_LENGTH * lengths.max(axis=-1, keepdims=True, initial=0.0)
     if has_arms.all():
         return lengths
     count = has_arms.sum(axis=-1, keepdims=True)

@@ -28,7 +28,7 @@ ABOUT = About(
     fails=("Redundant rows (also rows within 3e-6 rad of a dependent one), and bodies without inertia."),
 )
 
-SINGULAR_PIVOT = 1e-11  # pivot / diagonal entry: sine² of the angle between a row and earlier rows
+DEPENDENT_PIVOT = 1e-11  # pivot / diagonal entry: sine² of the angle between a row and earlier rows
 
 
 class Scratch(NamedTuple):
@@ -52,7 +52,7 @@ def factor_schur_complement(rows, dt, s, diagonal):
     if not cholesky_factor(s, rows):
         return False
     for i in range(rows):  # noqa: SIM110 - kernels have no generators
-        if not s[i, i] * diagonal[i] < 1.0 / SINGULAR_PIVOT:
+        if not s[i, i] * diagonal[i] < 1.0 / DEPENDENT_PIVOT:
             return False
     return True
 

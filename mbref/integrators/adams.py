@@ -25,7 +25,7 @@ HIGHEST = 12  # largest order of the method
 AIM = 0.5  # error / tolerance for which step lengths are chosen
 
 
-class Progress(NamedTuple):
+class OrderControl(NamedTuple):
     """Numbers of the order and step control."""
 
     restart: int = -1  # ``clock.restart`` of the stored past
@@ -52,7 +52,7 @@ class Past(NamedTuple):
     g: Annotated[Vector, HIGHEST + 3]
     sigma: Annotated[Vector, HIGHEST + 3]
     integrals: Annotated[Vector, HIGHEST + 3]
-    progress: Progress
+    progress: OrderControl
 
 
 past_of = opener(Past)

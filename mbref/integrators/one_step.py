@@ -8,7 +8,7 @@ from mbref.linear_algebra.vectors import larger
 
 # next step / step: margin (0.8 takes 5 to 10 % fewer evaluations than 0.9), limits, and after a failure
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
-ROUNDED = 0.02  # error / tolerance below which the error may be rounding and shows no trend
+ROUNDED_ERROR = 0.02  # error / tolerance below which the error may be rounding and shows no trend
 
 
 @kernel
@@ -42,7 +42,7 @@ def trend(h, ratio, memory):
     Gustafsson, ACM Trans. Math. Software 20, 1994).
     """
     clock, taken = memory.loop.clock, memory.equations.system.counts.steps
-    if taken - clock.restart < 2 or clock.share < ROUNDED or not min(ratio, clock.past_ratio) > 0.0:
+    if taken - clock.restart < 2 or clock.share < ROUNDED_ERROR or not min(ratio, clock.past_ratio) > 0.0:
         return 1.0
     found = h / clock.past_length * (clock.past_ratio / ratio) ** (1.0 / memory.control.order)
     return max(SHRINK, min(1.0, found))

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-LINE = 64  # bytes
+CACHE_LINE = 64  # bytes
 Kind = tuple[tuple[int, ...], np.dtype]  # shape and type of an array
 
 
@@ -17,9 +17,9 @@ def aligned_zeros(kinds: Iterable[Kind]) -> list[np.ndarray]:
     sizes = [math.prod(shape) * dtype.itemsize for shape, dtype in kinds]
     places = [0]
     for size in sizes:
-        places.append(places[-1] - (-size // LINE) * LINE)
-    block = np.zeros(places[-1] + LINE, np.uint8)
-    first = -block.ctypes.data % LINE
+        places.append(places[-1] - (-size // CACHE_LINE) * CACHE_LINE)
+    block = np.zeros(places[-1] + CACHE_LINE, np.uint8)
+    first = -block.ctypes.data % CACHE_LINE
     return [
         block[first + place : first + place + size].view(dtype).reshape(shape)
         for place, size, (shape, dtype) in zip(places[:-1], sizes, kinds, strict=True)

@@ -59,7 +59,7 @@ class Settings(NamedTuple):
     nearly_dependent: int = 0  # 1 if rows are nearly dependent at the start, as with two tilted hinges
 
 
-class Counts(NamedTuple):
+class OperationCounts(NamedTuple):
     """Counts of operations."""
 
     steps: int = 0
@@ -87,7 +87,7 @@ class System(NamedTuple):
     rhs: Annotated[Vector, "m"]
     multipliers: Annotated[Vector, "m"]  # λ
     settings: Settings
-    counts: Counts
+    counts: OperationCounts
     options: Address  # the formulation's own numbers
     scratch: Address  # the formulation's own memory
 

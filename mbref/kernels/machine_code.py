@@ -10,7 +10,7 @@ import llvmlite.binding as llvm
 
 from mbref.kernels import checked_file
 
-MOST = 64  # number of pieces of code that a process keeps loaded
+MOST_LOADED = 64  # number of pieces of code that a process keeps loaded
 _loaded: dict[Path, Code] = {}
 
 
@@ -39,7 +39,7 @@ def code_at(path: Path, write: Callable[[], str]) -> Code:
     returns."""
     if path not in _loaded:
         data = checked_file.read(path) or _compiled(path, write())
-        if len(_loaded) >= MOST:
+        if len(_loaded) >= MOST_LOADED:
             del _loaded[next(iter(_loaded))]
         _loaded[path] = Code(data)
     return _loaded[path]

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 # least number of iterations of ``solve_to_tolerance``; enough away from singular positions, so that it is
 # fixed there
-LEAST = 2
+LEAST_ITERATIONS = 2
 ALPHA = 1e10  # penalty of projections and single solutions; singular values below 1e-5 are ignored
 # largest number of iterations of a system that is solved once; relative change that ends them
 ITERATIONS, LAST_CHANGE = 20, 1e-15
@@ -65,7 +65,7 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
         for i in range(row.shape[0]):
             total[i] -= step[i]
         expected = min(expected, change * min(1.0, change / last if last > 0.0 else 1.0))
-        if k + 1 >= min(LEAST, most) and expected <= epsilon:
+        if k + 1 >= min(LEAST_ITERATIONS, most) and expected <= epsilon:
             status = OK
             break
     for i in range(row.shape[0]):

@@ -22,7 +22,7 @@ from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
 from mbref.stepping.run import Run
 
-MOST_STEPS = 100_000  # steps of the run by the default method
+MOST_COMPARED_STEPS = 100_000  # steps of the run by the default method
 TOLERANCE = 1e-10  # relative tolerance of the run by the default method
 # allowed distance (lengths of the mechanism or rad): a multiple of the run's tolerance, and a least value
 OFF = (1e3, 1e-6)
@@ -43,7 +43,7 @@ def compare_with_default(run: Run, ended: int) -> int:
     if not (clock.sample and may_leave(run) and run.limits.compared):
         return ended
     began = time.process_time()
-    limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_STEPS)
+    limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_COMPARED_STEPS)
     reference = start_run(run.scene, Method.parse(default_method(run.scene)), run.times, limits)
     status, _ = reference.stepper.advance(None)
     run.making += time.process_time() - began

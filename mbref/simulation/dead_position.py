@@ -16,13 +16,13 @@ from mbref.stepping.run import Run
 TRANSMISSION = 1e2  # largest velocity / driver rate above which the position is dead
 ROUNDED = 1e-13  # relative singular value below which rows are redundant
 BEYOND = 1.01  # a run that gets beyond this multiple of the failure's time has met no dead position
-MOST_ROWS = 400  # constraint rows; larger least-squares problems take seconds
+MOST_DRIVEN_ROWS = 400  # constraint rows; larger least-squares problems take seconds
 
 
 def is_at_dead_position(run: Run) -> bool:
     """Return whether a run that failed is at a dead position of its drivers."""
     state, model = run.memory.state, run.model
-    if not run.scene.driver or model.m > MOST_ROWS or not np.isfinite(state.coordinates).all():
+    if not run.scene.driver or model.m > MOST_DRIVEN_ROWS or not np.isfinite(state.coordinates).all():
         return False
     now, length = float(run.memory.loop.clock.time), model.length
     terms = model.terms(now, state.coordinates)

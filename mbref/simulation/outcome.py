@@ -74,7 +74,7 @@ NEARLY_DEPENDENT = (
     "constraint rows are nearly dependent at the start (singular value {:.1e} of unit rows), so that their "
     "rank is uncertain: give the axes and points of the joints with 12 digits"
 )
-NEAR_SINGULAR = (
+NEAR_SINGULAR_HINT = (
     "; if the mechanism begins near a singular position, rounding changes its motion: begin at that "
     "position, or at a pose with a singular value above {:g}"
 )
@@ -230,7 +230,7 @@ def _remedy(run: Run, status: int) -> str:
     if not run.memory.equations.system.settings.nearly_dependent or run.memory.loop.clock.time > 0.0:
         return (advice(run) if status in OF_ROUNDING else "") or remedy(run, status)
     turned = run.model.closed_loops > 0 and not run.scene.driver
-    return NEARLY_DEPENDENT.format(run.ranks.least) + (NEAR_SINGULAR.format(NEARLY) if turned else "")
+    return NEARLY_DEPENDENT.format(run.ranks.least) + (NEAR_SINGULAR_HINT.format(NEARLY) if turned else "")
 
 
 def _cause(run: Run, status: int) -> str:

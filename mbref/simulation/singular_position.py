@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.branches import MOST_ROWS
+from mbref.equations.branches import MOST_BRANCHED_ROWS
 from mbref.equations.units import row_lengths
 from mbref.stepping.run import Run
 
 TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored
-NEAR = 0.03  # relative pivot below which failing steps are near a singular position
+NEAR_PIVOT = 0.03  # relative pivot below which failing steps are near a singular position
 
 
 class Met(NamedTuple):
@@ -31,7 +31,7 @@ def is_near(run: Run) -> bool:
     """Return whether the last step of a run that monitors pivots ended near a singular position."""
     watch = run.memory.watch
     watched = run.model.closed_loops > 0 and watch.reference_pivot > 0.0
-    return bool(watched and watch.smallest_pivot < NEAR * watch.reference_pivot)
+    return bool(watched and watch.smallest_pivot < NEAR_PIVOT * watch.reference_pivot)
 
 
 def met_by(run: Run, inside: bool) -> Met:
@@ -39,7 +39,7 @@ def met_by(run: Run, inside: bool) -> Met:
     step from there to the state in memory."""
     memory, (q, v) = run.memory, _accepted(run)
     time, part = float(memory.loop.clock.time), float(memory.watch.singular_part) if inside else 0.0
-    rank = _rank(run, time, q) if run.model.m <= MOST_ROWS else 0
+    rank = _rank(run, time, q) if run.model.m <= MOST_BRANCHED_ROWS else 0
     if part > 0.0:
         time += part * (float(memory.loop.clock.attempt_end) - time)
         q, v = memory.loop.ends.pose.copy(), v + part * (memory.state.velocities - v)
@@ -71,7 +71,7 @@ def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.
 def _joints(run: Run, t: float, q: np.ndarray, rank: int) -> tuple[str, ...]:
     """Return the joints whose rows take part in dependences of Φ_q that exist at this pose only."""
     values, left = _singular_values(run, t, q)
-    lost = [k for k in range(min(rank, left.shape[1])) if values[k] < max(NEAR, 2.0 * values[rank - 1])]
+    lost = [k for k in range(min(rank, left.shape[1])) if values[k] < max(NEAR_PIVOT, 2.0 * values[rank - 1])]
     part = np.linalg.norm(left[:, lost], axis=1)
     rows = np.flatnonzero(part > TAKES_PART * part.max(initial=0.0))
     return tuple(dict.fromkeys(run.model.row_joint[row] for row in rows))

@@ -6,14 +6,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
-from mbref.method import MOST_BODIES, SERIES, Method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 
-MOST_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
+MOST_TRIAL_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
 
 
 _TRIALS: WeakKeyDictionary[Run, Trial | None] = WeakKeyDictionary()
@@ -42,8 +42,8 @@ def _made(run: Run) -> Trial | None:
     is_cheap = len(run.scene.body) <= MOST_BODIES and all(kernel.is_kept for kernel in KERNELS_OF_SERIES)
     if run.method.is_series or not is_cheap:
         return None
-    limits = Limits(code=GENERIC, most_steps=MOST_STEPS)
-    trial = start_run(run.scene, Method.parse(SERIES), run.times, limits)
+    limits = Limits(code=GENERIC, most_steps=MOST_TRIAL_STEPS)
+    trial = start_run(run.scene, Method.parse(SERIES_METHOD), run.times, limits)
     status, _ = trial.stepper.advance(None)
     reached = float(trial.memory.loop.clock.time)
     trial.release()

@@ -27,8 +27,8 @@ from mbref.linear_algebra.elimination import full_pivot, lu_factor, lu_solve
 from mbref.stabilisation.base import Stabilisation
 from mbref.stabilisation.projection import STUCK
 
-MOST_ITERATIONS = 20  # largest number of Newton steps for the dependent coordinates
-SINGULAR_PIVOT = 1e-13  # pivot of Φ_u (1, or 1/m) below which Φ_u is singular to rounding
+MOST_DEPENDENT_STEPS = 20  # largest number of Newton steps for the dependent coordinates
+SINGULAR_DEPENDENT = 1e-13  # pivot of Φ_u (1, or 1/m) below which Φ_u is singular to rounding
 
 
 class Options(NamedTuple):
@@ -37,7 +37,7 @@ class Options(NamedTuple):
     kept: float = 0.6
 
 
-class Partition(NamedTuple):
+class CoordinatePartition(NamedTuple):
     """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, at the last state and
     when the partition was chosen."""
 
@@ -55,7 +55,7 @@ class Scratch(NamedTuple):
     row_order: Annotated[Indices, "m + nb"]  # active rows first
     column_order: Annotated[Indices, "7*nb"]  # dependent coordinates first
     exchanges: Annotated[Indices, "7*nb"]  # column exchanges of the factorisation
-    partition: Partition
+    partition: CoordinatePartition
 
 
 options_of, scratch_of = opener(Options), opener(Scratch)
@@ -134,7 +134,7 @@ def factorise_dependent(memory):
         for j in range(rank):
             lu[i, j] = a[rows[i], columns[j]]
     memory.equations.system.counts.factorisations += 1
-    if not lu_factor(lu, rank, scratch.exchanges, SINGULAR_PIVOT):
+    if not lu_factor(lu, rank, scratch.exchanges, SINGULAR_DEPENDENT):
         return False
     smallest, greatest = abs(lu[0, 0]), abs(lu[0, 0])
     for i in range(rank):
@@ -186,7 +186,7 @@ def solve_dependent_coordinates(t, y, memory):
     predict_dependent(t, memory)
     for i in range(order.shape[0] - rank):
         state.coordinates[order[rank + i]] = y[i]
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MOST_DEPENDENT_STEPS):
         evaluate(t, state.coordinates, state.velocities, memory.equations)
         violation = find_violation(memory)
         if not factorise_dependent(memory):

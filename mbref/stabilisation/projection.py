@@ -19,7 +19,7 @@ from mbref.equations.evaluation import assemble_system, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
-from mbref.linear_algebra.minimum_norm import ALPHA, LEAST, solve_fixed_iterations
+from mbref.linear_algebra.minimum_norm import ALPHA, LEAST_ITERATIONS, solve_fixed_iterations
 from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, regularised_factor
 from mbref.linear_algebra.vectors import copy, flush_denormals, largest, sort
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
@@ -30,7 +30,7 @@ INDEPENDENT = (5.0 * ALPHA**-0.25) ** 2  # squared pivot above which a row count
 DEPENDENT = 3e-3  # pivot below which a row clearly depends on other rows
 CLEAR = 0.05  # pivot above which a row is clearly independent
 LEAST_REFERENCE = 0.05  # least value with which the smallest pivot is compared
-MOST_ITERATIONS = 10  # largest number of Newton steps of a correction
+MOST_CORRECTIONS = 10  # largest number of Newton steps of a correction
 STUCK = 1e3  # violation / tolerance below which iterations may fail to reduce it further
 # violation, and its reduction by a step, below which the factor is used again
 SMALL, GOOD_REDUCTION = 1e-8, 1e-2
@@ -159,7 +159,7 @@ def project_positions(t, memory):
     """
     system, before = memory.equations.system, inf
     tolerance = system.settings.newton_tolerance
-    for _ in range(MOST_ITERATIONS):
+    for _ in range(MOST_CORRECTIONS):
         system.counts.newton += 1
         violation = newton_step(t, before, memory)
         if violation < 0.0:
@@ -203,7 +203,7 @@ def project_velocities(memory):
     """Remove Φ' = Φ_q v - ν by the least change of v, with the last factor."""
     velocities, equations = memory.state.velocities, memory.equations
     violation_rate(velocities, equations)
-    remove_violation(equations.rows.phi_rate, LEAST, memory.factor, velocities)
+    remove_violation(equations.rows.phi_rate, LEAST_ITERATIONS, memory.factor, velocities)
 
 
 @exchangeable(RATES)

@@ -13,7 +13,7 @@ from mbref.scene_fields import LARGEST, SMALLEST, shown
 AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
 CODES = (AUTO, GENERIC, GENERATED)
 FINEST = 1e-16  # least relative tolerance; doubles have no more digits
-MOST = 2**62  # largest count
+LARGEST_COUNT = 2**62  # largest count
 
 # field → least and largest value, and whether 0 is allowed, too
 INTERVALS = {
@@ -27,7 +27,7 @@ INTERVALS = {
     "largest_step": (SMALLEST, LARGEST, True),
     "largest_turn": (SMALLEST, LARGEST, True),
 }
-COUNTS = {"most_steps": (1, MOST)}
+COUNTS = {"most_steps": (1, LARGEST_COUNT)}
 
 
 BranchChoice = Mapping[int, int] | tuple[tuple[int, int], ...]  # crossing → branch, or stored as pairs
@@ -110,7 +110,8 @@ def _pairs(value: Any) -> tuple[tuple[int, int], ...]:
     try:
         pairs = value.items() if isinstance(value, Mapping) else value
         return tuple(
-            (operator.index(crossing), _count("branches", branch, 1, MOST)) for crossing, branch in pairs
+            (operator.index(crossing), _count("branches", branch, 1, LARGEST_COUNT))
+            for crossing, branch in pairs
         )
     except (TypeError, ValueError):
         raise ValueError(

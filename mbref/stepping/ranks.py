@@ -13,7 +13,7 @@ from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.minimum_norm import factorise_once
 from mbref.stabilisation.projection import INDEPENDENT
 
-MOST_ROWS = 120  # rows; singular values of more rows are not computed
+MOST_RANKED_ROWS = 120  # rows; singular values of more rows are not computed
 
 
 class Ranks(NamedTuple):
@@ -38,7 +38,7 @@ def ranks_at(
     size = factor.symbolic.row.size
     if blocks is None:
         blocks = model.terms(0.0, q).blocks
-    if size > MOST_ROWS:
+    if size > MOST_RANKED_ROWS:
         return NO_RANKS._replace(rank=size if are_clear(model, blocks, factor) else 0)
     (found,) = all_ranks(model, blocks[None], model.data.metric_root[None], factor.symbolic, tolerance)
     return found
@@ -52,7 +52,7 @@ def all_ranks(
     Arguments are Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
     """
     rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
-    if rows.size > MOST_ROWS or not rows.size:
+    if rows.size > MOST_RANKED_ROWS or not rows.size:
         return [NO_RANKS] * len(blocks)
     jacobian = model.structure.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]
     every = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None], compute_uv=False)

@@ -25,7 +25,7 @@ from mbref.stabilisation.projection import factorise_constraints, keep_end
 REACHED = 1e-3  # relative pivot below which a step has reached a singular position
 # relative pivot inside a step below which it counts as zero, because the pose is interpolated
 VANISHED = 1e-2
-ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
+PRODUCT_ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
 SEARCH, PLACE_ERROR = 30, 1e-9  # evaluations that locate a zero, and error of its place / step
 
 
@@ -66,7 +66,7 @@ def passes_singular_position(h, memory):
     Rows whose pivots are small at both ends are redundant, and are not examined.
     """
     ends, factor = memory.loop.ends, memory.factor
-    factorise_product(factor, ends.gradient, ALPHA, ends)
+    factorise_product(factor, ends.gradient, PRODUCT_ALPHA, ends)
     least, looked_at = (REACHED * memory.watch.reference_pivot) ** 2, False
     for k in range(memory.pivots.shape[0]):
         larger = max(memory.pivots[k] ** 2, ends.squared_pivots[k])
@@ -111,7 +111,7 @@ def expand_product_at(part, h, memory):
     put_pose(part, h, memory)
     evaluate(t, ends.pose, memory.state.velocities, memory.equations)
     factorise_constraints(memory)
-    factorise_product(memory.factor, ends.gradient, ALPHA, ends)
+    factorise_product(memory.factor, ends.gradient, PRODUCT_ALPHA, ends)
 
 
 @kernel

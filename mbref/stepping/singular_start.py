@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.equations.branches import MOST_ROWS, fit_to_branches, tangents
+from mbref.equations.branches import MOST_BRANCHED_ROWS, fit_to_branches, tangents
 from mbref.equations.initial_state import MET, rate_violation
 from mbref.stepping.run import Run
 
 NEAR_SINGULAR = 1e-6  # smallest singular value of unit rows below which a start is near a singular position
-STILL = 1e-12  # force along a branch / largest force, below which the body stays at rest
+NO_FORCE = 1e-12  # force along a branch / largest force, below which the body stays at rest
 
 
 class Leaving(NamedTuple):
@@ -61,7 +61,7 @@ def begins_on_singular_position(run: Run) -> bool:
 def freedoms_of_first_order(run: Run) -> int:
     """Return the number of velocities that Φ_q allows at the start of a run with projection; 0 if ranks are
     not computed."""
-    if not run.method.stabilisation.projects or run.model.m > MOST_ROWS:
+    if not run.method.stabilisation.projects or run.model.m > MOST_BRANCHED_ROWS:
         return 0
     return int(run.memory.active.velocities.size - run.memory.watch.generic_rank)
 
@@ -109,6 +109,6 @@ def leaving_acceleration(run: Run) -> np.ndarray | None:
     terms = run.model.terms(0.0, run.start.q, run.start.v)
     push, inertia = found @ terms.force, np.einsum("bi,i,bi->b", found, run.model.mass, found)
     best = int(np.argmax(push**2 / inertia))
-    if not abs(push[best]) > STILL * np.abs(terms.force).max(initial=0.0) * np.abs(found[best]).max():
+    if not abs(push[best]) > NO_FORCE * np.abs(terms.force).max(initial=0.0) * np.abs(found[best]).max():
         return None
     return found[best] * (push[best] / inertia[best])

@@ -15,7 +15,7 @@ from mbref.taylor.natural import NaturalCoordinates, pose_of
 from mbref.taylor.numbers import OneScene
 from mbref.taylor.polynomials import Geometry
 
-MOST_KEPT = 64  # largest number of cached geometries
+MOST_GEOMETRIES = 64  # largest number of cached geometries
 
 _known: dict[Hashable, Geometry] = {}
 
@@ -28,7 +28,7 @@ def geometry_of(model: Model, start: Start, moving: np.ndarray, driven: bool) ->
     key = driven, _key(model, start, moving)
     found = _known.get(key)  # looked up once, because hashing joints takes time
     if found is None:
-        if len(_known) >= MOST_KEPT:
+        if len(_known) >= MOST_GEOMETRIES:
             _known.pop(next(iter(_known)), None)
         pose = pose_of(start.q)
         found = _known[key] = Geometry(NaturalCoordinates(model, pose, moving, driven, OneScene()))

@@ -67,7 +67,7 @@ class Solver(NamedTuple):
     change: Annotated[Vector, "lanes"]  # the last correction
 
 
-class Options(NamedTuple):
+class SeriesOptions(NamedTuple):
     """Numbers of a run that its steps do not change."""
 
     regular_tolerance: float = 0.0  # tolerance of the last terms of the series, in regular steps
@@ -140,7 +140,7 @@ class SeriesKernels(NamedTuple):
 
     begin: Annotated[Kernel, BEGIN]
     expand: Annotated[Kernel, EXPAND]
-    step: Annotated[Kernel, STEP]
+    step: Annotated[Kernel, TAKE_STEP]
     partition: Annotated[Kernel, PARTITION]
     respond: Annotated[Kernel, RESPOND]
     terms: Annotated[Kernel, TERMS]
@@ -209,7 +209,7 @@ class TaylorMemory(NamedTuple):
     pose_maps: PoseMaps
     series: Series
     solver: Solver
-    options: Options
+    options: SeriesOptions
     mode: Mode
     partition: Partition
     step: Step
@@ -231,6 +231,6 @@ class TaylorMemory(NamedTuple):
 
 
 SERIES = Named(TaylorMemory)
-BEGIN = STEP = PARTITION = RESPOND = TERMS = SAMPLE = INT(SERIES)
+BEGIN = TAKE_STEP = PARTITION = RESPOND = TERMS = SAMPLE = INT(SERIES)
 DETECT = INT(FLOAT, FLOAT, SERIES)  # arguments: length of the step (s), least pivot at its end
 EXPAND = INT(FLOAT, SERIES)  # arguments: t

@@ -12,7 +12,7 @@ from mbref.kernels.compilation import inlined, kernel
 
 VALUE, COSINE, SINE = range(3)  # functions of a driver's value
 SPRING_VECTOR, SPRING_LENGTH, SPRING_INVERSE, SPRING_RATE, SPRING_PULL, SPRING_SERIES = 0, 3, 4, 5, 6, 7
-E1, E2, F, COS, SIN, TURN, TORQUE, TORQUE_COS, TORQUE_SIN, TORSION_SERIES = 0, 3, 6, *range(9, 16)
+E1, E2, F, COS, SIN, TORSION, TORQUE, TORQUE_COS, TORQUE_SIN, TORSION_SERIES = 0, 3, 6, *range(9, 16)
 SLIDE_AXIS, SLIDE_VECTOR, SLID, PUSH, SLIDE_SERIES = 0, 3, 6, 7, 8
 
 
@@ -175,12 +175,12 @@ def grow_torsions(k, memory):
         of[COS, k], of[SIN, k] = cosine, sine
         if k == 0:
             angle, near = arctan2(sine, cosine), memory.angles[s]
-            of[TURN, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
+            of[TORSION, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
         else:
             value = 0.0
             for i in range(1, k + 1):
                 value += i * (of[COS, k - i] * of[SIN, i] - of[SIN, k - i] * of[COS, i])
-            of[TURN, k] = value / k
+            of[TORSION, k] = value / k
 
 
 @kernel
@@ -190,8 +190,8 @@ def add_torsions(k, memory):
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        angle = of[TURN, k] - torsions.natural[s] if k == 0 else of[TURN, k]
-        of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TURN, k + 1]
+        angle = of[TORSION, k] - torsions.natural[s] if k == 0 else of[TORSION, k]
+        of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TORSION, k + 1]
         of[TORQUE, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
         if torsions.row[s] >= 0:
             of[TORQUE, k] = 0.0

@@ -1,8 +1,8 @@
 """Numbers of many scenes at once: the equations of all scenes of a batch are computed together.
 
-Coefficients of a batch are floats if each scene has the same float, otherwise ``Numbers``. Every operation is
-an operation of IEEE arithmetic, so that a scene has equal bits in a batch and alone. The first scene makes
-decisions; the batch records which scenes would decide differently.
+Coefficients of a batch are floats if each scene has the same float, otherwise ``BatchNumber``. Every
+operation is an operation of IEEE arithmetic, so that a scene has equal bits in a batch and alone. The first
+scene makes decisions; the batch records which scenes would decide differently.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class ManyScenes:
             return np.array(first)
         found = first.astype(object)
         for place in zip(*np.nonzero(~same), strict=True):
-            found[place] = Numbers(np.ascontiguousarray(values[(slice(None), *place)]), self)
+            found[place] = BatchNumber(np.ascontiguousarray(values[(slice(None), *place)]), self)
         return found
 
     def spread(self, array: np.ndarray) -> np.ndarray:
         """Return the values (s, …) of numbers (…)."""
         found = np.empty((self.agree.size, array.size))
         for k, number in enumerate(array.ravel().tolist()):
-            found[:, k] = number.values if isinstance(number, Numbers) else number
+            found[:, k] = number.values if isinstance(number, BatchNumber) else number
         return found.reshape(-1, *array.shape)
 
     def pattern(self, values: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ class ManyScenes:
         return np.asarray(found[0])
 
 
-class Numbers:
+class BatchNumber:
     """A number for each scene of a batch."""
 
     __slots__ = ("batch", "values")
@@ -76,39 +76,39 @@ class Numbers:
     def __init__(self, values: np.ndarray, batch: ManyScenes):
         self.values, self.batch = values, batch
 
-    def _with(self, values: np.ndarray) -> Numbers:
-        return Numbers(values, self.batch)
+    def _with(self, values: np.ndarray) -> BatchNumber:
+        return BatchNumber(values, self.batch)
 
-    def __add__(self, other: Any) -> Numbers:
+    def __add__(self, other: Any) -> BatchNumber:
         return self._with(self.values + _values(other))
 
-    def __sub__(self, other: Any) -> Numbers:
+    def __sub__(self, other: Any) -> BatchNumber:
         return self._with(self.values - _values(other))
 
-    def __mul__(self, other: Any) -> Numbers:
+    def __mul__(self, other: Any) -> BatchNumber:
         return self._with(self.values * _values(other))
 
-    def __truediv__(self, other: Any) -> Numbers:
+    def __truediv__(self, other: Any) -> BatchNumber:
         return self._with(self.values / _values(other))
 
     __radd__, __rmul__ = __add__, __mul__  # sums and products do not depend on the order of the factors
 
-    def __rsub__(self, other: Any) -> Numbers:
+    def __rsub__(self, other: Any) -> BatchNumber:
         return self._with(other - self.values)
 
-    def __rtruediv__(self, other: Any) -> Numbers:
+    def __rtruediv__(self, other: Any) -> BatchNumber:
         return self._with(other / self.values)
 
-    def __neg__(self) -> Numbers:
+    def __neg__(self) -> BatchNumber:
         return self._with(-self.values)
 
-    def __abs__(self) -> Numbers:
+    def __abs__(self) -> BatchNumber:
         return self._with(np.abs(self.values))
 
-    def __round__(self, digits: int) -> Numbers:
+    def __round__(self, digits: int) -> BatchNumber:
         return self._with(np.array([round(value, digits) for value in self.values.tolist()]))
 
-    def sqrt(self) -> Numbers:
+    def sqrt(self) -> BatchNumber:
         """Return the square roots."""
         return self._with(np.sqrt(self.values))
 
@@ -128,38 +128,39 @@ class Numbers:
 
 
 def _values(number: Any) -> Any:
-    return number.values if type(number) is Numbers else number
+    return number.values if type(number) is BatchNumber else number
 
 
 def scalar(number: Any) -> Any:
-    """Return an entry of an array as a float, or as Numbers."""
-    return number if type(number) is Numbers else float(number)
+    """Return an entry of an array as a float, or as a BatchNumber."""
+    return number if type(number) is BatchNumber else float(number)
 
 
 def of_first(number: Any) -> Any:
     """Return the number of the first scene, for a decision that influences no result."""
-    return float(number.values[0]) if type(number) is Numbers else number
+    return float(number.values[0]) if type(number) is BatchNumber else number
 
 
 def root(number: Any) -> Any:
     """Return the square root."""
-    return number.sqrt() if type(number) is Numbers else math.sqrt(number)
+    return number.sqrt() if type(number) is BatchNumber else math.sqrt(number)
 
 
 def largest(numbers: Iterable[Any]) -> Any:
     """Return the largest magnitude; 0 without numbers."""
     sizes = [abs(number) for number in numbers]
-    many = [size for size in sizes if type(size) is Numbers]
+    many = [size for size in sizes if type(size) is BatchNumber]
     if not many:
         return max(sizes, default=0.0)
     values = np.maximum.reduce([size.values for size in many])
-    rest = max((size for size in sizes if type(size) is not Numbers), default=0.0)
-    return Numbers(np.maximum(values, rest), many[0].batch)
+    rest = max((size for size in sizes if type(size) is not BatchNumber), default=0.0)
+    return BatchNumber(np.maximum(values, rest), many[0].batch)
 
 
 def array_of(numbers: Sequence[Any]) -> np.ndarray:
     """Return numbers as an array; of floats if all numbers are floats."""
-    return np.array(numbers, dtype=object if any(type(number) is Numbers for number in numbers) else float)
+    many = any(type(number) is BatchNumber for number in numbers)
+    return np.array(numbers, dtype=object if many else float)
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> Any:

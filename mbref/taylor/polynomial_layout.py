@@ -23,7 +23,7 @@ class PoseMaps(NamedTuple):
     across: Annotated[Matrix, "nz", 12]
 
 
-class Rows(NamedTuple):
+class RowPolynomials(NamedTuple):
     """Constraint rows Φ: products of two variables or prescribed functions (each product twice), linear terms
     and constants."""
 
@@ -126,7 +126,7 @@ class TimedForces(NamedTuple):
 class Polynomials(NamedTuple):
     """A scene's equations."""
 
-    rows: Rows
+    rows: RowPolynomials
     products: Products
     inertia: Inertia
     poses: Poses

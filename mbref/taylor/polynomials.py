@@ -25,7 +25,7 @@ from mbref.taylor.load_polynomials import (
 from mbref.taylor.loads import VALUE
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.numbers import array_of
-from mbref.taylor.polynomial_layout import Given, Inertia, Polynomials, Poses, Products, Rows
+from mbref.taylor.polynomial_layout import Given, Inertia, Polynomials, Poses, Products, RowPolynomials
 from mbref.taylor.simd import WIDTH, padded_size
 
 
@@ -67,7 +67,7 @@ class Geometry:
         )
 
 
-def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
+def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> RowPolynomials:
     constant: np.ndarray = np.full(lanes, 0.0, of.numbers.number_type)
     linear: list[tuple[float, ...]] = []
     twofold: list[tuple[float, ...]] = []
@@ -80,10 +80,10 @@ def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> Rows:
             else:
                 twofold += [(r, lane[i], lane[j], coefficient), (r, lane[j], lane[i], coefficient)]
     columns = [*_columns(twofold, 3), *_columns(linear, 2), constant]
-    return Rows(*columns)
+    return RowPolynomials(*columns)
 
 
-def _tableau(rows: Rows, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
+def _tableau(rows: RowPolynomials, nz: int, nr: int, lanes: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the constant part of the tableau (nr + 1, lanes) of the rows, and the places of products in the
     tableau."""
     linear = np.full((nr + 1, lanes), 0.0, rows.constant.dtype)

@@ -18,9 +18,10 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from mbref.kernels.compilation import PLAIN
+from mbref.kernels.named_memory import WORD
 
 WIDTH = 8
-WORD, VECTOR = ir.IntType(64), ir.VectorType(ir.DoubleType(), WIDTH)
+SIMD_VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
 
 def padded_size(size: int) -> int:
@@ -41,7 +42,7 @@ SIMD = VectorType()
 @register_model(VectorType)
 class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager, kind):
-        super().__init__(manager, kind, VECTOR)
+        super().__init__(manager, kind, SIMD_VECTOR)
 
 
 def _repeated(builder, number):
@@ -84,7 +85,7 @@ def _place(context, builder, kind, array, offset):
 def _load(typing, array, offset):
     def generate(context, builder, signature, arguments):
         place = _place(context, builder, signature.args[0], *arguments)
-        loaded = builder.load(builder.bitcast(place, VECTOR.as_pointer()))
+        loaded = builder.load(builder.bitcast(place, SIMD_VECTOR.as_pointer()))
         loaded.align = WIDTH
         return loaded
 
@@ -95,7 +96,7 @@ def _load(typing, array, offset):
 def _store(typing, value, array, offset):
     def generate(context, builder, signature, arguments):
         place = _place(context, builder, signature.args[1], *arguments[1:])
-        builder.store(arguments[0], builder.bitcast(place, VECTOR.as_pointer())).align = WIDTH
+        builder.store(arguments[0], builder.bitcast(place, SIMD_VECTOR.as_pointer())).align = WIDTH
         return context.get_dummy_value()
 
     return types.void(SIMD, array, i8), generate
@@ -104,7 +105,7 @@ def _store(typing, value, array, offset):
 @intrinsic
 def _gather(typing, array, offset, lanes, first):
     def generate(context, builder, signature, arguments):
-        value, (kind, _, index_kind, _) = ir.Constant(VECTOR, ir.Undefined), signature.args
+        value, (kind, _, index_kind, _) = ir.Constant(SIMD_VECTOR, ir.Undefined), signature.args
         array, offset, lanes, first = arguments
         row = _place(context, builder, kind, array, offset)
         for k in range(WIDTH):

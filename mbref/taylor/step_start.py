@@ -7,7 +7,7 @@ from mbref.kernels.compilation import exchangeable, kernel
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.correction import violation
 from mbref.taylor.layout import PARTITION
-from mbref.taylor.loads import TORSION_SERIES, TURN
+from mbref.taylor.loads import TORSION, TORSION_SERIES
 from mbref.taylor.partition import choose, save_start_pivots
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
@@ -21,7 +21,7 @@ def save_series(memory):
         store(load(series.terms, j), series.past, j)
     for s in range(series.past_angles.shape[0]):
         for k in range(order):
-            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + TURN, k]
+            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + TORSION, k]
         series.past_angles[s, order] = 0.0
     step.last_order = step.used_order = order
     step.time_to_pole = 0.0

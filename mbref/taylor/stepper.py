@@ -40,13 +40,13 @@ from mbref.taylor.driven import (
     follow_drivers,
 )
 from mbref.taylor.geometry import geometry_of
-from mbref.taylor.layout import Options
+from mbref.taylor.layout import SeriesOptions
 from mbref.taylor.mode import REGULAR
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
 
 EXACT, EXACT_ORDER = 1e-13, 22  # tolerance and least order of high-accuracy steps
-SHARE = 0.05  # tolerance of the last terms / (rtol + atol), far from singular positions
+LAST_TERMS = 0.05  # tolerance of the last terms / (rtol + atol), far from singular positions
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000
 LEAST_ORDER, MOST_ORDER = 4, 30  # order of a series; rounding dominates higher terms
@@ -85,10 +85,10 @@ class SeriesStepper:
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, exact_order)
         self.taylor, self.argument = self._pooled.values, self._pooled.packed.argument
         self._calls, self._sampling = 0, 0.0  # calls of kernels that take steps; s of CPU time for samples
-        self._options = Options(
+        self._options = SeriesOptions(
             regular_tolerance=tolerance,
             regular_order=order,
-            accurate_tolerance=ACCURATE_TOLERANCE if self.follows_drivers else SHARE * (EXACT + EXACT),
+            accurate_tolerance=ACCURATE_TOLERANCE if self.follows_drivers else LAST_TERMS * (EXACT + EXACT),
             accurate_order=exact_order,
             velocity_change=max(run.memory.control.rtol, MIN_CHANGE),
             start_distance=START_ERROR * max(1.0, run.model.length),
@@ -113,7 +113,7 @@ class SeriesStepper:
                 PREDICTOR_TOLERANCE,
                 order_of(PREDICTOR_TOLERANCE, wanted or PREDICTOR_ORDER, GENERIC),
             )
-        tolerance = SHARE * (run.memory.control.rtol + run.memory.control.atol)
+        tolerance = LAST_TERMS * (run.memory.control.rtol + run.memory.control.atol)
         return False, tolerance, order_of(tolerance, wanted, GENERATED if code == GENERATED else GENERIC)
 
     def _decide_rank(self) -> None:

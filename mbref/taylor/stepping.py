@@ -30,7 +30,7 @@ from mbref.taylor.crossing.thresholds import (
     MIN_PIVOT_RATIO,
     OVERSHOOT,
 )
-from mbref.taylor.layout import BEGIN, EXPAND, STEP
+from mbref.taylor.layout import BEGIN, EXPAND, TAKE_STEP
 from mbref.taylor.loads import expand_functions, part_behind_no_length, time_to_no_length
 from mbref.taylor.mode import is_accurate
 from mbref.taylor.partition import least_pivot
@@ -202,7 +202,7 @@ def expand_at(h, last, memory):
     return status
 
 
-@exchangeable(STEP)
+@exchangeable(TAKE_STEP)
 def take_step(memory):
     """Take one step in as many attempts as it needs, and its samples; return OK or the failure status."""
     clock, counts, state, stop = (

@@ -43,7 +43,7 @@ def _(_):
     return near(found[0, 3], (0.5 * 2.0) ** 2)
 
 
-@check("equations.units SMALLEST")
+@check("equations.units SHORTEST_LENGTH")
 def _(_):
     def takes_mean(length):
         arms = np.array([[2.0, 0.0, 0.0], [length, 0.0, 0.0]])
@@ -134,7 +134,7 @@ def second_order(forms, freedoms=2):
     return branches.SecondOrder(np.eye(freedoms), np.asarray(forms, dtype=float), np.ones(freedoms))
 
 
-@check("equations.branches FLAT")
+@check("equations.branches ZERO_FORM")
 def _(_):
     form = lambda size: np.array([[[0.0, size], [size, 0.0]]])  # noqa: E731
     return flips(lambda size: len(branches._independent(form(size / math.sqrt(2.0)))) == 0, 0.98e-7, 1.02e-7)
@@ -147,7 +147,7 @@ def _(_):
 
 
 # --- linear algebra and formulations --------------------------------------------------------------------
-@check("formulations.lm2 SINGULAR_PIVOT")
+@check("formulations.lm2 DEPENDENT_PIVOT")
 def _(_):
     def is_singular(sine):
         dt = np.array([[1.0, math.sqrt(1.0 - sine)], [0.0, math.sqrt(sine)]])
@@ -180,7 +180,7 @@ def _(_):
     return near(one_step.next_step(1.0, 1.0, math.nan, 1.0, STEP), 0.25)
 
 
-@check("integrators.one_step ROUNDED")
+@check("integrators.one_step ROUNDED_ERROR")
 def _(_):
     def shows_no_trend(share):
         clock = SimpleNamespace(restart=0, share=share, past_ratio=0.1, past_length=1.0)
@@ -275,7 +275,7 @@ def positions(monkeypatch, violations):
     return projection.project_positions(0.0, run), counts.newton
 
 
-@check("stabilisation.projection MOST_ITERATIONS")
+@check("stabilisation.projection MOST_CORRECTIONS")
 def _(monkeypatch):
     return positions(monkeypatch, [1.0 / (k + 1) for k in range(40)])[1] == 10
 
@@ -439,7 +439,7 @@ def _(monkeypatch):
     return flips(lambda weight: not is_open(weight), 0.98e-6, 1.02e-6)
 
 
-@check("linear_algebra.minimum_norm LEAST")
+@check("linear_algebra.minimum_norm LEAST_ITERATIONS")
 def _(monkeypatch):
     made = []
     monkeypatch.setattr(minimum_norm, "change_by_step", lambda *_: made.append(1) or 0.0)

@@ -147,7 +147,7 @@ def _(monkeypatch):
     return flips(is_near, 0.98e-6, 1.02e-6)
 
 
-@check("stepping.singular_start STILL")
+@check("stepping.singular_start NO_FORCE")
 def _(monkeypatch):
     def along(share):
         """A branch along which a share of the largest force acts."""
@@ -249,7 +249,7 @@ def _(monkeypatch):
     return flips(lambda reached: dead(monkeypatch, 1e4, reached), 1.005, 1.015)
 
 
-@check("simulation.singular_position NEAR")
+@check("simulation.singular_position NEAR_PIVOT")
 def _(_):
     def is_near(pivot):
         run = SimpleNamespace(model=SimpleNamespace(closed_loops=1))
@@ -283,7 +283,7 @@ def _(_):
     return flips(lambda error: not is_warned(error, 1e-6), 0.98e-3, 1.02e-3)
 
 
-@check("error_estimate LEAST")
+@check("error_estimate LEAST_WARNED")
 def _(_):
     return flips(lambda error: not is_warned(error, 1e-12), 0.98e-6, 1.02e-6)
 
@@ -424,7 +424,7 @@ def _(_):
     return stepper.order_of(1e-30, 0, "generic") == 30
 
 
-@check("stepping.ranks MOST_ROWS")
+@check("stepping.ranks MOST_RANKED_ROWS")
 def _(_):
     def are_computed(rows):
         symbolic = SimpleNamespace(row=np.arange(rows), column=np.arange(rows))

@@ -95,7 +95,7 @@ def _(_):
     return flips(lambda r: not wide(r), 29.5, 30.5)
 
 
-@check("scene_slips APART")
+@check("scene_slips OTHER_UNIT")
 def _(_):
     def is_mixed(ratio):
         joints = tuple(
@@ -120,12 +120,12 @@ def stability(*eigenvalues):
     return equilibrium.Equilibrium(hinged(), np.array(eigenvalues), np.zeros((0, 1, 6)), {}).stability
 
 
-@check("design.equilibrium STILL")
+@check("design.equilibrium STILL_EIGENVALUE")
 def _(_):
     return flips(lambda part: stability(-1.0 + 0j, -part + 0j) == "indifferent", 0.98e-6, 1.02e-6)
 
 
-@check("design.equilibrium SAME")
+@check("design.equilibrium SAME_EQUILIBRIUM")
 def _(_):
     model = SimpleNamespace(length=1.0)
     at = lambda x: SimpleNamespace(q=np.array([x, 0, 0, 1.0, 0, 0, 0]), units=np.ones(6), model=model)  # noqa: E731
@@ -149,18 +149,18 @@ def _(_):
     return flips(lambda off: equilibrium._balanced(tangent(off), 1.0) is not None, 0.98e-11, 1.02e-11)
 
 
-@check("design.equilibrium LONGEST")
+@check("design.equilibrium LONGEST_STEP")
 def _(monkeypatch):
     """A first step that would be long is shortened."""
     start, moves = tangent(1.0), []
     start.slope = lambda: np.array([[1e-6]])
     monkeypatch.setattr(equilibrium, "_moved", lambda _, y: moves.append(abs(y[0])))
-    monkeypatch.setattr(equilibrium, "MOST_STEPS", 1)
+    monkeypatch.setattr(equilibrium, "MOST_NEWTON_STEPS", 1)
     equilibrium._balanced(start, 1.0)
     return near(moves[0], 0.3)
 
 
-@check("design.equilibrium MOST_STEPS")
+@check("design.equilibrium MOST_NEWTON_STEPS")
 def _(monkeypatch):
     start, moves = tangent(1.0), []
     start.slope = lambda: np.array([[1.0]])
@@ -176,14 +176,14 @@ def _(monkeypatch):
     return len(moves) == 60
 
 
-@check("design.linearisation RANK")
+@check("design.linearisation TANGENT_RANK")
 def _(_):
     rows = lambda value: np.array([[1.0, 0.0], [math.sqrt(1.0 - value**2), value]])  # noqa: E731
     freedoms = lambda value: linearisation._null_space(rows(value)).shape[1]  # noqa: E731
     return flips(lambda value: freedoms(value) == 1, 1.9e-9, 2.1e-9)
 
 
-@check("design.linearisation STEP")
+@check("design.linearisation DIFFERENCE_STEP")
 def _(_):
     found = linearisation.Tangent.__new__(linearisation.Tangent)
     terms = SimpleNamespace(jacobian=np.zeros((0, 6)))
@@ -192,7 +192,7 @@ def _(_):
     return near(found.step, 0.005 * 2.0)
 
 
-@check("design.along_motion SAME")
+@check("design.along_motion SAME_POSE")
 def _(_):
     def moves(far):
         motion = SimpleNamespace(position=np.array([[[0.0]], [[far]]]), orientation=np.zeros((2, 1, 4)))
@@ -227,7 +227,7 @@ def _(_):
     return flips(lambda value: freedoms(value) == 5, 1.9e-6, 2.1e-6)
 
 
-@check("equations.branches STARTS")
+@check("equations.branches ROOT_STARTS")
 def _(monkeypatch):
     tried = []
     monkeypatch.setattr(branches, "_root_from", lambda _, a: tried.append(1) or (a, 1.0, False))
@@ -235,7 +235,7 @@ def _(monkeypatch):
     return len(tried) == 200
 
 
-@check("equations.branches ITERATIONS")
+@check("equations.branches ROOT_ITERATIONS")
 def _(monkeypatch):
     made = []
     usual = branches._values
@@ -244,7 +244,7 @@ def _(monkeypatch):
     return len(made) == 40 + 1
 
 
-@check("equations.branches ZERO")
+@check("equations.branches ZERO_AT_ROOT")
 def _(monkeypatch):
     """A place where the forms are too large is no root."""
 
@@ -267,7 +267,7 @@ def _(monkeypatch):
             return np.array([math.cos(angle), math.sin(angle), 0.0]), 0.0, False
 
         monkeypatch.setattr(branches, "_root_from", found)
-        monkeypatch.setattr(branches, "STARTS", 2)
+        monkeypatch.setattr(branches, "ROOT_STARTS", 2)
         kept = []
         usual = branches._angle
         monkeypatch.setattr(branches, "_angle", lambda a, b: kept.append(usual(a, b)) or usual(a, b))
@@ -283,7 +283,7 @@ def _(monkeypatch):
 def _(_):
     def is_series(count):
         scene = SimpleNamespace(body=[None] * count)
-        return method.default_method(scene) == method.SERIES
+        return method.default_method(scene) == method.SERIES_METHOD
 
     return is_series(100) and not is_series(101)
 
@@ -331,7 +331,7 @@ def _(monkeypatch):
     )
 
 
-@check("simulation.trial MOST_STEPS")
+@check("simulation.trial MOST_TRIAL_STEPS")
 def _(monkeypatch):
     monkeypatch.setattr(trial, "KERNELS_OF_SERIES", ())
     run = SimpleNamespace(scene=hinged(), times=None, method=SimpleNamespace(is_series=False))
@@ -375,7 +375,7 @@ def options(scene="four_bar_gravity", rtol=1e-6):
     return run.stepper._options
 
 
-@check("taylor.stepper SHARE")
+@check("taylor.stepper LAST_TERMS")
 def _(_):
     return near(options().regular_tolerance, 0.05 * 2e-6)
 

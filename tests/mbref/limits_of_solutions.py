@@ -83,7 +83,7 @@ def _(_):
     return flips(is_kept, 0.98e-15, 1.02e-15)
 
 
-@check("scene_slips FLAT")
+@check("scene_slips FLAT_MECHANISM")
 def _(_):
     return flips(scene_slips._is_zero, 0.98e-6, 1.02e-6)
 
@@ -112,7 +112,7 @@ def _(monkeypatch):
     return len(made) == 30
 
 
-@check("equations.initial_state RANK_TOLERANCE")
+@check("equations.initial_state START_RANK_TOLERANCE")
 def _(monkeypatch):
     scenes = initial_state._alone(Model(pendulum()))
     blocks = scenes.terms(np.zeros(1, dtype=int), scenes.poses, np.zeros((1, 12))).blocks
@@ -169,7 +169,7 @@ def _(_):
 @check("equations.diagnosis UNIQUE_SHARE")
 def _(monkeypatch):
     monkeypatch.setattr(diagnosis, "LARGE", 0)
-    monkeypatch.setattr(diagnosis, "MOST_ROWS", 0)
+    monkeypatch.setattr(diagnosis, "MOST_DIAGNOSED_ROWS", 0)
 
     def is_unique(share):
         found = SimpleNamespace(rank=10, shares=np.full(10, share), singular_values=lambda: (1.0, 1.0))
@@ -207,7 +207,7 @@ def _(monkeypatch):
     return flips(is_nearly_dependent, 0.98e-5, 1.02e-5)
 
 
-@check("simulation.rounded_numbers LEAST")
+@check("simulation.rounded_numbers LEAST_GAP")
 def _(monkeypatch):
     eps = np.finfo(float).eps
     run = SimpleNamespace(model=SimpleNamespace(m=1), start=SimpleNamespace(q=np.array([3.0])))
@@ -230,14 +230,14 @@ def redundant_hinges():
     return SimpleNamespace(model=model, start=SimpleNamespace(q=model.start()))
 
 
-@check("simulation.rounded_numbers STEP")
+@check("simulation.rounded_numbers POSE_STEP")
 def _(monkeypatch):
     call = lambda: rounded_numbers.gap_of(redundant_hinges())  # noqa: E731
     _, moved = first_arguments(monkeypatch, rounded_numbers, "displaced", call)
     return near(np.abs(moved).max(), 0.1)
 
 
-@check("simulation.rounded_numbers ITERATIONS")
+@check("simulation.rounded_numbers POSE_ITERATIONS")
 def _(monkeypatch):
     run = redundant_hinges()
     made = calls_of(monkeypatch, rounded_numbers, "displaced", run.start.q)
@@ -301,7 +301,7 @@ def _(monkeypatch):
 
 
 # --- partitioning ---------------------------------------------------------------------------------------
-@check("stabilisation.partitioning MOST_ITERATIONS")
+@check("stabilisation.partitioning MOST_DEPENDENT_STEPS")
 def _(monkeypatch):
     made = calls_of(monkeypatch, partitioning, "find_violation", 1.0)
     for name in ("predict_dependent", "evaluate", "lu_solve"):
@@ -323,7 +323,7 @@ def _(monkeypatch):
     return status == NOT_CONVERGED and len(made) == 20
 
 
-@check("stabilisation.partitioning SINGULAR_PIVOT")
+@check("stabilisation.partitioning SINGULAR_DEPENDENT")
 def _(monkeypatch):
     monkeypatch.setattr(partitioning, "jacobian_by_euler_parameters", lambda *_: None)
 
@@ -382,7 +382,7 @@ def _(monkeypatch):
     return steps_of(12)[0] and not steps_of(11)[0]
 
 
-@check("stepping.singular_crossing ALPHA")
+@check("stepping.singular_crossing PRODUCT_ALPHA")
 def _(monkeypatch):
     from mbref.stepping import singular_crossing
 
@@ -398,7 +398,7 @@ def _(monkeypatch):
 
 
 # --- designs --------------------------------------------------------------------------------------------
-@check("design.assemble MOST_ITERATIONS")
+@check("design.assemble MOST_LINK_STEPS")
 def _(monkeypatch):
     made = calls_of(monkeypatch, np.linalg, "pinv", np.zeros((9, 3)))
     ends, points = [(0, 1), (1, 2), (0, 2)], np.eye(3)
@@ -406,7 +406,7 @@ def _(monkeypatch):
     return len(made) == 50
 
 
-@check("design.equilibrium NOTHING")
+@check("design.equilibrium FORCE_FREE")
 def _(monkeypatch):
     scene = SimpleNamespace(duration=2.0)
     monkeypatch.setattr(equilibrium, "find_scene", lambda _: SimpleNamespace(assembled=lambda: scene))
@@ -434,7 +434,7 @@ def _(_):
     return near(moved[0], 0.04 * 0.5)
 
 
-@check("design.turning PARALLEL")
+@check("design.turning PARALLEL_TO_GRAVITY")
 def _(_):
     def is_steady(sine):
         axis = (0.0, 0.0, 1.0)
@@ -488,7 +488,7 @@ def displaced(monkeypatch, entry, residual=0.0):
     return solve
 
 
-@check("design.offsets PART")
+@check("design.offsets LARGEST_PART")
 def _(monkeypatch):
     """In metres of a mechanism's length, and in components of a quaternion, which are half a rotation."""
     scene = pendulum()
@@ -502,7 +502,7 @@ def _(monkeypatch):
     return places and flips(lambda size: is_small(4, size / 2), 0.98 * 0.2, 1.02 * 0.2)
 
 
-@check("design.offsets MET")
+@check("design.offsets MET_OFFSET")
 def _(monkeypatch):
     scene = pendulum()
     longest = max(1.0, Model(scene).length)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mbref.drawing.film import png
-from mbref.drawing.labels import LETTER, LINE
+from mbref.drawing.labels import LETTER, LINE_HEIGHT
 from mbref.drawing.marks import SIGNS
 from mbref.drawing.picture import moving, side_by_side, still
 from mbref.drawing.shapes import at_rest, shapes
@@ -68,7 +68,7 @@ def covered(found: dict[str, np.ndarray]) -> list[tuple[str, str]]:
     """Pairs of names of which one covers a part of the other in some frame."""
     pairs = []
     for (first, a), (second, b) in itertools.combinations(found.items(), 2):
-        reach = np.array([LETTER * (len(first) + len(second)), 2 * LINE]) / 2
+        reach = np.array([LETTER * (len(first) + len(second)), 2 * LINE_HEIGHT]) / 2
         if (np.abs(a - b) < reach).all(axis=1).any():
             pairs.append((first, second))
     return pairs
@@ -98,7 +98,7 @@ def crossed(middle: np.ndarray, half: np.ndarray, bar: np.ndarray) -> bool:
 @pytest.mark.parametrize("name", SCENES)
 def test_names_of_bodies_stay_clear_of_bars(name):
     picture, scene = still(SCENES[name]()), SCENES[name]()
-    half = {body.name: np.array([LETTER * len(body.name), LINE]) / 2 + CLEAR for body in scene.body}
+    half = {body.name: np.array([LETTER * len(body.name), LINE_HEIGHT]) / 2 + CLEAR for body in scene.body}
     found = {word: place[0] for word, place in labels(picture).items() if word in half}
     assert not [word for word, at in found.items() for bar in bars(picture) if crossed(at, half[word], bar)]
 

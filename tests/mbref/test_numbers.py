@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mbref.taylor.numbers import ManyScenes, Numbers, dot, largest, norm, root
+from mbref.taylor.numbers import BatchNumber, ManyScenes, dot, largest, norm, root
 
 PLAIN = st.floats(0.1, 10.0)
 VALUES = st.lists(st.tuples(PLAIN, PLAIN), min_size=2, max_size=5)
@@ -37,14 +37,14 @@ def test_vectors_have_the_bits_of_each_scene_alone(values):
 
 def test_numbers_on_which_scenes_agree_are_floats():
     together = ManyScenes(2).together(np.array([[1.0, 2.0, 0.0], [1.0, 3.0, -0.0]]))
-    assert isinstance(together[0], float) and isinstance(together[1], Numbers)
-    assert isinstance(together[2], Numbers), "the signs of zeros differ"
+    assert isinstance(together[0], float) and isinstance(together[1], BatchNumber)
+    assert isinstance(together[2], BatchNumber), "the signs of zeros differ"
     assert ManyScenes(2).together(np.array([[1.0, 2.0], [1.0, 2.0]])).dtype == float
 
 
 def test_a_scene_that_decides_otherwise_leaves_the_batch():
     batch = ManyScenes(3)
-    number = Numbers(np.array([1.0, 2.0, -1.0]), batch)
+    number = BatchNumber(np.array([1.0, 2.0, -1.0]), batch)
     assert number > 0.0 and batch.agree.tolist() == [True, True, False]
     assert not number > 1.5 and batch.agree.tolist() == [True, False, False]
 
@@ -57,4 +57,6 @@ def test_patterns_are_of_the_first_scene():
 
 def test_rounded_numbers_are_those_of_python():
     values = [0.1234567885, 2.675, math.pi]
-    assert round(Numbers(np.array(values), ManyScenes(3)), 9).values.tolist() == [round(v, 9) for v in values]
+    assert round(BatchNumber(np.array(values), ManyScenes(3)), 9).values.tolist() == [
+        round(v, 9) for v in values
+    ]

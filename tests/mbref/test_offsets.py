@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import mbref
-from mbref.design.offsets import PART
+from mbref.design.offsets import LARGEST_PART
 from mbref.drawing.shapes import at_rest
 from mbref.ensembles.simulate_all import simulate_all
 from mbref.equations.model import Model
@@ -119,7 +119,7 @@ def test_driven_joint_stays_at_its_pose():
     agree(motion.joint("B").angle, np.array([0.4, 0.4 - 0.5 * 0.5]))
 
 
-@pytest.mark.parametrize(("offset", "turns"), [(0.4, 0), (40 * PART, 2)])
+@pytest.mark.parametrize(("offset", "turns"), [(0.4, 0), (40 * LARGEST_PART, 2)])
 def test_springs_of_joints_count_their_angle_from_the_file(offset, turns):
     """A spring that is relaxed at the assembled start leaves the wheels at rest; full turns count."""
     scene = shifted(gear_pair, "teeth", offset)

@@ -28,7 +28,7 @@ from mbref.method import Method
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
-from mbref.stepping.ranks import MOST_ROWS, are_clear
+from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
@@ -278,7 +278,7 @@ def test_pivots_tell_that_many_rows_are_independent(stabilisation):
         find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
     )
     rows = run.memory.pivots.size
-    assert rows > MOST_ROWS, "so few rows are told by singular values"
+    assert rows > MOST_RANKED_ROWS, "so few rows are told by singular values"
     assert run.memory.equations.system.settings.independent
 
 

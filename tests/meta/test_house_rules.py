@@ -113,6 +113,31 @@ def test_a_name_of_a_function_has_one_meaning_in_mbref():
     assert double == interface | alike, double ^ (interface | alike)
 
 
+def definitions(path):
+    """Public classes and constants of a file with what they are."""
+    for node in parsed(path).body:
+        if isinstance(node, ast.ClassDef):
+            yield node.name, ast.dump(node)
+        elif isinstance(node, ast.Assign | ast.AnnAssign) and node.value:
+            for target in node.targets if isinstance(node, ast.Assign) else [node.target]:
+                pairs = [(target, node.value)]
+                if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                    pairs = list(zip(target.elts, node.value.elts, strict=False))
+                yield from ((ast.unparse(each), ast.dump(value)) for each, value in pairs)
+
+
+def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
+    """Or it is the name that each method or each kind of generated code gives to one thing."""
+    interface = {"ABOUT", "Options", "Scratch", "Stages", "POINTERS"}
+    meanings: dict[str, set[str]] = {}
+    for path in files("mbref"):
+        for word, meaning in definitions(path) if path.parent.name != "scenes" else ():
+            if word.isidentifier() and not word.startswith("_"):
+                meanings.setdefault(word, set()).add(meaning)
+    double = {word for word, different in meanings.items() if len(different) > 1}
+    assert double == interface, double ^ interface
+
+
 def test_the_guide_lists_every_method():
     text = (ROOT / "docs" / "methods.md").read_text()
     listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))

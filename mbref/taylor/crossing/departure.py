@@ -24,7 +24,7 @@ from mbref.taylor.crossing.thresholds import (
     START_ERROR,
 )
 
-State = tuple[np.ndarray, np.ndarray]  # coordinates (7 nb,) and velocities (n,)
+Moved = tuple[np.ndarray, np.ndarray]  # coordinates (7 nb,) and velocities (n,)
 
 
 class Departure:
@@ -33,7 +33,7 @@ class Departure:
     ``expand`` begins a series at the present state, ``state_at`` evaluates it at a distance (s).
     """
 
-    def __init__(self, run: Run, taylor: Any, expand: Callable[[], int], state_at: Callable[[float], State]):
+    def __init__(self, run: Run, taylor: Any, expand: Callable[[], int], state_at: Callable[[float], Moved]):
         self._run, self._taylor, self._expand, self._state_at = run, taylor, expand, state_at
 
     def along_branch(self, passed: Passed) -> int:
@@ -96,7 +96,7 @@ class Departure:
         across = terms.force - terms.mass * acceleration
         samples.multipliers[k] = np.linalg.lstsq(terms.jacobian.T, across, rcond=None)[0]
 
-    def _come_from(self, start: Passed, velocities: np.ndarray, ahead: float, moved: State) -> int:
+    def _come_from(self, start: Passed, velocities: np.ndarray, ahead: float, moved: Moved) -> int:
         """Continue at a time ``ahead`` (s) after a singular position that is left with velocities (n,).
 
         ``moved`` is a state near the motion, which is corrected. Return PAUSED or the failure status.
@@ -126,7 +126,7 @@ class Departure:
         began.coordinates[:], began.velocities[:] = memory.state.coordinates, memory.state.velocities
         began.angles[:] = memory.equations.angles
 
-    def _corrected(self, start: Passed, velocities: np.ndarray, ahead: float, moved: State) -> int:
+    def _corrected(self, start: Passed, velocities: np.ndarray, ahead: float, moved: Moved) -> int:
         """Correct the state until its series, evaluated backwards, gives the singular position with
         velocities (n,); return the status."""
         (q, v), state = moved, self._run.memory.state

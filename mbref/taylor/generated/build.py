@@ -13,7 +13,7 @@ from mbref.kernels.machine_code import Code, NoGeneratedCode, code_at, processor
 from mbref.taylor.generated import corrections, elimination, multiplier_orders, orders, power_orders
 from mbref.taylor.generated.corrections import Correction
 from mbref.taylor.generated.driven_orders import DrivenOrders
-from mbref.taylor.generated.elimination import Elimination, EliminationOfRows
+from mbref.taylor.generated.elimination import ResponseCode, RowResponseCode
 from mbref.taylor.generated.instructions import Instructions
 from mbref.taylor.generated.multiplier_orders import MultiplierOrders
 from mbref.taylor.generated.power_orders import PowerOrders
@@ -21,8 +21,8 @@ from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.loads import varies
 from mbref.taylor.simd import WIDTH
 
-EXPAND, POWER, FACTORISE = "expand", "expand_by_power", "factorise"
-NAMES = EXPAND, POWER, FACTORISE, *corrections.POINTERS
+EXPAND_CODE, POWER_CODE, FACTORISE_CODE = "expand", "expand_by_power", "factorise"
+CODE_NAMES = EXPAND_CODE, POWER_CODE, FACTORISE_CODE, *corrections.POINTERS
 MOST_VECTORS = 2_000  # products of vectors that LLVM compiles in a second
 
 
@@ -57,11 +57,11 @@ def code_of(taylor: TaylorMemory, names: Sequence[str]) -> Code:
 def names_of_functions(taylor: TaylorMemory) -> tuple[str, ...]:
     """Return the names of a scene's functions: loads that vary are no sums of products of series, and
     elimination of many rows is left to the kernels' loops."""
-    has_constant_loads = not varies(taylor.polynomials)
+    is_constant = not varies(taylor.polynomials)
     rank, nr, nz = rank_of_rows(taylor), taylor.solver.pivot_rows.size, taylor.solver.pivot_columns.size
     is_short = (rank * rank + nr * nz) * taylor.series.terms.shape[1] // WIDTH <= MOST_VECTORS
     by_power = power_orders.serves(taylor)
-    names = {EXPAND: has_constant_loads, POWER: has_constant_loads and by_power, FACTORISE: is_short}
+    names = {EXPAND_CODE: is_constant, POWER_CODE: is_constant and by_power, FACTORISE_CODE: is_short}
     return *(name for name, served in names.items() if served), *corrections.POINTERS
 
 
@@ -89,18 +89,18 @@ def _key(taylor: TaylorMemory, names: Sequence[str]) -> str:
 def write_code(taylor: TaylorMemory, names: Sequence[str]) -> str:
     """Return LLVM IR of the functions whose addresses ``SceneCode`` has."""
     module = ir.Module()
-    if EXPAND in names:
-        write = Instructions(module, EXPAND, multiplier_orders.POINTERS, counts=orders.COUNTS)
+    if EXPAND_CODE in names:
+        write = Instructions(module, EXPAND_CODE, multiplier_orders.POINTERS, counts=orders.ORDER_ARGUMENTS)
         is_driven = rank_of_rows(taylor) == taylor.solver.pivot_columns.size
         (DrivenOrders if is_driven else MultiplierOrders)(taylor, write).put()
         write.end()
-    if POWER in names:
-        write = Instructions(module, POWER, power_orders.POINTERS, counts=orders.COUNTS)
+    if POWER_CODE in names:
+        write = Instructions(module, POWER_CODE, power_orders.POINTERS, counts=orders.ORDER_ARGUMENTS)
         PowerOrders(taylor, write).put()
         write.end()
-    if FACTORISE in names:
-        write = Instructions(module, FACTORISE, *elimination.POINTERS)
-        kind = EliminationOfRows if POWER in names else Elimination
+    if FACTORISE_CODE in names:
+        write = Instructions(module, FACTORISE_CODE, *elimination.POINTERS)
+        kind = RowResponseCode if POWER_CODE in names else ResponseCode
         kind(taylor, rank_of_rows(taylor), write).put()
         write.end()
     for name, pointers in corrections.POINTERS.items():

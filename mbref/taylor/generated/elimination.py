@@ -16,12 +16,12 @@ from mbref.taylor.generated.instructions import Instructions, Vectors, constant,
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.simd import WIDTH
 
-Row = dict[int, ir.Value]
+IrRow = dict[int, ir.Value]
 """The vectors of a row that are not known to be zero, by their number."""
 POINTERS = 6, 2  # terms, tableau, particular, null_space, response, last; row, order
 
 
-class Elimination:
+class ResponseCode:
     """Code for the response matrix at the first coefficients, for a given rank of the rows."""
 
     def __init__(self, taylor: TaylorMemory, rank: int, write: Instructions):
@@ -136,7 +136,7 @@ class Elimination:
             self._store({}, i)
         self._put_rows([self._one(i) for i in range(self._nz)])
 
-    def _put_rows(self, forces: list[Row]) -> None:
+    def _put_rows(self, forces: list[IrRow]) -> None:
         """Write the response to rows: Nᵀ of the forces that are left at the variables."""
         for e in range(self._nz, self._nz + self._nr):
             parts = [
@@ -147,19 +147,19 @@ class Elimination:
             ]
             self._store(self._sum(*parts), e)
 
-    def _free_motions(self, particular: list[Row]) -> list[Row]:
+    def _free_motions(self, particular: list[IrRow]) -> list[IrRow]:
         """Return the response of the independent variables, by the reduced mass matrix."""
         motions, momenta = self._motions_and_momenta()
         rest = [self._without_rows(p, motion, particular) for p, motion in zip(momenta, motions, strict=True)]
         return self._reduced(motions, momenta, rest)
 
-    def _motions_and_momenta(self) -> tuple[list[Row], list[Row]]:
+    def _motions_and_momenta(self) -> tuple[list[IrRow], list[IrRow]]:
         """Return T and M T, a row for each independent variable."""
         free = range(self._nz - self._rank)
         motions = [self._row(self._null_space, f, self._of_variables) for f in free]
         return motions, [self._momentum(f, motion) for f, motion in enumerate(motions)]
 
-    def _reduced(self, motions: list[Row], momenta: list[Row], solved: list[Row]) -> list[Row]:
+    def _reduced(self, motions: list[IrRow], momenta: list[IrRow], solved: list[IrRow]) -> list[IrRow]:
         """Generate code that solves right-hand sides by the reduced mass matrix, and stores its pivots."""
         free = range(len(motions))
         reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]
@@ -179,7 +179,7 @@ class Elimination:
                     ]
         return solved
 
-    def _momentum(self, f: int, motion: Row) -> Row:
+    def _momentum(self, f: int, motion: IrRow) -> IrRow:
         """Return M times a motion, whose variables are also in memory."""
         mass = self._taylor.polynomials.inertia.mass
         row = {}
@@ -199,11 +199,11 @@ class Elimination:
             row[vector] = self._write.total(parts)
         return row
 
-    def _inner(self, momentum: Row, motion: Row) -> ir.Value:
+    def _inner(self, momentum: IrRow, motion: IrRow) -> ir.Value:
         parts = [self._write.product(momentum[vector], motion[vector]) for vector in self._of_variables]
         return self._write.first(self._write.summed(self._write.total(parts)))
 
-    def _without_rows(self, momentum: Row, motion: Row, particular: list[Row]) -> Row:
+    def _without_rows(self, momentum: IrRow, motion: IrRow, particular: list[IrRow]) -> IrRow:
         """Return a motion in the lanes of variables, and minus its momentum times N in the lanes of
         multipliers."""
         vectors = [momentum[vector] for vector in self._of_variables]
@@ -213,38 +213,38 @@ class Elimination:
         ]
         return self._sum(motion, *parts)
 
-    def _force(self, i: int, rows: list[Row]) -> Row:
+    def _force(self, i: int, rows: list[IrRow]) -> IrRow:
         """Return the force that the inertia of all other variables leaves at a variable."""
         mass = self._taylor.polynomials.inertia.mass[i]
         parts = [self._times(constant([-mass[j]] * WIDTH), rows[j]) for j in np.flatnonzero(mass[: self._nz])]
         return self._sum(self._one(i), *parts)
 
-    def _one(self, i: int) -> Row:
+    def _one(self, i: int) -> IrRow:
         """Return a one in the lane of a variable."""
         return {i // WIDTH: constant([float(lane == i % WIDTH) for lane in range(WIDTH)])}
 
     # --- rows ---------------------------------------------------------------------------------------------
-    def _row(self, pointer: ir.Value, k: int, vectors: range) -> Row:
+    def _row(self, pointer: ir.Value, k: int, vectors: range) -> IrRow:
         return {
             vector: self._write.row(pointer, k * self._lanes + vector * WIDTH, WIDTH)[0] for vector in vectors
         }
 
-    def _times(self, factor: ir.Value, row: Row) -> Row:
+    def _times(self, factor: ir.Value, row: IrRow) -> IrRow:
         return {vector: self._write.product(factor, value) for vector, value in row.items()}
 
-    def _sum(self, *rows: Row) -> Row:
+    def _sum(self, *rows: IrRow) -> IrRow:
         vectors = sorted(set().union(*rows))
         return {
             vector: self._write.total([row[vector] for row in rows if vector in row]) for vector in vectors
         }
 
-    def _store(self, row: Row, k: int) -> None:
+    def _store(self, row: IrRow, k: int) -> None:
         zero = constant([0.0] * WIDTH)
         vectors = [row.get(vector, zero) for vector in range(self._lanes // WIDTH)]
         self._write.store(vectors, self._response, k * self._lanes)
 
 
-class EliminationOfRows(Elimination):
+class RowResponseCode(ResponseCode):
     """The response of the variables to rows alone."""
 
     def _put_response(self) -> None:

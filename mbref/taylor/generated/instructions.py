@@ -9,13 +9,13 @@ import numpy as np
 from llvmlite import ir
 
 from mbref.taylor.generated_calls import function_type
-from mbref.taylor.simd import VECTOR, WIDTH, WORD
+from mbref.taylor.simd import SIMD_VECTOR, WIDTH, WORD
 
 DOUBLE, PLACE = ir.DoubleType(), ir.IntType(32)
 WHOLE = WORD
 PLACES = ir.VectorType(PLACE, WIDTH)
 FUSED = ("contract",)
-CHAINS = 4  # sums that are added in parallel, since one sum would wait for each of its products
+PARALLEL_SUMS = 4  # sums that are added in parallel, since one sum would wait for each of its products
 
 Vectors = list[ir.Value]
 
@@ -46,7 +46,7 @@ class Instructions:
         head, inside, behind = (self._function.append_basic_block() for _ in range(3))
         write.branch(head)
         write.position_at_end(head)
-        count, kept = write.phi(WORD), [write.phi(VECTOR) for _ in vectors]
+        count, kept = write.phi(WORD), [write.phi(SIMD_VECTOR) for _ in vectors]
         count.add_incoming(_whole(first), before)
         for phi, vector in zip(kept, vectors, strict=True):
             phi.add_incoming(vector, before)
@@ -112,7 +112,7 @@ class Instructions:
 
     def everywhere(self, number: ir.Value) -> ir.Value:
         """Return a vector of one number in all lanes."""
-        none = ir.Constant(VECTOR, ir.Undefined)
+        none = ir.Constant(SIMD_VECTOR, ir.Undefined)
         first = self._builder.insert_element(none, number, PLACE(0))
         return self._shuffled(first, none, [0] * WIDTH)
 
@@ -144,7 +144,8 @@ class Instructions:
     def total(self, vectors: Sequence[ir.Value]) -> ir.Value:
         """Return the sum of vectors, added up in several chains; zero without vectors."""
         vectors = vectors or [constant([0.0] * WIDTH)]
-        chains = [functools.reduce(self._sum, vectors[k::CHAINS]) for k in range(min(CHAINS, len(vectors)))]
+        count = min(PARALLEL_SUMS, len(vectors))
+        chains = [functools.reduce(self._sum, vectors[k::count]) for k in range(count)]
         while len(chains) > 1:
             chains = [functools.reduce(self._sum, chains[k : k + 2]) for k in range(0, len(chains), 2)]
         return chains[0]
@@ -181,7 +182,7 @@ class Instructions:
         return pointer
 
     def _vector(self, pointer: ir.Value, *places: int | ir.Value) -> ir.Value:
-        return self._builder.bitcast(self._place(pointer, *places), VECTOR.as_pointer())
+        return self._builder.bitcast(self._place(pointer, *places), SIMD_VECTOR.as_pointer())
 
 
 def _whole(number: int | ir.Value) -> ir.Value:
@@ -190,7 +191,7 @@ def _whole(number: int | ir.Value) -> ir.Value:
 
 def constant(numbers: Sequence[float] | np.ndarray) -> ir.Constant:
     """Return a vector of constants."""
-    return ir.Constant(VECTOR, [float(number) for number in numbers])
+    return ir.Constant(SIMD_VECTOR, [float(number) for number in numbers])
 
 
 def levels(terms: Sequence[Sequence[tuple[float, int]]]) -> Iterator[tuple[np.ndarray, list[int]]]:

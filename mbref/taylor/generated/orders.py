@@ -27,7 +27,7 @@ Newest = dict[int, tuple[ir.Value, ...]]
 Term = tuple[int, int, float]
 """A product's factors and minus its weight."""
 AT_ONCE = 8  # slots whose sums fit into the registers of a processor
-COUNTS = 1  # number of integer arguments: the last order of multipliers
+ORDER_ARGUMENTS = 1  # number of integer arguments: the last order of multipliers
 
 
 class Factors(NamedTuple):
