@@ -52,8 +52,9 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
     assert f"{3 * len(NAMES)} passed" in done.stdout, done.stdout[-500:]
 
 
-def test_parts_of_crossings_do_what_they_say():
-    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", interpreted_crossings.__file__)
+def test_parts_of_crossings_and_small_kernels_do_what_they_say():
+    files = interpreted_crossings.__file__, str(Path(__file__).with_name("test_kernels_by_hand.py"))
+    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", *files)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-500:]
 

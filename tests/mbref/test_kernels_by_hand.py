@@ -1,0 +1,332 @@
+"""Small kernels on vectors, series and steps / numbers worked out by hand, with interpreted kernels.
+
+``test_thresholds.py`` runs this file in a process whose kernels are interpreted, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.kernels.compilation import PLAIN
+
+if not PLAIN:
+    pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
+
+from mbref.integrators import adams, dop853, one_step, rk4
+from mbref.kernels.layout import OK
+from mbref.linear_algebra import vectors
+from mbref.taylor import angles, coefficients, saved_state
+
+A, B = (1.0, 2.0, 3.0), (4.0, -5.0, 6.0)
+
+
+# --- vectors ----------------------------------------------------------------------------------------------
+def test_sums_and_products_of_vectors():
+    assert vectors.add(A, B) == (5.0, -3.0, 9.0) and vectors.subtract(A, B) == (-3.0, 7.0, -3.0)
+    assert vectors.scale(2.0, B) == (8.0, -10.0, 12.0) and vectors.dot(A, B) == 12.0
+    assert vectors.cross(A, B) == (27.0, 6.0, -13.0)
+    assert vectors.vector(np.array([[9.0] * 3, A]), 1) == A
+
+
+def test_vectors_in_a_turned_frame():
+    """A body turned by 90° about z: its x is Y, its y is -X."""
+    rotation = np.array([[1.0, 0, 0, 0, 1, 0, 0, 0, 1], [0.0, -1, 0, 1, 0, 0, 0, 0, 1]])
+    assert vectors.to_world(rotation, 1, A) == (-2.0, 1.0, 3.0) and vectors.to_body(rotation, 1, A) == (
+        2.0,
+        -1.0,
+        3.0,
+    )
+    skew = np.arange(18.0).reshape(2, 9)
+    assert vectors.to_world(skew, 1, A) == (62.0, 80.0, 98.0)
+    assert vectors.to_body(skew, 1, A) == (78.0, 84.0, 90.0)
+
+
+def test_vectors_in_tables():
+    table, values = np.zeros((2, 6)), np.arange(5.0)
+    vectors.put(table, 1, 2, A)
+    assert table.tolist() == [[0.0] * 6, [0, 0, 1, 2, 3, 0]]
+    vectors.accumulate(values, 1, A)
+    assert values.tolist() == [0, 2, 4, 6, 4]
+    target = np.zeros(2)
+    vectors.copy(values, target)
+    assert target.tolist() == [0.0, 2.0]
+
+
+def test_sizes_and_order():
+    assert vectors.larger(2.0, -3.0) == 3.0 and vectors.larger(4.0, -3.0) == 4.0
+    assert math.isnan(vectors.larger(4.0, math.nan)) and vectors.largest(np.array([1.0, -7.0, 3.0])) == 7.0
+    assert vectors.largest(np.zeros(0)) == 0.0
+    assert vectors.all_finite(np.ones(3)) and not vectors.all_finite(np.array([1.0, math.inf]))
+    tiny = np.array([0.9e-100, -1.1e-100, 1.0])
+    vectors.flush_denormals(tiny)
+    assert tiny.tolist() == [0.0, -1.1e-100, 1.0]
+    mixed = np.array([3.0, 1.0, 2.0, 1.0, -5.0])
+    vectors.sort(mixed)
+    assert mixed.tolist() == [-5.0, 1.0, 1.0, 2.0, 3.0]
+
+
+# --- angles of couplings ----------------------------------------------------------------------------------
+def torsion(row: int, factor: float) -> Any:
+    """One angle whose directions e₁, e₂ are constant and whose f is linear in two variables:
+    f = (u, v, 0.1 u + 0.2 v)."""
+    form = np.zeros((9, 2))
+    form[6], form[7], form[8] = (1.0, 0.0), (0.0, 1.0), (0.1, 0.2)
+    constant = np.array([[1.0, 0.0, 0.5, 0.0, 1.0, -0.5, 0.0, 0.0, 0.0]])
+    return SimpleNamespace(row=np.array([row]), factor=np.array([factor]), form=form, constant=constant)
+
+
+def memory(u: Any, v: Any, near: float = 0.0, row: int = 0) -> Any:
+    """Two variables with values and rates, and two rows behind three pivots."""
+    terms = np.array([[u[0], v[0]], [u[1], v[1]]])
+    return SimpleNamespace(
+        polynomials=SimpleNamespace(torsions=torsion(row, 2.0)),
+        series=SimpleNamespace(terms=terms),
+        solver=SimpleNamespace(phi=np.full(5, 0.25), pivot_columns=np.zeros(3)),
+        angles=np.array([near]),
+    )
+
+
+def cosine_and_sine(u: float, v: float) -> tuple[float, float]:
+    """e₁ · f = u + 0.05 u + 0.1 v; e₂ · f = v - 0.05 u - 0.1 v."""
+    return 1.05 * u + 0.1 * v, 0.9 * v - 0.05 * u
+
+
+@pytest.mark.parametrize("near", [0.0, 6.0, -7.0])
+def test_an_angle_is_added_to_its_row(near):
+    made = memory((0.6, 0.0), (0.8, 0.0), near)
+    angles.add_angles(made)
+    cosine, sine = cosine_and_sine(0.6, 0.8)
+    angle = math.atan2(sine, cosine)
+    angle += 2 * math.pi * round((near - angle) / (2 * math.pi))
+    assert made.solver.phi == pytest.approx([0.25, 0.25, 0.25, 0.25 + 2 * angle, 0.25])
+    left_out = memory((0.6, 0.0), (0.8, 0.0), row=-1)
+    angles.add_angles(left_out)
+    angles.add_angle_rates(left_out)
+    assert (left_out.solver.phi == 0.25).all()
+
+
+def test_the_rate_of_an_angle_is_its_derivative():
+    made = memory((0.6, 0.3), (0.8, -0.7))
+    angles.add_angle_rates(made)
+    h = 1e-6
+    ends = [math.atan2(*cosine_and_sine(0.6 + s * 0.3, 0.8 - s * 0.7)[::-1]) for s in (-h, h)]
+    assert made.solver.phi[3] == pytest.approx(0.25 + 2 * (ends[1] - ends[0]) / (2 * h), rel=1e-8)
+    assert made.solver.phi[[0, 1, 2, 4]].tolist() == [0.25] * 4
+
+
+def test_the_gradient_of_an_angle():
+    """Directions that depend on the variables, too: the derivatives by differences."""
+    made = memory((0.6, 0.0), (0.8, 0.0), row=1)
+    made.polynomials.torsions.form = np.random.default_rng(3).normal(size=(9, 2))
+    matrix = np.full((2, 2), 0.5)
+    angles.add_angle_gradients(made.series.terms, matrix, made)
+
+    def phi(u: float, v: float) -> float:
+        at = memory((u, 0.0), (v, 0.0), row=1)
+        at.polynomials.torsions.form = made.polynomials.torsions.form
+        angles.add_angles(at)
+        return float(at.solver.phi[4])
+
+    h = 1e-6
+    wanted = [
+        (phi(0.6 + h, 0.8) - phi(0.6 - h, 0.8)) / (2 * h),
+        (phi(0.6, 0.8 + h) - phi(0.6, 0.8 - h)) / (2 * h),
+    ]
+    assert matrix[1] - 0.5 == pytest.approx(wanted, rel=1e-7) and matrix[0].tolist() == [0.5, 0.5]
+
+
+# --- series -----------------------------------------------------------------------------------------------
+def test_sizes_of_coefficients():
+    series = np.array([[9.0, 9.0, 9.0], [1.0, -4.0, 7.0], [2.0, 3.0, -5.0]])
+    assert coefficients.largest_coefficient(series, 1, 2) == 4.0
+    assert (
+        coefficients.largest_coefficient(series, 2, 3) == 5.0
+        and coefficients.largest_coefficient(series, 2, 0) == 0.0
+    )
+    made = SimpleNamespace(
+        series=SimpleNamespace(past=series, terms=2 * series[::-1]),
+        solver=SimpleNamespace(pivot_columns=np.zeros(2)),
+    )
+    assert coefficients.distance_moved(0.5, made) == 0.5 * max(4.0, 8.0)
+    for rates, turned in (((4.0, 1.0), True), ((4.1, 1.0), False), ((-1.0, 0.0), True)):
+        assert bool(coefficients.turns_back(np.array([[0.0, 0.0], rates]), made)) is turned
+
+
+def test_a_saved_state_is_restored():
+    def run(value: float) -> Any:
+        clock = SimpleNamespace(time=value, sample=int(value) + 1)
+        return SimpleNamespace(
+            loop=SimpleNamespace(clock=clock),
+            state=SimpleNamespace(coordinates=np.full(7, value), velocities=np.full(6, value + 1)),
+            equations=SimpleNamespace(
+                angles=np.full(2, value + 2),
+                system=SimpleNamespace(counts=SimpleNamespace(crossings=int(value) + 3)),
+            ),
+        )
+
+    saved = SimpleNamespace(
+        instant=SimpleNamespace(), coordinates=np.zeros(7), velocities=np.zeros(6), angles=np.zeros(2)
+    )
+    saved_state.save_state(run(4.0), saved)
+    other = run(9.0)
+    saved_state.restore_state(saved, other)
+    assert (other.loop.clock.time, other.loop.clock.sample) == (4.0, 5)
+    assert other.equations.system.counts.crossings == 7 and other.equations.angles.tolist() == [6.0, 6.0]
+    assert other.state.coordinates.tolist() == [4.0] * 7 and other.state.velocities.tolist() == [5.0] * 6
+
+
+# --- steps of integrators ---------------------------------------------------------------------------------
+def control(**parts: Any) -> Any:
+    return SimpleNamespace(**{"atol": 1e-2, "rtol": 1e-1, "largest_step": 2.0, "order": 4.0, **parts})
+
+
+def test_the_first_step_of_one_step_methods():
+    """Sizes over tolerances: 3 / 0.31 and 2 / 0.02; a hundredth of the ratio."""
+    y, rate = np.array([3.0, 0.1]), np.array([0.0, 2.0])
+    assert one_step.first_step(y, rate, control()) == pytest.approx(0.01 * (3 / 0.31) / (2 / 0.02))
+    assert one_step.first_step(y, 0 * rate, control()) == 2e-6, "nothing moves"
+
+
+@pytest.mark.parametrize(
+    ("ratio", "suggested", "step"),
+    [
+        (16.0, 1.0, 0.8 * 0.5),
+        (1e9, 1.0, 0.2),
+        (math.nan, 1.0, 0.25),
+        (-1.0, 1.0, 0.25),
+        (0.0, 1.0, 100.0),
+        (1.0, 1.0, 0.8),
+        (0.0625, 1.0, 1.6),
+        (1e-12, 1.0, 100.0),
+        (1.0, 5.0, 5.0),
+    ],
+)
+def test_the_next_step_of_one_step_methods(ratio, suggested, step):
+    """A step of 1 s with an error ratio; a step cut off at a sample does not shorten the suggested one."""
+    assert one_step.next_step(1.0, suggested, ratio, 1.0, control()) == pytest.approx(step)
+    made = SimpleNamespace(control=control())
+    assert one_step.propose.function(1.0, suggested, ratio, None, None, made) == pytest.approx(step)
+
+
+def test_the_trend_of_growing_errors():
+    """Errors that grew 16-fold from a step of equal length shorten the next step by two."""
+
+    def trend(h: float = 1.0, ratio: float = 0.16, **clock: Any) -> float:
+        given = {"restart": 3, "share": 1.0, "past_ratio": 0.01, "past_length": 1.0, **clock}
+        made = SimpleNamespace(
+            loop=SimpleNamespace(clock=SimpleNamespace(**given)),
+            equations=SimpleNamespace(system=SimpleNamespace(counts=SimpleNamespace(steps=5))),
+            control=control(),
+        )
+        return one_step.trend(h, ratio, made)
+
+    assert trend() == pytest.approx(0.5) and trend(past_length=0.5) == pytest.approx(1.0)
+    assert trend(h=0.5) == pytest.approx(0.25) and trend(ratio=160.0) == 0.2 and trend(ratio=1e-5) == 1.0
+    assert trend(restart=4) == 1.0 and trend(past_ratio=0.0) == 1.0 and trend(ratio=0.0) == 1.0
+    assert trend(share=0.019) == 1.0 and trend(share=0.02) == pytest.approx(0.5)
+    assert trend(restart=3, past_ratio=0.16) == pytest.approx(1.0)
+
+
+class Rates:
+    """y' = y and -2 t y₂, with the times at which it is asked."""
+
+    def __init__(self, fails_at: int = -1) -> None:
+        self.times: list[float] = []
+        self.fails_at = fails_at
+
+    def __call__(self, t: float, y: np.ndarray, rate: np.ndarray, memory: Any) -> int:
+        self.times.append(t)
+        rate[0], rate[1] = y[0], -2 * t * y[1]
+        return 7 if len(self.times) == self.fails_at else OK
+
+
+def start() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return np.array([1.0, 1.0]), np.array([1.0, -1.0]), np.zeros(2)  # at t = 0.5
+
+
+def test_a_step_of_rk4(monkeypatch):
+    stages = SimpleNamespace(slope=np.zeros(3), total=np.zeros(3))
+    monkeypatch.setattr(rk4, "stages_of", lambda given: stages)
+    y, rate, new = start()
+    rates, h = Rates(), 0.5
+    assert rk4.step.function(rates, 0.5, h, y, rate, new, SimpleNamespace(integrator=None)) == 0.0
+    assert rates.times == [0.75, 0.75, 1.0]
+    k1, k2 = -1.0, -1.5 * 0.75
+    k3 = -1.5 * (1 + 0.25 * k2)
+    k4 = -2.0 * (1 + 0.5 * k3)
+    assert new == pytest.approx(
+        [1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24, 1 + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)]
+    )
+    failing = SimpleNamespace(integrator=None)
+    assert rk4.step.function(Rates(2), 0.5, h, y, rate, new, failing) == -7.0
+
+
+def test_a_step_of_dop853(monkeypatch):
+    """State and error of SciPy's integrator, whose error is a root mean square instead of the largest."""
+    from scipy.integrate import DOP853
+
+    stages = SimpleNamespace(slopes=np.zeros((12, 3)), errors3=np.zeros(3), errors5=np.zeros(3))
+    monkeypatch.setattr(dop853, "stages_of", lambda given: stages)
+    made = SimpleNamespace(
+        control=control(atol=1e-8, rtol=1e-6),
+        integrator=None,
+        loop=SimpleNamespace(clock=SimpleNamespace(share=0.5)),
+    )
+    y, rate, new = start()
+    rates = Rates()
+    error = dop853.step.function(rates, 0.5, 0.4, y, rate, new, made)
+    exact = np.array([math.exp(0.4), math.exp(0.25 - 0.81)])
+    assert new == pytest.approx(exact, abs=1e-7) and len(rates.times) == 11
+    assert rates.times == pytest.approx(0.5 + 0.4 * DOP853.C[1:])
+    k = np.zeros((13, 2))
+    k[:12] = stages.slopes[:, :2]
+    k[12] = new[0], -1.8 * new[1]
+    scale = 0.5 * (1e-8 + 1e-6 * np.maximum(np.abs(y), np.abs(new)))
+    fifth, third = (np.abs(DOP853.E5 @ k / scale).max(), np.abs(DOP853.E3 @ k / scale).max())
+    assert error == pytest.approx(0.4 * fifth**2 / math.hypot(fifth, 0.1 * third), rel=1e-6)
+    assert dop853.step.function(lambda t, y, k, m: k.fill(0.0) or OK, 0.5, 0.4, y, 0 * rate, new, made) == 0.0
+    assert dop853.step.function(Rates(3), 0.5, 0.4, y, rate, new, made) == -7.0
+
+
+def test_error_constants_of_adams():
+    """Shampine & Gordon's γ*: 1, 1/2, 1/12, 1/24, 19/720, 3/160."""
+    assert adams.GAMMA_STAR[:6] == pytest.approx([1, 1 / 2, 1 / 12, 1 / 24, 19 / 720, 3 / 160])
+    assert len(adams.GAMMA_STAR) == 14
+
+
+def test_coefficients_of_adams_for_equal_steps():
+    """Of equal steps g = 1, 1/2, 5/12, 3/8; β = 1; σ = 1, 1, 1, 1; of a doubled step β = 1, 2, 6."""
+    size = adams.HIGHEST + 3
+
+    def past(h: float) -> Any:
+        made = {name: np.zeros(size) for name in ("psi", "beta", "g", "sigma", "integrals")}
+        given = SimpleNamespace(past_psi=np.array([0.0, 1, 2, 3, 4, 5, *[0.0] * (size - 6)]), **made)
+        adams.find_coefficients(h, 3, given)
+        return given
+
+    equal = past(1.0)
+    assert equal.g[1:5] == pytest.approx([1, 1 / 2, 5 / 12, 3 / 8])
+    assert equal.beta[1:5] == pytest.approx(np.ones(4)) and equal.sigma[1:5] == pytest.approx([1, 1, 1, 1])
+    assert equal.psi[1:7].tolist() == [1, 2, 3, 4, 5, 6] and equal.psi[7] == equal.beta[7] == 0.0
+    double = past(2.0)
+    assert double.beta[1:4] == pytest.approx([1, 2 * 1, 2 * 3 / 2]) and double.psi[1:5].tolist() == [
+        2,
+        3,
+        4,
+        5,
+    ]
+
+
+def test_the_norm_and_the_first_step_of_adams():
+    y, vector = np.array([3.0, 0.0]), np.array([0.31 * 3, 0.01 * 4])
+    assert adams.norm(vector, y, control()) == pytest.approx(5.0)
+    size = adams.norm(y, y, control())
+    assert adams.first_step(y, vector, control()) == pytest.approx(0.25 * math.sqrt(size) / 5.0)
+    assert adams.first_step(y, 0 * vector, control()) == 2e-6
+    small = np.array([1e-9, 0.0])
+    assert adams.first_step(small, np.array([0.01, 0.0]), control()) == pytest.approx(0.25, rel=1e-6)
