@@ -209,21 +209,32 @@ def test_the_first_step_of_one_step_methods():
 def test_the_next_step_of_one_step_methods(ratio, suggested, step):
     """A step of 1 s with an error ratio; a step cut off at a sample does not shorten the suggested one."""
     assert one_step.next_step(1.0, suggested, ratio, 1.0, control()) == pytest.approx(step)
-    made = SimpleNamespace(control=control())
-    assert one_step.propose.function(1.0, suggested, ratio, None, None, made) == pytest.approx(step)
+    assert one_step.propose.function(1.0, suggested, ratio, None, None, steps(5)) == pytest.approx(step)
+
+
+def steps(restart: int, **clock: Any) -> Any:
+    """Memory after 5 steps, of which the last had an error of 0.01, since a restart."""
+    given = {"restart": restart, "share": 1.0, "past_ratio": 0.01, "past_length": 1.0, **clock}
+    return SimpleNamespace(
+        loop=SimpleNamespace(clock=SimpleNamespace(**given)),
+        equations=SimpleNamespace(system=SimpleNamespace(counts=SimpleNamespace(steps=5))),
+        control=control(),
+    )
+
+
+def test_steps_of_growing_errors_are_shorter():
+    y, rate = np.array([3.0, 0.1]), np.array([0.0, 2.0])
+    factor = 0.8 * 0.16**-0.25
+    assert one_step.propose.function(1.0, 1.0, 0.16, y, rate, steps(3)) == pytest.approx(0.5 * factor)
+    first = one_step.first_step(y, rate, control())
+    assert one_step.propose.function(0.0, 1.0, 0.0, y, rate, steps(3)) == first
 
 
 def test_the_trend_of_growing_errors():
     """Errors that grew 16-fold from a step of equal length shorten the next step by two."""
 
-    def trend(h: float = 1.0, ratio: float = 0.16, **clock: Any) -> float:
-        given = {"restart": 3, "share": 1.0, "past_ratio": 0.01, "past_length": 1.0, **clock}
-        made = SimpleNamespace(
-            loop=SimpleNamespace(clock=SimpleNamespace(**given)),
-            equations=SimpleNamespace(system=SimpleNamespace(counts=SimpleNamespace(steps=5))),
-            control=control(),
-        )
-        return one_step.trend(h, ratio, made)
+    def trend(h: float = 1.0, ratio: float = 0.16, restart: int = 3, **clock: Any) -> float:
+        return one_step.trend(h, ratio, steps(restart, **clock))
 
     assert trend() == pytest.approx(0.5) and trend(past_length=0.5) == pytest.approx(1.0)
     assert trend(h=0.5) == pytest.approx(0.25) and trend(ratio=160.0) == 0.2 and trend(ratio=1e-5) == 1.0
