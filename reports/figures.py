@@ -11,6 +11,7 @@ from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatterSciNotation
 
@@ -22,6 +23,7 @@ from reports.runs import Curve
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
 DASHES = ("-", "--", ":", "-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))
 FAILED = "X"
+DPI_OF_SVG = 72.0  # dots in an inch of an SVG picture: its unit is the point
 EXPONENT = re.compile(r"\^\{(-?\d+)\}")
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 STYLE: Any = {
@@ -104,10 +106,20 @@ def svg(figure: Figure | str, name: str) -> str:
             axis.set_major_formatter(PlainPowers())
             axis.set_minor_formatter(PlainPowers(labelOnlyBase=False))
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name, "svg.id": name}):
+        _lay_out(figure)
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    figure.set_layout_engine("none")
     text = out.getvalue()
     return text[text.index("<svg") :]
+
+
+def _lay_out(figure: Figure) -> None:
+    """Find the layout of a figure as SVG; savefig would draw the figure once more to find it."""
+    if engine := figure.get_layout_engine():
+        FigureCanvasSVG(figure)
+        figure.dpi, dpi = DPI_OF_SVG, figure.dpi
+        engine.execute(figure)
+        figure.dpi = dpi
+        figure.set_layout_engine(None)
 
 
 def png(figure: Figure | str) -> bytes:
