@@ -10,7 +10,7 @@ import numpy as np
 
 from mbref.drawing import svg
 from mbref.drawing.marks import Stage
-from mbref.drawing.shapes import anchors, moved, shapes
+from mbref.drawing.shapes import anchors, carried, shapes
 from mbref.drawing.svg import COLOURS, INK
 
 LETTER, LINE_HEIGHT = 7.4, 15.0  # px; mean width of a letter, and height of a line
@@ -60,7 +60,7 @@ def _parts(stage: Stage) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
             position = stage.scene.body[stage.scene.body_index(load.body)].position
             yield OVER_SIGN, stage.place(load.body, position), np.array([22.0, 22.0])
     for b, shape in enumerate(shapes(stage.scene)):
-        frames = stage.page.pixels(moved(shape, stage.motion, b))
+        frames = stage.page.pixels(carried(shape.points, stage.motion, b))
         if frames.shape[1] == 1:
             yield OVER_SIGN, frames[:, 0], np.array([19.0, 14.0])
         for start, end in itertools.pairwise(np.swapaxes(frames, 0, 1)):
@@ -100,7 +100,7 @@ def _of_joints(stage: Stage) -> Iterator[Label]:
 def _of_bodies(stage: Stage) -> Iterator[Label]:
     """Yield the names of bodies: next to the longest part of a bar, inside a plate, near a block."""
     for b, shape in enumerate(shapes(stage.scene)):
-        frames = stage.page.pixels(moved(shape, stage.motion, b))
+        frames = stage.page.pixels(carried(shape.points, stage.motion, b))
         look = f'fill="{COLOURS[b % len(COLOURS)]}"'
         yield Label(shape.name, look, _places(shape.name, shape.is_plate, frames))
 

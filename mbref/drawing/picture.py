@@ -10,7 +10,7 @@ import numpy as np
 from mbref.drawing import svg
 from mbref.drawing.labels import names
 from mbref.drawing.marks import Stage, coupling_mark, driver_mark, ground_mark, joint_mark, load_mark
-from mbref.drawing.shapes import Shape, anchors, at_rest, attack, moved, shapes
+from mbref.drawing.shapes import Shape, anchors, at_rest, attack, carried, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page, View, round_length, view_of
@@ -126,7 +126,8 @@ def picture(
     Readers whose browser suppresses animation see all panels at one sample: the one at which a body is
     farthest from its position in the first layer.
     """
-    space = _joined(shown or [layer.motion for panel in panels for layer in panel.layers])
+    motions = shown or [layer.motion for panel in panels for layer in panel.layers]
+    space = _samples(motions, np.concatenate)
     page = _page(scene, space, view, form)
     rows = max(len(panel.title) for panel in panels)
     grid = _Grid(page, form, rows * LEADING * form.letters + 6.0 * bool(rows), len(panels))
@@ -185,7 +186,7 @@ def _page(scene: Scene, shown: Trajectory, view: View | None, form: Form) -> Pag
     """Return the page that shows all of a motion, and anchors and ends of springs on the ground."""
     fixed = [a for joint in scene.joint for name, a in anchors(joint) if name == GROUND]
     fixed += [p for load in scene.load for name, p in attack(load) if name == GROUND]
-    bodies = [moved(shape, shown, b).reshape(-1, 3) for b, shape in enumerate(shapes(scene))]
+    bodies = [carried(shape.points, shown, b).reshape(-1, 3) for b, shape in enumerate(shapes(scene))]
     points = np.concatenate([*bodies, np.array(fixed).reshape(-1, 3)])
     axes = [joint.axis for joint in scene.joint if joint.type == "revolute"]
     return Page.around(points, view or view_of(points, axes), form.width, form.margin, form.tallest)
@@ -199,11 +200,6 @@ def _with_motions(panel: Panel, change: Callable[[Trajectory], Trajectory]) -> P
 def _at(motion: Trajectory, samples: Any) -> Trajectory:
     """Return the motion at samples given by number (k,); its last sample replaces missing ones."""
     return _samples([motion], lambda values: values[0][np.minimum(samples, len(motion.times) - 1)])
-
-
-def _joined(motions: Sequence[Trajectory]) -> Trajectory:
-    """Return the samples of several motions as one trajectory."""
-    return _samples(motions, np.concatenate)
 
 
 def _samples(motions: Sequence[Trajectory], choose: Callable[[list[np.ndarray]], np.ndarray]) -> Trajectory:
@@ -224,7 +220,8 @@ def _drawn(
     scene: Scene, shown: Trajectory, panels: Sequence[Panel], grid: _Grid, timeline: Timeline | None
 ) -> Iterator[str]:
     """Yield the panels, each clipped at its edges."""
-    ground = [part for part in _ground(Stage(scene, shown, grid.page, None))]
+    still, held = Stage(scene, shown, grid.page, None), (j for j in scene.joint if GROUND in j.bodies)
+    ground = [part for joint in held for part in ground_mark(still, joint)]
     for k, panel in enumerate(panels):
         x, y = grid.corner(k)
         parts = [*ground, *(svg.line(grid.page.pixels(path)[None], PATH_LOOK, None) for path in panel.paths)]
@@ -239,17 +236,11 @@ def _drawn(
 PATH_LOOK = f'fill="none" stroke="{GREY}" stroke-width="0.8"'
 
 
-def _ground(stage: Stage) -> Iterator[str]:
-    for joint in stage.scene.joint:
-        if GROUND in joint.bodies:
-            yield from ground_mark(stage, joint)
-
-
 def _bodies(stage: Stage, look: Look) -> Iterator[str]:
     """Yield the bodies of a layer."""
     opacity = f' opacity="{look.opacity:.3g}"' * (look.opacity < 1)
     for b, shape in enumerate(shapes(stage.scene)):
-        frames = stage.page.pixels(moved(shape, stage.motion, b))
+        frames = stage.page.pixels(carried(shape.points, stage.motion, b))
         yield _body(shape, frames, look.colour or COLOURS[b % len(COLOURS)], look.thickness, opacity, stage)
 
 

@@ -73,11 +73,6 @@ def _ordered(points: np.ndarray) -> np.ndarray:
     return points[np.append(order, order[0])]
 
 
-def moved(shape: Shape, trajectory: Trajectory, body: int) -> np.ndarray:
-    """Return the world points (k, n, 3) of a shape at the times of a trajectory."""
-    return carried(shape.points, trajectory, body)
-
-
 def carried(points: np.ndarray, trajectory: Trajectory, body: int) -> np.ndarray:
     """Return the world points (k, n, 3) of points (n, 3) in the frame of a body."""
     q, r = trajectory.orientation[:, body, None], trajectory.position[:, body, None]

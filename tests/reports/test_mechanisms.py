@@ -11,7 +11,7 @@ from synthetic import exact, motion, record, scene, truths
 
 from crosscheck.cli.moving_picture import singular_instants
 from crosscheck.study.truths import FRAMES, TURN, truth_record
-from mbref.drawing.shapes import moved, shapes
+from mbref.drawing.shapes import carried, shapes
 from mbref.scenes import SCENES
 from reports import mechanisms
 from reports.figures import colour
@@ -82,7 +82,7 @@ def test_bodies_of_a_joint_and_one_point(name):
     """Both bodies of every joint that keeps its points together are drawn through a common point."""
     a_scene = SCENES[name]().with_(duration=0.02)
     trajectory = exact(a_scene)
-    parts = {s.name: moved(s, trajectory, b) for b, s in enumerate(shapes(a_scene))}
+    parts = {s.name: carried(s.points, trajectory, b) for b, s in enumerate(shapes(a_scene))}
     for joint in a_scene.joint:
         if "ground" in joint.bodies:
             continue
