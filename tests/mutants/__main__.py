@@ -66,7 +66,11 @@ WITH_KERNELS = (
     "mbref/stepping/",
     "mbref/taylor/",
 )
-COMPILING = ("mbref/kernels/compilation.py", "mbref/kernels/disk_cache.py")  # plain Python does not run them
+COMPILING = (  # plain Python does not run them
+    "mbref/kernels/compilation.py",
+    "mbref/kernels/disk_cache.py",
+    "mbref/kernels/named_memory.py",
+)
 
 
 class Tree:
