@@ -21,7 +21,7 @@ SCENE = Scene(name="s", duration=2.0, body=(BLOCK,))
     ("parse", "good", "bad"),
     [
         (options.positive, ["5e-324", "1", "1e308"], ["0", "-1", "inf", "nan", "x"]),
-        (options._not_negative, ["0", "5e-324", "1e308"], ["-5e-324", "inf", "nan", "x"]),
+        (options.not_negative, ["0", "5e-324", "1e308"], ["-5e-324", "inf", "nan", "x"]),
         (options.whole, ["1", "2"], ["0", "-1", "1.5", "x", ""]),
         (
             options.digits,
