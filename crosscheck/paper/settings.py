@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -161,8 +162,13 @@ def heavy_crank(scene: Scene, axis: int, inertia: float = FLYWHEEL) -> Scene:
 
 def column_scene(column: str, variant: Variant = BASE) -> Scene:
     """Return the mechanism of a column of Tables I to III, with the errors in its data."""
+    return _imprecise_scene(column, variant.size, variant.seed)
+
+
+@functools.cache
+def _imprecise_scene(column: str, size: float, seed: int) -> Scene:
     name = "spatial_slider_crank_driven" if column.startswith("spatial") else LINKAGES[column][0]
-    return imprecise(kinematic(SCENES[name]()), variant.size, variant.seed)
+    return imprecise(kinematic(SCENES[name]()), size, seed)
 
 
 LINKAGES = {  # column → scene and θ₂ at t = 0
