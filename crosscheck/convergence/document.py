@@ -25,8 +25,8 @@ HEAD = f"""# Orders of convergence
 
 This page shows how fast the errors of an engine decrease with its time step, and where they stop. Use it to
 choose a step. Every run is made again at half of its step, or at a tenth of its tolerance, until the error no
-longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time; {SLOW:g} s in Newton's rows `dvi` and
-`defaults`, whose steps take about 0.1 s.
+longer decreases or a run takes more than {TIME_LIMIT:g} s of CPU time; {SLOW:g} s in Newton's rows with DVI
+and the defaults, whose steps take about 0.1 s.
 
 ```sh
 crosscheck convergence                        # print the table; nothing is simulated

@@ -79,6 +79,7 @@ ROWS = (
     Row("newton", "padmm, moreau", "Kamino with PADMM in single precision, Moreau's midpoint (order 2)"),
     Row("newton", "lox", "Kamino with LOX in single precision, Euler (order 1)"),
     Row("newton", "lox, moreau", "Kamino with LOX in single precision, Moreau's midpoint (order 2)"),
+    Row("newton", "dvi, moreau", "Kamino with DVI in single precision, Moreau's midpoint (order 2)", SLOW),
     Row("newton", "dvi", "Kamino with DVI in single precision, Euler (order 1)", SLOW),
     Row("newton", "defaults", "Kamino's defaults: PADMM in single precision, Euler (order 1)", SLOW),
     Row("newton", "mujoco", "SolverMuJoCo in single precision, default closures (order 1)"),

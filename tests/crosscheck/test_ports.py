@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -87,8 +88,11 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
 
 @pytest.mark.slow
 def test_models_that_differ_in_numbers_share_code_of_mjx() -> None:
+    """Code is compiled once in a process, and stored for other processes."""
     if not is_installed(MODULES["mjx"]):
         pytest.skip("mjx is not installed")
+    import jax
+
     from crosscheck.engines.mjx.adapter import _stepped
 
     scene, times = SCENES["four_bar_gravity"]().with_(duration=0.01), np.array([0.0, 0.01])
@@ -97,6 +101,7 @@ def test_models_that_differ_in_numbers_share_code_of_mjx() -> None:
     light = scene.with_(body=[body.model_copy(update={"mass": body.mass / 2}) for body in scene.body])
     run = engine("mjx").run(light, times, Setting("euler", {"step": 5e-4}))
     assert run.outcome is Outcome.COMPLETED and _stepped(False)._cache_size() == compiled > 0
+    assert any(Path(jax.config.jax_compilation_cache_dir).glob("jit_stepped*"))
 
 
 def side_by_side(scenes: Mapping[str, Scene]) -> Scene:

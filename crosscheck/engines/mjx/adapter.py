@@ -7,6 +7,7 @@ in the user's cache folder for later processes.
 
 from __future__ import annotations
 
+import contextlib
 import functools
 from collections.abc import Sequence
 from importlib import import_module
@@ -60,7 +61,9 @@ def _mjx(is_single: bool = False) -> Any:
         jax.clear_caches()
     config.update("jax_platforms", "cpu")
     if not config.jax_compilation_cache_dir:
-        config.update("jax_compilation_cache_dir", str(kept.cache("mjx")))
+        with contextlib.suppress(OSError):  # without the folder, no code is stored
+            (folder := kept.cache("mjx")).mkdir(parents=True, exist_ok=True)
+            config.update("jax_compilation_cache_dir", str(folder))
     from mujoco import mjx
 
     return jax, mjx
