@@ -185,6 +185,23 @@ def test_quantities_that_are_compared():
     assert [f.remark for f in precise._rates(bench(exact=motion(acceleration=None)))] == names[:1]
 
 
+def test_motions_that_are_compared(monkeypatch):
+    """Reactions are those of the run, and the forces they must exert those of the exact motion."""
+    given, asked = bench(), []
+    names = {id(given.scene): "scene", id(given.motion): "run", id(given.exact): "exact"}
+    for function in ("accelerations_apart", "balance", "idle"):
+        monkeypatch.setattr(
+            precise, function, lambda *of, name=function: asked.append([name, *(names[id(o)] for o in of)])
+        )
+    found = list(precise._rates(given))
+    assert asked == [
+        ["accelerations_apart", "scene", "exact", "run"],
+        ["balance", "scene", "run", "exact"],
+        ["idle", "scene", "run", "exact"],
+    ]
+    assert [f.allowed for f in found[1:]] == [1e-3] * 3
+
+
 def test_differences_of_accelerations_and_reactions():
     """0.16 of 16 m/s²; an angular acceleration counts times the length; 4.8 N of the reaction."""
     apart = push_difference.accelerations_apart

@@ -21,16 +21,17 @@ def ordered(
 ) -> list[str]:
     """Return the names of test files with these texts.
 
-    Files that have killed most mutants of the same folder come first, then files that name the function or
-    class of a mutant, or its module, and then the quickest.
+    Files that have killed most mutants of the same folder come first, then files that name most of these: the
+    functions and classes around a mutant, its module and its package. The quickest come first of the others.
     """
-    words = {Path(mutant.file).stem, *around(source, mutant)}
+    package = ".".join(Path(mutant.file).parent.parts)
+    words = {package, Path(mutant.file).stem, *around(source, mutant)}
     places = list(tests)
 
-    def rank(test: str) -> tuple[int, bool, float, int]:
-        named = any(re.search(rf"\b{word}\b", tests[test]) for word in words)
+    def rank(test: str) -> tuple[int, int, float, int]:
+        named = sum(bool(re.search(rf"\b{re.escape(word)}\b", tests[test])) for word in words)
         needed = seconds.get(test, len(tests[test]) / PER_SECOND)
-        return -kills.get(test, 0), not named, needed, places.index(test)
+        return -kills.get(test, 0), -named, needed, places.index(test)
 
     return sorted(tests, key=rank)
 
