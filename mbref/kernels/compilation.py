@@ -53,6 +53,7 @@ UNSIGNED = types.Array(u4, 1, "C")
 INDEX_TABLE = types.Array(i8, 2, "C")
 FLOAT = f8
 INT = i8
+BOOLEAN = types.boolean
 
 WITH_KERNELS = (
     "kernels", "linear_algebra", "equations", "formulations", "stabilisation", "integrators", "stepping",
@@ -236,6 +237,11 @@ def prepare_all(kernels: Sequence[Exchangeable]) -> None:
             each.prepare()
     for each in elsewhere:
         each.prepare()
+
+
+def pair_of(first: types.Type, second: types.Type) -> types.Type:
+    """Return the type of a kernel's two results."""
+    return types.Tuple((first, second))
 
 
 def pointer_to(signature: Signature) -> types.Type:

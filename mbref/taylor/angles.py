@@ -14,16 +14,13 @@ from mbref.kernels.compilation import inlined, kernel
 
 
 @inlined
-def components(s, first, order, variables, torsions):
-    """Return the three components, of order 0 or 1, of a direction; ``first`` is the index of the first
-    component."""
-    x, y, z = 0.0, 0.0, 0.0
-    if order == 0:
-        constant = torsions.constant
-        x, y, z = constant[s, first], constant[s, first + 1], constant[s, first + 2]
-    form, at = torsions.form, 9 * s + first
+def components(at, share, row, torsions):
+    """Return the three components of a direction, from the component with number ``at`` on, at variables
+    ``row``; ``share`` is 1.0, or 0.0 for the rate of a direction at rates of the variables."""
+    constant, form = torsions.constant.reshape(-1), torsions.form
+    x, y, z = share * constant[at], share * constant[at + 1], share * constant[at + 2]
     for i in range(form.shape[1]):
-        value = variables[order, i]
+        value = row[i]
         x += form[at, i] * value
         y += form[at + 1, i] * value
         z += form[at + 2, i] * value
@@ -40,12 +37,12 @@ def inner(a, b):
 def add_angles(memory):
     """Add the angles at the first coefficients, nearest to the previous angles, to Φ of their rows."""
     torsions, terms, phi = memory.polynomials.torsions, memory.series.terms, memory.solver.phi
-    nz = memory.solver.pivot_columns.shape[0]
+    nz, y = memory.solver.pivot_columns.shape[0], terms[0]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            f, near = components(s, 6, 0, terms, torsions), memory.angles[s]
-            cosine = inner(components(s, 0, 0, terms, torsions), f)
-            sine = inner(components(s, 3, 0, terms, torsions), f)
+            f, near = components(9 * s + 6, 1.0, y, torsions), memory.angles[s]
+            cosine = inner(components(9 * s, 1.0, y, torsions), f)
+            sine = inner(components(9 * s + 3, 1.0, y, torsions), f)
             angle = arctan2(sine, cosine)
             angle += 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
             phi[nz + torsions.row[s]] += torsions.factor[s] * angle
@@ -55,12 +52,12 @@ def add_angles(memory):
 def add_angle_rates(memory):
     """Add the rates of the angles at the first two coefficients to Φ' of their rows."""
     torsions, terms, phi = memory.polynomials.torsions, memory.series.terms, memory.solver.phi
-    nz = memory.solver.pivot_columns.shape[0]
+    nz, y, v = memory.solver.pivot_columns.shape[0], terms[0], terms[1]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            e1, e1_rate = components(s, 0, 0, terms, torsions), components(s, 0, 1, terms, torsions)
-            e2, e2_rate = components(s, 3, 0, terms, torsions), components(s, 3, 1, terms, torsions)
-            f, f_rate = components(s, 6, 0, terms, torsions), components(s, 6, 1, terms, torsions)
+            e1, e2 = components(9 * s, 1.0, y, torsions), components(9 * s + 3, 1.0, y, torsions)
+            e1_rate, e2_rate = components(9 * s, 0.0, v, torsions), components(9 * s + 3, 0.0, v, torsions)
+            f, f_rate = components(9 * s + 6, 1.0, y, torsions), components(9 * s + 6, 0.0, v, torsions)
             cosine, sine = inner(e1, f), inner(e2, f)
             cosine_rate = inner(e1_rate, f) + inner(e1, f_rate)
             sine_rate = inner(e2_rate, f) + inner(e2, f_rate)
@@ -72,11 +69,12 @@ def add_angle_rates(memory):
 def add_angle_gradients(variables, matrix, memory):
     """Add the gradients of the angles at variables[0] to the rows of a matrix, times their factors."""
     torsions = memory.polynomials.torsions
-    form = torsions.form
+    form, y = torsions.form, variables[0]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            e1, e2 = components(s, 0, 0, variables, torsions), components(s, 3, 0, variables, torsions)
-            f, at = components(s, 6, 0, variables, torsions), 9 * s
+            at = 9 * s
+            e1, e2 = components(at, 1.0, y, torsions), components(at + 3, 1.0, y, torsions)
+            f = components(at + 6, 1.0, y, torsions)
             cosine, sine = inner(e1, f), inner(e2, f)
             factor = torsions.factor[s] / (cosine * cosine + sine * sine)
             for i in range(form.shape[1]):

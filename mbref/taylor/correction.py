@@ -3,11 +3,12 @@ rows."""
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra.vectors import larger
 from mbref.taylor.angles import add_angle_rates, add_angles
 from mbref.taylor.generated_calls import close_by_code, violation_by_code
+from mbref.taylor.layout import CORRECT
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import factorise_equations, solution
@@ -122,7 +123,7 @@ def changes_factor(left, memory):
     return left > tolerance * pivot * pivot or change * change > tolerance * left
 
 
-@kernel
+@exchangeable(CORRECT)
 def correct_state(memory):
     """Correct positions and velocities, the first coefficients: OK, SINGULAR or NOT_CONVERGED."""
     step, left = memory.step, 1.0

@@ -19,13 +19,12 @@ from mbref.taylor.crossing.detection import (
     ends_near_singular,
     time_to_singular_position,
 )
-from mbref.taylor.crossing.short_crossing import is_full, record_crossings
+from mbref.taylor.crossing.short_crossing import is_full
 from mbref.taylor.crossing.thresholds import CROSSING_START, PIVOT_AHEAD, PIVOT_NEAR
 from mbref.taylor.layout import SERIES
 from mbref.taylor.mode import is_accurate, set_high_accuracy, set_predictor
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.samples import put_terms
-from mbref.taylor.step_start import return_to_start
 from mbref.taylor.stepping import (
     LOST_MOTION,
     LOST_ROWS,
@@ -86,7 +85,7 @@ def take_accurate_step(memory):
     if memory.kernels.step(memory) != OK:
         return UNDECIDED
     if step.crossed:
-        record_crossings(memory)
+        memory.kernels.record(memory)
     pivot = least_pivot(memory)
     is_behind = step.crossed or pivot >= step.start_pivot
     if is_behind and pivot >= PIVOT_AHEAD * memory.progress.largest_pivot:
@@ -121,7 +120,7 @@ def take_predictor_step(memory):
             return start_accurate_steps(time_to_singular_position(h, memory), stop, memory)
         counts.rejected += 1
         h *= SHORTER
-        return_to_start(memory)
+        memory.kernels.return_to_start(memory)
         if not h >= control.smallest_step:
             return status
 
@@ -184,14 +183,14 @@ def start_accurate_steps(ahead, stop, memory):
     the position.  Return SINGULAR_AHEAD or the failure status.
     """
     h = length_before(ahead, memory)
-    return_to_start(memory)
+    memory.kernels.return_to_start(memory)
     memory.step.crossed = 0
     if 0.0 < h < stop - memory.run.loop.clock.time:
         if attempt_predictor_step(h, True, memory) == OK:
             end_step(h, stop, memory)
             ahead -= h
         else:
-            return_to_start(memory)
+            memory.kernels.return_to_start(memory)
             memory.step.crossed = 0
     set_high_accuracy(memory)
     memory.step.time_to_crossing = ahead

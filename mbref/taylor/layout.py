@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.kernels.compilation import FLOAT, INT
+from mbref.kernels.compilation import FLOAT, INT, MATRIX, BOOLEAN, pair_of
 from mbref.kernels.layout import Memory
 from mbref.kernels.named_memory import Indices, Kernel, Matrix, Named, Vector
 from mbref.taylor.polynomial_layout import Polynomials, PoseMaps
@@ -142,11 +142,22 @@ class SeriesKernels(NamedTuple):
     expand: Annotated[Kernel, EXPAND]
     step: Annotated[Kernel, TAKE_STEP]
     partition: Annotated[Kernel, PARTITION]
+    choose: Annotated[Kernel, PARTITION]
     respond: Annotated[Kernel, RESPOND]
     terms: Annotated[Kernel, TERMS]
     multipliers: Annotated[Kernel, TERMS]
+    loads: Annotated[Kernel, TERMS]
+    correct: Annotated[Kernel, CORRECT]
+    save_series: Annotated[Kernel, SAVE_SERIES]
+    return_to_start: Annotated[Kernel, RETURN_TO_START]
+    gradient: Annotated[Kernel, GRADIENT]
+    determinant: Annotated[Kernel, DETERMINANT]
+    judge_start: Annotated[Kernel, JUDGE_START]
+    turning_pivot: Annotated[Kernel, TURNING_PIVOT]
     detect: Annotated[Kernel, DETECT]
+    record: Annotated[Kernel, RECORD_CROSSINGS]
     sample: Annotated[Kernel, SAMPLE]
+    balance: Annotated[Kernel, BALANCE]
 
 
 class SceneCode(NamedTuple):
@@ -231,6 +242,11 @@ class TaylorMemory(NamedTuple):
 
 
 SERIES = Named(TaylorMemory)
-BEGIN = TAKE_STEP = PARTITION = RESPOND = TERMS = SAMPLE = INT(SERIES)
+BEGIN = TAKE_STEP = PARTITION = RESPOND = TERMS = CORRECT = SAMPLE = INT(SERIES)
+SAVE_SERIES = RETURN_TO_START = RECORD_CROSSINGS = INT(SERIES)
+JUDGE_START = INT(INT, SERIES)  # arguments: status
+TURNING_PIVOT = FLOAT(FLOAT, SERIES)  # arguments: length of the step (s)
 DETECT = INT(FLOAT, FLOAT, SERIES)  # arguments: length of the step (s), least pivot at its end
-EXPAND = INT(FLOAT, SERIES)  # arguments: t
+EXPAND = BALANCE = INT(FLOAT, SERIES)  # arguments: t
+GRADIENT = INT(MATRIX, SERIES)  # arguments: variables
+DETERMINANT = pair_of(BOOLEAN, FLOAT)(MATRIX, SERIES)  # arguments: variables

@@ -25,34 +25,14 @@ def product_order(a, b, k):
     return value
 
 
-@inlined
-def grow_form(constant, form, k, variables, target):
-    """Compute order k of an affine form of the variables."""
-    value = constant if k == 0 else 0.0
-    for i in range(form.shape[0]):
-        value += form[i] * variables[k, i]
-    target[k] = value
-
-
-@inlined
-def start_loads(memory):
-    """Compute the orders 0 of all loads."""
-    grow_springs(0, memory)
-    grow_torsions(0, memory)
-    grow_slides(0, memory)
-
-
-@inlined
-def add_loads(k, memory):
-    """Add order k of the forces of all loads that are not constant, the variables being known to order
-    k + 1."""
-    grow_springs(k + 1, memory)
-    grow_torsions(k + 1, memory)
-    grow_slides(k + 1, memory)
-    add_springs(k, memory)
-    add_torsions(k, memory)
-    add_slides(k, memory)
-    add_timed_forces(k, memory)
+@kernel
+def grow_forms(constant, form, k, variables, target):
+    """Compute order k of affine forms of the variables, one in each row of ``form``."""
+    for c in range(form.shape[0]):
+        value = constant[c] if k == 0 else 0.0
+        for i in range(form.shape[1]):
+            value += form[c, i] * variables[k, i]
+        target[c, k] = value
 
 
 def varies(polynomials: Any) -> bool:
@@ -85,9 +65,9 @@ def grow_springs(k, memory):
     springs, variables = memory.polynomials.springs, memory.series.terms
     for s in range(springs.stiffness.shape[0]):
         of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
+        grow_forms(springs.constant[s], springs.form[3 * s : 3 * s + 3], k, variables, of)
         square = 0.0
         for c in range(3):
-            grow_form(springs.constant[s, c], springs.form[3 * s + c], k, variables, of[c])
             square += product_order(of[c], of[c], k)
         length, inverse = of[SPRING_LENGTH], of[SPRING_INVERSE]
         if k == 0:
@@ -166,8 +146,7 @@ def grow_torsions(k, memory):
     torsions, variables = memory.polynomials.torsions, memory.series.terms
     for s in range(torsions.stiffness.shape[0]):
         of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
-        for c in range(9):
-            grow_form(torsions.constant[s, c], torsions.form[9 * s + c], k, variables, of[c])
+        grow_forms(torsions.constant[s], torsions.form[9 * s : 9 * s + 9], k, variables, of)
         cosine, sine = 0.0, 0.0
         for c in range(3):
             cosine += product_order(of[E1 + c], of[F + c], k)
@@ -241,9 +220,8 @@ def grow_slides(k, memory):
     slides, variables = memory.polynomials.slides, memory.series.terms
     for s in range(slides.stiffness.shape[0]):
         of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
+        grow_forms(slides.constant[s], slides.form[6 * s : 6 * s + 6], k, variables, of)
         along = 0.0
-        for c in range(6):
-            grow_form(slides.constant[s, c], slides.form[6 * s + c], k, variables, of[c])
         for c in range(3):
             along += product_order(of[SLIDE_AXIS + c], of[SLIDE_VECTOR + c], k)
         of[SLID, k] = along

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from numpy import inf
 
-from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.compilation import exchangeable, inlined, kernel
+from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.angles import add_angle_gradients
+from mbref.taylor.layout import GRADIENT, PARTITION
 from mbref.taylor.simd import WIDTH, load, max_abs, store
 
 
@@ -22,7 +24,7 @@ def is_undriven(memory):
     return memory.run.equations.piece.shape[0] == 0
 
 
-@kernel
+@exchangeable(GRADIENT)
 def evaluate_gradient(y, memory):
     """Evaluate G at variables y[0] into ``work``; rows have about unit length, or are zero everywhere."""
     rows, work = memory.polynomials.rows, memory.solver.work
@@ -34,6 +36,7 @@ def evaluate_gradient(y, memory):
         if rows.lane[e] < work.shape[1]:
             work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
     add_angle_gradients(y, work, memory)
+    return OK
 
 
 @kernel
@@ -60,7 +63,7 @@ def put_rows(memory):
         add_angle_gradients(terms, solver.tableau, memory)
 
 
-@kernel
+@exchangeable(PARTITION)
 def choose(memory):
     """Choose independent rows and dependent variables by complete pivoting; return their number.
 

@@ -15,7 +15,7 @@ from mbref.linear_algebra.minimum_norm import ALPHA, find_least_multipliers
 from mbref.linear_algebra.sparse_cholesky import regularised_factor
 from mbref.linear_algebra.vectors import copy
 from mbref.stepping.loop import take_sample
-from mbref.taylor.layout import SAMPLE, SERIES
+from mbref.taylor.layout import BALANCE, SAMPLE, SERIES
 from mbref.taylor.loads import expand_functions
 from mbref.taylor.samples import find_poses, put_state
 from mbref.taylor.saved_state import restore_state, save_state
@@ -78,7 +78,7 @@ def complete_sample(memory):
     find_poses(memory)
     put_state(memory)
     if status == OK:
-        status = balance_forces(run.loop.times[k], run)
+        status = memory.kernels.balance(run.loop.times[k], memory)
     if status == OK:
         take_sample(run)
     return status
@@ -104,14 +104,15 @@ def expand_at_sample(memory):
     return status
 
 
-@kernel
-def balance_forces(t, run):
+@exchangeable(BALANCE)
+def balance_forces(t, memory):
     """Compute multipliers λ with Φ_qᵀ λ = g - M q̈ at the state and accelerations in memory; return OK or
     SINGULAR.
 
     For redundant rows, they have the least norm in unit rows.
     """
-    equations, system, factor = run.equations, run.equations.system, run.factor
+    run, equations = memory.run, memory.run.equations
+    system, factor = equations.system, run.factor
     system.counts.evaluations += 1
     evaluate(t, run.state.coordinates, run.state.velocities, equations)
     for j in range(system.force.shape[0]):

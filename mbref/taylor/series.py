@@ -13,7 +13,16 @@ from mbref.kernels.layout import OK
 from mbref.taylor.coefficients import largest_coefficient
 from mbref.taylor.generated_calls import expand_by_code, expand_by_power
 from mbref.taylor.layout import TERMS
-from mbref.taylor.loads import add_loads, has_varying_loads, start_loads
+from mbref.taylor.loads import (
+    add_slides,
+    add_springs,
+    add_timed_forces,
+    add_torsions,
+    grow_slides,
+    grow_springs,
+    grow_torsions,
+    has_varying_loads,
+)
 from mbref.taylor.simd import WIDTH, gather, load, store
 from mbref.taylor.solver import solution
 
@@ -101,13 +110,24 @@ def expand_without_loads(last, memory):
         solve_order(k, last, memory)
 
 
-@kernel
-def expand_with_loads(last, memory):
-    """Compute orders 0 … last with springs and other loads that vary."""
-    start_loads(memory)
-    for k in range(last + 1):
-        add_loads(k, memory)
-        solve_order(k, last, memory)
+@exchangeable(TERMS)
+def expand_with_loads(memory):
+    """Compute all orders with springs and other loads that vary; return OK.
+
+    Order k of the loads follows from order k + 1 of the variables, order -1 from the first coefficients.
+    """
+    last = memory.mode.order - 2
+    for k in range(-1, last + 1):
+        grow_springs(k + 1, memory)
+        grow_torsions(k + 1, memory)
+        grow_slides(k + 1, memory)
+        if k >= 0:
+            add_springs(k, memory)
+            add_torsions(k, memory)
+            add_slides(k, memory)
+            add_timed_forces(k, memory)
+            solve_order(k, last, memory)
+    return OK
 
 
 @exchangeable(TERMS)
@@ -163,7 +183,6 @@ def expand_with_multipliers(memory):
         return OK
     start_sums(memory)
     if has_varying_loads(memory.polynomials):
-        expand_with_loads(memory.mode.order - 2, memory)
-    else:
-        expand_without_loads(memory.mode.order - 2, memory)
+        return memory.kernels.loads(memory)
+    expand_without_loads(memory.mode.order - 2, memory)
     return OK

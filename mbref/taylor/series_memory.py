@@ -10,21 +10,29 @@ from mbref.equations.branches import SMOOTH
 from mbref.kernels.memory_pool import Pooled, acquire, copied, fill, shapes_of
 from mbref.kernels.named_memory import allocate
 from mbref.stepping.run import Run
+from mbref.taylor.correction import correct_state
+from mbref.taylor.crossing.acceptance import pivot_at_turning_point
 from mbref.taylor.crossing.detection import contains_singular_position
+from mbref.taylor.crossing.determinants import gradient_determinant
+from mbref.taylor.crossing.short_crossing import record_crossings
+from mbref.taylor.crossing.start import judge_start
 from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
+from mbref.taylor.partition import choose, evaluate_gradient
 from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
-from mbref.taylor.sample_completion import complete_sample
-from mbref.taylor.series import expand_series, expand_with_multipliers
+from mbref.taylor.sample_completion import balance_forces, complete_sample
+from mbref.taylor.series import expand_series, expand_with_loads, expand_with_multipliers
 from mbref.taylor.simd import padded_size
 from mbref.taylor.solver import respond_in_loops
-from mbref.taylor.step_start import choose_partition
-from mbref.taylor.stepping import begin_series, expand_from, take_step
+from mbref.taylor.step_start import choose_partition, return_to_start
+from mbref.taylor.stepping import begin_series, expand_from, save_series_without_pole, take_step
 
 KEPT = 16  # singular positions that a call can record
 CALLED = (
-    begin_series, expand_from, take_step, choose_partition, respond_in_loops, expand_series,
-    expand_with_multipliers, contains_singular_position, complete_sample,
+    begin_series, expand_from, take_step, choose_partition, choose, respond_in_loops, expand_series,
+    expand_with_multipliers, expand_with_loads, correct_state, save_series_without_pole, return_to_start,
+    evaluate_gradient, gradient_determinant, judge_start, pivot_at_turning_point,
+    contains_singular_position, record_crossings, complete_sample, balance_forces,
 )  # fmt: skip
 
 

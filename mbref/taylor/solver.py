@@ -12,7 +12,7 @@ from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.taylor.generated_calls import factorise_by_code
 from mbref.taylor.layout import RESPOND
-from mbref.taylor.partition import choose, put_rows, save_replaced_pivot
+from mbref.taylor.partition import put_rows, save_replaced_pivot
 from mbref.taylor.simd import WIDTH, load, store
 
 MIN_PIVOT_KEPT = 0.5  # pivot / first pivot below which rows and variables are selected again
@@ -251,7 +251,7 @@ def factorise_equations(memory):
     respond(memory)
     if not is_sharp(memory.solver):
         save_replaced_pivot(memory)
-        if choose(memory) != memory.partition.rank:
+        if memory.kernels.choose(memory) != memory.partition.rank:
             return SINGULAR
         factorise_anew(memory)
     return inertia_left(memory)

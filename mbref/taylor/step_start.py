@@ -4,11 +4,12 @@ attempt."""
 from __future__ import annotations
 
 from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.correction import violation
-from mbref.taylor.layout import PARTITION
+from mbref.taylor.layout import PARTITION, RETURN_TO_START
 from mbref.taylor.loads import TORSION, TORSION_SERIES
-from mbref.taylor.partition import choose, save_start_pivots
+from mbref.taylor.partition import save_start_pivots
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.solver import factorise_anew
 
@@ -27,7 +28,7 @@ def save_series(memory):
     step.time_to_pole = 0.0
 
 
-@kernel
+@exchangeable(RETURN_TO_START)
 def return_to_start(memory):
     """Restore the state, the partition and the pivots at the start of the step, and measure its violation."""
     past, terms = memory.series.past, memory.series.terms
@@ -37,11 +38,12 @@ def return_to_start(memory):
     if memory.partition.partition_id != memory.step.start_partition_id:
         memory.kernels.partition(memory)
         save_start_pivots(memory)
+    return OK
 
 
 @exchangeable(PARTITION)
 def choose_partition(memory):
     """Choose a partition at the first coefficients, and compute its response; return its rank."""
-    memory.partition.rank = choose(memory)
+    memory.partition.rank = memory.kernels.choose(memory)
     factorise_anew(memory)
     return memory.partition.rank

@@ -16,12 +16,11 @@ from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
 from mbref.stepping.loop import STEP_TOO_SMALL, UNDECIDED, share
 from mbref.taylor.coefficients import largest_used
-from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance
 from mbref.taylor.crossing.detection import save_pivots, time_to_singular_position
 from mbref.taylor.crossing.location import count_crossings
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
-from mbref.taylor.crossing.start import is_turned, judge_start
+from mbref.taylor.crossing.start import is_turned
 from mbref.taylor.crossing.thresholds import (
     CROSSING_MARGIN,
     CROSSING_START,
@@ -30,7 +29,7 @@ from mbref.taylor.crossing.thresholds import (
     MIN_PIVOT_RATIO,
     OVERSHOOT,
 )
-from mbref.taylor.layout import BEGIN, EXPAND, TAKE_STEP
+from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, TAKE_STEP
 from mbref.taylor.loads import expand_functions, part_behind_no_length, time_to_no_length
 from mbref.taylor.mode import is_accurate
 from mbref.taylor.partition import least_pivot
@@ -38,7 +37,7 @@ from mbref.taylor.pose_maps import read_variables
 from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
 from mbref.taylor.series import turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
-from mbref.taylor.step_start import return_to_start, save_series
+from mbref.taylor.step_start import save_series
 
 ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
 LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
@@ -53,7 +52,7 @@ def expand_from(t, memory):
     return OK or the failure status."""
     select_pieces(memory.run.loop.clock.time, memory.run.equations)
     expand_functions(t, memory)
-    status = correct_state(memory)
+    status = memory.kernels.correct(memory)
     if status == OK:
         memory.kernels.terms(memory)
     return status
@@ -134,7 +133,7 @@ def order_of_least_term(h, memory):
 
 
 # --- attempts -------------------------------------------------------------------------------------------
-@kernel
+@exchangeable(SAVE_SERIES)
 def save_series_without_pole(memory):
     """Save the series that starts here; its rounding pole is removed unless the removal makes steps short.
 
@@ -148,13 +147,14 @@ def save_series_without_pole(memory):
         remove_pole(pole, memory)
         if not longest_step(tolerance, memory) > MIN_GAIN * reached:
             save_series(memory)
+    return OK
 
 
 @kernel
 def save_start(memory):
     """Save the series and the pivots at the start of the step."""
     save_pivots(memory)
-    save_series_without_pole(memory)
+    memory.kernels.save_series(memory)
 
 
 @kernel
@@ -214,7 +214,7 @@ def take_step(memory):
     regular, h = first_lengths(left, memory)
     if turns_back_in(h, memory):
         memory.kernels.multipliers(memory)
-        save_series_without_pole(memory)
+        memory.kernels.save_series(memory)
         regular, h = first_lengths(left, memory)
     if 0.0 < state.time_to_pole < h and not is_accurate(memory):
         clock.attempt_end = clock.time + h
@@ -231,7 +231,7 @@ def take_step(memory):
             return status
         counts.rejected += 1
         h = min(next_length(h, regular, memory), left)
-        return_to_start(memory)
+        memory.kernels.return_to_start(memory)
         if not h >= memory.run.control.smallest_step:
             return status
     end_step(h, stop, memory)
@@ -294,4 +294,4 @@ def begin_series(memory):
     memory.kernels.partition(memory)
     memory.step.crossed, memory.progress.leaving, memory.progress.rests_near = 0, 0, 0
     status = memory.kernels.expand(t, memory)
-    return status if t > 0.0 else judge_start(status, memory)
+    return status if t > 0.0 else memory.kernels.judge_start(status, memory)

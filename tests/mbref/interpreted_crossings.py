@@ -26,7 +26,7 @@ from mbref.taylor.crossing import (
 )
 from mbref.taylor.crossing.thresholds import CROSSING_NOISE, DEPARTURE
 from mbref.taylor.mode import HIGH_ACCURACY, REGULAR
-from tests.mbref.threshold_checks import memory
+from tests.mbref.threshold_checks import KERNELS, memory
 
 pytestmark = pytest.mark.skipif(not PLAIN, reason="kernels are interpreted by test_thresholds.py")
 
@@ -45,7 +45,7 @@ def test_pivots_of_the_start_give_its_determinant_unless_rows_have_changed(monke
     state.partition.partition_id = chosen
     monkeypatch.setattr(determinants, "product_of_pivots", lambda *_: (1, 2.0))
     monkeypatch.setattr(determinants, "square_determinant", lambda _: (0, 3.0))
-    monkeypatch.setattr(determinants, "evaluate_gradient", lambda *_: None)
+    state.kernels = SimpleNamespace(gradient=lambda *_: OK)
     determinants.save_start_determinant(state)
     assert (state.step.start_negative, state.step.start_logarithm) == expected
 
@@ -79,7 +79,7 @@ def as_determinant(monkeypatch, value, end):
     def found(number):
         return number < 0.0, math.log(max(abs(number), 1e-300))
 
-    monkeypatch.setattr(location, "gradient_determinant", lambda *_: found(value(times[-1])))
+    monkeypatch.setattr(KERNELS, "determinant", lambda *_: found(value(times[-1])))
     monkeypatch.setattr(location, "save_start_determinant", lambda _: None)
     monkeypatch.setattr(location, "gradient_determinant_at_end", lambda _: found(value(end)))
     monkeypatch.setattr(location, "log_determinant_at_start", lambda _: math.log(abs(value(0.0))))
@@ -267,8 +267,7 @@ def test_a_crossing_ends_with_the_step_that_crosses(monkeypatch):
         counts.crossings += counts.steps == 2
         return OK
 
-    state.kernels = SimpleNamespace(step=step)
-    monkeypatch.setattr(long_crossing, "record_crossings", lambda _: recorded.append(counts.steps))
+    state.kernels = SimpleNamespace(step=step, record=lambda _: recorded.append(counts.steps))
     for name in ("put_terms", "judge_clearance"):
         monkeypatch.setattr(long_crossing, name, lambda *_: None)
     assert long_crossing.step_until_clear(state) == PAUSED
@@ -299,7 +298,7 @@ def test_a_crossing_is_recorded_with_its_time_and_state(monkeypatch):
         memory_of_run.run.state.coordinates[:], memory_of_run.run.state.velocities[:] = h, 10.0 * h
 
     monkeypatch.setattr(short_crossing, "put_state_at", put)
-    short_crossing.record_crossings(state)
+    short_crossing.record_crossings.function(state)
     assert state.progress.recorded == 2
     assert state.crossings.time == pytest.approx([2.25, 2.5])
     assert state.crossings.coordinates[:, 0] == pytest.approx([0.25, 0.5])
@@ -310,8 +309,8 @@ def test_a_crossing_is_recorded_with_its_time_and_state(monkeypatch):
 def test_a_short_crossing_that_fails_is_undone(monkeypatch, crosses):
     state, restored = memory(time=1.0), []
     state.progress.recorded, state.crossings = 0, SimpleNamespace(time=np.zeros(16))
-    state.kernels = SimpleNamespace(expand=lambda *_: OK)
-    for name in ("save_step_start", "return_to_start", "set_high_accuracy", "set_regular"):
+    state.kernels = SimpleNamespace(expand=lambda *_: OK, return_to_start=lambda _: OK)
+    for name in ("save_step_start", "set_high_accuracy", "set_regular"):
         monkeypatch.setattr(short_crossing, name, lambda _: None)
     monkeypatch.setattr(short_crossing, "restore_step_start", lambda _: restored.append(1))
 

@@ -30,7 +30,7 @@ from mbref.taylor.crossing import (
     uniqueness,
 )
 from mbref.taylor.mode import HIGH_ACCURACY, REGULAR
-from tests.mbref.threshold_checks import flips, memory
+from tests.mbref.threshold_checks import KERNELS, flips, memory
 
 CHECKS = {}
 
@@ -54,7 +54,7 @@ def of_determinant(monkeypatch, value):
 
     monkeypatch.setattr(location, "evaluate_series", lambda h, _: setattr(at, "h", h))
     monkeypatch.setattr(detection, "evaluate_series", lambda h, _: setattr(at, "h", h))
-    monkeypatch.setattr(location, "gradient_determinant", lambda *_: signed(value(at.h)))
+    monkeypatch.setattr(KERNELS, "determinant", lambda *_: signed(value(at.h)))
     for module in (location, detection):
         monkeypatch.setattr(module, "save_start_determinant", lambda _: None)
         monkeypatch.setattr(module, "gradient_determinant_at_end", lambda _: signed(value(1.0)))
@@ -114,7 +114,7 @@ def _(monkeypatch):
     def by_rates(count):
         monkeypatch.setattr(detection, "rates_oppose", lambda _: True)
         of_determinant(monkeypatch, lambda _: 1.0)
-        monkeypatch.setattr(detection, "gradient_determinant", lambda *_: (False, 0.0))
+        monkeypatch.setattr(KERNELS, "determinant", lambda *_: (False, 0.0))
         monkeypatch.setattr(detection, "save_gradient", lambda _: None)
         return detection.determinant_changes_sign(1.0, count, memory())
 
@@ -516,7 +516,7 @@ def _(monkeypatch):
         monkeypatch.setattr(stepping, "time_of_pole", lambda _: 1.0)
         monkeypatch.setattr(stepping, "remove_pole", lambda *_: None)
         monkeypatch.setattr(stepping, "longest_step", lambda *_: next(found))
-        stepping.save_series_without_pole(memory())
+        stepping.save_series_without_pole.function(memory())
         return len(saved) == 2
 
     return flips(keeps_pole, 0.49, 0.51)

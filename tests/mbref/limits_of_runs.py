@@ -346,7 +346,7 @@ def corrected(monkeypatch, violations):
     for name in ("close_rate", "largest_change"):
         monkeypatch.setattr(correction, name, lambda _: 0.0)
     monkeypatch.setattr(correction, "changes_factor", lambda *_: False)
-    return correction.correct_state(memory()), len(made)
+    return correction.correct_state.function(memory()), len(made)
 
 
 @check("taylor.correction MAX_VIOLATION")

@@ -11,14 +11,12 @@ from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
 from mbref.taylor.crossing.determinants import (
     determinant_by_null_vectors,
-    gradient_determinant,
     log_determinant_at_start,
     log_start_by_null_vector,
     null_vectors_oppose,
     save_start_determinant,
 )
 from mbref.taylor.layout import SERIES
-from mbref.taylor.partition import choose
 from mbref.taylor.solver import respond
 
 NEGATIVE, ALIKE = 1, 2
@@ -30,8 +28,8 @@ def compared(memory):
     """NEGATIVE where the determinant is, ALIKE where pivots and motions tell the same: their sum."""
     respond(memory)
     save_start_determinant(memory)
-    negative, size = gradient_determinant(memory.series.terms, memory)
-    _, first = gradient_determinant(memory.series.past, memory)
+    negative, size = memory.kernels.determinant(memory.series.terms, memory)
+    _, first = memory.kernels.determinant(memory.series.past, memory)
     told, found = determinant_by_null_vectors(memory)
     sizes = abs(found - size) < ROUNDING and abs(log_start_by_null_vector(memory) - first) < ROUNDING
     signs = told == negative and null_vectors_oppose(memory) == negative
@@ -48,7 +46,7 @@ def by_chosen(memory):
 @entry(INT(SERIES))
 def by_choosing(memory):
     """The same, by rows and variables that are chosen anew; 0 where there are fewer rows."""
-    return compared(memory) if choose(memory) == memory.partition.rank else 0
+    return compared(memory) if memory.kernels.choose(memory) == memory.partition.rank else 0
 
 
 @pytest.mark.parametrize("signs", (by_chosen, by_choosing))

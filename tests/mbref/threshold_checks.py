@@ -14,6 +14,8 @@ import pytest
 from mbref.taylor.mode import HIGH_ACCURACY
 
 CHECKS = {}
+# kernels that other kernels call by address, for tests to replace
+KERNELS = SimpleNamespace(determinant=None, gradient=None)
 
 
 def check(key):
@@ -131,4 +133,5 @@ def memory(variables=2, rank=1, kind=HIGH_ACCURACY, **numbers):
             state=SimpleNamespace(velocities=np.array([numbers.get("velocity", 1.0)])),
         ),
         state=np.zeros((3, 8)),
+        kernels=KERNELS,
     )

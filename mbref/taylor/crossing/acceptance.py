@@ -15,7 +15,7 @@ MIN_PIVOT and does not cross is
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import OK
 from mbref.stepping.loop import SINGULAR_AHEAD, STEP_TOO_SMALL, UNDECIDED
 from mbref.taylor.coefficients import turns_back
@@ -41,8 +41,9 @@ from mbref.taylor.crossing.thresholds import (
     VIOLATION_LEFT,
     VIOLATION_NEAR,
 )
+from mbref.taylor.layout import TURNING_PIVOT
 from mbref.taylor.mode import is_accurate
-from mbref.taylor.partition import eliminate_below, evaluate_gradient, freedoms, least_pivot
+from mbref.taylor.partition import eliminate_below, freedoms, least_pivot
 from mbref.taylor.samples import evaluate_series
 
 
@@ -132,14 +133,14 @@ def judge_approach(h, pivot, turned, last, memory):
         return STEP_TOO_SMALL if last else UNDECIDED
     resolved = MIN_PIVOT_FREE if freedoms(memory) > 0 else MIN_PIVOT_RESOLVED
     resolved = min(resolved, ENTRY_RATIO * progress.entry_pivot)
-    if turned and pivot_at_turning_point(h, memory) < resolved:
+    if turned and memory.kernels.turning_pivot(h, memory) < resolved:
         return UNDECIDED
     if pivot >= step.start_pivot:
         return OK
     return OK if pivot >= max(resolved, MIN_PIVOT * progress.largest_pivot) else UNDECIDED
 
 
-@kernel
+@exchangeable(TURNING_PIVOT)
 def pivot_at_turning_point(h, memory):
     """Return the least pivot of G at the turning point of a motion that reverses in a step of h seconds."""
     solver, start, end, least = memory.solver, 0.0, h, 1.0
@@ -150,7 +151,7 @@ def pivot_at_turning_point(h, memory):
             end = middle
         else:
             start = middle
-    evaluate_gradient(memory.state, memory)
+    memory.kernels.gradient(memory.state, memory)
     for k in range(memory.partition.rank):
         least = min(least, abs(solver.work[solver.pivot_rows[k], solver.pivot_columns[k]]))
         eliminate_below(solver.work, solver.pivot_rows, solver.pivot_columns, k)

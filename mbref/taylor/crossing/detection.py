@@ -13,7 +13,6 @@ from __future__ import annotations
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.taylor.coefficients import distance_moved, turns_back
 from mbref.taylor.crossing.determinants import (
-    gradient_determinant,
     gradient_determinant_at_end,
     has_one_null_vector,
     log_determinant_at_start,
@@ -131,13 +130,14 @@ def determinant_changes_sign(h, parts, memory):
     save_start_determinant(memory)
     for part in range(1, parts):
         evaluate_series(h * part / parts, memory)
-        negative, _ = gradient_determinant(memory.state, memory)
+        negative, _ = memory.kernels.determinant(memory.state, memory)
         changes = changes or negative
         if not square:
             save_gradient(memory)
-    negative, _ = (
-        gradient_determinant_at_end(memory) if square else gradient_determinant(memory.series.terms, memory)
-    )
+    if square:
+        negative, _ = gradient_determinant_at_end(memory)
+    else:
+        negative, _ = memory.kernels.determinant(memory.series.terms, memory)
     if parts > 1:
         evaluate_series(h, memory)
     return changes or negative

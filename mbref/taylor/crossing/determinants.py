@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from numpy import inf, log
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
-from mbref.taylor.partition import evaluate_gradient, freedoms
+from mbref.taylor.layout import DETERMINANT
+from mbref.taylor.partition import freedoms
 
 
 @kernel
@@ -22,12 +23,12 @@ def save_start_determinant(memory):
     """Save G at the start of the step; for a square G its determinant."""
     step, partition = memory.step, memory.partition
     if freedoms(memory) > 0:
-        evaluate_gradient(memory.series.past, memory)
+        memory.kernels.gradient(memory.series.past, memory)
         save_gradient(memory)
     elif partition.partition_id == step.start_partition_id:
         step.start_negative, step.start_logarithm = product_of_pivots(memory.solver.past, partition.rank)
     else:
-        evaluate_gradient(memory.series.past, memory)
+        memory.kernels.gradient(memory.series.past, memory)
         step.start_negative, step.start_logarithm = square_determinant(memory)
 
 
@@ -40,11 +41,11 @@ def save_gradient(memory):
             solver.past_gradient[c, i] = solver.work[solver.pivot_rows[i], c]
 
 
-@kernel
+@exchangeable(DETERMINANT)
 def gradient_determinant(y, memory):
     """Return whether det(G G₀ᵀ) of the independent rows is negative, and its logarithm:  G at variables
     y[0]."""
-    evaluate_gradient(y, memory)
+    memory.kernels.gradient(y, memory)
     if freedoms(memory) == 0:
         negative, size = square_determinant(memory)
         return negative != memory.step.start_negative, size + memory.step.start_logarithm
@@ -86,7 +87,7 @@ def gradient_determinant_at_end(memory):
     if has_one_null_vector(memory):
         return determinant_by_null_vectors(memory)
     if freedoms(memory) > 0:
-        return gradient_determinant(memory.series.terms, memory)
+        return memory.kernels.determinant(memory.series.terms, memory)
     negative, size = product_of_pivots(memory.solver.last, memory.partition.rank)
     return negative != memory.step.start_negative, size + memory.step.start_logarithm
 
@@ -98,7 +99,7 @@ def log_determinant_at_start(memory):
         return 2.0 * memory.step.start_logarithm
     if has_one_null_vector(memory):
         return log_start_by_null_vector(memory)
-    _, size = gradient_determinant(memory.series.past, memory)
+    _, size = memory.kernels.determinant(memory.series.past, memory)
     return size
 
 

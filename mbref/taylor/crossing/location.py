@@ -6,7 +6,6 @@ from numpy import exp
 
 from mbref.kernels.compilation import kernel
 from mbref.taylor.crossing.determinants import (
-    gradient_determinant,
     gradient_determinant_at_end,
     log_determinant_at_start,
     save_start_determinant,
@@ -129,7 +128,7 @@ def value_at(h, unit, memory):
     """Return the determinant at a time h (s) of the step, relative to a determinant whose logarithm is
     ``unit``."""
     evaluate_series(h, memory)
-    negative, size = gradient_determinant(memory.state, memory)
+    negative, size = memory.kernels.determinant(memory.state, memory)
     return signed(negative, size - unit)
 
 
@@ -165,5 +164,5 @@ def logarithm_at(h, memory):
     """Return the logarithm of the determinant at a time h (s) of the step; NEGATIVE for a negative
     determinant."""
     evaluate_series(h, memory)
-    negative, size = gradient_determinant(memory.state, memory)
+    negative, size = memory.kernels.determinant(memory.state, memory)
     return NEGATIVE if negative else size

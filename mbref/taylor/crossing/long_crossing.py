@@ -11,7 +11,6 @@ from __future__ import annotations
 from mbref.kernels.compilation import FLOAT, INT, entry, kernel
 from mbref.kernels.layout import OK
 from mbref.stepping.loop import DONE, PAUSED, TOO_MANY_STEPS, UNDECIDED
-from mbref.taylor.crossing.short_crossing import record_crossings
 from mbref.taylor.crossing.thresholds import LONG_CROSSING_ORDER, PIVOT_CLEAR
 from mbref.taylor.crossing.uniqueness import perturbed_run_agrees
 from mbref.taylor.layout import SERIES
@@ -70,7 +69,7 @@ def step_until_clear(memory):
             put_terms(memory.series.past, memory)
             return status
         if counts.crossings != crossings:
-            record_crossings(memory)
+            memory.kernels.record(memory)
         put_terms(memory.series.terms, memory)
         if clock.time >= progress.end:
             return DONE

@@ -6,16 +6,15 @@ crossing with a perturbed run follows.
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
-from mbref.taylor.crossing.start import judge_start
 from mbref.taylor.crossing.thresholds import MAX_SHORT_STEPS
 from mbref.taylor.crossing.uniqueness import energy_in_middle, is_bounded, keeps_moving, kinetic_energy
+from mbref.taylor.layout import RECORD_CROSSINGS
 from mbref.taylor.mode import set_high_accuracy, set_regular
 from mbref.taylor.partition import freedoms, is_undriven, least_pivot
 from mbref.taylor.samples import put_angles, put_state_at
-from mbref.taylor.step_start import return_to_start
 
 
 @kernel
@@ -52,12 +51,12 @@ def cross_briefly(memory):
     time, sample, attempt_end = clock.time, clock.sample, clock.attempt_end
     steps, crossings = counts.steps, counts.crossings
     save_step_start(memory)
-    return_to_start(memory)
+    memory.kernels.return_to_start(memory)
     set_high_accuracy(memory)
     memory.step.start_pivot = 1.0
     status = memory.kernels.expand(time, memory)
     if time == 0.0:
-        status = judge_start(status, memory)
+        status = memory.kernels.judge_start(status, memory)
     has_crossed = status == OK and take_crossing_steps(memory)
     set_regular(memory)
     if not has_crossed:
@@ -108,17 +107,18 @@ def take_crossing_steps(memory):
             is_determined = not is_free or is_bounded(delay, memory)
             progress.leaving = is_determined and not switches_branch_in_pair(crossings, memory)
             if progress.leaving:
-                record_crossings(memory)
+                memory.kernels.record(memory)
             return progress.leaving
     return False
 
 
-@kernel
+@exchangeable(RECORD_CROSSINGS)
 def record_crossings(memory):
     """Record times and states of the crossings of the last step."""
     record_at(memory.step.first_crossing, memory)
     if memory.step.second_crossing >= 0.0:
         record_at(memory.step.second_crossing, memory)
+    return OK
 
 
 @kernel

@@ -6,7 +6,7 @@ from __future__ import annotations
 from numpy import sqrt
 
 from mbref.equations.coordinates import copy_state
-from mbref.kernels.compilation import kernel
+from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.vectors import larger, largest
 from mbref.stepping.loop import UNDECIDED
@@ -18,11 +18,12 @@ from mbref.taylor.crossing.thresholds import (
     START_ERROR,
     START_ERROR_DRIVEN,
 )
+from mbref.taylor.layout import JUDGE_START
 from mbref.taylor.partition import freedoms, least_pivot
 from mbref.taylor.samples import put_terms
 
 
-@kernel
+@exchangeable(JUDGE_START)
 def judge_start(status, memory):
     """Return the status of the start, or UNDECIDED if rounding hides the motion.
 
