@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.kernels.compilation import FLOAT, INT, MATRIX, BOOLEAN, pair_of
+from mbref.kernels.compilation import BOOLEAN, FLOAT, INT, MATRIX, pair_of
 from mbref.kernels.layout import Memory
 from mbref.kernels.named_memory import Indices, Kernel, Matrix, Named, Vector
 from mbref.taylor.polynomial_layout import Polynomials, PoseMaps

@@ -1,15 +1,13 @@
-"""Independent constraint rows, and a dependent variable for each, by complete pivoting of the gradient G."""
+"""The partition: independent constraint rows, a dependent variable for each, and their pivots."""
 
 from __future__ import annotations
 
 from numpy import inf
 
-from mbref.kernels.compilation import exchangeable, inlined, kernel
-from mbref.kernels.layout import OK
+from mbref.kernels.compilation import inlined, kernel
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.angles import add_angle_gradients
-from mbref.taylor.layout import GRADIENT, PARTITION
-from mbref.taylor.simd import WIDTH, load, max_abs, store
+from mbref.taylor.simd import WIDTH, load, store
 
 
 @kernel
@@ -22,21 +20,6 @@ def freedoms(memory):
 def is_undriven(memory):
     """Return whether nothing in the scene depends on time: it has no drivers and no factors of loads."""
     return memory.run.equations.piece.shape[0] == 0
-
-
-@exchangeable(GRADIENT)
-def evaluate_gradient(y, memory):
-    """Evaluate G at variables y[0] into ``work``; rows have about unit length, or are zero everywhere."""
-    rows, work = memory.polynomials.rows, memory.solver.work
-    work[:] = 0.0
-    for e in range(rows.linear_row.shape[0]):
-        if rows.linear_lane[e] < work.shape[1]:
-            work[rows.linear_row[e], rows.linear_lane[e]] += rows.linear_weight[e]
-    for e in range(rows.row.shape[0]):
-        if rows.lane[e] < work.shape[1]:
-            work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
-    add_angle_gradients(y, work, memory)
-    return OK
 
 
 @kernel
@@ -61,67 +44,6 @@ def put_rows(memory):
         tableau[place[e]] += weight[e] * terms[0, other[e]]
     if memory.polynomials.torsions.row.shape[0] > 0:
         add_angle_gradients(terms, solver.tableau, memory)
-
-
-@exchangeable(PARTITION)
-def choose(memory):
-    """Choose independent rows and dependent variables by complete pivoting; return their number.
-
-    The tableau contains other numbers afterwards.
-    """
-    solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
-    pivot_rows, pivot_columns, rank = solver.pivot_rows, solver.pivot_columns, 0
-    tableau, row_max = solver.tableau, solver.row_max
-    parity = False
-    put_rows(memory)
-    copy(memory.series.variable, solver.left)
-    for k in range(pivot_rows.shape[0]):
-        pivot_rows[k] = k
-        subtract_pivot_row(k, 0.0, k, memory)
-    for k in range(pivot_columns.shape[0]):
-        pivot_columns[k] = k
-    while rank < min(pivot_rows.shape[0], pivot_columns.shape[0]):
-        p = place_of_largest_row(row_max, pivot_rows, rank)
-        if not row_max[pivot_rows[p]] > tolerance:
-            break
-        parity = parity != (p != rank)
-        pivot_rows[rank], pivot_rows[p] = pivot_rows[p], pivot_rows[rank]
-        q, r = rank, pivot_rows[rank]
-        while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:
-            q += 1
-        parity = parity != (q != rank)
-        pivot_columns[rank], pivot_columns[q] = pivot_columns[q], pivot_columns[rank]
-        c = pivot_columns[rank]
-        solver.left[c], inverse = 0.0, 1.0 / tableau[r, c]
-        for p in range(rank + 1, pivot_rows.shape[0]):
-            subtract_pivot_row(pivot_rows[p], inverse * tableau[pivot_rows[p], c], r, memory)
-        rank += 1
-    memory.partition.partition_id += 1
-    memory.partition.parity = parity
-    return rank
-
-
-@inlined
-def place_of_largest_row(row_max, pivot_rows, first):
-    """Return the first place, from ``first`` on, of the row with the largest entry."""
-    place = first
-    for p in range(first + 1, pivot_rows.shape[0]):
-        if row_max[pivot_rows[p]] > row_max[pivot_rows[place]]:
-            place = p
-    return place
-
-
-@inlined
-def subtract_pivot_row(i, factor, pivot, memory):
-    """Subtract a pivot row, times a factor, from row i in the free columns; keep its largest entry."""
-    tableau, left, largest = memory.solver.tableau, memory.solver.left, 0.0
-    lanes = tableau.shape[1]
-    for j in range(0, memory.solver.pivot_columns.shape[0], WIDTH):
-        entries = load(tableau, i * lanes + j) - factor * load(tableau, pivot * lanes + j)
-        entries = load(left, j) * entries
-        store(entries, tableau, i * lanes + j)
-        largest = max(largest, max_abs(entries))
-    memory.solver.row_max[i] = largest
 
 
 @kernel

@@ -11,7 +11,7 @@ from mbref.taylor.advance import advance_series, enter_series
 from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import pivot_at_turning_point
 from mbref.taylor.crossing.detection import contains_singular_position
-from mbref.taylor.crossing.determinants import gradient_determinant
+from mbref.taylor.crossing.determinants import evaluate_gradient, gradient_determinant
 from mbref.taylor.crossing.long_crossing import (
     begin_crossing,
     continue_crossing,
@@ -22,11 +22,10 @@ from mbref.taylor.crossing.long_crossing import (
 from mbref.taylor.crossing.short_crossing import record_crossings
 from mbref.taylor.crossing.start import judge_start
 from mbref.taylor.driven import follow_drivers
-from mbref.taylor.partition import choose, evaluate_gradient
 from mbref.taylor.sample_completion import balance_forces, complete_sample, complete_samples
 from mbref.taylor.series import expand_series, expand_with_loads, expand_with_multipliers
 from mbref.taylor.solver import respond_in_loops
-from mbref.taylor.step_start import choose_partition, return_to_start
+from mbref.taylor.step_start import choose, choose_partition, return_to_start
 from mbref.taylor.stepping import begin_series, expand_from, save_series_without_pole, take_step
 
 KERNELS_OF_SERIES = (

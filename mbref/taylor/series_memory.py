@@ -13,18 +13,17 @@ from mbref.stepping.run import Run
 from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import pivot_at_turning_point
 from mbref.taylor.crossing.detection import contains_singular_position
-from mbref.taylor.crossing.determinants import gradient_determinant
+from mbref.taylor.crossing.determinants import evaluate_gradient, gradient_determinant
 from mbref.taylor.crossing.short_crossing import record_crossings
 from mbref.taylor.crossing.start import judge_start
 from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
-from mbref.taylor.partition import choose, evaluate_gradient
 from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry
 from mbref.taylor.sample_completion import balance_forces, complete_sample
 from mbref.taylor.series import expand_series, expand_with_loads, expand_with_multipliers
 from mbref.taylor.simd import padded_size
 from mbref.taylor.solver import respond_in_loops
-from mbref.taylor.step_start import choose_partition, return_to_start
+from mbref.taylor.step_start import choose, choose_partition, return_to_start
 from mbref.taylor.stepping import begin_series, expand_from, save_series_without_pole, take_step
 
 KEPT = 16  # singular positions that a call can record

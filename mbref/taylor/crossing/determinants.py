@@ -13,9 +13,26 @@ from __future__ import annotations
 from numpy import inf, log
 
 from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.layout import OK
 from mbref.linear_algebra.elimination import determinant, product_of_pivots
-from mbref.taylor.layout import DETERMINANT
+from mbref.taylor.angles import add_angle_gradients
+from mbref.taylor.layout import DETERMINANT, GRADIENT
 from mbref.taylor.partition import freedoms
+
+
+@exchangeable(GRADIENT)
+def evaluate_gradient(y, memory):
+    """Evaluate G at variables y[0] into ``work``; rows have about unit length, or are zero everywhere."""
+    rows, work = memory.polynomials.rows, memory.solver.work
+    work[:] = 0.0
+    for e in range(rows.linear_row.shape[0]):
+        if rows.linear_lane[e] < work.shape[1]:
+            work[rows.linear_row[e], rows.linear_lane[e]] += rows.linear_weight[e]
+    for e in range(rows.row.shape[0]):
+        if rows.lane[e] < work.shape[1]:
+            work[rows.row[e], rows.lane[e]] += rows.weight[e] * y[0, rows.other[e]]
+    add_angle_gradients(y, work, memory)
+    return OK
 
 
 @kernel
