@@ -8,6 +8,8 @@ allow equal motions.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from crosscheck.engines.geometry import unit
@@ -32,16 +34,22 @@ AT_REST = 1e-12  # velocity out of the plane / velocity in the plane; smaller ra
 def planar_scene(scene: Scene) -> Scene:
     """Return the form of a planar scene that has the fewest coordinates: the given scene, or the scene with
     hinges instead of other joints."""
+    return _hinged_scene(scene) or scene
+
+
+@functools.lru_cache(maxsize=64)
+def _hinged_scene(scene: Scene) -> Scene | None:
+    """Return the scene with hinges; None if the given scene has as few coordinates."""
     normals = [joint.directions[0] for joint in scene.joint if isinstance(joint, Revolute)]
     if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
-        return scene
+        return None
     found = [scene]
     for kept in ((Spherical,), ()):  # a cut spherical joint closes a loop by a point without replacement
         joints = [joint if isinstance(joint, kept) else _hinged(joint, normal) for joint in scene.joint]
         if all(joint is not None for joint in joints):
             found.append(_closed_by_points(scene.with_(joint=joints)))
     best = min(found, key=lambda planar: spanning_tree(planar).nv)
-    return best if _freedoms(best) == _freedoms(scene) else scene
+    return best if best is not scene and _freedoms(best) == _freedoms(scene) else None
 
 
 def _starts_within(scene: Scene, normal: np.ndarray) -> bool:

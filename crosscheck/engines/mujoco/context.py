@@ -8,6 +8,7 @@ accuracy.
 from __future__ import annotations
 
 import ctypes
+import functools
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -79,6 +80,7 @@ class Context(NamedTuple):
         return int(self.numbers.ctypes.data)
 
 
+@functools.cache
 def function(name: str) -> int:
     """Return the address of a function in MuJoCo's library."""
     import mujoco
