@@ -22,14 +22,15 @@ def ordered(
     """Return the names of test files with these texts.
 
     Files that have killed most mutants of the same folder come first, then files that name most of these: the
-    functions and classes around a mutant, its module and its package. The quickest come first of the others.
+    functions and classes around a mutant, its module, a part of the module, and its package. The quickest
+    come first of the others.
     """
-    package = ".".join(Path(mutant.file).parent.parts)
-    words = {package, Path(mutant.file).stem, *around(source, mutant)}
+    package, module = ".".join(Path(mutant.file).parent.parts), Path(mutant.file).stem
+    words = {re.escape(package), module, rf"{module}(\.\w+| import)", *around(source, mutant)}
     places = list(tests)
 
     def rank(test: str) -> tuple[int, int, float, int]:
-        named = sum(bool(re.search(rf"\b{re.escape(word)}\b", tests[test])) for word in words)
+        named = sum(bool(re.search(rf"\b{word}\b", tests[test])) for word in words)
         needed = seconds.get(test, len(tests[test]) / PER_SECOND)
         return -kills.get(test, 0), -named, needed, places.index(test)
 

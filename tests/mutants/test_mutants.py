@@ -172,8 +172,16 @@ def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():
     kills = {"test_weak.py": 1, "test_broken.py": 2}
     assert order.ordered(mutant, source, texts, seconds, kills)[:2] == ["test_broken.py", "test_weak.py"]
     texts = {"word": "sums", "both": "sums total", "near": "from pack.part import sums, total", "none": ""}
+    texts |= {
+        "calls": "from pack.part import sums\nsums.total()",
+        "parts": "from pack.part.sums import other",
+    }
     deep = mutant._replace(file="pack/part/sums.py")
-    assert order.ordered(deep, source, texts, {}, {}) == ["near", "both", "word", "none"]
+    assert order.ordered(deep, source, texts, {}, {}) == [
+        "calls",
+        *("parts", "near"),
+        *("both", "word", "none"),
+    ]
 
 
 def test_files_with_kernels_run_without_compilation():
