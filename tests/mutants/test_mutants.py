@@ -164,9 +164,9 @@ def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():
     assert order.around(source, mutant) == ["total"]
     texts = {test: TINY[test] for test in tests}
     assert order.ordered(mutant, source, texts, seconds, {}) == [
-        "test_wait.py",  # all import the module ``sums``, except the last one
         "test_total.py",
         "test_weak.py",
+        "test_wait.py",  # names the module ``sums`` alone
         "test_broken.py",
     ]
     kills = {"test_weak.py": 1, "test_broken.py": 2}
