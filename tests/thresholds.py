@@ -130,11 +130,12 @@ def constants(name: str, text: str) -> Iterator[Threshold]:
     for node in ast.parse(text).body:
         if not isinstance(node, ast.Assign) or not (comment := _comment(lines, node)):
             continue
-        (target,) = node.targets
-        if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
-            pairs = list(zip(target.elts, node.value.elts, strict=True))
-        else:
-            pairs = [(target, node.value)]
+        pairs: list[tuple[ast.expr, ast.expr]] = []
+        for target in node.targets:
+            if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                pairs += zip(target.elts, node.value.elts, strict=True)
+            else:
+                pairs.append((target, node.value))
         for each, value in pairs:
             if isinstance(each, ast.Name) and _is_number(value):
                 yield Threshold(module, each.id, ast.unparse(value), comment)
