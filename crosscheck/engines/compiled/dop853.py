@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from crosscheck.engines.compiled import dop853_coefficients as tableau
 from crosscheck.engines.compiled.calls import rates_of
@@ -67,13 +68,13 @@ def memory(y: np.ndarray) -> Memory:
     )
 
 
-@njit(cache=True)
+@register_jitable
 def is_finite(y):
     """Return whether all numbers and their sum are finite."""
     return math.isfinite(np.sum(y))
 
 
-@njit(cache=True)
+@register_jitable
 def evaluate(system, t, y, rates, memory):
     """Compute the rates of a state; returns REACHED, NOT_FINITE, or REFUSED if the function fails."""
     memory.counts[EVALUATIONS] += 1
@@ -84,7 +85,7 @@ def evaluate(system, t, y, rates, memory):
     return REACHED if is_finite(rates) else NOT_FINITE
 
 
-@njit(cache=True)
+@register_jitable
 def add_slopes(weights, count, factor, slopes, total):
     """Add factor Σ_s weights[s] slopes[s] to ``total``; zero weights are skipped."""
     for s in range(count):
@@ -94,7 +95,7 @@ def add_slopes(weights, count, factor, slopes, total):
                 total[i] += weight * slopes[s, i]
 
 
-@njit(cache=True)
+@register_jitable
 def attempt(system, h, memory):
     """Write the state after a step of h into ``memory.new``; returns its error over the tolerance, or -1 if
     the step fails."""
@@ -112,7 +113,7 @@ def attempt(system, h, memory):
     return ratio if system.settle == 0 or is_settled(system, t + h, memory) else -1.0
 
 
-@njit(cache=True)
+@register_jitable
 def is_settled(system, t, memory):
     """Correct the new state by the function ``system.settle``; returns whether the correction succeeded."""
     new, spare = memory.new, memory.errors[0]
@@ -120,7 +121,7 @@ def is_settled(system, t, memory):
     return status == 0 and is_finite(new)
 
 
-@njit(cache=True)
+@register_jitable
 def error_ratio(system, h, memory):
     """Return the error of a step over the tolerance, from the estimates of orders 5 and 3."""
     y, new, errors = memory.y, memory.new, memory.errors
@@ -134,7 +135,7 @@ def error_ratio(system, h, memory):
     return h * fifth * fifth / math.sqrt(fifth * fifth + 0.01 * third * third) if fifth > 0.0 else 0.0
 
 
-@njit(cache=True)
+@register_jitable
 def growth(ratio):
     """Return the factor for the next step length, from the error over the tolerance."""
     if ratio < 0.0:
@@ -142,7 +143,7 @@ def growth(ratio):
     return GROW if ratio == 0.0 else min(GROW, max(SHRINK, SAFETY * ratio ** (-1.0 / ORDER)))
 
 
-@njit(cache=True)
+@register_jitable
 def trend(h, ratio, clock):
     """Return the factor, at most 1, by which growing errors shorten the step after a step of length h."""
     length, before = clock[2], clock[3]
@@ -152,7 +153,7 @@ def trend(h, ratio, clock):
     return max(SHRINK, min(1.0, h / length * (before / ratio) ** (1.0 / ORDER)))
 
 
-@njit(cache=True)
+@register_jitable
 def first_step(system, end, memory):
     """Return the initial step by Hairer, Nørsett & Wanner, section II.4, from the sizes of y and y'."""
     y, rate = memory.y, memory.slopes[0]
@@ -163,7 +164,7 @@ def first_step(system, end, memory):
     return 0.01 * size / speed if min(size, speed) > 1e-5 else 1e-6 * end
 
 
-@njit(cache=True)
+@register_jitable
 def step_within(left, h):
     """Return the next step towards a sample: the whole remaining time, half of the remaining time, or h."""
     if h * (1.0 + STRETCH) >= left:
@@ -171,7 +172,7 @@ def step_within(left, h):
     return min(h, 0.5 * left)
 
 
-@njit(cache=True)
+@register_jitable
 def jump(system, left, memory):
     """Try the shortest and some longer steps and return the length with the least error; 0 if all attempted
     steps fail."""
@@ -187,7 +188,7 @@ def jump(system, left, memory):
     return best
 
 
-@njit(cache=True)
+@register_jitable
 def accept(system, t, memory):
     """Accept the new state and normalise its quaternions."""
     y = memory.y
@@ -198,7 +199,7 @@ def accept(system, t, memory):
     memory.counts[STEPS] += 1
 
 
-@njit(cache=True)
+@register_jitable
 def step(system, target, end, memory):
     """Take one accepted step towards a sample, from a state with known slope; return OK or the failure
     status."""
@@ -224,7 +225,7 @@ def step(system, target, end, memory):
     return REACHED
 
 
-@njit(cache=True)
+@register_jitable
 def advance(system, target, end, memory):
     """Step to a sample time; return REACHED or the failure status."""
     while memory.clock[0] < target:

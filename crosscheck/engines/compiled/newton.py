@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 
 from crosscheck.engines.compiled.calls import rates_of
 from crosscheck.engines.compiled.dop853 import EVALUATIONS, NOT_FINITE, REACHED, STEPS, is_finite
@@ -29,7 +30,7 @@ class System(NamedTuple):
     longest: float  # s; longest step
 
 
-@njit(cache=True)
+@register_jitable
 def advance(system, target, memory, numbers):
     """Take equal steps to a sample time; return REACHED or the failure status."""
     start = memory.clock[0]
