@@ -242,7 +242,9 @@ def prepare_all(kernels: Sequence[Exchangeable]) -> None:
 
 def pair_of(first: types.Type, second: types.Type) -> types.Type:
     """Return the type of a kernel's two results."""
-    return types.Tuple((first, second))
+    make: Any = types.Tuple  # numba declares no types of its arguments
+    pair: types.Type = make((first, second))
+    return pair
 
 
 def pointer_to(signature: Signature) -> types.Type:

@@ -247,6 +247,7 @@ SAVE_SERIES = RETURN_TO_START = RECORD_CROSSINGS = INT(SERIES)
 JUDGE_START = INT(INT, SERIES)  # arguments: status
 TURNING_PIVOT = FLOAT(FLOAT, SERIES)  # arguments: length of the step (s)
 DETECT = INT(FLOAT, FLOAT, SERIES)  # arguments: length of the step (s), least pivot at its end
-EXPAND = BALANCE = INT(FLOAT, SERIES)  # arguments: t
+EXPAND = INT(FLOAT, SERIES)  # arguments: t
+BALANCE = EXPAND  # arguments: t
 GRADIENT = INT(MATRIX, SERIES)  # arguments: variables
 DETERMINANT = pair_of(BOOLEAN, FLOAT)(MATRIX, SERIES)  # arguments: variables
