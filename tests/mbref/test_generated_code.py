@@ -218,7 +218,7 @@ def test_a_scene_that_has_no_code_is_told_why(monkeypatch):
     assert why_no_code(SCENES["four_bar"](), TAYLOR) == ""
     assert why_no_code(SCENES["andrews_squeezer"](), TAYLOR) == ""
     with pytest.raises(MethodError, match="products of vectors, more than 2000"):
-        simulate(find_scene("four_bar_chain[40]"), "taylor", [0.01], Limits(code="generated"))
+        simulate(find_scene("four_bar_chain[16]"), "taylor", [0.01], Limits(code="generated"))
     monkeypatch.setattr(build, "PLAIN", True)
     with pytest.raises(MethodError, match="without the JIT"):
         simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="generated"))
