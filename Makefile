@@ -60,6 +60,7 @@ VERIFIED = $$($(BIN)/python -c "from crosscheck.engine import default_engines as
 
 ANEW := build/reference
 ON_REQUEST := dart drake mjx
+ALSO_mjx := --scene planar_slider_crank  # a fast loop, on which MJX is wrong
 KEPT := $(wildcard reports/reference/conformance/*_*.json) $(ON_REQUEST:%=reports/reference/conformance/%.json)
 
 reference: $(VENV)/ready ## the committed report with its records, anew, into reports/reference/
@@ -71,8 +72,8 @@ reference: $(VENV)/ready ## the committed report with its records, anew, into re
 	$(BIN)/crosscheck report --render reports/reference
 
 request: $(VENV)/ready ## every check on engines that run on request, if installed, for the committed report
-	for engine in $(ON_REQUEST); do $(BIN)/crosscheck verify $$engine --in-process --json \
-	    $(PROBES) > reports/reference/conformance/$$engine.json; done
+	-$(foreach engine,$(ON_REQUEST),$(BIN)/crosscheck verify $(engine) --in-process --json \
+	    $(PROBES) $(ALSO_$(engine)) > reports/reference/conformance/$(engine).json;)
 	$(BIN)/crosscheck report --render reports/reference
 
 DRAWN := mechanisms 200 --beside mbref=taylor
