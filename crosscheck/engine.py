@@ -70,6 +70,8 @@ class Engine(ABC):
         Families of settings, and options of a setting with units, each with a description.
     integrated_here : collection of str
         Families whose integrator or extrapolation belongs to crosscheck.
+    with_default : collection of str
+        Options that a setting may leave out.
     compile_seconds : float
         CPU time, s, by which the time limit of a run is extended, for an engine that compiles code for each
         model within its runs.
@@ -83,6 +85,7 @@ class Engine(ABC):
     families: Mapping[str, str] = {}
     integrated_here: Collection[str] = ()
     options: Mapping[str, str] = {}
+    with_default: Collection[str] = ()
     compile_seconds: float = 0.0
 
     def version(self) -> str:

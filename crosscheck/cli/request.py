@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 import traceback
 from collections.abc import Iterable, Sequence
@@ -178,12 +179,14 @@ def _single(
     if faults := [f"{name} cannot run {scene}: {gap}" for scene, gap in gaps.items() if gap]:
         raise RequestError(*faults)
     scout([name], scenes, lambda _: None)
-    if strange := [fault for scene in scenes for fault in _strange_options(scene, name, setting)]:
-        raise RequestError(*dict.fromkeys(strange))
-    return [
-        Case(s, when, name, _with_file(s, name, setting), time_limit)
-        for s, when in zip(scenes, times, strict=True)
+    whole = [_with_file(scene, name, setting) for scene in scenes]
+    faults = [fault for scene in scenes for fault in _strange_options(scene, name, setting)]
+    faults += [
+        f for scene, each in zip(scenes, whole, strict=True) for f in _missing_options(scene, name, each)
     ]
+    if faults:
+        raise RequestError(*dict.fromkeys(faults))
+    return [Case(s, when, name, each, time_limit) for s, when, each in zip(scenes, times, whole, strict=True)]
 
 
 def _with_file(scene: Scene, name: str, setting: Setting) -> Setting:
@@ -207,6 +210,17 @@ def _strange_options(scene: Scene, name: str, setting: Setting) -> list[str]:
         for option in setting.options
         if own and option not in known
     ]
+
+
+def _missing_options(scene: Scene, name: str, setting: Setting) -> list[str]:
+    """Return a sentence on the options that all settings of the family have and this setting lacks, with an
+    example; no sentence if the setting lacks none."""
+    own = [offered.options for offered in settings(name, scene) if offered.family == setting.family]
+    shared = [option for option in own[0] if all(option in each for each in own)] if own else []
+    missing = [o for o in shared if o not in setting.options and o not in engine(name).with_default]
+    example = " ".join(f"--option {option}={json.dumps(own[-1][option])}" for option in missing)
+    what = f"--option: {name} {setting.family} also needs {' and '.join(missing)}, for example {example}"
+    return [what] if missing else []
 
 
 def _able(

@@ -59,6 +59,7 @@ class Mbref(Engine):
     """The reference implementation; ``settings`` has several relative tolerances for each method."""
 
     name = "mbref"
+    with_default = ("rtol",)
     package = "mbref"
     families, options = FAMILIES, OPTIONS
     supports = Supports(
