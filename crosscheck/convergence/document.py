@@ -46,6 +46,7 @@ the engine chooses its steps, the mean step counts. Order 1 means that half the 
 - `3e-04 ↓ (1.0)`: the finest step within the limit has the least error; finer steps would lower it.
 - `<1e-12`: less than the bound on the truth's error.
 - Without a number in parentheses, no range of steps has a constant order.
+- `!`: no run completes; the outcomes are below.
 - `–`: the mechanism is refused; the reason is below, and whether the adapter, the engine or the engine's
   model lacks the feature.
 """
