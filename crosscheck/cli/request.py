@@ -181,9 +181,9 @@ def _single(
     scout([name], scenes, lambda _: None)
     whole = [_with_file(scene, name, setting) for scene in scenes]
     faults = [fault for scene in scenes for fault in _strange_options(scene, name, setting)]
-    faults += [
-        f for scene, each in zip(scenes, whole, strict=True) for f in _missing_options(scene, name, each)
-    ]
+    if not faults:
+        pairs = zip(scenes, whole, strict=True)
+        faults = [fault for scene, each in pairs for fault in _missing_options(scene, name, each)]
     if faults:
         raise RequestError(*dict.fromkeys(faults))
     return [Case(s, when, name, each, time_limit) for s, when, each in zip(scenes, times, whole, strict=True)]

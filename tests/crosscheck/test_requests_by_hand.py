@@ -29,6 +29,8 @@ FAMILIES = {"a": ("x", "y"), "b": ("x", "z")}
 class Stand:
     """An engine of two families; its package may be missing, and it may refuse scenes."""
 
+    with_default = ()
+
     def __init__(self, name: str) -> None:
         self.name, self.package, self.options = name, f"package-{name}", {"size": "a size"}
 
@@ -154,6 +156,8 @@ def test_one_setting_with_its_options(monkeypatch):
         RequestError, match=r"a x has no option 'rtoll'; it has: rtol, size; did you mean 'rtol'"
     ):
         single("a", "x", rtoll=0.5)
+    with pytest.raises(RequestError, match=r"^--option: a x also needs rtol, for example --option rtol="):
+        single("a", "x", size=3.0)
     with pytest.raises(RequestError, match=r"b cannot run four_bar: .*no hinge"):
         single("b", "x", rtol=0.5)
     assert len(single("a", "unlisted", anything=1.0)) == 1, "a family that the sweep does not have"
