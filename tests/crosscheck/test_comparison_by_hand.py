@@ -157,7 +157,7 @@ def test_runs_that_are_timed_again(machine, is_quick, long):
 
 
 def test_coarser_settings_are_added_until_none_is_useful(machine, monkeypatch):
-    """Of the first family 0.16 and 0.32, of the second none: its coarsest setting is too inaccurate."""
+    """The first family gets 0.16 and 0.32; the second gets none: its coarsest is too inaccurate."""
 
     def beyond(family: list[Case], records: dict[str, Any]) -> list[Case]:
         step = family[0].setting.options["step"]

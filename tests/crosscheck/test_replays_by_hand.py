@@ -53,7 +53,7 @@ TURNED = (HALF, 0.0, 0.0, HALF)
 
 
 def motion(times: tuple[float, ...] = (0.0, 2.0), **parts: Any) -> Trajectory:
-    """Positions and velocities of sample k are those of the second sample times k; c moves along z."""
+    """Positions and velocities of sample k are k times the values of the second sample; c moves along z."""
     k = np.arange(len(times), dtype=float)[:, None, None]
     place = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 0.0]]) + k * np.array([[3.0, -2.0, 5.0], [0.0, 0.0, 1.0]])
     half_angle = math.pi / 4 * (1 + k[:, 0, 0])

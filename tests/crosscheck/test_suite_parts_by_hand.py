@@ -186,7 +186,7 @@ def test_quantities_that_are_compared():
 
 
 def test_motions_that_are_compared(monkeypatch):
-    """Reactions are those of the run, and the forces they must exert those of the exact motion."""
+    """The run gives the reactions; the exact motion gives the forces that the reactions must exert."""
     given, asked = bench(), []
     names = {id(given.scene): "scene", id(given.motion): "run", id(given.exact): "exact"}
     for function in ("accelerations_apart", "balance", "idle"):

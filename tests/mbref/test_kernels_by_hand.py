@@ -311,7 +311,7 @@ def test_error_constants_of_adams():
 
 
 def test_coefficients_of_adams_for_equal_steps():
-    """Of equal steps g = 1, 1/2, 5/12, 3/8; β = 1; σ = 1, 1, 1, 1; of a doubled step β = 1, 2, 6."""
+    """Equal steps give g = 1, 1/2, 5/12, 3/8; β = 1; σ = 1, 1, 1, 1. A doubled step gives β = 1, 2, 6."""
     size = adams.HIGHEST + 3
 
     def past(h: float) -> Any:

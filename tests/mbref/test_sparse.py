@@ -278,7 +278,7 @@ def test_pivots_tell_that_many_rows_are_independent(stabilisation):
         find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
     )
     rows = run.memory.pivots.size
-    assert rows > MOST_RANKED_ROWS, "so few rows are told by singular values"
+    assert rows > MOST_RANKED_ROWS, "singular values decide the rank of up to MOST_RANKED_ROWS rows"
     assert run.memory.equations.system.settings.independent
 
 
