@@ -8,7 +8,6 @@ import re
 import shlex
 import shutil
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,16 +17,15 @@ from crosscheck.cli import collection
 from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
 from crosscheck.judge.reference.cache import mechanism
-from crosscheck.study import comparison as comparisons
 from crosscheck.study import ladder
 from crosscheck.study import sweep as sweeps
 from crosscheck.study.grid import Case, Record, default_cases, key, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import mechanisms, render, stored
+from reports import render, stored
 from reports.blocks import Block, Heading, Matrix, Table
-from reports.sections import blocks, paper
+from reports.sections import blocks
 
 FAKE = "fake_engines:FAKE"
 
@@ -182,57 +180,6 @@ def test_records_of_a_scene_before_it_was_edited_are_not_rendered(tmp_path, of_f
     assert group.truth["mechanism"] == mechanism(group.scene)
 
 
-def test_program_interrupted_and_what_to_do(tmp_path, of_fakes, capsys, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(comparisons, "study", interrupted)
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 130
-    assert "the same command resumes from there" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])
-def test_sections_with_scenes_of_their_own_take_no_others(tmp_path, capsys, asked, given):
-    folder = tmp_path / "report"
-    assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
-    assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err
-    assert not folder.exists(), "something was run"
-
-
-@pytest.mark.parametrize(("depth", "is_whole"), [("quick", False), ("whole", True)])
-def test_section_of_the_paper_prints_its_score(tmp_path, capsys, monkeypatch, depth, is_whole):
-    asked = []
-
-    def found(out, whole, notice):
-        asked.append((out, whole))
-        return collection.Paper({}, {})
-
-    monkeypatch.setattr(collection, "paper", found)
-    monkeypatch.setattr(paper, "score", lambda records: f"{len(records)} cells")
-    monkeypatch.setattr(paper, "render", lambda *_: [Heading("Its tables")])
-    assert program.main(["--section", "paper", "--depth", depth, "--out", str(tmp_path)]) == 0
-    assert asked == [(tmp_path, is_whole)] and capsys.readouterr().out == "0 cells\n"
-    page = (tmp_path / "index.html").read_text()
-    assert "Its tables" in page and f"<title>{program.TITLES['paper',]}</title>" in page
-
-
-def test_animated_picture_of_the_readme(tmp_path, capsys, monkeypatch):
-    made = SimpleNamespace(scene=still("s"), exact=None, records=[{"scene": "s"}], singular=[0.25])
-    monkeypatch.setattr(program, "moving_picture", lambda: made)
-    monkeypatch.setattr(
-        mechanisms, "compared", lambda scene, exact, runs, singular: f"{scene.name}{singular}"
-    )
-    assert program.main(["--picture", str(tmp_path / "a.svg")]) == 0
-    assert (tmp_path / "a.svg").read_text() == "s[0.25]"
-    assert capsys.readouterr().err == f"written: {tmp_path / 'a.svg'}\n"
-
-
-def test_a_scene_that_is_no_scene_is_refused_by_its_faults(tmp_path, capsys):
-    (tmp_path / "bad.toml").write_text("gravity = 3\n")
-    assert program.main([str(tmp_path / "bad.toml"), "--out", str(tmp_path / "out")]) == 2
-    assert "gravity" in capsys.readouterr().err and not (tmp_path / "out").exists()
-
-
 def test_words_of_tables_may_break_where_the_page_is_narrow():
     """Keep the last column on a page of 900 to 1100 px: long words break; cells of short words do not."""
     style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
@@ -240,12 +187,6 @@ def test_words_of_tables_may_break_where_the_page_is_narrow():
     assert ".scroll :is(th, td:not(.right)), .scroll th.right { white-space: normal; }" in narrow, narrow
     assert ".scroll :is(th, td):not(.whole) { overflow-wrap: anywhere; }" in narrow, narrow
     assert ".scroll table { font-size: 13px; width: 100%; }" in narrow, narrow
-
-
-def test_program_without_its_packages_and_what_to_install(capsys, monkeypatch):
-    monkeypatch.setattr(program, "find_spec", lambda package: None)
-    assert program.main([]) == 2
-    assert "pip install 'mbref[report]'" in capsys.readouterr().err
 
 
 def test_short_runs_and_interleaved_times(tmp_path):
