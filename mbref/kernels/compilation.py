@@ -164,8 +164,8 @@ class Exchangeable:
 
     @property
     def is_compiled_elsewhere(self) -> bool:
-        """Return whether another process compiles the kernel now."""
-        return is_held(self._lock)
+        """Return whether another process compiles the kernel now, which this process does not have yet."""
+        return "pointer" not in vars(self) and is_held(self._lock)
 
     @property
     def _lock(self) -> Path:
