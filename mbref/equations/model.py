@@ -137,11 +137,12 @@ class Model:
         t = np.array(times, dtype=float, ndmin=1)
         q = np.ascontiguousarray(q, dtype=float).reshape(t.size, 7 * self.nb)
         v = np.zeros((t.size, self.n)) if v is None else np.ascontiguousarray(v).reshape(t.size, self.n)
-        blocks, rows = np.empty((t.size, self.entry_columns.size)), np.empty((t.size, 3 * self.m))
+        blocks, m = np.empty((t.size, self.entry_columns.size)), self.m
+        rows = np.empty((t.size, 3 * m))
         forces = np.empty((t.size, self.n))
         evaluate_along(t, q, v, blocks, rows, forces, self.memory.packed.argument)
         blocks = blocks.reshape(t.size, *self.entry_columns.shape)
-        phi, nu, gamma = np.split(rows, 3, axis=1)
+        phi, nu, gamma = rows[:, :m], rows[:, m : 2 * m], rows[:, 2 * m :]
         found = Terms(self.structure, self.mass, blocks, phi, nu, gamma, forces)
         return found if np.ndim(times) else found[0]
 

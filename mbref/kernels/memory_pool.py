@@ -8,7 +8,7 @@ the next run.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from typing import Any
 
 import numpy as np
@@ -36,18 +36,24 @@ class SavedNumbers:
             block[...] = numbers
 
 
-def arrays_in(values: Any) -> Iterator[np.ndarray]:
+def arrays_in(values: Any) -> list[np.ndarray]:
     """Return the arrays of a schema and of the packed schemas in it. The array of a record has one
     element."""
-    if isinstance(values, Packed):
-        yield from arrays_in(values.values)
+    found: list[np.ndarray] = []
+    _add_arrays(values, found)
+    return found
+
+
+def _add_arrays(values: Any, found: list[np.ndarray]) -> None:
+    if isinstance(values, np.ndarray):
+        found.append(values)
     elif isinstance(values, tuple):
         for value in values:
-            yield from arrays_in(value)
+            _add_arrays(value, found)
+    elif isinstance(values, Packed):
+        _add_arrays(values.values, found)
     elif isinstance(values, Numbers):
-        yield np.asarray(values.base)
-    elif isinstance(values, np.ndarray):
-        yield values
+        found.append(np.asarray(values.base))
 
 
 class Pooled:

@@ -125,17 +125,6 @@ def slides_of(loads: Loads, forms: Forms) -> Slides:
     return Slides(constant, form, stiffness, damping, natural, amount, function.astype(np.int64))
 
 
-def no_springs(d: int) -> Springs:
-    """Return an empty table of springs for a scene of d variables."""
-    return Springs(*_stacked([], 3, d))
-
-
-def no_slides(d: int) -> Slides:
-    """Return an empty table of loads along joints' axes for a scene of d variables."""
-    constant, form, stiffness, damping, natural = _stacked([], 6, d)
-    return Slides(constant, form, stiffness, damping, natural, np.zeros(0), np.zeros(0, dtype=np.int64))
-
-
 def timed_forces(loads: Loads, forms: Forms) -> TimedForces:
     """Return the forces and moments on bodies that functions of time multiply."""
     places = [k for k in np.flatnonzero(loads.function >= 0) if loads.kind[k] in (FORCE, MOMENT)]

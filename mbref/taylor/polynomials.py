@@ -9,14 +9,12 @@ from typing import Any
 import numpy as np
 
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import ALONG_AXIS, SPRING
+from mbref.kernels.scene_layout import Loads
 from mbref.taylor.expressions import ONE, cleaned
 from mbref.taylor.forms import Forms
 from mbref.taylor.load_polynomials import (
     constant_forces,
     coupled_angles,
-    no_slides,
-    no_springs,
     slides_of,
     springs_of,
     timed_forces,
@@ -45,26 +43,31 @@ class Geometry:
         self._poses, self._given = _poses(of, self._forms), _given(of)
         self.tableau = _tableau(self._rows, len(of.kept), len(of.rows), self._lanes)
         self._angles = coupled_angles(self._forms)
-        self._without = no_springs(len(of.kept)), no_slides(len(of.kept))
+        self._no_loads: dict[str, Any] | None = None  # tables of loads of scenes without loads
 
     def polynomials(self, model: Model) -> Polynomials:
         """Return the polynomials of a scene of this geometry."""
-        (springs, slides), loads = self._without, model.data.loads
-        if (loads.kind == SPRING).any():
-            springs = springs_of(loads, self._forms)
-        if (loads.kind == ALONG_AXIS).any():
-            slides = slides_of(loads, self._forms)
         return Polynomials(
             rows=self._rows,
             products=self._products,
             inertia=_inertia(model, self._forms, self._lanes),
             poses=self._poses,
             given=self._given,
-            springs=springs,
-            torsions=torsions_of(loads, self._forms, self._angles),
-            slides=slides,
-            timed=timed_forces(loads, self._forms),
+            **self._loads(model.data.loads),
         )
+
+    def _loads(self, loads: Loads) -> dict[str, Any]:
+        """Return the tables of loads that are not constant; tables without loads are made once."""
+        if not loads.kind.size and self._no_loads:
+            return self._no_loads
+        found = {
+            "springs": springs_of(loads, self._forms),
+            "torsions": torsions_of(loads, self._forms, self._angles),
+            "slides": slides_of(loads, self._forms),
+            "timed": timed_forces(loads, self._forms),
+        }
+        self._no_loads = self._no_loads if loads.kind.size else found
+        return found
 
 
 def _rows(of: NaturalCoordinates, lane: dict[int, int], lanes: int) -> RowPolynomials:
