@@ -6,12 +6,10 @@ g has 6 entries per body: force in the world frame, moment about the centre of m
 
 from __future__ import annotations
 
-from math import pi
-
-from numpy import arctan2, floor, sqrt
+from numpy import sqrt
 
 from mbref.equations.functions import function_value
-from mbref.equations.primitives import joint_angle
+from mbref.equations.primitives import unwrapped_angle
 from mbref.kernels.compilation import inlined, kernel
 from mbref.kernels.scene_layout import ABOUT_AXIS, FORCE, MOMENT, SPRING
 from mbref.linear_algebra.vectors import (
@@ -91,14 +89,17 @@ def spring(k, loads, frames, g):
 
 
 @kernel
-def relative_angle(k, reference, loads, rotation):
-    """Return the angle of the second body relative to the first about the joint axis (rad), nearest to
-    ``reference``."""
-    i, j = loads.first[k], loads.second[k]
-    x, y = to_world(rotation, i, vector(loads.x_first, k)), to_world(rotation, i, vector(loads.y_first, k))
-    u = to_world(rotation, j, vector(loads.x_second, k))
-    angle = arctan2(dot(u, y), dot(u, x))
-    return angle + 2.0 * pi * floor((reference - angle) / (2.0 * pi) + 0.5)
+def joint_angle(i, j, x, y, u, reference, rotation):
+    """Return the angle from x towards y on body i to u on body j (rad), nearest to ``reference``."""
+    x, y, u = to_world(rotation, i, x), to_world(rotation, i, y), to_world(rotation, j, u)
+    return unwrapped_angle(dot(u, y), dot(u, x), reference)
+
+
+@kernel
+def angle_of_load(k, angles, loads, rotation):
+    """Return the angle of the joint on which a load acts (rad), nearest to the angle at the last step."""
+    x, y, u = vector(loads.x_first, k), vector(loads.y_first, k), vector(loads.x_second, k)
+    return joint_angle(loads.first[k], loads.second[k], x, y, u, angles[loads.angle[k]], rotation)
 
 
 @kernel
@@ -107,7 +108,7 @@ def act_about_axis(k, torque, loads, frames, angles, g):
     moment on the first body."""
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     axis = to_world(rotation, i, vector(loads.axis, k))
-    angle = relative_angle(k, angles[loads.angle[k]], loads, rotation)
+    angle = angle_of_load(k, angles, loads, rotation)
     w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
     w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
     rate = dot(subtract(w_j, w_i), axis)
@@ -140,12 +141,14 @@ def act_along_axis(k, force, loads, frames, g):
 def remember_angles(equations):
     """Save the angles of loads about axes and of couplings at the accepted state, from which later angles are
     unwrapped."""
-    loads, angles, primitives = equations.scene.loads, equations.angles, equations.scene.primitives
+    loads, primitives = equations.scene.loads, equations.scene.primitives
+    angles, rotation = equations.angles, equations.frames.rotation
     for k in range(loads.angle.shape[0]):
-        slot = loads.angle[k]
-        if slot >= 0:
-            angles[slot] = relative_angle(k, angles[slot], loads, equations.frames.rotation)
+        if loads.angle[k] >= 0:
+            angles[loads.angle[k]] = angle_of_load(k, angles, loads, rotation)
     for p in range(primitives.angle.shape[0]):
         slot = primitives.angle[p]
         if slot >= 0:
-            angles[slot] = joint_angle(p, angles[slot], primitives, equations.frames.rotation)
+            x, y = vector(primitives.direction_first, p), vector(primitives.turning_first, p)
+            i, j, u = primitives.first[p], primitives.second[p], vector(primitives.direction_second, p)
+            angles[slot] = joint_angle(i, j, x, y, u, angles[slot], rotation)

@@ -148,29 +148,37 @@ def between(p, primitives, frames):
 
 
 @kernel
-def dot2(p, t, equations):
-    """Evaluate a dot-2 constraint: a vector on the first body stays perpendicular to d; a driver prescribes d
-    along it."""
-    primitives, frames = equations.scene.primitives, equations.frames
-    rows, blocks, rotation = equations.rows, equations.system.blocks, frames.rotation
-    i, j, row = primitives.first[p], primitives.second[p], primitives.row[p]
+def slide_of_joint(p, equations):
+    """Return a·d and its γ, and its derivatives: by the position of the second body, by both rotations."""
+    primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
+    i, j = primitives.first[p], primitives.second[p]
     a, w_i = vector(primitives.direction_first, p), vector(frames.angular_velocity, i)
     s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
     d, d_rate, d_second = between(p, primitives, frames)
     a_world, a_rate = to_world(rotation, i, a), to_world(rotation, i, cross(w_i, a))
     a_second = to_world(rotation, i, cross(w_i, cross(w_i, a)))
-    rows.phi[row] = dot(a_world, d)
+    gamma = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
+    turn_i, turn_j = cross(a, add(to_body(rotation, i, d), s_i)), cross(s_j, to_body(rotation, j, a_world))
+    return dot(a_world, d), gamma, a_world, turn_i, turn_j
+
+
+@kernel
+def dot2(p, t, equations):
+    """Evaluate a dot-2 constraint: a vector on the first body stays perpendicular to d; a driver prescribes d
+    along it."""
+    primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
+    row = primitives.row[p]
+    rows.phi[row], rows.gamma[row], along, turn_i, turn_j = slide_of_joint(p, equations)
     rows.nu[row] = 0.0
-    rows.gamma[row] = -(dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
     if primitives.driver[p] >= 0:
         value, rate, acceleration = function_value(primitives.driver[p], t, equations)
         rows.phi[row] -= value
         rows.nu[row] = rate
         rows.gamma[row] += acceleration
-    put(blocks, row, 0, scale(-1.0, a_world))
-    put(blocks, row, 3, cross(a, add(to_body(rotation, i, d), s_i)))
-    put(blocks, row, 6, a_world)
-    put(blocks, row, 9, cross(s_j, to_body(rotation, j, a_world)))
+    put(blocks, row, 0, scale(-1.0, along))
+    put(blocks, row, 3, turn_i)
+    put(blocks, row, 6, along)
+    put(blocks, row, 9, turn_j)
 
 
 @kernel
@@ -209,14 +217,9 @@ def joint_coordinate(p, equations):
 
 
 @kernel
-def joint_angle(p, reference, primitives, rotation):
-    """Return the angle of the second body relative to the first about the joint's axis (rad), nearest to
-    ``reference``."""
-    i, j = primitives.first[p], primitives.second[p]
-    x = to_world(rotation, i, vector(primitives.direction_first, p))
-    y = to_world(rotation, i, vector(primitives.turning_first, p))
-    u = to_world(rotation, j, vector(primitives.direction_second, p))
-    angle = arctan2(dot(u, y), dot(u, x))
+def unwrapped_angle(sine, cosine, reference):
+    """Return the angle of these multiples of its sine and cosine (rad) that is nearest to ``reference``."""
+    angle = arctan2(sine, cosine)
     return angle + 2.0 * pi * floor((reference - angle) / (2.0 * pi) + 0.5)
 
 
@@ -240,8 +243,7 @@ def add_angle(p, equations):
     normal, normal_rate = cross(u, across), add(cross(u_rate, across), cross(u, across_rate))
     h = scale(1.0 / square, normal)
     h_rate = scale(1.0 / square, subtract(normal_rate, scale(square_rate, h)))
-    reference = equations.angles[primitives.angle[p]]
-    rows.phi[row] += factor * joint_angle(p, reference, primitives, rotation)
+    rows.phi[row] += factor * unwrapped_angle(s, c, equations.angles[primitives.angle[p]])
     rows.gamma[row] -= factor * dot(subtract(w_j, w_i), h_rate)
     accumulate(blocks[row], primitives.column_first[p] + 3, scale(-factor, to_body(rotation, i, h)))
     accumulate(blocks[row], primitives.column_second[p] + 3, scale(factor, to_body(rotation, j, h)))
@@ -249,22 +251,16 @@ def add_angle(p, equations):
 
 @kernel
 def add_displacement(p, equations):
-    """Add a displacement to the row of its coupling, by the formulas of the ``dot2`` constraint."""
-    primitives, frames, rotation = equations.scene.primitives, equations.frames, equations.frames.rotation
-    rows, blocks = equations.rows, equations.system.blocks
-    i, j, row, factor = primitives.first[p], primitives.second[p], primitives.row[p], primitives.length[p]
-    a, w_i = vector(primitives.direction_first, p), vector(frames.angular_velocity, i)
-    s_i, s_j = vector(primitives.point_first, p), vector(primitives.point_second, p)
-    d, d_rate, d_second = between(p, primitives, frames)
-    a_world, a_rate = to_world(rotation, i, a), to_world(rotation, i, cross(w_i, a))
-    a_second = to_world(rotation, i, cross(w_i, cross(w_i, a)))
-    first, second = primitives.column_first[p], primitives.column_second[p]
-    rows.phi[row] += factor * dot(a_world, d)
-    rows.gamma[row] -= factor * (dot(a_second, d) + 2.0 * dot(a_rate, d_rate) + dot(a_world, d_second))
-    accumulate(blocks[row], first, scale(-factor, a_world))
-    accumulate(blocks[row], first + 3, scale(factor, cross(a, add(to_body(rotation, i, d), s_i))))
-    accumulate(blocks[row], second, scale(factor, a_world))
-    accumulate(blocks[row], second + 3, scale(factor, cross(s_j, to_body(rotation, j, a_world))))
+    """Add a displacement to the row of its coupling."""
+    primitives, rows, blocks = equations.scene.primitives, equations.rows, equations.system.blocks
+    row, factor = primitives.row[p], primitives.length[p]
+    value, gamma, along, turn_i, turn_j = slide_of_joint(p, equations)
+    rows.phi[row] += factor * value
+    rows.gamma[row] += factor * gamma
+    accumulate(blocks[row], primitives.column_first[p], scale(-factor, along))
+    accumulate(blocks[row], primitives.column_first[p] + 3, scale(factor, turn_i))
+    accumulate(blocks[row], primitives.column_second[p], scale(factor, along))
+    accumulate(blocks[row], primitives.column_second[p] + 3, scale(factor, turn_j))
 
 
 @inlined

@@ -6,11 +6,9 @@ arctan2(S, C), unwrapped, and its gradient is (C δS - S δC) / (C² + S²).
 
 from __future__ import annotations
 
-from math import pi
-
-from numpy import arctan2, floor
-
+from mbref.equations.primitives import unwrapped_angle
 from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.vectors import dot
 
 
 @inlined
@@ -27,12 +25,6 @@ def components(at, share, row, torsions):
     return x, y, z
 
 
-@inlined
-def inner(a, b):
-    """Return the product of two triples."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
 @kernel
 def add_angles(memory):
     """Add the angles at the first coefficients, nearest to the previous angles, to Φ of their rows."""
@@ -41,11 +33,9 @@ def add_angles(memory):
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
             f, near = components(9 * s + 6, 1.0, y, torsions), memory.angles[s]
-            cosine = inner(components(9 * s, 1.0, y, torsions), f)
-            sine = inner(components(9 * s + 3, 1.0, y, torsions), f)
-            angle = arctan2(sine, cosine)
-            angle += 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
-            phi[nz + torsions.row[s]] += torsions.factor[s] * angle
+            cosine = dot(components(9 * s, 1.0, y, torsions), f)
+            sine = dot(components(9 * s + 3, 1.0, y, torsions), f)
+            phi[nz + torsions.row[s]] += torsions.factor[s] * unwrapped_angle(sine, cosine, near)
 
 
 @kernel
@@ -58,9 +48,9 @@ def add_angle_rates(memory):
             e1, e2 = components(9 * s, 1.0, y, torsions), components(9 * s + 3, 1.0, y, torsions)
             e1_rate, e2_rate = components(9 * s, 0.0, v, torsions), components(9 * s + 3, 0.0, v, torsions)
             f, f_rate = components(9 * s + 6, 1.0, y, torsions), components(9 * s + 6, 0.0, v, torsions)
-            cosine, sine = inner(e1, f), inner(e2, f)
-            cosine_rate = inner(e1_rate, f) + inner(e1, f_rate)
-            sine_rate = inner(e2_rate, f) + inner(e2, f_rate)
+            cosine, sine = dot(e1, f), dot(e2, f)
+            cosine_rate = dot(e1_rate, f) + dot(e1, f_rate)
+            sine_rate = dot(e2_rate, f) + dot(e2, f_rate)
             rate = (cosine * sine_rate - sine * cosine_rate) / (cosine * cosine + sine * sine)
             phi[nz + torsions.row[s]] += torsions.factor[s] * rate
 
@@ -75,7 +65,7 @@ def add_angle_gradients(variables, matrix, memory):
             at = 9 * s
             e1, e2 = components(at, 1.0, y, torsions), components(at + 3, 1.0, y, torsions)
             f = components(at + 6, 1.0, y, torsions)
-            cosine, sine = inner(e1, f), inner(e2, f)
+            cosine, sine = dot(e1, f), dot(e2, f)
             factor = torsions.factor[s] / (cosine * cosine + sine * sine)
             for i in range(form.shape[1]):
                 value = 0.0

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from math import pi
 from typing import Any
 
-from numpy import arctan2, cos, floor, inf, sin, sqrt
+from numpy import cos, inf, sin, sqrt
 
 from mbref.equations.functions import expand_function
+from mbref.equations.primitives import unwrapped_angle
 from mbref.kernels.compilation import inlined, kernel
 
 VALUE, COSINE, SINE = range(3)  # functions of a driver's value
@@ -153,8 +153,7 @@ def grow_torsions(k, memory):
             sine += product_order(of[E2 + c], of[F + c], k)
         of[COS, k], of[SIN, k] = cosine, sine
         if k == 0:
-            angle, near = arctan2(sine, cosine), memory.angles[s]
-            of[TORSION, 0] = angle + 2.0 * pi * floor((near - angle) / (2.0 * pi) + 0.5)
+            of[TORSION, 0] = unwrapped_angle(sine, cosine, memory.angles[s])
         else:
             value = 0.0
             for i in range(1, k + 1):
