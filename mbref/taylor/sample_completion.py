@@ -18,7 +18,7 @@ from mbref.stepping.loop import take_sample
 from mbref.taylor.layout import BALANCE, SAMPLE, SERIES
 from mbref.taylor.loads import expand_functions
 from mbref.taylor.samples import find_poses, put_state
-from mbref.taylor.saved_state import restore_state, save_state
+from mbref.taylor.saved_state import restore_state, restore_variables, save_state, save_variables
 from mbref.taylor.simd import WIDTH, load, store
 
 SAMPLE_CORRECTIONS = 2  # corrections of a sample of a low-accuracy series; two reach rounding
@@ -35,7 +35,7 @@ def complete_samples(go_on, memory):
     if memory.progress.completed >= end:
         return OK
     save_state(memory.run, memory.before_samples)
-    keep_series_here(memory)
+    save_variables(memory.series.terms, memory.angles, memory.series_start)
     status = complete_until(end, memory)
     if status == OK:
         restore_state(memory.before_samples, memory.run)
@@ -124,21 +124,9 @@ def balance_forces(t, memory):
 
 
 @kernel
-def keep_series_here(memory):
-    """Save the variables, their rates and the angles about which the series in ``terms`` is expanded."""
-    here, terms = memory.series_start, memory.series.terms
-    for order in range(2):
-        copy(terms[order], here.terms[order])
-    copy(memory.angles, here.angles)
-
-
-@kernel
 def return_to_series(memory):
     """Restore the series about the saved variables in ``terms``."""
-    here, terms = memory.series_start, memory.series.terms
-    for order in range(2):
-        copy(here.terms[order], terms[order])
-    copy(here.angles, memory.angles)
+    restore_variables(memory.series_start, memory.series.terms, memory.angles)
     select_pieces(memory.run.loop.clock.time, memory.run.equations)
     expand_functions(memory.run.loop.clock.time, memory)
     memory.kernels.partition(memory)

@@ -1,4 +1,4 @@
-"""Saved states of a run, to which it can return."""
+"""Saved states of a run, and saved starts of its series, to which it can return."""
 
 from __future__ import annotations
 
@@ -26,3 +26,19 @@ def restore_state(saved, run):
     copy(saved.coordinates, run.state.coordinates)
     copy(saved.velocities, run.state.velocities)
     copy(saved.angles, run.equations.angles)
+
+
+@kernel
+def save_variables(series, angles, saved):
+    """Save variables and rates, the first two orders of a series, and the angles of torsion springs."""
+    copy(series[0], saved.terms[0])
+    copy(series[1], saved.terms[1])
+    copy(angles, saved.angles)
+
+
+@kernel
+def restore_variables(saved, series, angles):
+    """Restore the first two orders of a series, and angles, that ``save_variables`` saved."""
+    copy(saved.terms[0], series[0])
+    copy(saved.terms[1], series[1])
+    copy(saved.angles, angles)

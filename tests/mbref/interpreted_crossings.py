@@ -309,9 +309,10 @@ def test_a_crossing_is_recorded_with_its_time_and_state(monkeypatch):
 def test_a_short_crossing_that_fails_is_undone(monkeypatch, crosses):
     state, restored = memory(time=1.0), []
     state.progress.recorded, state.crossings = 0, SimpleNamespace(time=np.zeros(16))
+    state.angles, state.step_start = np.zeros(0), None
     state.kernels = SimpleNamespace(expand=lambda *_: OK, return_to_start=lambda _: OK)
-    for name in ("save_step_start", "set_high_accuracy", "set_regular"):
-        monkeypatch.setattr(short_crossing, name, lambda _: None)
+    for name in ("put_angles", "save_variables", "set_high_accuracy", "set_regular"):
+        monkeypatch.setattr(short_crossing, name, lambda *_: None)
     monkeypatch.setattr(short_crossing, "restore_step_start", lambda _: restored.append(1))
 
     def steps(memory_of_run):

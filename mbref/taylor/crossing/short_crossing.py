@@ -15,6 +15,7 @@ from mbref.taylor.layout import RECORD_CROSSINGS
 from mbref.taylor.mode import set_high_accuracy, set_regular
 from mbref.taylor.partition import freedoms, is_undriven, least_pivot
 from mbref.taylor.samples import put_angles, put_state_at
+from mbref.taylor.saved_state import restore_variables, save_variables
 
 
 @kernel
@@ -50,7 +51,8 @@ def cross_briefly(memory):
         return False
     time, sample, attempt_end = clock.time, clock.sample, clock.attempt_end
     steps, crossings = counts.steps, counts.crossings
-    save_step_start(memory)
+    put_angles(0.0, memory)
+    save_variables(memory.series.past, memory.angles, memory.step_start)
     memory.kernels.return_to_start(memory)
     set_high_accuracy(memory)
     memory.step.start_pivot = 1.0
@@ -67,23 +69,12 @@ def cross_briefly(memory):
 
 
 @kernel
-def save_step_start(memory):
-    """Save the variables and angles at the start of the last step."""
-    saved, past = memory.step_start, memory.series.past
-    for order in range(2):
-        copy(past[order], saved.terms[order])
-    put_angles(0.0, memory)
-    copy(memory.angles, saved.angles)
-
-
-@kernel
 def restore_step_start(memory):
-    """Restore the variables and angles that ``save_step_start`` saved."""
-    saved, slot = memory.step_start, memory.polynomials.torsions.slot
-    for order in range(2):
-        copy(saved.terms[order], memory.series.past[order])
+    """Restore the variables at the start of the last step, and the angles of the run."""
+    slot = memory.polynomials.torsions.slot
+    restore_variables(memory.step_start, memory.series.past, memory.angles)
     for s in range(slot.shape[0]):
-        memory.run.equations.angles[slot[s]] = saved.angles[s]
+        memory.run.equations.angles[slot[s]] = memory.angles[s]
 
 
 @kernel
