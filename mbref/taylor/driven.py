@@ -12,7 +12,6 @@ from numpy import exp, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
-from mbref.linear_algebra.vectors import larger
 from mbref.stepping.loop import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.detection import (
@@ -33,6 +32,7 @@ from mbref.taylor.stepping import (
     begin_pieces,
     end_of_step,
     end_step,
+    error_of_motion,
     expand_at,
     is_last,
     longest_step,
@@ -161,18 +161,10 @@ def attempt_predictor_step(h, last, memory):
     memory.step.crossed = memory.kernels.detect(h, pivot, memory)
     if memory.step.crossed or ends_near_singular(pivot, memory):
         return SINGULAR_AHEAD
-    is_accepted = memory.step.violation <= LOST_ROWS * PREDICTOR_TOLERANCE and continues_motion(h, memory)
+    off, order = error_of_motion(h, memory)[0], memory.mode.order
+    is_continued = isfinite(off) and off <= LOST_MOTION * order * order * PREDICTOR_TOLERANCE
+    is_accepted = is_continued and memory.step.violation <= LOST_ROWS * PREDICTOR_TOLERANCE
     return OK if is_accepted else STEP_TOO_SMALL
-
-
-@kernel
-def continues_motion(h, memory):
-    """Return whether the new series and the old series have equal second derivatives, within the
-    tolerance."""
-    order, state, terms, off = memory.mode.order, memory.state, memory.series.terms, 0.0
-    for i in range(memory.solver.pivot_columns.shape[0]):
-        off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
-    return isfinite(off) and off <= LOST_MOTION * order * order * PREDICTOR_TOLERANCE
 
 
 @kernel

@@ -158,13 +158,24 @@ def save_start(memory):
 
 
 @kernel
+def error_of_motion(h, memory):
+    """Return the largest difference between the accelerations of the new series and of the old one, and the
+    larger of 1 and the largest acceleration, both times the square of the step (s)."""
+    state, terms, off, size = memory.state, memory.series.terms, 0.0, 1.0
+    for i in range(memory.solver.pivot_columns.shape[0]):
+        off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
+        size = larger(size, state[2, i] * h * h)
+    return off, size
+
+
+@kernel
 def judge_step(h, last, memory):
     """Return OK if rows and accelerations at the end of a step differ by no more than the tolerance explains.
 
     After a position at which a spring has zero length, errors of the accelerations act for the remaining time
     only.
     """
-    step, order, state, terms = memory.step, memory.mode.order, memory.state, memory.series.terms
+    step, order = memory.step, memory.mode.order
     if not step.violation <= LOST_ROWS * memory.mode.tolerance + ROW_ROUNDING:
         return STEP_TOO_SMALL
     status = judge_branch(h, last, memory)
@@ -172,10 +183,7 @@ def judge_step(h, last, memory):
         return status
     if memory.progress.rests_near and is_turned(memory):
         return UNDECIDED
-    off, size = 0.0, 1.0
-    for i in range(memory.solver.pivot_columns.shape[0]):
-        off = larger(off, (2.0 * terms[2, i] - state[2, i]) * h * h)
-        size = larger(size, state[2, i] * h * h)
+    off, size = error_of_motion(h, memory)
     if not isfinite(off):
         return NOT_FINITE
     part = part_behind_no_length(memory)
