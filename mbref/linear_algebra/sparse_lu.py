@@ -8,6 +8,7 @@ D.
 from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
+from mbref.linear_algebra.sparse_cholesky import product_of_rows
 
 
 @kernel
@@ -20,7 +21,8 @@ def factorise_product(factor, other, alpha, product):
     """
     first, lower, upper, pivots = factor.symbolic.l_start, product.lower, product.upper, product.pivots
     for k in range(pivots.shape[0]):
-        start, square = first[k], square_of_row(factor, first[k])
+        start, square = first[k], product_of_rows(factor, first[k])
+        square = square if square > 0.0 else 1.0  # a row without entries
         value, _ = eliminated(factor, other, product, start)
         pivot = value + square / alpha
         pivots[k] = pivot / square
@@ -28,16 +30,6 @@ def factorise_product(factor, other, alpha, product):
         for p in range(start + 1, first[k + 1]):
             below, right = eliminated(factor, other, product, p)
             lower[p], upper[p] = below * inverse, right
-
-
-@kernel
-def square_of_row(factor, diagonal):
-    """Return the squared length of a row of D, given by the row's place on the diagonal; 1 for a row without
-    entries."""
-    symbolic, d, square = factor.symbolic, factor.d, 0.0
-    for p in range(symbolic.s_start[diagonal], symbolic.s_start[diagonal + 1]):
-        square += d[symbolic.s_left[p]] * d[symbolic.s_right[p]]
-    return square if square > 0.0 else 1.0
 
 
 @kernel
