@@ -136,28 +136,29 @@ class Progress(NamedTuple):
 
 
 class SeriesKernels(NamedTuple):
-    """The kernels that several others call by address, so that each is compiled once."""
+    """The kernels that several others call by address, so that each is compiled once. Neighbours call common
+    helpers."""
 
-    begin: Annotated[Kernel, BEGIN]
+    balance: Annotated[Kernel, BALANCE]
+    sample: Annotated[Kernel, SAMPLE]
+    loads: Annotated[Kernel, TERMS]
+    multipliers: Annotated[Kernel, TERMS]
+    terms: Annotated[Kernel, TERMS]
+    correct: Annotated[Kernel, CORRECT]
     expand: Annotated[Kernel, EXPAND]
-    step: Annotated[Kernel, TAKE_STEP]
+    respond: Annotated[Kernel, RESPOND]
     partition: Annotated[Kernel, PARTITION]
     choose: Annotated[Kernel, PARTITION]
-    respond: Annotated[Kernel, RESPOND]
-    terms: Annotated[Kernel, TERMS]
-    multipliers: Annotated[Kernel, TERMS]
-    loads: Annotated[Kernel, TERMS]
-    correct: Annotated[Kernel, CORRECT]
-    save_series: Annotated[Kernel, SAVE_SERIES]
     return_to_start: Annotated[Kernel, RETURN_TO_START]
+    save_series: Annotated[Kernel, SAVE_SERIES]
+    record: Annotated[Kernel, RECORD_CROSSINGS]
+    judge_start: Annotated[Kernel, JUDGE_START]
+    begin: Annotated[Kernel, BEGIN]
     gradient: Annotated[Kernel, GRADIENT]
     determinant: Annotated[Kernel, DETERMINANT]
-    judge_start: Annotated[Kernel, JUDGE_START]
-    turning_pivot: Annotated[Kernel, TURNING_PIVOT]
     detect: Annotated[Kernel, DETECT]
-    record: Annotated[Kernel, RECORD_CROSSINGS]
-    sample: Annotated[Kernel, SAMPLE]
-    balance: Annotated[Kernel, BALANCE]
+    turning_pivot: Annotated[Kernel, TURNING_PIVOT]
+    step: Annotated[Kernel, TAKE_STEP]
 
 
 class SceneCode(NamedTuple):

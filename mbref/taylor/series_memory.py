@@ -27,11 +27,11 @@ from mbref.taylor.step_start import choose, choose_partition, return_to_start
 from mbref.taylor.stepping import begin_series, expand_from, save_series_without_pole, take_step
 
 KEPT = 16  # singular positions that a call can record
-CALLED = (
-    begin_series, expand_from, take_step, choose_partition, choose, respond_in_loops, expand_series,
-    expand_with_multipliers, expand_with_loads, correct_state, save_series_without_pole, return_to_start,
-    evaluate_gradient, gradient_determinant, judge_start, pivot_at_turning_point,
-    contains_singular_position, record_crossings, complete_sample, balance_forces,
+CALLED = (  # the SeriesKernels
+    balance_forces, complete_sample, expand_with_loads, expand_with_multipliers, expand_series, correct_state,
+    expand_from, respond_in_loops, choose_partition, choose, return_to_start, save_series_without_pole,
+    record_crossings, judge_start, begin_series, evaluate_gradient, gradient_determinant,
+    contains_singular_position, pivot_at_turning_point, take_step,
 )  # fmt: skip
 
 
@@ -59,7 +59,6 @@ def _allocate(
     run: Run, geometry: Geometry, polynomials: Polynomials, sizes: Mapping[str, int]
 ) -> TaylorMemory:
     """Return memory of the series without the numbers of a run."""
-    kernels = zip(SeriesKernels._fields, CALLED, strict=True)
     orders, nz, nr = sizes["orders"], sizes["nz"], sizes["nr"]
     series = allocate(Series, sizes)
     grown = np.arange(1.0, orders + 1) * np.arange(2.0, orders + 2)
@@ -74,7 +73,7 @@ def _allocate(
         polynomials=copied(polynomials),
         pose_maps=copied(geometry.pose_maps),
         series=series,
-        kernels=SeriesKernels(**{name: kernel.pointer for name, kernel in kernels}),
+        kernels=SeriesKernels(*(kernel.pointer for kernel in CALLED)),
         branch_switches=np.array(switches, np.int64),
     )
 
