@@ -30,7 +30,7 @@ REFUSED = {
     "circle.urdf": "the joints form a circle",
     "close_unknown.urdf": "no link, body or site 'fd'; known: world",
     "fixed_tendon_spring.xml": "tendon 't', which is not a spring between two sites",
-    "flexcomp.xml": "1 flexible bodies.*--without flexible-bodies",
+    "flexcomp.xml": "1 flexible body.*--without flexible-bodies",
     "floating_on_a_moving_link.urdf": "joint 'F': floats on link 'a', which is not the base of the file",
     "fluid.xml": "the fluid around the bodies.*--without fluid",
     "friction.urdf": "dry friction of 'A'.*--without friction",

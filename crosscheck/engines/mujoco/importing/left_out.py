@@ -75,7 +75,9 @@ def of_model(model: Any, kept: Collection[int]) -> Iterator[Part]:
 
 def flexible(model: Any) -> list[Part]:
     """Return one part for all flexible bodies of a model."""
-    return [Part("flexible-bodies", f"{model.nflex} flexible bodies")] if model.nflex else []
+    if not model.nflex:
+        return []
+    return [Part("flexible-bodies", numbered(model.nflex, "flexible body", "flexible bodies"))]
 
 
 def _joint_names(model: Any, numbers: np.ndarray) -> list[str]:
