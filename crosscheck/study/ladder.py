@@ -47,7 +47,7 @@ def beyond(family: Family, records: Mapping[str, Record]) -> list[Case]:
     no coarser setting exists.
     """
     run = [case for case in family if key(case) in records][:2]
-    if len(run) < 2 or family[0] != run[0]:
+    if len(run) < 2 or run[0] is not family[0]:
         return []
     first, second = (records[key(case)] for case in run)
     if not (is_completed(first) and error(first) <= ERROR_LEVELS[0]):

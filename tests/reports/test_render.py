@@ -17,9 +17,8 @@ from crosscheck.cli import collection
 from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
 from crosscheck.judge.reference.cache import mechanism
-from crosscheck.study import ladder
 from crosscheck.study import sweep as sweeps
-from crosscheck.study.grid import Case, Record, default_cases, key, study
+from crosscheck.study.grid import default_cases, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
@@ -28,6 +27,32 @@ from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
 
 FAKE = "fake_engines:FAKE"
+
+
+def test_words_of_tables_may_break_where_the_page_is_narrow():
+    """Keep the last column on a page of 900 to 1100 px: long words break; cells of short words do not."""
+    style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
+    [narrow] = [line for line in style.splitlines() if line.startswith("@media (max-width: 1120px)")]
+    assert ".scroll :is(th, td:not(.right)), .scroll th.right { white-space: normal; }" in narrow, narrow
+    assert ".scroll :is(th, td):not(.whole) { overflow-wrap: anywhere; }" in narrow, narrow
+    assert ".scroll table { font-size: 13px; width: 100%; }" in narrow, narrow
+
+
+@pytest.mark.parametrize(
+    ("cell", "is_right", "classes"),
+    [
+        ("MPI (SVD) + CP", False, "short whole"),
+        ("planar_slider_crank", False, "short"),
+        ("a" * 27, False, "short"),
+        ("a" * 28, False, ""),
+        ("many short words in one long cell", False, "whole"),
+        ("12345678", True, "right whole"),
+        ("123456789", True, "right"),
+        ("1234567 12345", True, "right long whole"),
+    ],
+)
+def test_cells_of_short_words_are_broken_between_words_only(cell, is_right, classes):
+    assert render.classes(cell, is_right) == classes
 
 
 @pytest.fixture(scope="module")
@@ -180,15 +205,6 @@ def test_records_of_a_scene_before_it_was_edited_are_not_rendered(tmp_path, of_f
     assert group.truth["mechanism"] == mechanism(group.scene)
 
 
-def test_words_of_tables_may_break_where_the_page_is_narrow():
-    """Keep the last column on a page of 900 to 1100 px: long words break; cells of short words do not."""
-    style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
-    [narrow] = [line for line in style.splitlines() if line.startswith("@media (max-width: 1120px)")]
-    assert ".scroll :is(th, td:not(.right)), .scroll th.right { white-space: normal; }" in narrow, narrow
-    assert ".scroll :is(th, td):not(.whole) { overflow-wrap: anywhere; }" in narrow, narrow
-    assert ".scroll table { font-size: 13px; width: 100%; }" in narrow, narrow
-
-
 def test_short_runs_and_interleaved_times(tmp_path):
     cases, _ = few([still("still")], [FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
@@ -196,64 +212,3 @@ def test_short_runs_and_interleaved_times(tmp_path):
     timed = with_timings(cases, study(cases), tmp_path / "timings.jsonl", lambda _: None)
     assert [r.get("timing", {}).get("repeats") for r in timed] == [5, 5, 5, None], timed
     assert [r["cost"]["seconds"] for r in timed] == [0.1, 0.2, 0.5, 2 * LONG]
-
-
-def case(family: str, k: int) -> Case:
-    return Case(still("s"), np.array([0.0, 1.0]), "e", Setting(family, {"k": k}))
-
-
-def test_thinned_sweep_and_the_ends_of_every_family():
-    named = [case(family, k) for family in ("other", "defaults", "tuned") for k in range(7)]
-    kept = [(c.setting.family, c.setting.options["k"]) for c in sweeps.thinned(named)]
-    assert kept == [(f, k) for f in ("other", "defaults", "tuned") for k in (0, 3, 6)], kept
-    few = {c.setting.family for c in sweeps.of_few_families(named)}
-    assert few == {"defaults", "tuned"}, few
-    unnamed = [case(family, k) for family in ("a", "b", "c", "d") for k in range(2)]
-    assert {c.setting.family for c in sweeps.of_few_families(unnamed)} == {"a", "b"}
-    assert {c.setting.family for c in sweeps.of_few_families(unnamed, ["c"])} == {"c"}
-
-
-def cost(asked: Case, seconds: float, outcome: str = "COMPLETED") -> dict[str, Record]:
-    return {key(asked): {"outcome": outcome, "cost": {"seconds": seconds}}}
-
-
-@pytest.mark.parametrize(
-    ("seconds", "middle", "outcome", "chosen"),
-    [
-        (0.01, 0.02, "COMPLETED", 6),
-        (0.1, 0.8, "COMPLETED", 4),
-        (0.5, 4.0, "COMPLETED", None),
-        (0.5, 10.0, "TIMED_OUT", None),
-        (0.1, 0.1, "STEP_FAILED", 6),
-    ],
-)
-def test_the_finest_setting_that_is_affordable_by_the_growth_so_far(seconds, middle, outcome, chosen):
-    family = [case("a", k) for k in range(7)]
-    begun = ladder.first(family)
-    assert [c.setting.options["k"] for c in begun] == [0, 3]
-    records = cost(begun[0], seconds) | cost(begun[1], middle, outcome)
-    assert [c.setting.options["k"] for c in ladder.finest(family, records)] == [chosen] * (chosen is not None)
-
-
-def test_the_cost_of_a_step_is_inverse_to_its_length():
-    family = [case("a", k)._replace(setting=Setting("a", {"step": 10.0**-k})) for k in range(5)]
-    records = cost(family[0], 0.4, "STEP_FAILED") | cost(family[2], 0.2)
-    assert ladder.finest(family, records) == [family[3]], "2 s are affordable, 20 s are not"
-    assert ladder.first(family[:1]) == family[:1] and not ladder.finest(family[:1], cost(family[0], 0.1))
-
-
-@pytest.mark.parametrize(
-    ("cell", "is_right", "classes"),
-    [
-        ("MPI (SVD) + CP", False, "short whole"),
-        ("planar_slider_crank", False, "short"),
-        ("a" * 27, False, "short"),
-        ("a" * 28, False, ""),
-        ("many short words in one long cell", False, "whole"),
-        ("12345678", True, "right whole"),
-        ("123456789", True, "right"),
-        ("1234567 12345", True, "right long whole"),
-    ],
-)
-def test_cells_of_short_words_are_broken_between_words_only(cell, is_right, classes):
-    assert render.classes(cell, is_right) == classes
