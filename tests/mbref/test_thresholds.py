@@ -11,21 +11,6 @@ from tests.mbref import interpreted_crossings, interpreted_thresholds
 
 NAMES = [name for name in vars(thresholds) if name.isupper()]
 CHECKS = Path(interpreted_thresholds.__file__)
-CROSSINGS = """
-import warnings
-warnings.simplefilter("error")
-import numpy as np
-from mbref.scenes import find_scene
-from mbref.scenes.four_bar import four_bar_gravity
-from mbref.simulation.simulate import Limits, simulate
-for scene, end, crossings in (
-    (find_scene("planar_slider_crank_equal"), 0.1, 1), (find_scene("four_bar"), 0.1, 4),
-    (four_bar_gravity(), 0.6, 1), (four_bar_gravity(-1e-3), 0.5, 0), (four_bar_gravity(1e-4), 0.3, 1),
-):
-    run = simulate(scene, "taylor", np.linspace(0.0, end, 5), Limits(rtol=1e-9))
-    assert run.outcome.label == "COMPLETED", run.message
-    assert len(run.crossings or ()) == crossings, (scene.name, run.crossings)
-"""
 
 
 def interpreted(*arguments: str) -> subprocess.CompletedProcess:
@@ -53,12 +38,10 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
 
 
 def test_parts_of_crossings_and_small_kernels_do_what_they_say():
-    files = interpreted_crossings.__file__, str(Path(__file__).with_name("test_kernels_by_hand.py"))
+    by_hand = (
+        CHECKS.with_name(f"test_{name}.py") for name in ("kernels_by_hand", "written_code", "short_runs")
+    )
+    files = interpreted_crossings.__file__, *map(str, by_hand)
     done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", *files)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-500:]
-
-
-def test_singular_positions_are_crossed_without_compiled_kernels():
-    done = interpreted("-c", CROSSINGS)
-    assert done.returncode == 0, done.stderr[-3000:]

@@ -1,0 +1,105 @@
+"""Short runs of every method with interpreted kernels: two derivations of the equations against each other.
+
+Series are of natural coordinates, other methods of body coordinates; they share only the scene.
+``test_thresholds.py`` runs this file in a process whose kernels are interpreted, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from mbref.kernels.compilation import PLAIN
+
+if not PLAIN:
+    pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
+
+from mbref import energy
+from mbref.scene import Scene
+from mbref.scenes import find_scene
+from mbref.scenes.four_bar import four_bar_gravity
+from mbref.simulation.simulate import Limits, simulate
+from mbref.trajectory import Outcome, Trajectory
+from tests.coupled_scenes import planetary
+from tests.crosscheck.tree_scenes import every_joint
+from tests.loads_over_time import arm, driven_arm
+
+TIMES = np.array([0.0, 0.002])
+SCENES: dict[str, Callable[[], Scene]] = {
+    "arm": arm,
+    "driven arm": driven_arm,
+    "every joint": every_joint,
+    "planetary gear": planetary,
+    "redundant": lambda: find_scene("planar_slider_crank"),
+}
+METHODS = (
+    "lm1+none/rk4[step=0.001]",
+    "lm1+baumgarte/dop853",
+    "lm2+none/dop853",
+    "lm2+projection/adams",
+    "alf+none/adams",
+    "alf-dual+projection/dop853",
+    "mpi-svd+partitioning/adams",
+    "mpi-svd+none/dop853",
+    "mpi-gs+none/dop853",
+    "mpi-qr+baumgarte/rk4[step=0.001]",
+)
+RUNS = [
+    *((name, method) for name in ("arm", "driven arm") for method in METHODS),
+    *(("planetary gear", method) for method in ("lm1+none/rk4[step=0.001]", "alf-dual+projection/dop853")),
+    ("every joint", "alf-dual+projection/dop853"),
+    *(
+        ("redundant", method)
+        for method in ("mpi-qr+partitioning/dop853", "mpi-svd+none/dop853", "alf+projection/dop853")
+    ),
+]
+
+
+def ran(scene: Scene, method: str, rtol: float = 1e-10) -> Trajectory:
+    run = simulate(scene, method, TIMES, Limits(rtol=rtol))
+    assert run.outcome == Outcome.COMPLETED, run.message
+    return run
+
+
+@functools.cache
+def series(name: str) -> Trajectory:
+    return ran(SCENES[name](), "taylor")
+
+
+@pytest.mark.parametrize(("name", "method"), RUNS)
+def test_short_runs_agree_with_the_series(name, method):
+    found, expected = ran(SCENES[name](), method), series(name)
+    for field in ("position", "orientation", "velocity", "angular_velocity", "acceleration"):
+        one, other = getattr(found, field), getattr(expected, field)
+        size = max(1.0, np.abs(other).max())
+        tolerance = 1e-8 if field == "acceleration" else 1e-10
+        assert np.abs(one - other).max() <= tolerance * size, (field, np.abs(one - other).max())
+    for joint, reaction in (found.reactions or {}).items():
+        other = (expected.reactions or {})[joint]
+        assert np.abs(reaction - other).max() <= 1e-7 * max(1.0, np.abs(other).max()), joint
+
+
+@pytest.mark.parametrize(
+    ("scene", "end", "crossings"),
+    [
+        (find_scene("planar_slider_crank_equal"), 0.1, 1),
+        (find_scene("four_bar"), 0.1, 4),
+        (four_bar_gravity(), 0.6, 1),
+        (four_bar_gravity(-1e-3), 0.5, 0),
+        (four_bar_gravity(1e-4), 0.3, 1),
+    ],
+    ids=["equal cranks", "four-bar", "falling", "turning back", "passing beside"],
+)
+def test_singular_positions_are_crossed_with_their_energy(scene, end, crossings):
+    run = simulate(scene, "taylor", np.linspace(0.0, end, 9), Limits(rtol=1e-9))
+    assert run.outcome == Outcome.COMPLETED, run.message
+    assert len(run.crossings or ()) == crossings
+    total = energy.kinetic(scene, run) + energy.potential(scene, run)
+    for load in scene.load:  # moments about z, whose work is moment times angle
+        orientation = run.orientation[:, [body.name for body in scene.body].index(load.body)]
+        total -= load.moment[2] * np.unwrap(2.0 * np.arctan2(orientation[:, 3], orientation[:, 0]))
+    size = energy.kinetic(scene, run).max()
+    assert np.abs(total - total[0]).max() <= 1e-9 * size, (total - total[0]) / size
