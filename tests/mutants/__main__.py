@@ -8,10 +8,11 @@ the unit tests of the file.  Mutants that change nothing are listed with the rea
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
 The test files that killed other mutants of the folder run first, then files that name the mutant's function
-or module, then the quickest, each for 5 s of CPU time at most, until a test fails or 40 s are over; other
-work on the machine does not end them. A test that fails without the mutant, too, is left out. Results stay
+or module, then the quickest, each for 5 s of CPU time at most, until a test fails or 20 s are over; other
+work on the machine does not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out
+that fails or takes longer than a file may without the mutant, too. Results stay
 in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted run goes
-on where it ended. Tests of files with kernels run as plain Python, so that no kernel is compiled for a
+on where it ended. Tests of mbref and of kernels run as plain Python, so that no kernel is compiled for a
 mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
 survives, is seen by a stored text alone or runs out of time.
 """
@@ -48,24 +49,12 @@ TREE = ROOT / "build" / "mutants" / "tree"
 WORKERS = Path(__file__).with_name("workers.py")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
 BY_TEXT, EQUIVALENT, UNTESTED = "killed by a stored text alone", "equivalent", "untested"
-RENDERED = (
-    "reports/",
-    "crosscheck/study/",
-    "crosscheck/judge/",
-)  # packages whose numbers stand in stored texts
-# CPU s of a test file and of all files, after which no test begins, and after which a test is ended
-OF_FILE, BUDGET, LIMIT = 5.0, 40.0, 90.0
+# packages whose numbers stand in stored texts
+RENDERED = "reports/", "crosscheck/study/", "crosscheck/judge/"
+BUDGET = 20.0  # CPU s of all files of a mutant, after which no test begins
+# parts of the budget after which no test of a file begins, and after which a test is ended
+OF_FILE, LIMIT = 1 / 4, 3 / 2
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
-WITH_KERNELS = (
-    "mbref/kernels/",
-    "mbref/linear_algebra/",
-    "mbref/equations/",
-    "mbref/formulations/",
-    "mbref/stabilisation/",
-    "mbref/integrators/",
-    "mbref/stepping/",
-    "mbref/taylor/",
-)
 COMPILING = (  # plain Python does not run them
     "mbref/kernels/compilation.py",
     "mbref/kernels/disk_cache.py",
@@ -79,12 +68,14 @@ class Tree:
     The copy stands always in the same place, since compiled kernels are kept by the path of their source.
     """
 
-    def __init__(self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED) -> None:
-        self.place, self._planted, self._begun = place, 0, time.time()
+    def __init__(
+        self, place: Path, root: Path = ROOT, copied: Sequence[str] = COPIED, budget: float = BUDGET
+    ) -> None:
+        self.place, self._planted, self._begun, self._budget = place, 0, time.time(), budget
         self._workers: dict[bool, subprocess.Popen[str]] = {}
-        self._seconds: dict[str, float] = {}
+        self._seconds: dict[str, float] = {}  # CPU s of files and tests
         self._kills: Counter[tuple[str, str]] = Counter()  # by folder of the mutant and test file
-        self._sound: dict[tuple[bool, str], bool] = {}
+        self._sound: dict[bool, dict[str, bool]] = {True: {}, False: {}}
         shutil.rmtree(place, ignore_errors=True)
         place.mkdir(parents=True)
         for name in (name for name in copied if (root / name).exists()):
@@ -115,34 +106,29 @@ class Tree:
         return result, test
 
     def _seen(self, mutant: Mutant, source: str, files: Sequence[str], plain: bool) -> tuple[str, str]:
-        """Return KILLED, SURVIVED or TIMED_OUT, and the test that fails."""
-        out: list[str] = []
+        """Return KILLED, SURVIVED or TIMED_OUT, and the test that fails or takes too long."""
         while True:
             with self._plant(mutant, source):
-                answer = self._ask(plain, files, out)
-            for file, seconds in answer["seconds"].items():
-                self._seconds[file] = max(seconds, self._seconds.get(file, 0.0))
-            if answer["status"] in (0, 5):
-                return SURVIVED, ""
+                answer = self._ask(plain, files)
             test = answer["failed"]
+            if answer["status"] in (0, 5):
+                late = [test for test in answer["ended"] if self._is_sound(test, plain)]
+                return (TIMED_OUT, late[0]) if late else (SURVIVED, "")
             if answer["status"] is None:
                 return TIMED_OUT, ""
-            if not test and self._ask(plain, files, out)["status"] not in (0, 5):
+            if not test and self._ask(plain, files)["status"] not in (0, 5):
                 raise RuntimeError(f"the tests end early without a mutant, too: {' '.join(files)}")
             if not test or self._is_sound(test, plain):
                 return KILLED, test
-            if "::" in test:
-                out.append(test)
-            else:
-                files = [file for file in files if file != test]
+            files = [file for file in files if file != test]
 
     def _is_sound(self, test: str, plain: bool) -> bool:
-        """Return whether a test passes without a mutant."""
-        if (plain, test) not in self._sound:
+        """Return whether a test passes without a mutant, in the time of a file; others are left out."""
+        if test not in self._sound[plain]:
             only = test if "::" in test else ""
-            answer = self._ask(plain, [test.split("::", maxsplit=1)[0]], (), only)
-            self._sound[plain, test] = answer["status"] == 0
-        return self._sound[plain, test]
+            answer = self._ask(plain, [test.split("::", maxsplit=1)[0]], only)
+            self._sound[plain][test] = answer["status"] == 0 and not answer["ended"]
+        return self._sound[plain][test]
 
     @contextmanager
     def _plant(self, mutant: Mutant, source: str) -> Iterator[None]:
@@ -158,7 +144,7 @@ class Tree:
             path.write_text(source)
             os.utime(path, (before.st_atime, before.st_mtime))
 
-    def _ask(self, plain: bool, files: Sequence[str], out: Sequence[str], only: str = "") -> dict[str, Any]:
+    def _ask(self, plain: bool, files: Sequence[str], only: str = "") -> dict[str, Any]:
         """Return the answer of a process that runs tests."""
         if plain not in self._workers:
             self._workers[plain] = subprocess.Popen(
@@ -178,15 +164,18 @@ class Tree:
         assert worker.stdin and worker.stdout
         request = {
             "files": files,
-            "out": out,
+            "out": [test for test, is_sound in self._sound[plain].items() if not is_sound],
             "only": only,
-            "of_file": OF_FILE,
-            "budget": BUDGET,
-            "limit": LIMIT,
-            "waiting": WAITING * LIMIT,
+            "of_file": OF_FILE * self._budget,
+            "budget": self._budget,
+            "limit": LIMIT * self._budget,
+            "waiting": WAITING * LIMIT * self._budget,
         }
         print(json.dumps(request), file=worker.stdin, flush=True)
-        return json.loads(worker.stdout.readline())
+        answer = json.loads(worker.stdout.readline())
+        for test, seconds in answer["seconds"].items():
+            self._seconds[test] = max(seconds, self._seconds.get(test, 0.0))
+        return answer
 
     def close(self) -> None:
         """End the processes."""
@@ -196,8 +185,8 @@ class Tree:
 
 
 def is_plain(file: str, source: str) -> bool:
-    """Return whether the tests of a file run without compilation: where it has kernels."""
-    has_kernels = file.startswith(WITH_KERNELS) or re.search(r"^(from|import) numba\b", source, re.MULTILINE)
+    """Return whether the tests of a file run without compilation: of mbref, and where it has kernels."""
+    has_kernels = file.startswith("mbref/") or re.search(r"^(from|import) numba\b", source, re.MULTILINE)
     return bool(has_kernels) and file not in COMPILING
 
 
@@ -238,9 +227,9 @@ def _is_absent(file: str) -> bool:
     return file.startswith(ADAPTERS) and folder in engines() and not installed(folder)
 
 
-def key(mutant: Mutant, tests: Sequence[str]) -> str:
+def key(mutant: Mutant, tests: Sequence[str], root: Path) -> str:
     """Return a digest of the mutant, its file and its tests."""
-    texts = [*map(str, mutant), *((ROOT / name).read_text() for name in (mutant.file, *tests))]
+    texts = [*map(str, mutant), *((root / name).read_text() for name in (mutant.file, *tests))]
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
 
@@ -253,17 +242,19 @@ def _records(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
 
-def run(chosen: Sequence[Mutant], seconds: float, alone: Sequence[str] = ()) -> dict[Mutant, str]:
+def run(
+    chosen: Sequence[Mutant], seconds: float, alone: Sequence[str] = (), budget: float = BUDGET
+) -> dict[Mutant, str]:
     """Return the result of each mutant; none is begun after that time.
 
     Test files that run ``alone`` replace those that import the mutant's file.
     """
     found, before, end = {}, known(), time.monotonic() + seconds
-    with closing(Tree(TREE)) as tree:
+    with closing(Tree(TREE, budget=budget)) as tree:
         for k, mutant in enumerate(chosen, 1):
             tests = alone or importers(mutant.file)
-            name, by = key(mutant, tests), ""
-            if why := reason(mutant, (ROOT / mutant.file).read_text()):
+            name, by = key(mutant, tests, tree.place), ""
+            if why := reason(mutant, (tree.place / mutant.file).read_text()):
                 before[name] = EQUIVALENT
             elif name not in before:
                 if time.monotonic() > end:
@@ -307,13 +298,16 @@ def main() -> int:
     parser.add_argument("--minutes", type=float, default=float("inf"), help="begin no mutant after these")
     parser.add_argument("--list", action="store_true", help="print the mutants and their tests, run nothing")
     parser.add_argument("--tests", nargs="+", default=(), metavar="FILE", help="run these test files alone")
+    parser.add_argument(
+        "--budget", type=float, default=BUDGET, metavar="S", help="CPU s for a mutant's tests"
+    )
     options = parser.parse_args()
     chosen = drawn(options.seed, options.count, options.only)
     if options.list:
         for mutant in chosen:
             print(f"{_line(mutant)}   ({' '.join(importers(mutant.file)) or 'no test imports it'})")
         return 0
-    found = run(chosen, 60 * options.minutes, options.tests)
+    found = run(chosen, 60 * options.minutes, options.tests, options.budget)
     for package in PACKAGES:
         if results := [result for mutant, result in found.items() if mutant.file.startswith(f"{package}/")]:
             print(f"{package}: {score(results)}")

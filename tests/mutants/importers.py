@@ -16,6 +16,7 @@ ADAPTERS = "crosscheck/engines/"
 LISTS = ("BUILT_IN", "OPTIONAL", "GENERATORS", "LARGE", "ON_REQUEST")
 FEWEST = 4  # test files that are run, where so many reach the source
 FARTHEST = 3  # imports between a test and the source
+NAMES = "test_*.py", "interpreted_*.py"  # files of tests; some of them run with interpreted kernels alone
 SNAPSHOTS = (  # they see that a text changed, not that it is wrong
     "tests/reports/test_reference_report.py",
     "tests/reports/test_committed_paper.py",
@@ -54,7 +55,7 @@ def _tests() -> Mapping[str, set[str]]:
     modules = [name for package in PACKAGES for name in sources(package)]
     helpers = {module_name(path): path for path in sorted((ROOT / "tests").rglob("*.py"))}
     found = {}
-    for path in sorted((ROOT / "tests").rglob("test_*.py")):
+    for path in sorted(path for kind in NAMES for path in (ROOT / "tests").rglob(kind)):
         name = path.relative_to(ROOT).as_posix()
         if name in SNAPSHOTS or name.startswith(("tests/meta/", "tests/mutants/")):
             continue

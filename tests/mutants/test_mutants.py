@@ -98,6 +98,7 @@ TINY = {
     "test_total.py": "from mbref.sums import total\n\n\ndef test_total():\n    assert total(2, 3) == 5\n",
     "test_weak.py": "from mbref.sums import total\n\n\ndef test_total():\n    assert total(2, 0) == 2\n",
     "test_wait.py": "from mbref.sums import wait\n\n\ndef test_wait():\n    wait(3)\n",
+    "test_slow.py": "def test_slow():\n    while True:\n        pass\n",
     "test_broken.py": "def test_broken():\n    assert False\n",
 }
 
@@ -112,9 +113,8 @@ def tree(tmp_path_factory):
     names = [name.partition("/")[0] for name in TINY]
     with (
         pytest.MonkeyPatch.context() as patch,
-        closing(runner.Tree(folder / "place", folder / "root", names)) as made,
+        closing(runner.Tree(folder / "place", folder / "root", names, budget=2.0)) as made,
     ):
-        patch.setattr(runner, "LIMIT", 3.0)
         patch.setattr(runner, "SNAPSHOTS", ("test_text.py",))
         patch.setattr(runner, "RENDERED", ("mbref/",))
         yield made
@@ -132,7 +132,8 @@ def planted(new: str) -> Mutant:
         (["test_weak.py"], "((a) - (b))", (runner.BY_TEXT, "test_text.py::test_text")),
         (["test_weak.py"], "2", (runner.SURVIVED, "")),
         (["test_weak.py", "test_total.py"], "((a) - (b))", (runner.KILLED, "test_total.py::test_total")),
-        (["test_wait.py"], "((n) + (1))", (runner.TIMED_OUT, "")),
+        (["test_wait.py"], "((n) + (1))", (runner.TIMED_OUT, "test_wait.py::test_wait")),
+        (["test_slow.py", "test_weak.py"], "2", (runner.SURVIVED, "")),
         (["test_broken.py", "test_weak.py"], "2", (runner.SURVIVED, "")),
         ([], "((a) - (b))", (runner.UNTESTED, "")),
     ],
@@ -188,11 +189,12 @@ def test_files_with_kernels_run_without_compilation():
     for file in (
         "mbref/taylor/series.py",
         "mbref/equations/loads.py",
+        "mbref/scene.py",
         "crosscheck/engines/compiled/calls.py",
     ):
         assert runner.is_plain(file, (ROOT / file).read_text()), file
     compiling = ("mbref/kernels/disk_cache.py", "mbref/kernels/named_memory.py")
-    for file in ("mbref/scene.py", *compiling, "crosscheck/study/grid.py"):
+    for file in (*compiling, "crosscheck/study/grid.py"):
         assert not runner.is_plain(file, (ROOT / file).read_text()), file
 
 

@@ -5,9 +5,10 @@ none of the project's packages: each fork imports them anew, with the mutant tha
 
 A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
 of the one test that runs; empty: all), ``of_file`` and ``budget`` (CPU s of a file and of all files, after
-which no test begins), ``limit`` (CPU s of the fork) and ``waiting`` (s of wall time).  The answer has
-``status`` (pytest's exit status; none: the time was up), ``failed`` (the id of the test that failed first, or
-the file that could not be collected) and ``seconds`` (CPU s by file).
+which no test begins; a test that takes longer than a file may is ended), ``limit`` (CPU s of the fork) and
+``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was up),
+``failed`` (the id of the test that failed first, or the file that could not be collected), ``ended`` (the
+ids of tests that took too long) and ``seconds`` (CPU s by file and by test).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import signal
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,8 @@ class Session:
         self._out, self._only, self._of_file = set(request["out"]), request["only"], request["of_file"]
         self._end = 0.0  # CPU s
         self.failed = ""
+        self.ended: list[str] = []
+        self.seconds: dict[str, float] = {}
 
     def pytest_collection_finish(self) -> None:
         """Begin the time of a file after its imports, which take seconds in a new process."""
@@ -54,6 +58,35 @@ class Session:
         items[:] = [
             item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)
         ]
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
+        """Limit the time of the fixtures."""
+        with self._limited(item):
+            return (yield)
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
+        """Limit the time of a test."""
+        with self._limited(item):
+            return (yield)
+
+    @contextlib.contextmanager
+    def _limited(self, item: pytest.Item) -> Iterator[None]:
+        """End a test that takes longer than a file may, and note its time."""
+
+        def end(signum: int, frame: object) -> None:
+            self.ended.append(item.nodeid)
+            raise pytest.skip.Exception("too long")
+
+        signal.signal(signal.SIGPROF, end)
+        begun = _cpu()
+        signal.setitimer(signal.ITIMER_PROF, self._of_file)
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            self.seconds[item.nodeid] = self.seconds.get(item.nodeid, 0.0) + _cpu() - begun
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """End where the time of the file is up."""
@@ -80,14 +113,15 @@ def work(request: dict[str, Any], answer: Path) -> None:
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(null, stream)
-    session, status, seconds = Session(request), 0, {}
+    session, status = Session(request), 0
     for file in request["files"]:
         begun = _cpu()
         status = int(pytest.main([*OPTIONS, file], plugins=[session]))
-        seconds[file] = _cpu() - begun
+        session.seconds[file] = _cpu() - begun
         if status not in (0, 5) or _cpu() > request["budget"]:
             break
-    answer.write_text(json.dumps({"status": status, "failed": session.failed, "seconds": seconds}))
+    found = {"status": status, "failed": session.failed, "ended": session.ended, "seconds": session.seconds}
+    answer.write_text(json.dumps(found))
 
 
 def answer_of(request: dict[str, Any]) -> dict[str, Any]:
@@ -106,7 +140,7 @@ def answer_of(request: dict[str, Any]) -> dict[str, Any]:
         if path.exists():
             return json.loads(path.read_text())
     is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
-    return {"status": None if is_late else CRASHED, "failed": "", "seconds": {}}
+    return {"status": None if is_late else CRASHED, "failed": "", "ended": [], "seconds": {}}
 
 
 def _wait(child: int, end: float) -> int:
