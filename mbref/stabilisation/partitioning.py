@@ -68,7 +68,7 @@ def jacobian_by_euler_parameters(q, equations, a):
     m, nq = bodies.shape[0], q.shape[0]
     a[:] = 0.0
     for row in range(m):
-        for side in range(2):
+        for side in range(bodies.shape[1]):
             b = bodies[row, side]
             if 7 * b < nq:
                 i, j = 7 * b, 6 * side

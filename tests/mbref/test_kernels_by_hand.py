@@ -20,6 +20,7 @@ if not PLAIN:
 from mbref.integrators import adams, dop853, one_step, rk4
 from mbref.kernels.layout import OK
 from mbref.linear_algebra import vectors
+from mbref.stabilisation import partitioning
 from mbref.taylor import angles, coefficients, saved_state
 
 A, B = (1.0, 2.0, 3.0), (4.0, -5.0, 6.0)
@@ -178,6 +179,18 @@ def test_a_saved_state_is_restored():
     assert (other.loop.clock.time, other.loop.clock.sample) == (4.0, 5)
     assert other.equations.system.counts.crossings == 7 and other.equations.angles.tolist() == [6.0, 6.0]
     assert other.state.coordinates.tolist() == [4.0] * 7 and other.state.velocities.tolist() == [5.0] * 6
+
+
+# --- coordinate partitioning -------------------------------------------------------------------------------
+def test_the_row_of_a_coupling_by_the_euler_parameters_of_its_bodies():
+    """At p = (1, 0, 0, 0) the derivatives by p are (0, 2 Φ_π')."""
+    scene = SimpleNamespace(row_bodies=np.array([[2, 0, 1, 3]]))
+    system = SimpleNamespace(blocks=np.arange(1.0, 25.0)[None])
+    q, a = np.tile([0.0, 0, 0, 1, 0, 0, 0], 3), np.ones((4, 21))
+    partitioning.jacobian_by_euler_parameters(q, SimpleNamespace(scene=scene, system=system), a)
+    of_bodies = [7, 8, 9, 0, 20, 22, 24], [13, 14, 15, 0, 32, 34, 36], [1, 2, 3, 0, 8, 10, 12]
+    assert a[0].reshape(3, 7).tolist() == [*of_bodies]
+    assert a[1:].tolist() == (2.0 * np.eye(21)[[3, 10, 17]]).tolist()
 
 
 # --- steps of integrators ---------------------------------------------------------------------------------
