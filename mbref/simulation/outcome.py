@@ -84,16 +84,9 @@ NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
 
 SINGULAR_POSITION = "the motion reaches a singular position at t = {:.6g} s{}; {} does not cross it{}"
 LOSE_RANK = " (the constraint rows of {} lose rank)"
-# statuses that rounded numbers may cause
-OF_ROUNDING = (
-    STEP_TOO_SMALL,
-    NOT_CONVERGED,
-    SINGULAR,
-    CREEPING,
-    UNDECIDED,
-)  # may follow from rounded numbers
 # statuses of failures near a singular position that it may have caused
 FAILED = (STEP_TOO_SMALL, NOT_CONVERGED, SINGULAR, CREEPING)
+OF_ROUNDING = (*FAILED, UNDECIDED)  # statuses that rounded numbers may cause
 
 
 def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion:
