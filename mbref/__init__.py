@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
     from mbref.error_estimate import ErrorEstimate
+    from mbref.input_error import InputError
     from mbref.method import Method, MethodError
     from mbref.motion import Motion
     from mbref.scene import Scene, SceneError
@@ -31,6 +32,7 @@ _PUBLIC = {  # module → its public names
     "ensembles.ensemble": ("ensemble",),
     "equations.diagnosis": ("Diagnosis", "counts", "diagnose"),
     "error_estimate": ("ErrorEstimate",),
+    "input_error": ("InputError",),
     "method": ("Method", "MethodError"),
     "motion": ("Motion",),
     "scene": ("Scene", "SceneError"),
@@ -56,6 +58,7 @@ __all__ = [
     "Diagnosis",
     "Equilibrium",
     "ErrorEstimate",
+    "InputError",
     "Limits",
     "Method",
     "MethodError",

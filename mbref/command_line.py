@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
             command.error(
                 f"unknown option {unknown[0]!r}{meant(unknown[0], known)}"
                 if unknown[0].startswith("-")
-                else f"unknown argument {unknown[0]!r}"
+                else f"unknown argument {unknown[0]!r}{_repeated(command, args or sys.argv[1:], unknown[0])}"
             )
         return found
 
@@ -57,6 +57,17 @@ class _Command(Parser):
     def __init__(self, *args: Any, action: Any = None, **names: Any):
         super().__init__(*args, **names)
         self.set_defaults(parser_of_command=self, action=action)
+
+
+def _repeated(command: argparse.ArgumentParser, words: Sequence[str], extra: str) -> str:
+    """Return the advice to repeat an option if the extra word follows an option that may repeat and its
+    value."""
+    option = words[words.index(extra) - 2] if extra in words[2:] else ""
+    repeatable = [a for a in command._actions if isinstance(a, argparse._AppendAction)]
+    if not any(option in action.option_strings for action in repeatable):
+        return ""
+    value = words[words.index(extra) - 1]
+    return f"; repeat the option for each value: {option} {value} {option} {extra}"
 
 
 def _known(found: re.Match[str]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
+from mbref.input_error import InputError
 from mbref.joint_motion import along, joint_motion, position_of
 from mbref.scene import JointLoad, Scene
 from mbref.trajectory import Trajectory
@@ -13,7 +14,7 @@ from mbref.trajectory import Trajectory
 def kinetic(scene: Scene, motion: Trajectory) -> np.ndarray:
     """Return the kinetic energy (k,), J: Σ (m v·v + ω·J ω)/2 over the bodies plus Σ I q'²/2 over armatures.
 
-    Raises ValueError if a body has no mass.
+    Raises InputError if a body has no mass.
     """
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])
@@ -35,7 +36,7 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
 
     Forces, moments and torques have no potential here: their work changes the energy.
 
-    Raises ValueError where a body has no mass.
+    Raises InputError where a body has no mass.
     """
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])
@@ -54,7 +55,7 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
 def _need_masses(scene: Scene) -> None:
     if not scene.has_mass():
         without = next(body.name for body in scene.body if body.mass is None)
-        raise ValueError(f"body {without!r} has no mass; energies need the mass and inertia of every body")
+        raise InputError(f"body {without!r} has no mass; energies need the mass and inertia of every body")
 
 
 def _matrix(inertia: tuple[float, ...] | tuple[tuple[float, ...], ...] | None) -> np.ndarray:

@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol
 
+from mbref.input_error import InputError
 from mbref.scene import Scene
 
 GROUP = "mbref.formats"
@@ -174,7 +175,7 @@ class Format(Protocol):
     writes: tuple[str, ...]
 
     def read(self, path: Path, options: ImportOptions) -> Imported:
-        """Return the scene in a file; raises SceneError for a faulty file, ValueError for a faulty option,
+        """Return the scene in a file; raises SceneError for a faulty file, InputError for a faulty option,
         OSError."""
 
     def write(self, scene: Scene) -> Exported:
@@ -206,7 +207,7 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
 
     Raises
     ------
-    ValueError
+    InputError
         If no installed format has this suffix.
     """
     exported = _found(path, "writes").write(scene.assembled())
@@ -215,7 +216,7 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
 
 
 def _found(path: str | Path, does: str) -> Format:
-    """Return the format that reads or writes a path; raises ValueError if no installed format does."""
+    """Return the format that reads or writes a path; raises InputError if no installed format does."""
     formats: list[Format] = [point.load() for point in entry_points(group=GROUP)]
     ending = Path(path).suffix
     for item in formats:
@@ -223,4 +224,4 @@ def _found(path: str | Path, does: str) -> Format:
             return item
     known = ", ".join(sorted(end for item in formats for end in getattr(item, does))) or "none installed"
     what = f"no format {does} {ending or 'a name without an ending'}; known: {known}"
-    raise ValueError(f"{path}: {what}{REMEDIES.get(ending, '')}")
+    raise InputError(f"{path}: {what}{REMEDIES.get(ending, '')}")

@@ -70,12 +70,12 @@ class Motion(Trajectory):
 
     @property
     def kinetic_energy(self) -> np.ndarray:
-        """Kinetic energy, J, shape (k,). Raises ValueError if a body has no mass."""
+        """Kinetic energy, J, shape (k,). Raises InputError if a body has no mass."""
         return kinetic(self.mechanism, self)
 
     @property
     def potential_energy(self) -> np.ndarray:
-        """Energy of gravity and springs, J, shape (k,). Raises ValueError if a body has no mass."""
+        """Energy of gravity and springs, J, shape (k,). Raises InputError if a body has no mass."""
         return potential(self.mechanism, self)
 
     @property
@@ -134,7 +134,7 @@ class Motion(Trajectory):
     @cached_property
     def error_estimate(self) -> ErrorEstimate:
         """Estimated global error of the motion at its samples, by a second run at a smaller tolerance. The
-        second run is made on first access and takes about twice the time of the motion. Raises ValueError if
+        second run is made on first access and takes about twice the time of the motion. Raises InputError if
         the motion is of another engine than mbref."""
         return SERVICES["estimate_error"](self)
 
@@ -152,7 +152,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        ValueError
+        InputError
             If the motion is of another engine than mbref.
         """
         estimate = SERVICES["estimate_error"](self, seconds, progress)
@@ -190,7 +190,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        ValueError
+        InputError
             If a name fits no column.
         """
         table = all_columns(self)
@@ -232,7 +232,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        ValueError
+        InputError
             If the file's name does not end in ``.json``.
         """
         write_json(path, self.mechanism, self.to_record())
@@ -248,7 +248,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        OSError, ValueError
+        OSError, InputError
             If the file cannot be read, or contains no saved motion.
         """
         scene, trajectory, estimate = read_json(path)
@@ -269,7 +269,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        ValueError, ImportError
+        InputError, ImportError
             If a name fits no column, or matplotlib is not installed.
         """
         from mbref.drawing.plot import plot
@@ -286,7 +286,7 @@ class Motion(Trajectory):
 
         Raises
         ------
-        ValueError
+        InputError
             If the view is unknown, or the motion has no sample.
         """
         return moving(self.mechanism, self, View.parse(view) if view else None)

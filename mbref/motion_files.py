@@ -11,28 +11,29 @@ from typing import Any
 import numpy as np
 
 from mbref.error_estimate import ErrorEstimate
+from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.trajectory import Trajectory
 
 
 def write_json(path: str | Path, scene: Scene, record: Mapping[str, Any]) -> None:
-    """Write scene and record of a motion; raises ValueError unless the path ends in ``.json``."""
+    """Write scene and record of a motion; raises InputError unless the path ends in ``.json``."""
     if Path(path).suffix.lower() != ".json":
-        raise ValueError(f"{path}: a motion is saved as .json; for a picture use animate or plot")
+        raise InputError(f"{path}: a motion is saved as .json; for a picture use animate or plot")
     whole = {"scene": scene.to_dict(), "record": record}
     Path(path).write_text(strict_json(whole) + "\n", encoding="utf-8")
 
 
 def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None]:
-    """Return what ``write_json`` wrote; raises ValueError for another file, OSError."""
+    """Return what ``write_json`` wrote; raises InputError for another file, OSError."""
     try:
         whole = json.loads(Path(path).read_text(encoding="utf-8"))
         scene, record = Scene(**whole["scene"]), whole["record"]
         trajectory, estimate = Trajectory.from_record(scene.name, record), record.get("error_estimate")
         return scene, trajectory, ErrorEstimate.from_record(trajectory.times, estimate) if estimate else None
     except (ValueError, KeyError, TypeError, AttributeError, SceneError):
-        raise ValueError(f"{path}: is not a file that Motion.save wrote") from None
+        raise InputError(f"{path}: is not a file that Motion.save wrote") from None
 
 
 def write_csv(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:

@@ -10,6 +10,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from mbref.input_error import InputError
 from mbref.scene_fields import meant
 
 Owner = Literal["body", "joint", "driver", "load", "mechanism"]
@@ -162,14 +163,14 @@ def _totals(motion: Any) -> dict[str, np.ndarray | None]:
 def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:
     """Return the columns with these names or beginnings, such as ``rod.position``.
 
-    Raises ValueError for a name that fits no column. The message names the missing data, a similar name, or
+    Raises InputError for a name that fits no column. The message names the missing data, a similar name, or
     the existing columns.
     """
     found: list[str] = []
     for name in names:
         fitting = [column for column in columns if column == name or column.startswith(f"{name}.")]
         if not fitting:
-            raise ValueError(f"no column {name!r}{_hint(list(columns), name)}")
+            raise InputError(f"no column {name!r}{_hint(list(columns), name)}")
         found += [column for column in fitting if column not in found]
     return found
 

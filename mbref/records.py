@@ -17,10 +17,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from mbref.input_error import InputError
+
 INFINITE_MARKS = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
 
 
-class RecordsError(ValueError):
+class RecordsError(InputError):
     """Error: a file contains something else than records. The file is not changed."""
 
 

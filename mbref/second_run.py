@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbref.error_estimate import ErrorEstimate, distances
+from mbref.input_error import InputError
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
@@ -50,11 +51,11 @@ def estimate_error(
 
     Raises
     ------
-    ValueError
+    InputError
         If the motion is of another engine.
     """
     if motion.engine != "mbref":
-        raise ValueError(f"error_estimate: a motion of {motion.engine}; crosscheck judges other engines")
+        raise InputError(f"error_estimate: a motion of {motion.engine}; crosscheck judges other engines")
     method = Method.parse(motion.method)
     limits = Limits(**{f.name: motion.settings[f.name] for f in fields(Limits)})
     rtol = limits.rtol if method.integrator.adaptive else None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from mbref.input_error import InputError
 from mbref.scene import Scene, SceneError
 from mbref.scene_paths import replaced_at
 
@@ -45,7 +46,7 @@ class Variation:
 
         Raises
         ------
-        ValueError
+        InputError
             If the text has another form, or limits that are not finite or not in order.
         """
         path, equals, spread = text.partition("=")
@@ -54,9 +55,9 @@ class Variation:
         try:
             low, high = map(float, numbers)
         except ValueError:
-            raise ValueError(f"{text!r} is not PATH=LOW:HIGH or PATH=MEAN+-DEVIATION") from None
+            raise InputError(f"{text!r} is not PATH=LOW:HIGH or PATH=MEAN+-DEVIATION") from None
         if not (equals and np.isfinite([low, high]).all() and (high >= 0 if normal else high >= low)):
-            raise ValueError(f"{text!r} must have LOW <= HIGH, or a DEVIATION that is not negative")
+            raise InputError(f"{text!r} must have LOW <= HIGH, or a DEVIATION that is not negative")
         return Variation(path.strip(), low, high, normal)
 
     def draw(self, random: np.random.Generator) -> float:

@@ -19,6 +19,7 @@ from mbref.cli.scene_files import add as add_scene_files
 from mbref.cli.statics import add as add_statics
 from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands
+from mbref.input_error import InputError
 from mbref.method import MethodError
 from mbref.scene import SceneError
 from mbref.scene_toml import with_lines
@@ -43,7 +44,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(options.action(options))
     except SceneError as error:
         return _refuse(_with_lines(options, error.faults))
-    except (MethodError, ValueError) as error:
+    except (MethodError, InputError) as error:
         return _refuse([str(error)])
     except KeyboardInterrupt:
         print("mbref: interrupted", file=sys.stderr)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbref.cli.options import add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
+from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -55,7 +56,7 @@ def _ensemble(options: argparse.Namespace) -> int:
     times, limits = sample_times(options, scene), limits_of(options)
     warn(scene)
     if options.count < 1 or not (options.workers is None or options.workers > 0):
-        raise ValueError("--count and --workers: must be at least 1")
+        raise InputError("--count and --workers: must be at least 1")
     scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
     runs, began = {}, time.perf_counter()
     with processes(options.workers) as pool, progress_bar("simulating", options.count) as progress:

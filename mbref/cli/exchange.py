@@ -9,6 +9,7 @@ from typing import Any
 
 from mbref import formats
 from mbref.cli.options import add_scene
+from mbref.input_error import InputError
 from mbref.scenes import find_scene
 
 
@@ -46,7 +47,7 @@ def add(commands: Any) -> None:
 def _import(options: argparse.Namespace) -> int:
     out = Path(options.out or Path(options.file).with_suffix(".toml"))
     if out.suffix != ".toml":
-        raise ValueError(f"--out: must end in .toml, got {str(out)!r}")
+        raise InputError(f"--out: must end in .toml, got {str(out)!r}")
     found = formats.read(options.file, formats.import_options(options))
     found.scene.save(out)
     status = _report(out, found.left_out)

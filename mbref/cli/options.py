@@ -10,6 +10,7 @@ import numpy as np
 
 from mbref.cli.output import progress_bar, warn
 from mbref.formulations import FORMULATIONS
+from mbref.input_error import InputError
 from mbref.integrators import INTEGRATORS
 from mbref.method import SERIES_METHOD, SHORT_NAMES, SPARSE_METHOD, Method, default_method
 from mbref.scene import Scene
@@ -82,7 +83,7 @@ class Request(NamedTuple):
 def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Request:
     """Return the run that the options request, with branches by crossing; prints warnings about its scene.
 
-    Raises SceneError, or ValueError that names the faulty option.
+    Raises SceneError, or InputError that names the faulty option.
     """
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), limits_of(options, branches)
@@ -91,24 +92,24 @@ def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None =
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
-    """Return the sample times that the options request; raises ValueError that names the faulty option."""
+    """Return the sample times that the options request; raises InputError that names the faulty option."""
     duration = scene.duration if options.duration is None else options.duration
     if not 0 < duration < np.inf:
-        raise ValueError(f"--duration: must be positive, got {duration:g}")
+        raise InputError(f"--duration: must be positive, got {duration:g}")
     if options.times is None:
         samples = 101 if options.samples is None else options.samples
         if samples < 2:
-            raise ValueError(f"--samples: must be at least 2, got {samples}")
+            raise InputError(f"--samples: must be at least 2, got {samples}")
         return np.linspace(0.0, duration, samples)
     try:
         times = np.array([float(word) for word in options.times.split(",")])
     except ValueError:
-        raise ValueError(f"--times: must be numbers separated by commas, got {options.times!r}") from None
+        raise InputError(f"--times: must be numbers separated by commas, got {options.times!r}") from None
     if not np.isfinite(times).all() or times[0] < 0 or np.any(np.diff(times) <= 0):
-        raise ValueError(f"--times: must be finite, not negative and increasing, got {options.times}")
+        raise InputError(f"--times: must be finite, not negative and increasing, got {options.times}")
     times = times if options.duration is None else times[times <= duration]
     if not times.size:
-        raise ValueError(f"--times: none is within --duration {duration:g}")
+        raise InputError(f"--times: none is within --duration {duration:g}")
     return times
 
 
@@ -122,6 +123,6 @@ def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = 
             rtol=options.rtol, largest_step=options.max_step, code=options.code, branches=branches or {}
         )
     except ValueError as error:
-        raise ValueError(
+        raise InputError(
             f"--{error}".replace("largest_step", "max-step").replace("branches", "branch")
         ) from None

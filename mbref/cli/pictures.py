@@ -13,6 +13,7 @@ from mbref.drawing.film import MOVING, png, write_film
 from mbref.drawing.picture import side_by_side, still
 from mbref.drawing.view import View
 from mbref.equations.branches import SMOOTH
+from mbref.input_error import InputError
 from mbref.method import MethodError
 from mbref.motion import Motion
 from mbref.scenes import find_scene
@@ -111,11 +112,11 @@ def requested_view(options: argparse.Namespace) -> View | None:
 def path_of(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
     """Return the requested file, or a file in the working directory named after the scene or its file.
 
-    Raises ValueError for another kind of file.
+    Raises InputError for another kind of file.
     """
     path = Path(options.out or f"{Path(options.scene).name.removesuffix('.toml')}{ending}.svg")
     if path.suffix not in suffixes:
-        raise ValueError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")
+        raise InputError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")
     return path
 
 
@@ -123,7 +124,7 @@ def chosen_crossing(smooth: Motion, number: int | None) -> int:
     """Return the number, from 1, of the chosen singular position; without a choice, of the first position
     with several branches.
 
-    Raises MethodError if the method does not detect singular positions, ValueError if the motion passes none.
+    Raises MethodError if the method does not detect singular positions, InputError if the motion passes none.
     """
     if smooth.crossings is None:
         raise MethodError(
@@ -131,13 +132,13 @@ def chosen_crossing(smooth: Motion, number: int | None) -> int:
         )
     passed, until = len(smooth.crossings), f"up to t = {smooth.t_end:g} s"
     if number is not None and not 1 <= number <= passed:
-        raise ValueError(
+        raise InputError(
             f"--crossing: must be at most {passed}, the singular positions {until}, got {number}"
         )
     several = of_several_branches(smooth)
     if number is None and not several:
         which = "; ".join(sentence(smooth, k) for k in range(1, passed + 1)) or "the motion passes none"
-        raise ValueError(f"--branches: no singular position {until} has several branches: {which}")
+        raise InputError(f"--branches: no singular position {until} has several branches: {which}")
     return number or several[0]
 
 

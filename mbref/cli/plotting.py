@@ -8,6 +8,7 @@ from typing import Any
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
+from mbref.input_error import InputError
 from mbref.outputs import OUTPUTS
 
 COLUMN_LIST = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
@@ -42,7 +43,7 @@ def _plot(options: argparse.Namespace) -> int:
     try:
         figure = motion.plot(*options.columns)
     except ImportError:
-        raise ValueError("a plot needs matplotlib: pip install 'mbref[report]'") from None
+        raise InputError("a plot needs matplotlib: pip install 'mbref[report]'") from None
     figure.savefig(path, dpi=150)
     print(path)
     return exit_status(motion)

@@ -12,6 +12,7 @@ import numpy as np
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
+from mbref.input_error import InputError
 from mbref.method import short_name
 from mbref.motion import Motion
 from mbref.outputs import UNIT_OF
@@ -96,20 +97,20 @@ def _estimated(motion: Motion, wanted: str) -> Motion:
 
 
 def _branches(words: list[str]) -> dict[int, int]:
-    """Return the branch for each crossing; raises ValueError for a word that is not of the form
+    """Return the branch for each crossing; raises InputError for a word that is not of the form
     ``CROSSING=BRANCH``."""
     try:
         pairs = [word.split("=") for word in words]
         return {int(crossing): int(branch) for crossing, branch in pairs}
     except ValueError:
-        raise ValueError(f"--branch: must be CROSSING=BRANCH, such as 2=2, got {' '.join(words)!r}") from None
+        raise InputError(f"--branch: must be CROSSING=BRANCH, such as 2=2, got {' '.join(words)!r}") from None
 
 
 def _writer(out: str | None) -> Any:
-    """Return the writer for a file of that name; raises ValueError for an unknown file suffix."""
+    """Return the writer for a file of that name; raises InputError for an unknown file suffix."""
     writers = {".csv": Motion.to_csv, ".json": lambda motion, path, *_: motion.save(path)}
     if out is not None and Path(out).suffix not in writers:
-        raise ValueError(f"--out: must end in {' or '.join(writers)}, got {out!r}")
+        raise InputError(f"--out: must end in {' or '.join(writers)}, got {out!r}")
     return writers[Path(out).suffix] if out else None
 
 

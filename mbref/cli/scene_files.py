@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mbref.cli.options import add_scene
+from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 
@@ -59,9 +60,9 @@ def add(commands: Any) -> None:
 def _new(options: argparse.Namespace) -> int:
     path = Path(options.out)
     if path.suffix != ".toml":
-        raise ValueError(f"FILE: must end in .toml, got {options.out!r}")
+        raise InputError(f"FILE: must end in .toml, got {options.out!r}")
     if path.exists():
-        raise ValueError(f"{path}: exists already and was not changed; name another file")
+        raise InputError(f"{path}: exists already and was not changed; name another file")
     if options.like:
         find_scene(options.like).save(path)
     else:
@@ -107,7 +108,7 @@ def _length(scene: Scene, text: str) -> tuple[tuple[str, str], float]:
     except ValueError:
         length = -1.0
     if not (equals and known and 0 < length < float("inf")):
-        raise ValueError(f"--length: must be A-B=LENGTH with a positive length in m, got {text!r}")
+        raise InputError(f"--length: must be A-B=LENGTH with a positive length in m, got {text!r}")
     return known[0], length
 
 

@@ -11,6 +11,7 @@ from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
 from mbref.drawing.film import MOVING, write_film
+from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.rotations import to_vector
 from mbref.scenes import find_scene
@@ -61,29 +62,29 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
 
 
 def _found(options: argparse.Namespace) -> list[Equilibrium]:
-    """Return the equilibria; raises ValueError if no equilibrium is found, or if the requested number is
+    """Return the equilibria; raises InputError if no equilibrium is found, or if the requested number is
     larger than theirs."""
     from mbref.design.equilibrium import equilibria
 
     if options.starts < 1:
-        raise ValueError(f"--starts: must be at least 1, got {options.starts}")
+        raise InputError(f"--starts: must be at least 1, got {options.starts}")
     scene = find_scene(options.scene)
     warn(scene)
     found = equilibria(scene, options.starts)
     if not found:
         pushing = [f"load[{k}] ({load.type})" for k, load in enumerate(scene.load) if load.type in PUSHING]
         cause = f"perhaps {' and '.join(pushing)} moves it at every pose; " * bool(pushing)
-        raise ValueError(
+        raise InputError(
             f"{scene.name}: no equilibrium is found from {options.starts} starts; {cause}--starts tries more"
         )
     if options.number is not None and not 1 <= options.number <= len(found):
-        raise ValueError(f"--number: must be from 1 to {len(found)}, got {options.number}")
+        raise InputError(f"--number: must be from 1 to {len(found)}, got {options.number}")
     return found
 
 
 def _equilibrium(options: argparse.Namespace) -> int:
     if options.out and not options.out.endswith(".toml"):
-        raise ValueError(f"--out: must end in .toml, got {options.out!r}")
+        raise InputError(f"--out: must end in .toml, got {options.out!r}")
     found = _found(options)
     if options.out:
         found[(options.number or 1) - 1].scene.save(options.out)

@@ -16,6 +16,7 @@ from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced, displacement
+from mbref.input_error import InputError
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
@@ -154,11 +155,11 @@ def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMP
 
     Raises
     ------
-    ValueError
+    InputError
         If there is no such vibration.
     """
     if not 1 <= number <= len(equilibrium.oscillating):
-        raise ValueError(
+        raise InputError(
             f"mode: there are {len(equilibrium.oscillating)} vibrations, there is none with number {number}"
         )
     which = equilibrium.oscillating[number - 1]

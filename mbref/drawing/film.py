@@ -13,6 +13,7 @@ import numpy as np
 from mbref.drawing.picture import frames, moving
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import View
+from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -24,19 +25,19 @@ MISSING = "{} needs {}: pip install 'mbref[video]'; SVG needs nothing more"
 def png(svg: str, zoom: int = 2) -> bytes:
     """Return the picture as PNG at twice its size; of an animation, the first frame.
 
-    Raises ValueError without resvg.
+    Raises InputError without resvg.
     """
     try:
         import resvg_py
     except ImportError:
-        raise ValueError("PNG needs resvg: pip install 'mbref[draw]'; SVG needs nothing more") from None
+        raise InputError("PNG needs resvg: pip install 'mbref[draw]'; SVG needs nothing more") from None
     return bytes(resvg_py.svg_to_bytes(svg_string=svg, zoom=zoom))
 
 
 def write_film(path: Path, scene: Scene, motion: Trajectory, view: View | None = None) -> None:
     """Write the motion as .svg, .gif or .mp4, in real time if one round of it takes 4 to 12 s.
 
-    Raises ValueError if a library is not installed or the trajectory has no sample.
+    Raises InputError if a library is not installed or the trajectory has no sample.
     """
     writers = dict(zip(MOVING, (_write_svg, _write_gif, _write_mp4), strict=True))
     writers[path.suffix](path, scene, motion, view)
@@ -50,7 +51,7 @@ def _write_gif(path: Path, scene: Scene, motion: Trajectory, view: View | None) 
     try:
         import PIL.Image  # noqa: F401
     except ImportError:
-        raise ValueError(MISSING.format("GIF", "Pillow")) from None
+        raise InputError(MISSING.format("GIF", "Pillow")) from None
     first, *others = [image.quantize(64) for image in _images(scene, motion, view)]
     ends = np.linspace(0.0, 100.0 * Timeline.of(motion.times).seconds, 2 + len(others))
     durations = (10.0 * np.diff(np.round(ends))).tolist()  # ms; the unit of time in a GIF is 10 ms
@@ -62,7 +63,7 @@ def _write_mp4(path: Path, scene: Scene, motion: Trajectory, view: View | None) 
         import imageio_ffmpeg
         import PIL.Image  # noqa: F401
     except ImportError:
-        raise ValueError(MISSING.format("MP4", "imageio-ffmpeg and Pillow")) from None
+        raise InputError(MISSING.format("MP4", "imageio-ffmpeg and Pillow")) from None
     timeline, images = Timeline.of(motion.times), _images(scene, motion, view)
     first = next(images)
     pixels = _padded(first)

@@ -14,6 +14,7 @@ from mbref.drawing.shapes import Shape, anchors, at_rest, attack, carried, shape
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page, View, round_length, view_of
+from mbref.input_error import InputError
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 
@@ -79,7 +80,7 @@ def still(scene: Scene, view: View | None = None, width: float = Form().width) -
 def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
     """Return the motion as animated SVG, in real time if its duration is 4 to 12 s.
 
-    The animation shows every n-th of the samples, at most 120.  Raises ValueError if there is no sample.
+    The animation shows every n-th of the samples, at most 120.  Raises InputError if there is no sample.
     """
     _check([motion])
     panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)
@@ -99,7 +100,7 @@ def side_by_side(
 ) -> str:
     """Return motions over one span of time as one animated SVG, two in a row, below their titles.
 
-    A motion that ended early stays at its last sample. Raises ValueError if a trajectory has no sample.
+    A motion that ended early stays at its last sample. Raises InputError if a trajectory has no sample.
     """
     _check(motions.values())
     panels = [Panel([Layer(motion)], [title]) for title, motion in motions.items()]
@@ -153,7 +154,7 @@ def _title(scene: Scene) -> str:
 def _check(motions: Iterable[Trajectory]) -> None:
     for motion in motions:
         if not motion.times.size:
-            raise ValueError(
+            raise InputError(
                 f"the motion of {motion.scene!r} has no sample to draw: {motion.outcome.sentence}"
             )
 

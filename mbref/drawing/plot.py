@@ -16,7 +16,7 @@ DEFAULT = ("angle", "displacement", "energy")
 def plot(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> Any:
     """Return a figure with one panel for each quantity of the named columns, by default of ``DEFAULT``.
 
-    Raises ValueError for a name of no column, ImportError without matplotlib.
+    Raises InputError for a name of no column, ImportError without matplotlib.
     """
     panels = grouped([name for name in columns if name != "time"], names)
     try:

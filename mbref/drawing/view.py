@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref.drawing.shapes import FLAT
+from mbref.input_error import InputError
 
 NAMED = {"xy": (-90.0, 90.0), "xz": (-90.0, 0.0), "yz": (0.0, 0.0), "oblique": (-60.0, 22.0)}  # degrees
 ACROSS = ("yz", "xz", "xy")  # the view along each axis
@@ -23,16 +24,16 @@ class View:
 
     @staticmethod
     def parse(text: str) -> View:
-        """Return the view of a name, or of ``AZIMUTH,ELEVATION`` in degrees; raises ValueError."""
+        """Return the view of a name, or of ``AZIMUTH,ELEVATION`` in degrees; raises InputError."""
         try:
             azimuth, elevation = NAMED.get(text) or map(float, text.split(","))
         except ValueError:
             known = ", ".join(NAMED)
-            raise ValueError(
+            raise InputError(
                 f"view: must be {known}, or AZIMUTH,ELEVATION in degrees, got {text!r}"
             ) from None
         if not (math.isfinite(azimuth) and -90 <= elevation <= 90):
-            raise ValueError(f"view: the elevation must be from -90 to 90 degrees, got {text!r}")
+            raise InputError(f"view: the elevation must be from -90 to 90 degrees, got {text!r}")
         return View(math.radians(azimuth), math.radians(elevation))
 
     @property

@@ -73,7 +73,7 @@ def ensemble(
 
     Raises
     ------
-    SceneError, MethodError, ValueError
+    SceneError, MethodError, InputError
         As ``simulate``, for the first scene that cannot be simulated.
     RecordsError
         If the file contains something else than records.

@@ -16,6 +16,7 @@ import numpy as np
 
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
+from mbref.input_error import InputError
 
 SMOOTH = 1  # number of the smooth branch, which is taken unless another is requested
 MOST_BRANCHED_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
@@ -290,10 +291,10 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
 def branches_passed(model: Model, passed: Passed) -> Branches:
     """Return the branches at a crossing that a motion passed; the first branch is the smooth branch.
 
-    Raises ValueError if the requested branch does not exist.
+    Raises InputError if the requested branch does not exist.
     """
     t, q, v, taken = passed
     found = Branches(v[None], NOT_LOOKED_FOR) if model.m > MOST_BRANCHED_ROWS else branches(model, t, q, v)
     if taken > len(found.velocities):
-        raise ValueError(f"branches: the crossing at t = {t:.6g} s has no branch {taken}: {found.sentence}")
+        raise InputError(f"branches: the crossing at t = {t:.6g} s has no branch {taken}: {found.sentence}")
     return found

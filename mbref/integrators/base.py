@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from mbref.input_error import InputError
 from mbref.kernels.compilation import Exchangeable
 
 
@@ -38,9 +39,9 @@ class Integrator:
     crosses: Literal["no", "by series"] = "no"  # how the integrator crosses singular positions
 
     def highest_order(self, options: Mapping[str, float]) -> int:
-        """Return the order that the options allow; raises ValueError unless ``max_order`` is a whole number
+        """Return the order that the options allow; raises InputError unless ``max_order`` is a whole number
         up to ``order``."""
         wanted = options.get("max_order", self.order)
         if wanted not in range(1, self.order + 1):
-            raise ValueError(f"{self.name}: max_order must be 1 to {self.order}, got {wanted:g}")
+            raise InputError(f"{self.name}: max_order must be 1 to {self.order}, got {wanted:g}")
         return int(wanted)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import Method, MethodError, default_method
@@ -66,7 +67,7 @@ def simulate(
     ------
     SceneError
         If the scene cannot be simulated.
-    ValueError
+    InputError
         If times do not increase or are given beside a duration, or the integrator does not have the order.
     MethodError
         If the method is unknown, has no generated code, or crosses no singular position at which ``limits``
@@ -75,7 +76,7 @@ def simulate(
     scene = find_scene(scene)
     if duration is not None:
         if times is not None:
-            raise ValueError("give sample times or a duration, not both")
+            raise InputError("give sample times or a duration, not both")
         scene = scene.with_(duration=duration)
     limits = limits or Limits()
     if rtol is not None:
@@ -111,10 +112,10 @@ def finish_run(run: Run, progress: Callable[[float], None] | None = None) -> Mot
 
 
 def _check_branches(run: Run) -> None:
-    """Raise ValueError if a branch is requested at a singular position that the motion does not pass."""
+    """Raise InputError if a branch is requested at a singular position that the motion does not pass."""
     last, passed = max(dict(run.limits.branches), default=0), len(run.crossings)
     if last > passed:
-        raise ValueError(
+        raise InputError(
             f"branches: the motion passes {passed} singular positions up to t = {run.times[-1]:g} s, "
             f"and no number {last}"
         )
@@ -151,14 +152,14 @@ def why_no_code(scene: Scene, method: Method) -> str:
 
 
 def checked_times(times: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Return sample times as an array (k,); raises ValueError unless they are finite, not negative and
+    """Return sample times as an array (k,); raises InputError unless they are finite, not negative and
     increasing."""
     try:
         array = np.ascontiguousarray(times, dtype=float)
     except (TypeError, ValueError, OverflowError):
-        raise ValueError("times: must be numbers") from None
+        raise InputError("times: must be numbers") from None
     if array.ndim != 1 or not array.size:
-        raise ValueError("times: needs at least one sample time")
+        raise InputError("times: needs at least one sample time")
     if not np.isfinite(array).all() or array[0] < 0 or np.any(np.diff(array) <= 0):
-        raise ValueError("times: must be finite, not negative and increasing")
+        raise InputError("times: must be finite, not negative and increasing")
     return array

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
+from mbref.input_error import InputError
 from mbref.scene_fields import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
@@ -38,7 +39,7 @@ class Limits:
     """Tolerances, steps and code of a run.
 
     Whatever number is given, the field is a Python float or int: compiled code reads its bytes. Raises
-    ValueError for a field outside its interval.
+    InputError for a field outside its interval.
 
     Attributes
     ----------
@@ -92,11 +93,11 @@ class Limits:
 def _checked(name: str, value: Any) -> Any:
     if name == "code":
         if value not in CODES:
-            raise ValueError(f"code: must be one of {', '.join(CODES)}, got {shown(value)}")
+            raise InputError(f"code: must be one of {', '.join(CODES)}, got {shown(value)}")
         return value
     if name == "compared":
         if not isinstance(value, bool):
-            raise ValueError(f"compared: must be True or False, got {shown(value)}")
+            raise InputError(f"compared: must be True or False, got {shown(value)}")
         return value
     if name == "branches":
         return _pairs(value)
@@ -114,7 +115,7 @@ def _pairs(value: Any) -> tuple[tuple[int, int], ...]:
             for crossing, branch in pairs
         )
     except (TypeError, ValueError):
-        raise ValueError(
+        raise InputError(
             f"branches: must be pairs of a crossing and a branch, counted from 1, got {shown(value)}"
         ) from None
 
@@ -126,7 +127,7 @@ def _number(name: str, value: Any, least: float, largest: float, zero: bool) -> 
         number = math.nan
     if not (least <= number <= largest or (zero and number == 0)):
         also = "0 or " if zero else ""
-        raise ValueError(f"{name}: must be {also}a number from {least:g} to {largest:g}, got {shown(value)}")
+        raise InputError(f"{name}: must be {also}a number from {least:g} to {largest:g}, got {shown(value)}")
     return number
 
 
@@ -136,5 +137,5 @@ def _count(name: str, value: Any, least: int, largest: int) -> int:
     except TypeError:
         count = least - 1
     if not least <= count <= largest:
-        raise ValueError(f"{name}: must be a whole number from {least} to 2**62, got {shown(value)}")
+        raise InputError(f"{name}: must be a whole number from {least} to 2**62, got {shown(value)}")
     return count

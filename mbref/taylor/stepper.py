@@ -13,6 +13,7 @@ import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed
 from mbref.equations.packing import Packs
+from mbref.input_error import InputError
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.kernels.memory_pool import release, write_record
@@ -55,14 +56,14 @@ CHEAPEST = {GENERIC: (6.0, 1.2), GENERATED: (7.0, 1.6)}
 
 
 def order_of(tolerance: float, wanted: float, code: str) -> int:
-    """Return the order of the series: the requested order, or for 0 the cheapest order; raises ValueError
+    """Return the order of the series: the requested order, or for 0 the cheapest order; raises InputError
     outside 4 to 30."""
     if wanted == 0:
         first, per_digit = CHEAPEST[code]
         best = 2 * round((first - per_digit * np.log10(tolerance)) / 2)
         return int(min(max(best, LEAST_ORDER), MOST_ORDER))
     if wanted not in range(LEAST_ORDER, MOST_ORDER + 1):
-        raise ValueError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
+        raise InputError(f"taylor: order must be {LEAST_ORDER} to {MOST_ORDER}, got {wanted:g}")
     return int(wanted)
 
 

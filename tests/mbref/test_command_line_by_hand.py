@@ -373,3 +373,17 @@ def test_an_ensemble_from_the_command_line(monkeypatch, tmp_path, capsys):
     for fault in (["--count", "0"], ["--workers", "0"]):
         assert main([*words, *fault]) == 2
         assert "--count and --workers: must be at least 1" in capsys.readouterr().err
+
+
+# --- refusals ---------------------------------------------------------------------------------------------
+def test_the_command_line_reports_refused_input_alone_and_raises_a_defect(monkeypatch, capsys):
+    """A ValueError of another kind is a defect of the program, so its traceback stays."""
+    assert main(["run", "four_bar", "--duration=-1"]) == 2
+    assert capsys.readouterr().err == "--duration: must be positive, got -1\n"
+
+    def fail(*_: object) -> None:
+        raise ValueError("operands of other shapes")
+
+    monkeypatch.setattr("mbref.cli.options.sample_times", fail)
+    with pytest.raises(ValueError, match="operands"):
+        main(["run", "four_bar"])

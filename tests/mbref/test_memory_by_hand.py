@@ -216,6 +216,7 @@ def parser() -> Parser:
     run.add_argument("--steps", type=int)
     run.add_argument("--rtol", type=float)
     run.add_argument("--kind", choices=("fine", "coarse"))
+    run.add_argument("--name", action="append")
     return made
 
 
@@ -228,7 +229,12 @@ def parser() -> Parser:
         ("rum", "unknown 'rum'; known: run; did you mean 'run'?"),
         ("run --stepz 3", "p run: error: unknown option '--stepz'; did you mean '--steps'?"),
         ("run --zzzzzz", "p run: error: unknown option '--zzzzzz'\n"),
-        ("run this", "p run: error: unknown argument 'this'"),
+        ("run this", "p run: error: unknown argument 'this'\n"),
+        ("run --steps 3 this", "p run: error: unknown argument 'this'\n"),
+        (
+            "run --name a b",
+            "unknown argument 'b'; repeat the option for each value: --name a --name b\n",
+        ),
         ("--alll run", "unknown option '--alll'"),
     ],
 )

@@ -21,7 +21,16 @@ ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mb
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        ["rotations", "records", "lazy", "crossing", "trajectory", "error_estimate", "scene_services"],
+        [
+            "input_error",
+            "rotations",
+            "records",
+            "lazy",
+            "crossing",
+            "trajectory",
+            "error_estimate",
+            "scene_services",
+        ],
         [
             "scene",
             "scene_bodies",
