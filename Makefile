@@ -109,8 +109,20 @@ ladders: $(VENV)/ready ## mbref's methods on mechanisms that become difficult, w
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
 	$(BIN)/python -m reports --picture reports/rendered/passage.svg
 
-docs: $(VENV)/ready ## the support matrix, into docs/engines.md
+docs: $(VENV)/ready ## every page, schema and report that is made from code and committed records
+	mkdir -p build && $(BIN)/mbref schema > build/scene.schema.json && mv build/scene.schema.json mbref/templates/
+	$(BIN)/python docs/method_pages.py
+	$(BIN)/python -m tests.thresholds docs/internals/thresholds.md
+	$(BIN)/python -m tests.zoo.table docs/conformance.md
 	$(BIN)/python -m crosscheck.cli.support docs/engines.md
+	$(BIN)/python -m crosscheck.findings.document docs/findings.md
+	$(BIN)/python -m reports.which_engine docs/which-engine.md
+	$(BIN)/crosscheck closed-loops --page docs/closed-loops.md
+	$(BIN)/crosscheck convergence --page docs/convergence.md
+	$(BIN)/crosscheck modes --page docs/small-motions.md
+	$(BIN)/crosscheck report --render reports/reference
+	$(BIN)/crosscheck report --section stability --render reports/stability
+	$(BIN)/crosscheck report --section paper --render $(PAPER)
 
 site: $(VENV)/ready ## the documentation as a site, into build/site/, its commands run, its links checked
 	$(BIN)/pip install -q -c constraints.txt -e '.[docs]'

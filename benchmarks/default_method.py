@@ -9,7 +9,7 @@ the sparse method ends at the first singular position.  ``mbref.method.MOST_BODI
 
 from __future__ import annotations
 
-import sys
+from collections.abc import Sequence
 from statistics import median
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import Limits, simulate
+from mbref.command_line import Parser
 from mbref.method import SERIES_METHOD, SPARSE_METHOD
 from mbref.scenes import find_scene
 
@@ -24,11 +25,11 @@ LOOPS, REPEATS, RTOL = (2, 5, 10, 15, 20, 30, 40), 5, 1e-8
 END = {"four_bar_chain": 0.5, "slider_crank_chain": 0.02}  # s
 
 
-def main() -> None:
+def main(sizes: Sequence[int]) -> None:
     """Print a row for each chain and number of loops."""
     print(f"{'scene':26} {'bodies':>6} {'taylor':>9} {'error':>8} {'sparse':>9} {'error':>8}")
     for family, end in END.items():
-        for loops in [int(word) for word in sys.argv[1:]] or LOOPS:
+        for loops in sizes:
             scene = find_scene(f"{family}[{loops}]")
             times, truth = np.linspace(0.0, end, 5), truth_for(scene)
             runs = [
@@ -48,4 +49,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    parser = Parser(description=__doc__)
+    parser.add_argument("loops", nargs="*", type=int, metavar="LOOPS", help="numbers of loops")
+    main(parser.parse_args().loops or LOOPS)

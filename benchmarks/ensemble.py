@@ -12,7 +12,6 @@ transfer of scenes and trajectories between processes; it is a median over round
 from __future__ import annotations
 
 import os
-import sys
 import time
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
@@ -21,6 +20,7 @@ from statistics import median
 
 import numpy as np
 
+from mbref.command_line import Parser
 from mbref.ensembles.ensemble import MOST_AT_ONCE, ensemble
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import run_all
@@ -109,4 +109,8 @@ def _seconds(scenes: Sequence[Scene], pool: Executor) -> float:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if sys.argv[1:] else 200)
+    parser = Parser(description=__doc__)
+    parser.add_argument(
+        "count", nargs="?", type=int, default=200, help="variants of each scene; default: 200"
+    )
+    main(parser.parse_args().count)

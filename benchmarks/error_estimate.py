@@ -8,7 +8,6 @@ counts as overestimated if the estimate is more than a hundred times the sum of 
 
 import contextlib
 import math
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -22,6 +21,7 @@ from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series, exact_motion
 from crosscheck.judge.truth import truth_for
 from mbref import Limits, Scene, simulate
+from mbref.command_line import Parser
 from mbref.equations.diagnosis import undriven_freedoms
 from mbref.scene import Spherical, Spring, Translational
 from mbref.scenes import SCENES, find_scene
@@ -278,4 +278,6 @@ def pendulum_on_four_bar() -> Scene:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if sys.argv[1:] else 500)
+    parser = Parser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=500, help="random mechanisms; default: 500")
+    main(parser.parse_args().count)

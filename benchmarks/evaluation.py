@@ -9,13 +9,13 @@ compiled loop, evaluations of engines are called from Python.
 from __future__ import annotations
 
 import functools
-import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from forward_dynamics import timed_calls
 
+from mbref.command_line import Parser
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.compilation import INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY, OK
@@ -81,4 +81,6 @@ def _timed(run: Run) -> float:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or SCENE_NAMES)
+    parser = Parser(description=__doc__)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="default: the scenes of the paper")
+    main(parser.parse_args().scenes or SCENE_NAMES)

@@ -3,7 +3,6 @@
 ``python benchmarks/random_mechanisms.py [COUNT]``, by default 200 mechanisms of seeds 0, 1, 2, …
 """
 
-import sys
 from collections import Counter
 from collections.abc import Sequence
 
@@ -12,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.conformance.random_mechanisms import PRINCIPLE, Comparison, compare, random_mechanism
+from mbref.command_line import Parser
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")
 EXPECTED = 1e-6  # larger differences must be explained by a small distance to singularity
@@ -51,4 +51,6 @@ def describe(found: Sequence[Comparison]) -> str:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if sys.argv[1:] else 200)
+    parser = Parser(description=__doc__)
+    parser.add_argument("count", nargs="?", type=int, default=200, help="random mechanisms; default: 200")
+    main(parser.parse_args().count)

@@ -10,7 +10,6 @@ the cost of an error; all other tables have milliseconds per step, for STEPS ste
 from __future__ import annotations
 
 import math
-import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -27,6 +26,7 @@ from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth.crankshaft import crankshaft
 from crosscheck.judge.truth.one_dof import OneDof
 from crosscheck.judge.truth.parallelogram import parallelogram
+from mbref.command_line import Parser
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
@@ -205,8 +205,8 @@ def at_errors(console: Console, loops: int) -> None:
     console.print(table)
 
 
-def main() -> None:
-    sizes = sorted({int(word) for word in sys.argv[1:]}) or LOOPS
+def main(sizes: Sequence[int]) -> None:
+    """Measure and print."""
     console = Console(width=200)
     began = time.process_time()
     for loops in (size for size in sizes if size in (20, 200)):
@@ -217,4 +217,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    parser = Parser(description=__doc__)
+    parser.add_argument("loops", nargs="*", type=int, metavar="LOOPS", help="numbers of loops")
+    main(sorted({*parser.parse_args().loops}) or LOOPS)

@@ -21,6 +21,7 @@ from pathlib import Path
 from statistics import median
 
 from crosscheck.engine import engine
+from mbref.command_line import Parser
 from mbref.scenes import SCENES
 
 WARM = 3  # number of processes for each warm number
@@ -103,4 +104,6 @@ def _seconds_of(command: Sequence[str], environment: dict[str, str]) -> float:
 
 if __name__ == "__main__":
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    main(sys.argv[1:])
+    parser = Parser(description=__doc__)
+    parser.add_argument("methods", nargs="*", metavar="METHOD", help="default: the methods of crosscheck")
+    main(parser.parse_args().methods)

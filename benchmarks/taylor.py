@@ -12,7 +12,6 @@ from __future__ import annotations
 import one_thread  # noqa: F401 - before NumPy
 
 # isort: split
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import median
@@ -22,6 +21,7 @@ import numpy as np
 from crosscheck.judge.metrics import cost_at_error, measure
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
+from mbref.command_line import Parser
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
@@ -114,4 +114,6 @@ def main(names: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or NAMES)
+    parser = Parser(description=__doc__)
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", help="default: six scenes")
+    main(parser.parse_args().scenes or NAMES)

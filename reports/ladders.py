@@ -6,10 +6,10 @@ runs the ladders before, and renders them afterwards.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from crosscheck.study.stability import FILE
+from mbref.command_line import Parser
 from mbref.records import looked_at, strict_json
 
 # fields of a record that the section shows, and its origin
@@ -26,4 +26,8 @@ def keep(source: Path, folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    keep(Path(sys.argv[1]), Path(sys.argv[2]))
+    parser = Parser(description=__doc__)
+    parser.add_argument("source", type=Path, help="folder of the records with their motions")
+    parser.add_argument("folder", type=Path, help="folder of the records without motions")
+    options = parser.parse_args()
+    keep(options.source, options.folder)

@@ -7,7 +7,6 @@ beside the stored records of other scenes. `make kinds` does both.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
 from crosscheck.study.speed_sentences import LEVEL, SAID, title
 from crosscheck.study.verdict import Grade, Judged
+from mbref.command_line import Parser
 from mbref.records import strict_json
 from mbref.trajectory import Outcome
 from reports.runs import SceneRuns, duration, plain
@@ -301,11 +301,15 @@ def _write(path: Path, records: Sequence[Record]) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--keep"]:
-        new = groups(Path(sys.argv[2]))
+    parser = Parser(description=__doc__)
+    parser.add_argument("page", nargs="?", type=Path, help="default: print the page")
+    parser.add_argument("--keep", type=Path, metavar="REPORT", help="keep the records of this report")
+    options = parser.parse_args()
+    if options.keep:
+        new = groups(options.keep)
         names = {group.scene.name for group in new}
         keep([*new, *(old for old in groups(KINDS_FOLDER) if old.scene.name not in names)], KINDS_FOLDER)
-    elif sys.argv[1:]:
-        Path(sys.argv[1]).write_text(page())
+    elif options.page:
+        options.page.write_text(page())
     else:
         print(page(), end="")

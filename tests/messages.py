@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import ast
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
+
+from mbref.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("mbref", "crosscheck", "reports")
@@ -46,6 +47,9 @@ def collected() -> Iterator[tuple[str, int, str]]:
 
 
 if __name__ == "__main__":
+    parser = Parser(description=__doc__)
+    parser.add_argument("folders", nargs="*", metavar="FOLDER", help="default: all packages")
+    chosen = tuple(parser.parse_args().folders) or PACKAGES
     for place, number, message in collected():
-        if place.startswith(tuple(sys.argv[1:]) or PACKAGES):
+        if place.startswith(chosen):
             print(f"{place}:{number}: {' '.join(message.split())}")

@@ -8,8 +8,10 @@ from __future__ import annotations
 import re
 import sys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+
+from mbref.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
 RULES = tomllib.loads((Path(__file__).parent / "prose.toml").read_text())
@@ -72,13 +74,15 @@ def faults(text: str) -> list[tuple[int, str]]:
     return sorted([*linted(bare), *long_sentences(bare)])
 
 
-def main(arguments: list[str]) -> int:
+def main(files: Sequence[Path]) -> int:
     """Print the faults of the files; return 1 if there are any."""
-    paths = [Path(name) for name in arguments] or pages()
+    paths = files or pages()
     lines = [f"{path}:{line}: {message}" for path in paths for line, message in faults(path.read_text())]
     print("\n".join(lines) or f"{len(paths)} files: no fault")
     return 1 if lines else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    parser = Parser(description=__doc__)
+    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="default: all pages")
+    sys.exit(main(parser.parse_args().files))

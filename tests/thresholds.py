@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import ast
 import re
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
+
+from mbref.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
 CHECKS = tuple(
@@ -191,4 +192,6 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page())
+    parser = Parser(description=__doc__)
+    parser.add_argument("page", type=Path, help="the page that is written")
+    parser.parse_args().page.write_text(page())

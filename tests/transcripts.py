@@ -13,6 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from mbref.command_line import Parser
+
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(r"^```console\n(.*?)^```$", re.S | re.M)
 OUTPUT = "<!-- output -->"
@@ -78,5 +80,7 @@ def _output(command: str, folder: Path) -> str:
 
 
 if __name__ == "__main__":
-    for page in map(Path, sys.argv[1:]):
+    parser = Parser(description=__doc__)
+    parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
+    for page in parser.parse_args().pages:
         page.write_text(filled(page.read_text()))

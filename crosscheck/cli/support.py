@@ -6,7 +6,6 @@ program prints the matrix.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
 from crosscheck.conformance.geared_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
+from mbref.command_line import Parser
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 
@@ -119,7 +119,10 @@ def refresh(path: str | Path) -> None:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        refresh(sys.argv[1])
+    parser = Parser(description=__doc__)
+    parser.add_argument("page", nargs="?", type=Path, help="default: print the matrix")
+    path = parser.parse_args().page
+    if path:
+        refresh(path)
     else:
         print(markdown(KNOWN), end="")

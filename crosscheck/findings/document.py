@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from crosscheck.findings.finding import FOLDER, Finding, findings
+from mbref.command_line import Parser
 
 HEAD = """# Findings
 
@@ -49,7 +49,10 @@ def _entry(found: Finding) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:]:
-        Path(sys.argv[1]).write_text(page())
+    parser = Parser(description=__doc__)
+    parser.add_argument("page", nargs="?", type=Path, help="default: print the page")
+    path = parser.parse_args().page
+    if path:
+        path.write_text(page())
     else:
         print(page(), end="")

@@ -3,12 +3,12 @@ docs/conformance.md``, and the same as data for reports."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 from crosscheck.conformance import suite
 from crosscheck.conformance.suite import Verdict, abouts
+from mbref.command_line import Parser
 from tests.zoo.defects import DEFECTS
 
 FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
@@ -57,5 +57,7 @@ def data() -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page())
+    parser = Parser(description=__doc__)
+    parser.add_argument("page", type=Path, help="the page that is written")
+    parser.parse_args().page.write_text(page())
     FOR_REPORTS.write_text(data())
