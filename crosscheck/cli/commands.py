@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
@@ -36,6 +39,7 @@ from mbref.scene import SceneError
 from mbref.trajectory import Outcome
 
 BAD_INPUT, INTERRUPTED = 2, 130
+KILLED = 128  # plus the number of the signal that ended a program
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -140,12 +144,28 @@ def _paper(arguments: argparse.Namespace) -> int:
 
 
 def _rendered(options: Sequence[str]) -> int:
-    """Run `python -m reports` as a program. This package must not import `reports`, which depends on it."""
-    with subprocess.Popen([sys.executable, "-m", "reports", *options]) as program:
-        try:
-            return program.wait()
-        except KeyboardInterrupt:  # Ctrl-C interrupts the program, too: wait until it has stored its records
-            return program.wait()
+    """Run `python -m reports` as a program. This package must not import `reports`, which depends on it.
+
+    The program has a process group of its own, so that it gets each interrupt once, from here.
+    """
+    command = [sys.executable, "-m", "reports", *options]
+    with subprocess.Popen(command, process_group=0) as program, passed_on(program):
+        status = program.wait()
+    return status if status >= 0 else KILLED - status
+
+
+@contextlib.contextmanager
+def passed_on(program: subprocess.Popen[Any]) -> Iterator[None]:
+    """Pass SIGINT and SIGTERM on to a program during the ``with`` block."""
+    before = {
+        number: signal.signal(number, lambda received, _: program.send_signal(received))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:

@@ -19,6 +19,7 @@ from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
 from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, Specimen, set_up
 from crosscheck.engine import engine
+from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import ChildFailed
 
 PASS, FAIL, CANNOT, OUTSIDE = "pass", "fail", "cannot", "outside"
@@ -110,8 +111,9 @@ def held_against(
         return verdicts
 
     with ThreadPoolExecutor(1 if isinstance(runner, InProcess) else os.cpu_count()) as threads:
-        groups = threads.map(examined, [Specimen(undetermined()), *specimens])
-        verdicts = [verdict for group in groups for verdict in group]
+        calls = [threads.submit(examined, specimen) for specimen in [Specimen(undetermined()), *specimens]]
+        with calls_ended(calls):
+            verdicts = [verdict for call in calls for verdict in call.result()]
     failures = _failures(specimens, verdicts)
     return Conformance(
         runner.name, ", ".join(sorted(versions)), verdicts, family, hint(runner, failures, family)

@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor, as_completed, wait
+from concurrent.futures import Executor, ThreadPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,13 +17,13 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Setting, engine
 from crosscheck.judge import metrics
-from crosscheck.judge.deadline import given_up
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes import pool
-from crosscheck.processes.child import ChildFailed, stop_all
+from crosscheck.processes.child import ChildFailed
+from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
@@ -240,16 +240,9 @@ def _run_all(
             yield from _run_all(cases, stack.enter_context(ThreadPoolExecutor(os.cpu_count())), run)
         return
     futures = [executor.submit(run, case) for case in cases]
-    try:
+    with calls_ended(futures):
         for future in as_completed(futures):
             yield future.result()
-    except BaseException:
-        for future in futures:
-            future.cancel()
-        with given_up():
-            while isinstance(executor, ThreadPoolExecutor) and wait(futures, timeout=0.1).not_done:
-                stop_all()  # repeated, since a run may start between two calls
-        raise
 
 
 def _worth_repeating(record: Record, time_limit: float) -> bool:

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.processes.child import ChildFailed
+from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import READY_SECONDS, capabilities
 from mbref.formats import OriginalRun
 from mbref.scene import Scene
@@ -45,13 +46,14 @@ def scout(engines: Sequence[str], scenes: Sequence[Scene], advance: Callable[[st
     first = [(name, theirs.pop(0)) for name, theirs in left.items() if theirs]
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         asked = {threads.submit(_asked, pair): pair for pair in first}
-        while asked:
-            for future in wait(asked, return_when=FIRST_COMPLETED).done:
-                name, scene = pair = asked.pop(future)
-                _found[pair] = future.result()
-                advance(f"{shown_name(name)} {scene.name}")
-                more = [(name, other) for other in left.pop(name, ())]
-                asked |= {threads.submit(_asked, pair): pair for pair in more}
+        with calls_ended(asked):
+            while asked:
+                for future in wait(asked, return_when=FIRST_COMPLETED).done:
+                    name, scene = pair = asked.pop(future)
+                    _found[pair] = future.result()
+                    advance(f"{shown_name(name)} {scene.name}")
+                    more = [(name, other) for other in left.pop(name, ())]
+                    asked |= {threads.submit(_asked, pair): pair for pair in more}
 
 
 def offer(engine_name: str, scene: Scene) -> Offer:

@@ -6,7 +6,9 @@ import contextlib
 import io
 import json
 import shlex
+import signal
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -561,14 +563,20 @@ def test_report_command_and_the_program_it_starts(monkeypatch):
     started = []
 
     class Program(contextlib.nullcontext):
-        def wait(self) -> int:
-            started.append(self.enter_result)
-            if len(started) == 1:
-                raise KeyboardInterrupt
-            return 130
+        def __init__(self, command: list[str], process_group: int) -> None:
+            assert process_group == 0, "the terminal interrupts this process alone"
+            self.command = command
 
         def __enter__(self):
             return self
+
+        def send_signal(self, number: int) -> None:
+            started.append(number)
+
+        def wait(self) -> int:
+            started.append(self.command)
+            signal.raise_signal(signal.SIGINT)
+            return 130
 
     monkeypatch.setattr(subprocess, "Popen", Program)
     assert (
@@ -588,7 +596,7 @@ def test_report_command_and_the_program_it_starts(monkeypatch):
         "--section",
         "speed",
     ]
-    assert started[1][1:] == ["-m", "reports", *asked], started
+    assert started == [[sys.executable, "-m", "reports", *asked], signal.SIGINT], started
 
 
 def test_cost_fields_and_the_trajectory_s():

@@ -16,10 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from crosscheck.cli.commands import passed_on
 from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import Setting
 from crosscheck.processes import fork_server
 from crosscheck.processes.child import ChildFailed, stop_all
+from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import (
     ask,
     capabilities,
@@ -357,3 +359,27 @@ def test_interleaved_crash_is_an_error():
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
         time_interleaved(still(), TIMES, jobs, repeats=1, time_limit=60.0)
     assert caught.value.outcome is Outcome.CRASHED
+
+
+def test_an_interrupt_ends_the_calls_of_threads(tmp_path: Path):
+    """The running call ends with its child, and the waiting call does not begin."""
+    pid = tmp_path / "pid"
+    with ThreadPoolExecutor(1) as pool:
+        calls = [pool.submit(run, "HANG", still(str(pid))) for _ in range(2)]
+        with pytest.raises(KeyboardInterrupt), calls_ended(calls):
+            while not (pid.exists() and pid.read_text()):
+                time.sleep(0.05)
+            raise KeyboardInterrupt
+        assert calls[0].result(timeout=0).message == "the process was ended by SIGKILL"
+        assert calls[1].cancelled()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_signals_are_passed_on_to_a_program(number: signal.Signals):
+    command = ["sh", "-c", "echo begun; exec sleep 60"]
+    before = signal.getsignal(number)
+    with subprocess.Popen(command, stdout=subprocess.PIPE, process_group=0) as program, passed_on(program):
+        assert program.stdout is not None and program.stdout.readline()
+        signal.raise_signal(number)
+        assert program.wait() == -number
+    assert signal.getsignal(number) is before
