@@ -111,7 +111,7 @@ def _early_ends(runs: Mapping[int, Trajectory]) -> Iterator[str]:
 def _table(scene: Scene, end: float, last: dict[str, np.ndarray]) -> Any:
     def cells(b: int, field: str) -> list[str]:
         mean, deviation = (rounded(f(last[field][:, b], axis=0)) for f in (np.mean, np.std))
-        return [f"{m:.5g} ± {d:.2g}" for m, d in zip(mean, deviation, strict=True)]
+        return [f"{m:.5g}\n± {d:.2g}" for m, d in zip(mean, deviation, strict=True)]
 
     names = [body.name for body in scene.body]
-    return body_table(f"mean ± standard deviation at t = {end:g} s", names, "left", cells)
+    return body_table(f"mean ± standard deviation at t = {end:g} s", names, cells)

@@ -6,7 +6,7 @@ import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.console import Console
@@ -60,21 +60,16 @@ def rounded(vector: np.ndarray) -> np.ndarray:
     return np.round(vector, 12) + 0.0
 
 
-def body_table(
-    title: str,
-    bodies: Sequence[str],
-    justify: Literal["left", "right"],
-    cells: Callable[[int, str], Iterable[str]],
-) -> Table:
+def body_table(title: str, bodies: Sequence[str], cells: Callable[[int, str], Iterable[str]]) -> Table:
     """Return a table with rows x, y, z of ``cells(body, field of QUANTITIES)`` for every body and
     quantity."""
     from rich.table import Table
 
     table = Table(title=title)
     table.add_column("body", overflow="fold")
-    table.add_column("")
+    table.add_column("", no_wrap=True)
     for axis in "xyz":
-        table.add_column(axis, justify=justify, no_wrap=True)
+        table.add_column(axis, justify="right", no_wrap=True)
     for b, name in enumerate(bodies):
         for k, (quantity, field) in enumerate(QUANTITIES.items()):
             last = k == len(QUANTITIES) - 1

@@ -141,7 +141,7 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
     def numbers(b: int, field: str) -> list[str]:
         return [f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b])]
 
-    out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, "right", numbers))
+    out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, numbers))
 
 
 def _largest(motion: Motion) -> Iterator[str]:

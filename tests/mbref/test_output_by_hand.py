@@ -28,7 +28,7 @@ def test_the_table_of_two_bodies():
     def cells(b: int, field: str) -> list[str]:
         return [f"{b}{field[0]}{axis}" for axis in "xyz"]
 
-    table = output.body_table("state", ["rod", "wheel"], "right", cells)
+    table = output.body_table("state", ["rod", "wheel"], cells)
     assert printed(table) == [
         "                        state",
         "┏━━━━━━━┳━━━━━━━━━━━━━━━━━━━━━━━━━┳━━━━━┳━━━━━┳━━━━━┓",
@@ -45,11 +45,13 @@ def test_the_table_of_two_bodies():
     ]
 
 
-def test_the_sides_of_the_cells_of_a_body_table():
-    table = output.body_table("", ["b"], "left", lambda b, field: ["1", "22", "333"])
-    assert [column.justify for column in table.columns[2:]] == ["left"] * 3
-    assert all(column.no_wrap for column in table.columns[2:]), "a number is not broken"
-    assert table.columns[0].overflow == "fold", "a long name is"
+def test_a_long_name_is_broken_and_a_number_is_not():
+    """At 80 columns numbers of 11 characters leave 8 characters of a name in a line."""
+    name, number = "connecting_rod", "-1.2346e-08"
+    lines = printed(output.body_table("", [name], lambda b, field: [number] * 3))
+    first = next(k for k, line in enumerate(lines) if name[:8] in line)
+    assert [line.split("│")[1].strip() for line in lines[first : first + 2]] == [name[:8], name[8:]]
+    assert sum(line.count(number) for line in lines) == 9
 
 
 def test_columns_over_time_have_units_and_six_digits():
