@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
 from mbref.scene_fields import meant
@@ -57,6 +59,38 @@ class _Command(Parser):
     def __init__(self, *args: Any, action: Any = None, **names: Any):
         super().__init__(*args, **names)
         self.set_defaults(parser_of_command=self, action=action)
+
+
+def output_file(text: str) -> str:
+    """Return the path of a file, if the file can be written: the type of an option.
+
+    Raises ``argparse.ArgumentTypeError`` with the cause, before any work is done.
+    """
+    path = Path(text)
+    if path.is_dir():
+        raise argparse.ArgumentTypeError(f"{text} is a folder; name a file")
+    if not path.parent.is_dir():
+        raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
+    _check_permission(path if path.exists() else path.parent, text)
+    return text
+
+
+def output_folder(text: str) -> str:
+    """Return the path of a folder, if files can be written there: the type of an option.
+
+    The folder and its parents may be missing. Raises ``argparse.ArgumentTypeError`` with the cause.
+    """
+    path = Path(text).absolute()
+    there = next(place for place in (path, *path.parents) if place.exists())
+    if not there.is_dir():
+        raise argparse.ArgumentTypeError(f"{there} is a file; name a folder")
+    _check_permission(there, text)
+    return text
+
+
+def _check_permission(place: Path, wanted: str) -> None:
+    if not os.access(place, os.W_OK):
+        raise argparse.ArgumentTypeError(f"{wanted} cannot be written: no permission for {place}")
 
 
 def _repeated(command: argparse.ArgumentParser, words: Sequence[str], extra: str) -> str:

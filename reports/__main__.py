@@ -10,9 +10,9 @@ from pathlib import Path
 
 from crosscheck.cli import collection
 from crosscheck.cli.moving_picture import moving_picture
-from crosscheck.cli.options import add_depth, add_engines, add_reference_time
+from crosscheck.cli.options import add_depth, add_engines, add_folder, add_reference_time
 from crosscheck.cli.scene_request import RequestError, find_scenes
-from mbref.command_line import Parser
+from mbref.command_line import Parser, output_file
 from mbref.scene import SceneError
 from reports.blocks import Block
 from reports.runs import Run, by_scene
@@ -49,7 +49,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
         wanted = collection.Runs(scenes, arguments.engine, is_quick, arguments.reference_time)
-        blocks = _blocks(out, wanted, names)
+        _write(_blocks(out, wanted, names), out, names)
     except (RequestError, SceneError) as error:
         for fault in error.faults:
             _notice(fault)
@@ -57,7 +57,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         _notice(f"interrupted; the finished runs are in {arguments.out}, the same command resumes from there")
         return 130
-    _write(blocks, Path(arguments.out), names)
+    except OSError as error:  # a file could not be written, as on a full disk
+        if error.filename is None:
+            raise
+        _notice(f"{error.filename}: {error.strerror}")
+        return 2
     return 0
 
 
@@ -137,11 +141,13 @@ def _parser(sections: Sequence[str]) -> argparse.ArgumentParser:
     parser.add_argument(
         "--section", action="append", choices=sections, metavar="S", help="only this one; may repeat"
     )
-    parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    add_folder(parser, "report")
     parser.add_argument(
         "--render", metavar="DIR", help="render the records of a report again, without any run"
     )
-    parser.add_argument("--picture", metavar="FILE", help="write only the animated picture of the README")
+    parser.add_argument(
+        "--picture", type=output_file, metavar="FILE", help="write only the animated picture of the README"
+    )
     return parser
 
 

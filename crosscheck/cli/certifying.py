@@ -20,7 +20,6 @@ def certify(arguments: argparse.Namespace) -> int:
     from crosscheck.judge.reference.certify import NotCertified, certified
 
     _refuse_without_flint()
-    _refuse_missing_folder(arguments.out)
     scene = scene_request.find_certifiable(arguments.scene)
     times = request.sample_times(request.lasting(scene, None, arguments.duration), None, arguments.samples)
     try:
@@ -39,9 +38,3 @@ def _refuse_without_flint() -> None:
     """Raise RequestError if python-flint, the package for arithmetic of many digits, is not installed."""
     if importlib.util.find_spec("flint") is None:
         raise RequestError("certify: the package python-flint is not installed: pip install python-flint")
-
-
-def _refuse_missing_folder(file: str | None) -> None:
-    """Raise RequestError if the folder of an output file does not exist."""
-    if file and not Path(file).parent.is_dir():
-        raise RequestError(f"--out: {Path(file).parent} must be in an existing folder")

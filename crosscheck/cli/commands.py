@@ -59,6 +59,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:  # the reader closed the pipe, as in `crosscheck list | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return OTHERWISE
+    except OSError as error:  # a file could not be written, as on a full disk
+        if error.filename is None:
+            raise
+        notice(f"{error.filename}: {error.strerror}")
+        return BAD_INPUT
 
 
 def _command(arguments: argparse.Namespace, known: argparse.ArgumentParser) -> int:

@@ -80,10 +80,7 @@ def write_reference(arguments: argparse.Namespace) -> int:
         raise RequestError(
             f"{scene.name}: no reference was found in {arguments.reference_time:g} CPU seconds"
         )
-    try:
-        write(table, Path(arguments.out))
-    except OSError as error:
-        raise RequestError(f"--out: {arguments.out}: {error.strerror}") from None
+    write(table, Path(arguments.out))
     reached = float(table["time"][-1])
     console().print(
         f"{arguments.out}: {len(table['time'])} samples to t = {reached:g} s, error at most "

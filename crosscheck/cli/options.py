@@ -14,6 +14,7 @@ from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 from mbref import formats
+from mbref.command_line import output_file, output_folder
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
@@ -76,6 +77,17 @@ def add_engines(parser: argparse.ArgumentParser) -> None:
         metavar="E",
         help=f"{', '.join(engine_names())}, or {ALL} for every installed one; may repeat; "
         f"default: all but {', '.join(ON_REQUEST)}",
+    )
+
+
+def add_folder(parser: argparse.ArgumentParser, default: str) -> None:
+    """Add the option ``--out``, a folder that is written."""
+    parser.add_argument(
+        "--out",
+        type=output_folder,
+        default=default,
+        metavar="DIR",
+        help=f"folder to write (default: {default})",
     )
 
 
@@ -185,5 +197,8 @@ def add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:
         "--records", default=str(records), metavar="FILE", help="default: the records of the package"
     )
     parser.add_argument(
-        "--page", metavar="FILE", help="also write the tables and the runs as a page in Markdown"
+        "--page",
+        type=output_file,
+        metavar="FILE",
+        help="also write the tables and the runs as a page in Markdown",
     )

@@ -11,6 +11,7 @@ from crosscheck.cli.options import (
     DIGITS,
     add_depth,
     add_engines,
+    add_folder,
     add_limits,
     add_reading,
     add_reference_time,
@@ -27,7 +28,7 @@ from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.timings import REPEATS
-from mbref.command_line import Parser, commands
+from mbref.command_line import Parser, commands, output_file
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
 FIRST = """\
@@ -97,7 +98,7 @@ def _add_certify(commands: Commands) -> None:
     parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
     parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument("--out", metavar="FILE", help="default: standard output")
+    parser.add_argument("--out", type=output_file, metavar="FILE", help="default: standard output")
 
 
 def _add_judge(commands: Commands) -> None:
@@ -143,7 +144,7 @@ def _add_reference(commands: Commands) -> None:
     about = "write the reference motion with the bound on its error as a table for other tools"
     parser = _add(commands, "reference", about, example)
     parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
-    parser.add_argument("--out", required=True, metavar="FILE", help="the .csv file")
+    parser.add_argument("--out", required=True, type=output_file, metavar="FILE", help="the .csv file")
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
     when.add_argument("--samples", type=int, default=101, metavar="N", help="equally spaced (default: 101)")
@@ -220,9 +221,7 @@ def _add_verify(commands: Commands) -> None:
         "--mechanisms", type=whole, metavar="N", help="make every check on N random mechanisms"
     )
     drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
-    drawn.add_argument(
-        "--records", metavar="FILE", help="store verdicts in this file, and reuse the stored ones"
-    )
+    drawn.add_argument("--records", type=output_file, metavar="FILE", help="store and reuse verdicts there")
     drawn.add_argument(
         "--beside",
         action="append",
@@ -274,7 +273,7 @@ def _add_modes(commands: Commands) -> None:
         "--starts", type=whole, default=16, metavar="N", help="poses to search from (default: %(default)s)"
     )
     parser.add_argument("--run", action="store_true", help="measure the stored table again, or engines of it")
-    parser.add_argument("--page", metavar="FILE", help="also write the table as a page in Markdown")
+    parser.add_argument("--page", type=output_file, metavar="FILE", help="also write the table in Markdown")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 
@@ -299,7 +298,7 @@ def _add_report(commands: Commands) -> None:
         metavar="S",
         help="render only this section, such as speed (docs/compare.md lists them); may repeat",
     )
-    parser.add_argument("--out", default="report", metavar="DIR", help="folder to write (default: report)")
+    add_folder(parser, "report")
     parser.add_argument("--render", metavar="DIR", help="render a report from its records, without any run")
     add_reference_time(parser)
 
@@ -317,7 +316,7 @@ def _add_paper(commands: Commands) -> None:
         default="quick",
         help="quick: the tables and figures; whole: also the sweeps of settings and every pair of methods",
     )
-    parser.add_argument("--out", default="paper", metavar="DIR", help="folder to write (default: paper)")
+    add_folder(parser, "paper")
 
 
 def _add_diff(commands: Commands) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 
 from mbref import formats
 from mbref.cli.options import add_scene
+from mbref.command_line import output_file
 from mbref.input_error import InputError
 from mbref.scenes import find_scene
 
@@ -29,7 +30,9 @@ def add(commands: Any) -> None:
         "  mbref import legs.urdf --close foot_a=foot_b:revolute:y --pose knee=0.4",
     )
     take.add_argument("file", metavar="FILE", help="the .xml, .urdf or .sdf file")
-    take.add_argument("--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
+    take.add_argument(
+        "--out", type=output_file, metavar="FILE", help="the scene file (default: the same name with .toml)"
+    )
     formats.add_options(take)
 
     give = commands.add_parser(
@@ -41,7 +44,7 @@ def add(commands: Any) -> None:
         epilog="example:\n  mbref export four_bar_gravity --out four_bar.xml",
     )
     add_scene(give)
-    give.add_argument("--out", metavar="FILE", required=True, help="the .xml file")
+    give.add_argument("--out", type=output_file, metavar="FILE", required=True, help="the .xml file")
 
 
 def _import(options: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from typing import Any
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
+from mbref.command_line import output_file
 from mbref.drawing.film import MOVING, png, write_film
 from mbref.drawing.picture import side_by_side, still
 from mbref.drawing.view import View
@@ -37,7 +38,9 @@ def add(commands: Any) -> None:
     )
     add_scene(draw)
     draw.add_argument("--view", metavar="VIEW", help=VIEW)
-    draw.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with .svg)")
+    draw.add_argument(
+        "--out", type=output_file, metavar="FILE", help=".svg or .png (default: as the scene, with .svg)"
+    )
 
     animate = commands.add_parser(
         "animate",
@@ -53,6 +56,7 @@ def add(commands: Any) -> None:
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
     animate.add_argument(
         "--out",
+        type=output_file,
         metavar="FILE",
         help=".svg, .gif or .mp4 (default: as the scene, with -moving.svg);\n"
         ".gif and .mp4 need the extra video",

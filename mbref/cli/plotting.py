@@ -8,6 +8,7 @@ from typing import Any
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
+from mbref.command_line import output_file
 from mbref.input_error import InputError
 from mbref.outputs import OUTPUTS
 
@@ -33,7 +34,9 @@ def add(commands: Any) -> None:
         metavar="COLUMN",
         help="a column or its beginning, such as rod.position (default: joint coordinates and energy)",
     )
-    plot.add_argument("--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
+    plot.add_argument(
+        "--out", type=output_file, metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)"
+    )
     add_method_options(plot, json=False)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mbref.cli.options import add_scene
+from mbref.command_line import output_file
 from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -25,7 +26,9 @@ def add(commands: Any) -> None:
         description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
         epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
     )
-    new.add_argument("out", metavar="FILE", help="the .toml file; an existing file is not changed")
+    new.add_argument(
+        "out", type=output_file, metavar="FILE", help="the .toml file; an existing file is not changed"
+    )
     new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
 
     assemble = commands.add_parser(
@@ -44,7 +47,7 @@ def add(commands: Any) -> None:
         metavar="A-B=LENGTH",
         help="distance of the joints A and B of a link, m; may repeat",
     )
-    assemble.add_argument("--out", metavar="FILE", help="write the closed scene")
+    assemble.add_argument("--out", type=output_file, metavar="FILE", help="write the closed scene")
 
     commands.add_parser(
         "schema",

@@ -343,7 +343,7 @@ def test_certify_tells_its_progress_and_looks_for_its_folder_first(capsys, tmp_p
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     asked = ("certify", "four_bar_gravity", "--digits", "4", "--duration", "0.002", "--out")
     status, _, err = run_main(capsys, *asked, str(tmp_path / "nowhere" / "table.json"))
-    assert status == 2 and err == f"--out: {tmp_path / 'nowhere'} must be in an existing folder\n", err
+    assert status == 2 and err.endswith(f"argument --out: there is no folder {tmp_path / 'nowhere'}\n"), err
     status, _, err = run_main(capsys, *asked, str(tmp_path / "table.json"))
     assert status == 0 and (tmp_path / "table.json").exists(), err
     for name in "AB":

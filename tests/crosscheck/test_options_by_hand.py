@@ -290,6 +290,41 @@ def test_a_report_runs_as_a_program_of_its_own(monkeypatch):
     assert "--render" not in ran[2]
 
 
+PLACES = [
+    "certify four_bar --out",
+    "reference four_bar --out",
+    "verify mbref --mechanisms 1 --records",
+    "modes --page",
+    "closed-loops --page",
+    "convergence --page",
+    "report --out",
+    "paper --out",
+]
+
+
+@pytest.mark.parametrize("line", PLACES)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(line, tmp_path, capsys):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(SystemExit) as caught:
+        main([*line.split(), f"{tmp_path}/file/below"])
+    assert caught.value.code == 2
+    assert f"argument {line.split()[-1]}: " in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_later_is_reported_in_a_line(monkeypatch, capsys):
+    """A full disk is reported, and an error of the system that names no file keeps its traceback."""
+    errors = [OSError(28, "No space left on device", "run.csv"), OSError(12, "Cannot allocate memory")]
+
+    def fail(*_: Any) -> None:
+        raise errors.pop(0)
+
+    monkeypatch.setitem(commands.COMMANDS, "diff", fail)
+    assert main(["diff", "old", "new"]) == 2
+    assert capsys.readouterr().err == "run.csv: No space left on device\n"
+    with pytest.raises(OSError, match="allocate"):
+        main(["diff", "old", "new"])
+
+
 @pytest.mark.parametrize(("changed", "status"), [(True, 1), (False, 0)])
 def test_a_difference_sets_the_status(monkeypatch, changed, status):
     asked = []

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import argparse
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
-from mbref.command_line import Parser, commands
+from mbref.command_line import Parser, commands, output_file, output_folder
 from mbref.kernels import memory_pool
 from mbref.kernels.aligned import aligned_zeros, block_of
 from mbref.kernels.dimensions import check_sizes, size_of
@@ -242,6 +244,44 @@ def test_messages_of_a_command_line(parser, line, says, capsys):
     with pytest.raises(SystemExit) as caught:
         parser.parse_args(line.split())
     assert caught.value.code == 2 and says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "says"),
+    [
+        (output_file, "there/made.csv", ""),
+        (output_file, "there/old.csv", ""),
+        (output_file, "there", "DIR/there is a folder; name a file"),
+        (output_file, "gone/new.csv", "there is no folder DIR/gone"),
+        (output_folder, "there", ""),
+        (output_folder, "gone/below", ""),
+        (output_folder, "there/old.csv", "DIR/there/old.csv is a file; name a folder"),
+        (output_folder, "there/old.csv/below", "DIR/there/old.csv is a file; name a folder"),
+    ],
+)
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(tmp_path, kind, name, says):
+    (tmp_path / "there").mkdir()
+    (tmp_path / "there" / "old.csv").write_text("")
+    wanted = f"{tmp_path}/{name}"
+    if not says:
+        assert kind(wanted) == wanted and not (tmp_path / "gone").exists(), "nothing is made yet"
+        return
+    with pytest.raises(argparse.ArgumentTypeError) as caught:
+        kind(wanted)
+    assert str(caught.value) == says.replace("DIR", str(tmp_path))
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [(output_file, "new.csv"), (output_file, "old.csv"), (output_folder, "new")]
+)
+def test_a_place_without_permission_is_refused(tmp_path, monkeypatch, kind, name):
+    (tmp_path / "old.csv").write_text("")
+    asked = []
+    monkeypatch.setattr("os.access", lambda place, mode: asked.append((str(place), mode)))
+    there = tmp_path / "old.csv" if name == "old.csv" else tmp_path
+    with pytest.raises(argparse.ArgumentTypeError, match=f"/{name} cannot be written: .* for {there}$"):
+        kind(f"{tmp_path}/{name}")
+    assert asked == [(str(there), os.W_OK)]
 
 
 def test_a_command_line_without_a_command_shows_the_help(parser, capsys):
