@@ -7,6 +7,7 @@ mechanisms, of an engine or one of its families, and, with ``--mechanisms``, cou
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -16,6 +17,7 @@ from crosscheck.study.speed_sentences import title
 from reports.blocks import Block, Heading, Table, Text
 
 Verified = Mapping[str, Any]  # an engine, its version and its verdicts, as stored in JSON
+Verdict = Mapping[str, Any]
 
 CAPTION = (
     "Checks of the conformance suite: the number of the suite's mechanisms on which an engine passes (✓) and "
@@ -30,6 +32,10 @@ DRAWN = (
     "Checks on random mechanisms: closed loops of 3 to 8 bodies with all kinds of joints, loads and drivers, "
     "floating ones, rotors, and ones without masses. Shown is on how many a check holds, of how many it was "
     "decided on."
+)
+CAUSES = (
+    "Causes of violated checks: the checks with the number of mechanisms that violate them, and the worst "
+    "violation."
 )
 ANY_RANDOM = "random mechanisms"  # stands for all random mechanisms in the file of explanations
 UNEXPLAINED = "not explained yet"
@@ -99,21 +105,10 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
     for found in verified:
         for name in dict.fromkeys(v["property"] for v in found["violations"]):
             here = [v for v in found["violations"] if v["property"] == name]
-            worst = max(here, key=lambda v: (v["measured"] or 0.0) / (v["allowed"] or 1.0))
-            known = explanations().get((found["engine"], name, ANY_RANDOM))
-            cause, remedy = known or (worst["reason"] or UNEXPLAINED, "–")
-            numbers = _number(worst["measured"]), _number(worst["allowed"])
-            rows.append(
-                (
-                    title(found["engine"]),
-                    worst["card"],
-                    str(len(here)),
-                    worst["scene"],
-                    *numbers,
-                    cause,
-                    remedy,
-                )
-            )
+            worst = _worst(here)
+            why = _explanation(found["engine"], worst, ANY_RANDOM)
+            where = (str(len(here)), worst["scene"])
+            rows.append((title(found["engine"]), worst["card"], *where, *_numbers(worst), *why))
     if not rows:
         return [Text("No random mechanism violates a check.")]
     header = ("Engine", "Check", "Times", "Worst", "Measured", "Allowed", "Cause", "Remedy")
@@ -162,28 +157,52 @@ def _cell(statuses: Sequence[str]) -> str:
 
 
 def _violations(verified: Sequence[Verified]) -> list[Block]:
-    """Return the table of violations with numbers, cause and remedy."""
-    rows = [
-        _violation(found["engine"], v) for found in verified for v in found["verdicts"] if v["status"] == FAIL
-    ]
-    if not rows:
+    """Return a table with one row for each cause of violations, and a folded table of all violations."""
+    failed = [(found["engine"], v) for found in verified for v in found["verdicts"] if v["status"] == FAIL]
+    if not failed:
         return [Text("No engine violates a check.")]
-    header = ("Engine", "Mechanism", "Check", "Measured", "Allowed", "Cause", "Remedy")
+    groups: dict[tuple[str, str, str], list[Verdict]] = {}
+    for engine, verdict in failed:
+        groups.setdefault((engine, *_explanation(engine, verdict, verdict["scene"])), []).append(verdict)
+    causes = [
+        (title(engine), _counted(of), _worst(of)["scene"], *_numbers(_worst(of)), cause, remedy)
+        for (engine, cause, remedy), of in groups.items()
+    ]
+    single = [(title(engine), v["scene"], v["card"], *_numbers(v)) for engine, v in failed]
+    worst = ("Worst", "Measured", "Allowed")
     return [
         Heading("Violations"),
-        Table("Every violated check, with its cause.", header, rows, frozenset({3, 4})),
+        Table(CAUSES, ("Engine", "Violated checks", *worst, "Cause", "Remedy"), causes, frozenset({3, 4})),
+        Table(
+            f"The {len(single)} violated checks, each with its number and limit.",
+            ("Engine", "Mechanism", "Check", "Measured", "Allowed"),
+            single,
+            frozenset({3, 4}),
+            folded=True,
+        ),
     ]
 
 
-def _violation(engine: str, verdict: Mapping[str, Any]) -> tuple[str, ...]:
-    known = explanations().get((engine, verdict["property"], verdict["scene"]))
-    cause, remedy = known or (verdict["reason"] or UNEXPLAINED, "–")
-    measured, allowed = (_number(verdict[name]) for name in ("measured", "allowed"))
-    return title(engine), verdict["scene"], verdict["card"], measured, allowed, cause, remedy
+def _counted(violations: Sequence[Verdict]) -> str:
+    """Return the names of violated checks, each with its number of mechanisms if there are several."""
+    counts = Counter(v["card"] for v in violations)
+    return ", ".join(f"{card} ({n} mechanisms)" if n > 1 else card for card, n in counts.items())
 
 
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.1e}"
+def _worst(violations: Sequence[Verdict]) -> Verdict:
+    """Return the violation whose number is the largest multiple of its limit."""
+    return max(violations, key=lambda v: (v["measured"] or 0.0) / (v["allowed"] or 1.0))
+
+
+def _explanation(engine: str, verdict: Verdict, scene: str) -> tuple[str, str]:
+    """Return cause and remedy of a violation."""
+    return explanations().get((engine, verdict["property"], scene)) or (verdict["reason"] or UNEXPLAINED, "–")
+
+
+def _numbers(verdict: Verdict) -> tuple[str, str]:
+    """Return the measured number and its limit."""
+    measured, allowed = ("–" if (n := verdict[k]) is None else f"{n:.1e}" for k in ("measured", "allowed"))
+    return measured, allowed
 
 
 def _defects() -> Table:

@@ -42,19 +42,36 @@ def test_checks_of_every_engine_and_their_counts(verified):
 
 
 def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
+    numbers, check = ("2.0e-03", "1.0e-06"), VERDICTS[1].check()
     [row] = violations(verified).rows
-    assert row == (
-        "MuJoCo",
-        "pendulum",
-        VERDICTS[1].check(),
-        "2.0e-03",
-        "1.0e-06",
-        conformance.UNEXPLAINED,
-        "–",
-    )
+    assert row == ("MuJoCo", check, "pendulum", *numbers, conformance.UNEXPLAINED, "–")
     known = {("mujoco", "truth", "pendulum"): explained.Explanation("It slips.", "Hold it.")}
     monkeypatch.setattr(conformance, "explanations", lambda: known)
     assert violations(verified).rows[0][-2:] == ("It slips.", "Hold it.")
+    single = conformance.render(verified)[-2]
+    assert isinstance(single, Table) and single.folded and single.caption.startswith("The 1 violated")
+    assert single.rows == [("MuJoCo", "pendulum", check, *numbers)]
+
+
+def test_a_cause_is_stated_once_for_each_engine(monkeypatch):
+    """Three violations of two checks by one cause, one by another cause, and one of another engine."""
+    found = [("truth", "a", 4e-6), ("truth", "b", 2e-6), ("closure", "a", 3e-6), ("energy", "a", 1.0)]
+    known = {
+        ("mujoco", check, scene): explained.Explanation("It slips.", "Hold it.") for check, scene, _ in found
+    }
+    known["mujoco", "energy", "a"] = explained.Explanation("It leaks.", "Plug it.")
+    known["exudyn", "truth", "a"] = known["mujoco", "truth", "a"]
+    monkeypatch.setattr(conformance, "explanations", lambda: known)
+    records = [
+        Conformance(name, "1.0", [Verdict(c, s, "fail", n, 1e-6) for c, s, n in own]).to_record()
+        for name, own in (("mujoco", found), ("exudyn", found[:1]))
+    ]
+    truth, closure, energy = (Verdict(name, "", "fail").check() for name in ("truth", "closure", "energy"))
+    assert [(*row[:4], row[5]) for row in violations(records).rows] == [
+        ("MuJoCo", f"{truth} (2 mechanisms), {closure}", "a", "4.0e-06", "It slips."),
+        ("MuJoCo", energy, "a", "1.0e+00", "It leaks."),
+        ("Exudyn", truth, "a", "4.0e-06", "It slips."),
+    ]
 
 
 def violations(verified) -> Table:
