@@ -3,13 +3,14 @@
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
 masses, inertias, axes and loads are the same.  Differences are relative to the largest value, or to a
 fraction of the accelerations that gravity, loads, drivers and velocities of the scene can cause, whichever is
-larger: accelerations that balance to zero are rounding.
+larger: accelerations that balance to zero are rounding. An engine in single precision may also differ by the
+rounding that it declares.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +23,7 @@ from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import (
     GATE_TIME,
+    GRAINS,
     LEAST_CHANGE,
     NEXT_TO_SINGULAR,
     RANK,
@@ -67,13 +69,20 @@ def gate(scene: Scene, trajectories: Sequence[Trajectory]) -> Difference | None:
     return next(iter(differences(scene, trajectories).values()), None)
 
 
-def differences(scene: Scene, trajectories: Sequence[Trajectory]) -> dict[str, Difference]:
-    """Return for each engine the first difference of its trajectory from the first trajectory, as in
-    `gate`."""
+def differences(
+    scene: Scene, trajectories: Sequence[Trajectory], rounding: Mapping[str, float] | None = None
+) -> dict[str, Difference]:
+    """Return for each engine the first difference of its trajectory from the first trajectory, as in `gate`.
+
+    ``rounding`` has the relative rounding of each engine's numbers, by name; engines without an entry compute
+    in double precision.
+    """
     reference, *others = (in_scene_order(scene, trajectory) for trajectory in trajectories)
     found: dict[str, Difference] = {}
     for other in others:
-        for field, by, allowed in _differences(scene, reference, other):
+        for field, by, allowed in _differences(
+            scene, reference, other, (rounding or {}).get(other.engine, 0.0)
+        ):
             if not by <= allowed:
                 found[other.engine] = Difference(field, (reference.engine, other.engine), by, allowed)
                 break
@@ -164,39 +173,45 @@ def _regular(scene: Scene, run: Trajectory, chosen: Sequence[int]) -> list[int]:
     return [k for k, r, n in zip(chosen, ranks, near, strict=True) if r == max(ranks) and not n]
 
 
-def _differences(scene: Scene, first: Trajectory, second: Trajectory) -> Iterator[tuple[str, float, float]]:
+def _differences(
+    scene: Scene, first: Trajectory, second: Trajectory, rounding: float = 0.0
+) -> Iterator[tuple[str, float, float]]:
     """Return (quantity, difference relative to its scale, allowed difference), causes before their
     effects."""
     missing = abs(len(first.times) - len(second.times)) + abs(2 - len(first.times))
     yield "samples reached", float(missing), 0.0
-    length = scene_length(scene)
-    yield "initial position", _apart(first.position[0], second.position[0], length), SAME_START
+    length, grain = scene_length(scene), GRAINS * rounding
+    same_place = SAME_START + grain * max(1.0, _size(first.position[0]) / length)
+    yield "initial position", _apart(first.position[0], second.position[0], length), same_place
     angles = rotations.angle_between(first.orientation[0], second.orientation[0])
-    yield "initial orientation", float(angles.max()), SAME_START
+    yield "initial orientation", float(angles.max()), SAME_START + grain
     if scene.has_mass():
         off = _apart(_centre_of_mass(scene, first), _centre_of_mass(scene, second), length)
-        yield "centre of mass", off, SAME_START
+        yield "centre of mass", off, same_place
     speed = max(_size(first.velocity[0]), length * _size(first.angular_velocity[0]), length / scene.duration)
-    yield "initial velocity", _apart(first.velocity[0], second.velocity[0], speed), SAME_START
+    yield "initial velocity", _apart(first.velocity[0], second.velocity[0], speed), SAME_START + grain
     angular = (first.angular_velocity[0], second.angular_velocity[0])
-    yield "initial angular velocity", _apart(*angular, speed / length), SAME_START
+    yield "initial angular velocity", _apart(*angular, speed / length), SAME_START + grain
     if scene.has_mass():
         energies = [_energy(scene, t) for t in (first, second)]
         scale = max(*map(abs, energies), _energy_unit(scene))
-        yield "initial energy", abs(energies[0] - energies[1]) / scale, 4 * SAME_START
-    yield from _changes(scene, first, second, speed)
+        yield "initial energy", abs(energies[0] - energies[1]) / scale, 4 * same_place
+    yield from _changes(scene, first, second, speed, grain)
 
 
 def _changes(
-    scene: Scene, first: Trajectory, second: Trajectory, speed: float
+    scene: Scene, first: Trajectory, second: Trajectory, speed: float, grain: float
 ) -> Iterator[tuple[str, float, float]]:
+    """Return the differences of the changes of velocities, and of given accelerations; ``grain`` is the part
+    of the ``speed`` (m/s) by which rounding changes velocities."""
     length, least = scene_length(scene), LEAST_CHANGE * acceleration_scale(scene)
     changes = [
         (np.diff(t.velocity, axis=0), length * np.diff(t.angular_velocity, axis=0)) for t in (first, second)
     ]
     change = max(*map(_size, changes[0]), least * float(first.times[1]), SAME_START * speed)
-    yield "change of velocity", _apart(changes[0][0], changes[1][0], change), SAME_CHANGE
-    yield "change of angular velocity", _apart(changes[0][1], changes[1][1], change), SAME_CHANGE
+    allowed = SAME_CHANGE + grain * speed / change
+    yield "change of velocity", _apart(changes[0][0], changes[1][0], change), allowed
+    yield "change of angular velocity", _apart(changes[0][1], changes[1][1], change), allowed
     linear = (first.acceleration, second.acceleration)
     angular = (first.angular_acceleration, second.angular_acceleration)
     if linear[0] is None or linear[1] is None or angular[0] is None or angular[1] is None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Setting, engine, engine_names
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
@@ -53,7 +53,9 @@ def model_differences(
         exact = []
     done = [record for record in records if is_completed(record)]
     runs = [_motion(scene, r) for r in done]
-    found = differences(scene, [*exact, *runs]) if exact or runs else {}
+    known = {record["engine"] for record in done} & set(engine_names())
+    rounding = {name: engine(name).rounding for name in known}
+    found = differences(scene, [*exact, *runs], rounding) if exact or runs else {}
     return {name: str(difference) for name, difference in found.items()}
 
 

@@ -249,3 +249,19 @@ def test_differences_are_given_by_engine():
     heavier = short_run(with_body(scene, -1, mass=scene.body[-1].mass * 1.05), gate_times(scene))
     found = differences(scene, [run, replace(heavier, engine="a"), replace(run, engine="b")])
     assert list(found) == ["a"] and found["a"].field.startswith("change of"), found
+
+
+def test_single_precision_is_no_other_model_and_hides_none():
+    scene = MODELS["four_bar_gravity"]
+    exact = short_run(scene)
+    names = ("position", "orientation", "velocity", "angular_velocity")
+
+    def single(run):
+        rounded = {name: getattr(run, name).astype(np.float32).astype(float) for name in names}
+        return replace(run, engine="single", acceleration=None, angular_acceleration=None, **rounded)
+
+    heavier = short_run(with_body(scene, -1, mass=scene.body[-1].mass * 1.05), gate_times(scene))
+    rounding = {"single": 2.0**-23}
+    assert differences(scene, [exact, single(exact)], rounding) == {}
+    assert differences(scene, [exact, single(exact)])["single"].field == "initial position"
+    assert differences(scene, [exact, single(heavier)], rounding)["single"].field.startswith("change of")
