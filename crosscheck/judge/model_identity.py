@@ -3,8 +3,8 @@
 Every engine makes a short run.  The initial poses and the changes of the velocities must agree, so that
 masses, inertias, axes and loads are the same.  Differences are relative to the largest value, or to a
 fraction of the accelerations that gravity, loads, drivers and velocities of the scene can cause, whichever is
-larger: accelerations that balance to zero are rounding. An engine in single precision may also differ by the
-rounding that it declares.
+larger: accelerations that balance to zero are rounding. An engine in single precision may differ by the
+rounding that it declares, and in the changes of the velocities by SINGLE_CHANGE.
 """
 
 from __future__ import annotations
@@ -27,9 +27,11 @@ from crosscheck.judge.tolerances import (
     LEAST_CHANGE,
     NEXT_TO_SINGULAR,
     RANK,
+    ROUNDING,
     SAME_CHANGE,
     SAME_FORCES,
     SAME_START,
+    SINGLE_CHANGE,
 )
 from mbref import rotations
 from mbref.scene import Force, Load, Moment, Scene, Spring
@@ -196,20 +198,19 @@ def _differences(
         energies = [_energy(scene, t) for t in (first, second)]
         scale = max(*map(abs, energies), _energy_unit(scene))
         yield "initial energy", abs(energies[0] - energies[1]) / scale, 4 * same_place
-    yield from _changes(scene, first, second, speed, grain)
+    yield from _changes(scene, first, second, speed, SAME_CHANGE if rounding <= ROUNDING else SINGLE_CHANGE)
 
 
 def _changes(
-    scene: Scene, first: Trajectory, second: Trajectory, speed: float, grain: float
+    scene: Scene, first: Trajectory, second: Trajectory, speed: float, allowed: float
 ) -> Iterator[tuple[str, float, float]]:
-    """Return the differences of the changes of velocities, and of given accelerations; ``grain`` is the part
-    of the ``speed`` (m/s) by which rounding changes velocities."""
+    """Return the differences of the changes of velocities, and of given accelerations; ``speed`` (m/s) is the
+    largest initial velocity."""
     length, least = scene_length(scene), LEAST_CHANGE * acceleration_scale(scene)
     changes = [
         (np.diff(t.velocity, axis=0), length * np.diff(t.angular_velocity, axis=0)) for t in (first, second)
     ]
     change = max(*map(_size, changes[0]), least * float(first.times[1]), SAME_START * speed)
-    allowed = SAME_CHANGE + grain * speed / change
     yield "change of velocity", _apart(changes[0][0], changes[1][0], change), allowed
     yield "change of angular velocity", _apart(changes[0][1], changes[1][1], change), allowed
     linear = (first.acceleration, second.acceleration)

@@ -75,6 +75,11 @@ SAME_CHANGE = 1e-4
 percent of one body's mass changes them by 5e-4 or more in most built-in scenes; integration errors of an
 engine at its finer settings are below 1e-6 over so short a time."""
 
+SINGLE_CHANGE = 0.1
+"""Relative difference of the velocity changes for engines in single precision: rounding of poses, fed back by
+closures, and velocities that are off by a part of a step change them by up to 4e-2 over the gate's short time
+(Newton on the heavy top); a load that is lost or has another sign changes them by more where it matters."""
+
 LEAST_CHANGE = 1e-3
 """Part of the accelerations that gravity, loads, drivers and velocities can cause, below which differences
 count relative to it: engines solve for accelerations that balance to 1e-8 of it or better."""
