@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from crosscheck.engine import BUILT_IN, GENERATORS, OPTIONAL, engine, installed
+from crosscheck.engine import BUILT_IN, GENERATORS, OPTIONAL, Setting, engine, installed
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.metrics import error_series
+from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import LIKE_TRUTH
 from crosscheck.processes.serve import run_once
 from mbref.scene import (
@@ -25,7 +26,9 @@ from mbref.scene import (
     TorsionSpring,
 )
 from mbref.trajectory import Outcome
+from tests.crosscheck.side_by_side import side_by_side
 
+GRAVITY = (0.0, -9.81, 0.0)  # m/s²
 TIMES = (0.0, 0.05, 0.1)
 ARM = Body(name="arm", mass=1.0, inertia=(0.01, 0.09, 0.09), position=(0.5, 0.0, 0.0))
 BOB = Body(name="bob", mass=0.4, inertia=(0.02, 0.03, 0.04), position=(1.0, -0.4, 0.1))
@@ -73,7 +76,7 @@ ENGINES = [name for name in (*BUILT_IN, *OPTIONAL, *GENERATORS, *ACCURATE) if in
 
 
 def scene(**parts: object) -> Scene:
-    given = {"body": (ARM, BOB), "joint": (A, B), "gravity": (0.0, -9.81, 0.0), **parts}
+    given = {"body": (ARM, BOB), "joint": (A, B), "gravity": GRAVITY, **parts}
     return Scene(name="pair", duration=TIMES[-1], **given)
 
 
@@ -109,26 +112,85 @@ def test_each_load_of_a_pair_changes_the_motion(pair):
         assert error_series(scene(), alone, both).max() > 100 * LIKE_TRUTH, (pair, lost)
 
 
+DRIVEN_SPRUNG = {
+    "driver": (Driver(joint="A", polynomial=(0.0, 2.0, 1.0)),),
+    "load": (twist("A", 13.0, 0.1, 1.4), twist("B", 3.0, 0.1, 0.5)),
+}
+TWO_DRIVERS = Driver(joint="A", polynomial=(0.0, 2.0)), Driver(joint="B", polynomial=(0.0, -1.0, 3.0))
+SECOND_JOINTS = {
+    "and a distance": Distance(name="D", bodies=("arm", "bob"), anchors=((0.5, 0.2, 0.0), (1.0, -0.4, 0.1))),
+    "and a coaxial hinge": Revolute(
+        name="D", bodies=("arm", "bob"), anchor=(1.0, 0.3, 0.4), axis=(0.0, 0.6, 0.8)
+    ),
+}
+
+
 @pytest.mark.parametrize("name", ENGINES)
 def test_a_driver_and_a_torsion_spring_act_in_one_joint(name):
-    driven = Driver(joint="A", polynomial=(0.0, 2.0, 1.0))
-    check(name, scene(driver=(driven,), load=(twist("A", 13.0, 0.1, 1.4), twist("B", 3.0, 0.1, 0.5))))
+    check(name, scene(**DRIVEN_SPRUNG))
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_two_drivers_move_joints_of_one_body(name):
-    drivers = Driver(joint="A", polynomial=(0.0, 2.0)), Driver(joint="B", polynomial=(0.0, -1.0, 3.0))
-    check(name, scene(driver=drivers))
+    check(name, scene(driver=TWO_DRIVERS))
 
 
 @pytest.mark.parametrize("name", ENGINES)
-@pytest.mark.parametrize(
-    "second",
-    [
-        Distance(name="D", bodies=("arm", "bob"), anchors=((0.5, 0.2, 0.0), (1.0, -0.4, 0.1))),
-        Revolute(name="D", bodies=("arm", "bob"), anchor=(1.0, 0.3, 0.4), axis=(0.0, 0.6, 0.8)),
-    ],
-    ids=["and a distance", "and a coaxial hinge"],
-)
+@pytest.mark.parametrize("second", SECOND_JOINTS.values(), ids=SECOND_JOINTS)
 def test_two_joints_hold_the_same_two_bodies(name, second):
     check(name, scene(joint=(A, C, second)))
+
+
+# engines of first order, in single precision, or without J' v in closures, at a fine step
+STEPPERS = {
+    "bullet": Setting("iterated", {"step": 1e-4, "iterations": 1000}),
+    "mjx": Setting("stock", {"step": 1e-3}),
+    "warp": Setting("stock", {"step": 1e-3}),
+    "newton": Setting("padmm, moreau", {"step": 5e-4, "alpha": 0.1}),
+}
+DRIVEN = {"a driver and a torsion spring", "two drivers"}
+REFUSED = {
+    "bullet": set(),
+    "mjx": DRIVEN,
+    "warp": DRIVEN,
+    "newton": DRIVEN | {pair for pair in PAIRS if "torsion" in pair},
+}
+SHARE = 0.1  # largest error / effect of the part of a pair with the least effect
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", STEPPERS)
+def test_engines_that_step_move_every_pair(name):
+    """All pairs are in one scene, so that code is compiled once; a lost part leaves a share of 1 or more."""
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    pairs = {
+        pair: (scene(load=loads), [scene(load=loads[k : k + 1]) for k in (0, 1)])
+        for pair, loads in PAIRS.items()
+    }
+    for key, second in SECOND_JOINTS.items():
+        pairs[key] = scene(joint=(A, C, second)), [scene(joint=(A, C))]
+    pairs["a driver and a torsion spring"] = (
+        scene(**DRIVEN_SPRUNG),
+        [
+            scene(driver=DRIVEN_SPRUNG["driver"]),
+            scene(load=DRIVEN_SPRUNG["load"]),
+        ],
+    )
+    pairs["two drivers"] = scene(driver=TWO_DRIVERS), [scene(driver=(driver,)) for driver in TWO_DRIVERS]
+    served = {pair: both for pair, (both, _) in pairs.items() if engine(name).cannot(both) is None}
+    assert set(pairs) - set(served) == REFUSED[name]
+    together = side_by_side(served, GRAVITY)
+    run = in_scene_order(together, run_once(name, together, np.array(TIMES), STEPPERS[name]))
+    assert run.outcome is Outcome.COMPLETED, run.message
+    shares = {}
+    for pair, mechanism in served.items():
+        own = [together.body_index(f"{pair} {body.name}") for body in mechanism.body]
+        moved = {
+            n: getattr(run, n)[:, own] for n in ("position", "orientation", "velocity", "angular_velocity")
+        }
+        exact = gauss_motion(mechanism, TIMES)
+        found = replace(exact, acceleration=None, angular_acceleration=None, **moved)
+        effects = [error_series(mechanism, gauss_motion(lost, TIMES), exact).max() for lost in pairs[pair][1]]
+        shares[pair] = float(error_series(mechanism, found, exact).max() / min(effects))
+    assert all(share < SHARE for share in shares.values()), shares

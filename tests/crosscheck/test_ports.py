@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +11,7 @@ import pytest
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.features import feature_scenes
 from crosscheck.engine import Owner, Setting, engine
+from crosscheck.engines.mujoco.ports import FAMILIES
 from crosscheck.findings.finding import FOLDER
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import error_series
@@ -24,6 +23,7 @@ from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
 from tests.coupled_scenes import EVERY as COUPLED
 from tests.crosscheck.measured import MARGIN
+from tests.crosscheck.side_by_side import side_by_side
 
 MODULES = {"mjx": "mujoco.mjx", "warp": "mujoco_warp"}
 IN_C = 8.2e-9  # error of MuJoCo in C over 0.05 s at a step of 1 ms
@@ -31,6 +31,7 @@ LOOP = {"mjx": 6.1e-6, "warp": 1.4e-7}  # MJX leaves J' v out of the closures; W
 # largest error / effect of a body's loads, couplings and armatures: a lost part leaves an error of 1, a wrong
 # ratio of a coupling its relative error; single precision and the stiffness of couplings leave 3e-5
 PART = 1e-3
+GRAVITY = (1.0, -8.0, -5.0)  # m/s²
 
 
 def is_installed(module: str) -> bool:
@@ -43,6 +44,16 @@ def test_drivers_are_refused_by_name(name: str) -> None:
     refusal = engine(name).cannot(SCENES["four_bar"]())
     assert refusal is not None and refusal.owner is Owner.ENGINE and "callback" in refusal.reason, refusal
     assert engine(name).cannot(SCENES["four_bar_gravity"]()) is None
+
+
+def test_warp_has_the_finest_steps_only_for_loops() -> None:
+    """In single precision the rounding of a tree's motion grows with the number of steps."""
+    for scene, fewer in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0)):
+        for family in FAMILIES:
+            steps = [
+                [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in MODULES
+            ]
+            assert steps[1] == steps[0][: len(steps[0]) - fewer] != [], family
 
 
 @pytest.mark.slow
@@ -104,25 +115,6 @@ def test_models_that_differ_in_numbers_share_code_of_mjx() -> None:
     assert any(Path(jax.config.jax_compilation_cache_dir).glob("jit_stepped*"))
 
 
-def side_by_side(scenes: Mapping[str, Scene]) -> Scene:
-    """All scenes in one, so that a port compiles once; parts have the scene's name before their own."""
-    parts: dict[str, list] = {"body": [], "joint": [], "coupling": [], "load": []}
-    for name, scene in scenes.items():
-
-        def renamed(value: Any, name: str = name) -> Any:
-            return value if value == "ground" else f"{name} {value}"
-
-        for kind, found in parts.items():
-            for part in getattr(scene, kind):
-                fields = part.model_dump(exclude_none=True)
-                for field in {"name", "body", "joint"} & set(fields):
-                    fields[field] = renamed(fields[field])
-                for field in {"bodies", "joints"} & set(fields):
-                    fields[field] = [renamed(value) for value in fields[field]]
-                found.append(fields)
-    return Scene(name="side_by_side", gravity=(1.0, -8.0, -5.0), duration=0.1, **parts)
-
-
 def bare(scene: Scene) -> Scene:
     """The scene without loads, couplings and armatures."""
     joints = [
@@ -151,7 +143,7 @@ def test_ports_move_loads_couplings_and_armatures(name: str) -> None:
     if not is_installed(MODULES.get(name, name)):
         pytest.skip(f"{name} is not installed")
     probes = {probe.name: probe for kind, probe in feature_scenes().items() if kind.endswith(" load")}
-    scene = side_by_side(probes | {make.__name__: make() for make in COUPLED})
+    scene = side_by_side(probes | {make.__name__: make() for make in COUPLED}, GRAVITY)
     times = np.array([0.0, scene.duration])
     run = engine(name).run(scene, times, Setting("stock", {"step": 1e-3}))
     assert run.outcome is Outcome.COMPLETED, run.message
