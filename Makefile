@@ -59,7 +59,7 @@ PROBES := --scene "dead end" --scene "tumbling body" --scene "heavy top" --scene
 VERIFIED = $$($(BIN)/python -c "from crosscheck.engine import default_engines as names; print(*names())")
 
 ANEW := build/reference
-ON_REQUEST := dart drake mjx bullet
+ON_REQUEST := dart drake mjx bullet warp newton
 ALSO_mjx := --scene planar_slider_crank  # a fast loop, on which MJX is wrong
 KEPT := $(wildcard reports/reference/conformance/*_*.json) $(ON_REQUEST:%=reports/reference/conformance/%.json)
 

@@ -18,6 +18,7 @@ from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, Specimen, set_up
 from crosscheck.judge.constraints import initial_twists, scene_length
 from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants
+from crosscheck.judge.tolerances import GRAINS
 from crosscheck.processes.pool import ChildFailed
 from mbref.scene import Scene
 
@@ -92,7 +93,7 @@ def explanations(bench: Bench) -> Changes:
     difference = float(np.linalg.norm(own - right))
     if not np.isfinite(difference):
         raise Broken("the terms of its motion are not known")
-    if difference <= WRONG * max(float(np.linalg.norm(right)), _least(scene)):
+    if difference <= WRONG * max(float(np.linalg.norm(right)), _least(scene)) + _rounded(bench):
         return None
     return {
         (part, change)
@@ -111,6 +112,13 @@ def _differences(scene: Scene, bench: Bench) -> np.ndarray:
         w * (rates[NEIGHBOURS + k] - rates[NEIGHBOURS - k]) for k, w in enumerate(WEIGHTS[:NEIGHBOURS], 1)
     )
     return np.ravel(found / step)
+
+
+def _rounded(bench: Bench) -> float:
+    """Return the accelerations, as of `_differences`, that the rounding of the engine's velocities causes."""
+    motion = bench.close
+    rates = np.concatenate([motion.velocity, scene_length(bench.scene) * motion.angular_velocity], axis=-1)
+    return GRAINS * bench.rounding * float(np.linalg.norm(rates[NEIGHBOURS]) / np.diff(motion.times)[0])
 
 
 def _least(scene: Scene) -> float:

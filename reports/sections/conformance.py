@@ -164,10 +164,11 @@ def _violations(verified: Sequence[Verified]) -> list[Block]:
     groups: dict[tuple[str, str, str], list[Verdict]] = {}
     for engine, verdict in failed:
         groups.setdefault((engine, *_explanation(engine, verdict, verdict["scene"])), []).append(verdict)
-    causes = [
-        (title(engine), _counted(of), _worst(of)["scene"], *_numbers(_worst(of)), cause, remedy)
-        for (engine, cause, remedy), of in groups.items()
-    ]
+    causes = []
+    for (engine, cause, remedy), of in groups.items():
+        most = _worst(of)
+        where = f"{most['card']} on {most['scene']}"
+        causes.append((title(engine), _counted(of), where, *_numbers(most), cause, remedy))
     single = [(title(engine), v["scene"], v["card"], *_numbers(v)) for engine, v in failed]
     worst = ("Worst", "Measured", "Allowed")
     return [

@@ -44,7 +44,7 @@ def test_checks_of_every_engine_and_their_counts(verified):
 def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
     numbers, check = ("2.0e-03", "1.0e-06"), VERDICTS[1].check()
     [row] = violations(verified).rows
-    assert row == ("MuJoCo", check, "pendulum", *numbers, conformance.UNEXPLAINED, "–")
+    assert row == ("MuJoCo", check, f"{check} on pendulum", *numbers, conformance.UNEXPLAINED, "–")
     known = {("mujoco", "truth", "pendulum"): explained.Explanation("It slips.", "Hold it.")}
     monkeypatch.setattr(conformance, "explanations", lambda: known)
     assert violations(verified).rows[0][-2:] == ("It slips.", "Hold it.")
@@ -68,9 +68,9 @@ def test_a_cause_is_stated_once_for_each_engine(monkeypatch):
     ]
     truth, closure, energy = (Verdict(name, "", "fail").check() for name in ("truth", "closure", "energy"))
     assert [(*row[:4], row[5]) for row in violations(records).rows] == [
-        ("MuJoCo", f"{truth} (2 mechanisms), {closure}", "a", "4.0e-06", "It slips."),
-        ("MuJoCo", energy, "a", "1.0e+00", "It leaks."),
-        ("Exudyn", truth, "a", "4.0e-06", "It slips."),
+        ("MuJoCo", f"{truth} (2 mechanisms), {closure}", f"{truth} on a", "4.0e-06", "It slips."),
+        ("MuJoCo", energy, f"{energy} on a", "1.0e+00", "It leaks."),
+        ("Exudyn", truth, f"{truth} on a", "4.0e-06", "It slips."),
     ]
 
 
