@@ -79,11 +79,14 @@ def end_of_pieces(equations):
 def expand_function(t, f, equations, series):
     """Compute function f as a series about time t: polynomial and sine of its piece, and the cubic."""
     functions, p, size = equations.scene.functions, equations.piece[f], series.shape[0]
-    terms, begin = functions.polynomial.shape[1], functions.begin[p]
-    for k in range(size):
-        series[k] = functions.part[p] * shifted(functions.polynomial[f], terms, k, t)
-        if k < 4:
-            series[k] += shifted(functions.cubic[p], 4, k, t - begin)
+    series[:] = 0.0
+    for k in range(min(functions.polynomial.shape[1], size)):
+        series[k] = functions.part[p] * shifted(functions.polynomial[f], k, t)
+    s, c = t - functions.begin[p], functions.cubic
+    series[0] += c[p, 0] + s * (c[p, 1] + s * (c[p, 2] + s * c[p, 3]))
+    series[1] += c[p, 1] + s * (2.0 * c[p, 2] + 3.0 * s * c[p, 3])
+    series[2] += c[p, 2] + 3.0 * s * c[p, 3]
+    series[3] += c[p, 3]
     if functions.amplitude[f] == 0.0 or functions.part[p] == 0.0:
         return
     frequency, argument = functions.frequency[f], functions.frequency[f] * t + functions.phase[f]
@@ -94,10 +97,10 @@ def expand_function(t, f, equations, series):
 
 
 @kernel
-def shifted(coefficients, terms, k, t):
+def shifted(coefficients, k, t):
     """Return order k of the polynomial about t: Σ_i c_i binom(i, k) t^(i - k)."""
     value, binomial, power = 0.0, 1.0, 1.0
-    for i in range(k, terms):
+    for i in range(k, coefficients.shape[0]):
         value += coefficients[i] * binomial * power
         power *= t
         binomial *= (i + 1.0) / (i + 1.0 - k)
