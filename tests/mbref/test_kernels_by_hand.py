@@ -17,11 +17,14 @@ from mbref.kernels.compilation import PLAIN
 if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
+from mbref import rotations
+from mbref.equations import coordinates
 from mbref.integrators import adams, dop853, one_step, rk4
 from mbref.kernels.layout import OK
 from mbref.linear_algebra import vectors
 from mbref.stabilisation import partitioning
-from mbref.taylor import angles, coefficients, saved_state
+from mbref.taylor import angles, coefficients, samples, saved_state
+from mbref.taylor.crossing import determinants, rounding_pole
 
 A, B = (1.0, 2.0, 3.0), (4.0, -5.0, 6.0)
 
@@ -354,3 +357,87 @@ def test_the_norm_and_the_first_step_of_adams():
     assert adams.first_step(y, 0 * vector, control()) == 2e-6
     small = np.array([1e-9, 0.0])
     assert adams.first_step(small, np.array([0.01, 0.0]), control()) == pytest.approx(0.25, rel=1e-6)
+
+
+# --- states of bodies -------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    "q",
+    [
+        (0.8, 0.3, -0.4, 0.331662),
+        (0.2, 0.9, 0.3, -0.244949),
+        (0.1, -0.3, 0.9, 0.3),
+        (0.3, 0.2, -0.3, 0.88318),
+    ],
+)
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_quaternion_keeps_the_sign_of_the_one_before(q, sign):
+    """One for each of the largest components, of both signs."""
+    unit = np.array(q) / math.hypot(*q)
+    before = sign * unit + np.array([0.01, -0.02, 0.01, 0.02])
+    samples.put_quaternion(rotations.to_matrix(unit).ravel(), before)
+    assert before == pytest.approx(sign * unit, abs=1e-15)
+
+
+def test_the_axial_vector_of_a_rate():
+    """A' = A (ω' ×), in the axes of the body."""
+    turned, found = rotations.to_matrix(rotations.from_vector(np.array([0.3, -0.7, 0.2]))), np.zeros(3)
+    skew = np.array([[0.0, -3.0, 2.0], [3.0, 0.0, -1.0], [-2.0, 1.0, 0.0]])
+    samples.put_axial_vector(turned.ravel(), (turned @ skew).ravel(), found)
+    assert found == pytest.approx([1.0, 2.0, 3.0])
+
+
+def test_states_are_copied_whole():
+    names = ("coordinates", "velocities", "coordinate_rates", "coordinate_second")
+    source = SimpleNamespace(**{name: np.arange(3.0) + k for k, name in enumerate(names)})
+    target = SimpleNamespace(**{name: np.zeros(3) for name in names})
+    coordinates.copy_state(source, target)
+    for k, name in enumerate(names):
+        assert getattr(target, name).tolist() == [k, k + 1.0, k + 2.0], name
+
+
+# --- determinants and poles -------------------------------------------------------------------------------
+def gradient(work, past) -> Any:
+    """Memory of a gradient whose rows and variables are chosen in reverse order."""
+    rank = len(past[0])
+    return SimpleNamespace(
+        solver=SimpleNamespace(
+            work=np.array(work),
+            pivot_rows=np.arange(rank)[::-1].copy(),
+            pivot_columns=np.arange(len(past))[::-1].copy(),
+            product=np.zeros((rank, rank)),
+            past_gradient=np.array(past),
+        ),
+        partition=SimpleNamespace(rank=rank),
+        step=SimpleNamespace(parity=0, start_parity=0),
+    )
+
+
+def test_determinants_of_gradients():
+    """det [1 2; 3 4] = -2, and det G G₀ᵀ of two by three."""
+    memory = gradient([[1.0, 2.0], [3.0, 4.0]], [[1.0, 0.0], [0.0, 1.0]])
+    negative, size = determinants.square_determinant(memory)
+    assert negative and size == pytest.approx(math.log(2.0))
+    now = np.array([[1.0, 2.0, 0.0], [0.0, 1.0, 3.0]])
+    before = np.array([[2.0, 0.0, 1.0], [1.0, -1.0, 0.5]])  # rows in the order of pivots
+    negative, size = determinants.product_determinant(gradient(now, before.T))
+    exact = np.linalg.det(now[::-1] @ before.T)
+    assert negative == (exact < 0.0) and size == pytest.approx(math.log(abs(exact)))
+
+
+def test_a_pole_is_subtracted_from_every_variable_and_angle():
+    """Nine variables in two vectors: a_k - (last) · distance^(order - k), and angles an order earlier."""
+    order, distance = 3, 0.5
+    past, variable = np.arange(4.0 * 16).reshape(4, 16), np.ones(16)
+    variable[9:] = 0.0
+    angle = np.array([[10.0, 20.0, 40.0, 7.0]])
+    memory = SimpleNamespace(
+        mode=SimpleNamespace(order=order),
+        series=SimpleNamespace(past=past.copy(), variable=variable, past_angles=angle.copy()),
+        solver=SimpleNamespace(pivot_columns=np.zeros(9)),
+    )
+    rounding_pole.subtract_pole(distance, memory)
+    expected = past.copy()
+    for k in range(order):
+        expected[k] -= variable * past[order] * distance ** (order - k)
+    assert memory.series.past.tolist() == expected.tolist()
+    assert memory.series.past_angles.tolist() == [[10.0 - 40.0 / 4, 20.0 - 40.0 / 2, 40.0, 7.0]]

@@ -17,13 +17,15 @@ from mbref.kernels.compilation import PLAIN
 if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
-from mbref import energy
+from mbref import energy, rotations
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.scenes.four_bar import four_bar_gravity
+from mbref.scenes.five_bar import five_bar
+from mbref.scenes.four_bar import four_bar, four_bar_gravity
+from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 from mbref.trajectory import Outcome, Trajectory
-from tests.coupled_scenes import planetary
+from tests.coupled_scenes import gear_pair, planetary
 from tests.crosscheck.tree_scenes import every_joint
 from tests.loads_over_time import arm, driven_arm
 
@@ -33,6 +35,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
     "driven arm": driven_arm,
     "every joint": every_joint,
     "planetary gear": planetary,
+    "gear pair": gear_pair,
     "redundant": lambda: find_scene("planar_slider_crank"),
 }
 METHODS = (
@@ -51,6 +54,7 @@ RUNS = [
     *((name, method) for name in ("arm", "driven arm") for method in METHODS),
     *(("planetary gear", method) for method in ("lm1+none/rk4[step=0.001]", "alf-dual+projection/dop853")),
     ("every joint", "alf-dual+projection/dop853"),
+    ("gear pair", "mpi-svd+partitioning/dop853"),
     *(
         ("redundant", method)
         for method in ("mpi-qr+partitioning/dop853", "mpi-svd+none/dop853", "alf+projection/dop853")
@@ -103,3 +107,26 @@ def test_singular_positions_are_crossed_with_their_energy(scene, end, crossings)
         total -= load.moment[2] * np.unwrap(2.0 * np.arctan2(orientation[:, 3], orientation[:, 0]))
     size = energy.kinetic(scene, run).max()
     assert np.abs(total - total[0]).max() <= 1e-9 * size, (total - total[0]) / size
+
+
+@pytest.mark.parametrize("linkage", [four_bar, five_bar])
+def test_a_driven_loop_that_starts_on_its_flat_position(linkage):
+    """The crank turns on at its rate, and the distances between the hinges of each bar are kept."""
+    run = simulate(linkage(0.0), "taylor", np.linspace(0.0, 0.02, 5), Limits(rtol=1e-9))
+    assert run.outcome == Outcome.COMPLETED, run.message
+    turned = rotations.angle_between(run.orientation[:1, 0], run.orientation[:, 0])
+    assert turned == pytest.approx(run.times * np.linalg.norm(run.angular_velocity[0, 0]), abs=1e-10)
+
+
+def test_velocities_that_agree_with_no_branch_are_refused():
+    """A crank and a rod of equal lengths lie on each other; 30 and 9 rad/s belong to no motion."""
+    scene = slider_crank(0.308, 0.308, np.pi / 2, "upright", rate=30.0)
+    crank, rod, slider = scene.body
+    wrong = rod.model_copy(update={"angular_velocity": (0.0, 0.0, 9.0)})
+    run = simulate(scene.with_(body=(crank, wrong, slider)), "taylor", [0.0, 0.01])
+    assert run.outcome == Outcome.UNDECIDED and "agree with none of the branches" in run.message
+    right = rod.model_copy(update={"angular_velocity": (0.0, 0.0, -30.0)})
+    run = simulate(scene.with_(body=(crank, right, slider)), "taylor", [0.0, 0.001])
+    assert run.outcome == Outcome.COMPLETED and run.angular_velocity[-1, 1, 2] == pytest.approx(
+        -30.0, rel=1e-3
+    )

@@ -27,7 +27,7 @@ from mbref.method import Method
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
-from mbref.taylor import generated_calls
+from mbref.taylor import correction, generated_calls, series, solver
 from mbref.taylor.correction import subtract_violation, violation_in_loops, violation_rate_in_loops
 from mbref.taylor.generated import build, driven_orders
 from mbref.taylor.generated.instructions import levels
@@ -265,3 +265,96 @@ def test_calls_pass_arrays_in_order_and_then_integers(name):
     assert emit(context, builder, made, ["address", *names, *last]) == "nothing"
     kind = ", ".join(["double*"] * (len(names) - len(whole)) + ["i64*"] * len(whole) + ["i64"] * len(last))
     assert called == [(("address", f"void ({kind})*"), [*(f"data of {array}" for array in names), *last])]
+
+
+# --- kernels that call the code ----------------------------------------------------------------------------
+class Called(list):
+    """Calls of generated functions, in place of them."""
+
+    def __init__(self, patch: pytest.MonkeyPatch) -> None:
+        super().__init__()
+        for module in (correction, solver, series):
+            for name in CALLS:
+                if hasattr(module, name):
+                    patch.setattr(module, name, lambda *call, name=name: self.append((name, *call)))
+
+
+def coded(**code: int) -> Any:
+    """Return memory whose arrays are their names, of one variable and two rows, with addresses of code."""
+    arrays = "terms left right scale growth sums"
+    matrices = "tableau particular null_space response last change"
+    memory = SimpleNamespace(
+        series=SimpleNamespace(**{name: name for name in arrays.split()}),
+        solver=SimpleNamespace(
+            **{name: name for name in matrices.split()},
+            pivot_columns=np.zeros(1),
+            pivot_rows=np.zeros(2),
+            phi=np.array([9.0, -0.5, 0.25, 7.0]),
+            rhs=np.array([-4.0]),
+        ),
+        code=SimpleNamespace(**dict.fromkeys(build.CODE_NAMES, 0), rank=2),
+        partition=SimpleNamespace(rank=2),
+        polynomials=SimpleNamespace(given=SimpleNamespace(driver=np.zeros(0))),
+        step=SimpleNamespace(deceleration=1.0),
+        mode=SimpleNamespace(order=9),
+        run=SimpleNamespace(loop=SimpleNamespace(clock=SimpleNamespace(length=0.5))),
+        kernels=SimpleNamespace(respond=lambda memory: "loops", multipliers=lambda memory: "multipliers"),
+    )
+    vars(memory.code).update(code)
+    return memory
+
+
+def test_corrections_call_the_code(monkeypatch):
+    called, memory = Called(monkeypatch), coded(violation=11, close=12, close_rate=13)
+    phi = memory.solver.phi
+    assert correction.violation(memory) == 0.5, "lanes of rows alone"
+    correction.close(memory)
+    correction.close_rate(memory)
+    assert called == [
+        ("violation_by_code", 11, "terms", phi),
+        ("close_by_code", 12, "terms", phi, "response", "change"),
+        ("close_by_code", 13, "terms", phi, "response", "change"),
+    ]
+
+
+def test_the_response_calls_the_code_at_its_rank(monkeypatch):
+    called, memory = Called(monkeypatch), coded(factorise=14)
+    solver.respond(memory)
+    arrays = "terms", "tableau", "particular", "null_space", "response", "last"
+    order = memory.solver.pivot_rows, memory.solver.pivot_columns
+    [(name, *call)] = called
+    assert (name, *call[:-2]) == ("factorise_by_code", 14, *arrays)
+    assert call[-2] is order[0] and call[-1] is order[1]
+    asked = []
+    memory.kernels.respond = asked.append
+    memory.partition.rank = 1
+    solver.respond(memory)
+    memory.partition.rank, memory.code.factorise = 2, 0
+    solver.respond(memory)
+    assert asked == [memory, memory] and len(called) == 1
+
+
+def test_orders_call_the_code_and_motions_that_turn_back_need_multipliers(monkeypatch):
+    """A step of 0.5 s and a deceleration of 4 / s: the motion stops after half of a step."""
+    called, memory = Called(monkeypatch), coded(expand=15)
+    assert series.expand_with_multipliers.function(memory) == OK and memory.step.deceleration == 0.0
+    rhs = memory.solver.rhs
+    assert called.pop() == (
+        "expand_by_code",
+        15,
+        "terms",
+        "response",
+        *["left", "right", "scale", "growth"],
+        rhs,
+        7,
+    )
+    memory.code.expand_by_power = 16
+    assert series.expand_series.function(memory) == OK
+    assert called == [("expand_by_power", 16, "terms", "response", "left", "right", rhs, 7)]
+    assert memory.step.deceleration == 4.0
+    memory.run.loop.clock.length = 0.51
+    assert series.expand_series.function(memory) == "multipliers"
+    memory.run.loop.clock.length, memory.partition.rank = 0.5, 1
+    assert series.expand_series.function(memory) == "multipliers" and memory.step.deceleration == 0.0
+    memory.partition.rank, memory.code.expand_by_power = 2, 0
+    assert series.expand_series.function(memory) == "multipliers" and len(called) == 2
