@@ -166,6 +166,7 @@ class Tree:
             "files": files,
             "out": [test for test, is_sound in self._sound[plain].items() if not is_sound],
             "only": only,
+            "known": {test: s for test, s in self._seconds.items() if test.split("::")[0] in files},
             "of_file": OF_FILE * self._budget,
             "budget": self._budget,
             "limit": LIMIT * self._budget,

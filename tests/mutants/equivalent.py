@@ -5,6 +5,9 @@ from __future__ import annotations
 from tests.mutants.operators import Mutant
 
 ERRORS = "position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)"
+AT_FIRST_CALL = (
+    "Kernels that are not prepared are compiled or loaded at their first call, with equal results."
+)
 REASONS: dict[tuple[str, str, str], str] = {
     ("crosscheck/judge/metrics.py", ERRORS, "position_error_series(scene, exact, trajectory)"): (
         "The distance of two points is the same in both directions."
@@ -27,6 +30,28 @@ REASONS: dict[tuple[str, str, str], str] = {
         "if not place.part or place.of not in names:",
         "(place.of not in names)",
     ): "A primitive that is no part of a coupling or an armature names no joint in its field ``of``.",
+    ("mbref/simulation/start_run.py", "if method.is_series:", "(not (method.is_series))"): AT_FIRST_CALL,
+    ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES)", "pass"): AT_FIRST_CALL,
+    ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES[::-1])", "pass"): AT_FIRST_CALL,
+    ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES[::-1])", "(+1)"): AT_FIRST_CALL,
+    ("mbref/taylor/polynomials.py", "slots, start = _slots(terms, (0, 0, 0.0))", "1"): (
+        "A padded slot has the weight zero, whatever its factors are."
+    ),
+    (
+        "mbref/taylor/crossing/location.py",
+        "if value_at(middle, unit, memory) < 0.0:",
+        "(value_at(middle, unit, memory) <= 0.0)",
+    ): "A value of zero is the sign change; bisection comes to it from either side.",
+    (
+        "mbref/scenes/flyball_governor.py",
+        "reach = (rod * LENGTH / 2 + BALL * LENGTH) / mass",
+        "((rod) / (LENGTH))",
+    ): "The rods are 1 m long.",
+    (
+        "mbref/taylor/generated/elimination.py",
+        "write.put(write.minus(entry), self._null_space, f * self._lanes, column)",
+        "write.put(write.minus(entry), self._null_space, column, f * self._lanes)",
+    ): "The place in memory is the sum of both numbers.",
 }
 """By file, the line of the source and the new text of the mutant."""
 

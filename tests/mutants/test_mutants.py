@@ -148,7 +148,7 @@ def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
 
 def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
     """Imports take 7 s here; tests may take 5 s after them."""
-    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0}), [7.0]
+    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0, "known": {}}), [7.0]
     monkeypatch.setattr(workers, "_cpu", lambda: now[0])
     session.pytest_collection_finish()
     now[0] = 11.9

@@ -4,11 +4,12 @@ The process reads requests from its input, one JSON object a line, and answers i
 none of the project's packages: each fork imports them anew, with the mutant that stands in the tree.
 
 A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
-of the one test that runs; empty: all), ``of_file`` and ``budget`` (CPU s of a file and of all files, after
-which no test begins; a test that takes longer than a file may is ended), ``limit`` (CPU s of the fork) and
-``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was up),
-``failed`` (the id of the test that failed first, or the file that could not be collected), ``ended`` (the
-ids of tests that took too long) and ``seconds`` (CPU s by file and by test).
+of the one test that runs; empty: all), ``known`` (CPU s of tests: the quickest of a file run first),
+``of_file`` and ``budget`` (CPU s of a file and of all files, after which no test begins; a test that takes
+longer than a file may is ended), ``limit`` (CPU s of the fork) and ``waiting`` (s of wall time).  The answer
+has ``status`` (pytest's exit status; none: the time was up), ``failed`` (the id of the test that failed
+first, or the file that could not be collected), ``ended`` (the ids of tests that took too long) and
+``seconds`` (CPU s by file and by test).
 """
 
 from __future__ import annotations
@@ -44,6 +45,7 @@ class Session:
 
     def __init__(self, request: dict[str, Any]) -> None:
         self._out, self._only, self._of_file = set(request["out"]), request["only"], request["of_file"]
+        self._known: dict[str, float] = request["known"]
         self._end = 0.0  # CPU s
         self.failed = ""
         self.ended: list[str] = []
@@ -54,10 +56,9 @@ class Session:
         self._end = _cpu() + self._of_file
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leave out tests."""
-        items[:] = [
-            item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)
-        ]
+        """Leave out tests, and let the quickest begin."""
+        kept = [item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)]
+        items[:] = sorted(kept, key=lambda item: self._known.get(item.nodeid, 0.0))
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
