@@ -7,8 +7,8 @@ run out of time it is counted apart.  ``--only mbref/taylor`` draws from files o
 the unit tests of the file.  Mutants that change nothing are listed with the reason
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
-The test files that killed other mutants of the folder run first, then files that name the mutant's function
-or module, then the quickest, each for 5 s of CPU time at most, until a test fails or 20 s are over; other
+The test files that killed other mutants of the folder run first, then files that are quick and name the
+mutant's function or module, each for 5 s of CPU time at most, until a test fails or 20 s are over; other
 work on the machine does not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out
 that fails or takes longer than a file may without the mutant, too. Results stay
 in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted run goes

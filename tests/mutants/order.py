@@ -9,6 +9,7 @@ from pathlib import Path
 
 from tests.mutants.operators import Mutant
 
+STARTING = 1.0  # CPU s until the first test of a file runs
 PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
 
 
@@ -21,18 +22,18 @@ def ordered(
 ) -> list[str]:
     """Return the names of test files with these texts.
 
-    Files that have killed most mutants of the same folder come first, then files that name most of these: the
-    functions and classes around a mutant, its module, a part of the module, and its package. The quickest
-    come first of the others.
+    Files that have killed most mutants of the same folder come first, then files with the least time for each
+    of these names that they contain: the functions and classes around a mutant, its module, a part of the
+    module, and its package.
     """
     package, module = ".".join(Path(mutant.file).parent.parts), Path(mutant.file).stem
     words = {re.escape(package), module, rf"{module}(\.\w+| import)", *around(source, mutant)}
     places = list(tests)
 
-    def rank(test: str) -> tuple[int, int, float, int]:
+    def rank(test: str) -> tuple[int, float, int]:
         named = sum(bool(re.search(rf"\b{word}\b", tests[test])) for word in words)
-        needed = seconds.get(test, len(tests[test]) / PER_SECOND)
-        return -kills.get(test, 0), -named, needed, places.index(test)
+        needed = seconds.get(test, STARTING + len(tests[test]) / PER_SECOND)
+        return -kills.get(test, 0), needed / (1 + named), places.index(test)
 
     return sorted(tests, key=rank)
 

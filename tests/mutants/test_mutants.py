@@ -158,16 +158,16 @@ def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
         session.pytest_runtest_logfinish("a")
 
 
-def test_tests_that_name_the_function_run_first_and_then_the_quick_ones():
+def test_quick_tests_that_name_the_function_run_first():
     mutant, source = planted("((a) - (b))"), TINY["mbref/sums.py"]
     tests = ["test_broken.py", "test_wait.py", "test_weak.py", "test_total.py"]
-    seconds = {"test_weak.py": 2.0, "test_total.py": 1.0, "test_broken.py": 0.1, "test_wait.py": 0.3}
+    seconds = {"test_weak.py": 1.5, "test_total.py": 0.9, "test_broken.py": 2.0, "test_wait.py": 0.8}
     assert order.around(source, mutant) == ["total"]
     texts = {test: TINY[test] for test in tests}
     assert order.ordered(mutant, source, texts, seconds, {}) == [
-        "test_total.py",
-        "test_weak.py",
+        "test_total.py",  # one name more in 0.9 s
         "test_wait.py",  # names the module ``sums`` alone
+        "test_weak.py",  # the names of test_total.py in 1.5 s
         "test_broken.py",
     ]
     kills = {"test_weak.py": 1, "test_broken.py": 2}
