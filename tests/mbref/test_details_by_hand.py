@@ -29,18 +29,18 @@ LONE = Scene(name="lone", body=(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0)
 RUN = "--method --times --samples:int --duration:float --rtol:float=1e-09 --code=auto --max-step:float"
 COMMANDS = {  # option:type=default; "!" is a switch, "+" may be given several times
     "": "--version",
-    "new": "out --like",
-    "assemble": "scene --length=[]+ --out",
-    "draw": "scene --view --out",
-    "animate": f"scene --view --out --branches! --crossing:int {RUN}",
+    "new": "out:output_file --like",
+    "assemble": "scene --length=[]+ --out:output_file",
+    "draw": "scene --view --out:output_file",
+    "animate": f"scene --view --out:output_file --branches! --crossing:int {RUN}",
     "diagnose": "scene --start! --json!",
-    "run": f"scene {RUN} --json! --out --columns=[]+ --branch=[]+ --estimate=auto",
-    "plot": f"scene columns* --out {RUN}",
-    "equilibrium": "scene --starts:int=24 --number:int --json! --out",
-    "modes": "scene --starts:int=24 --number:int --json! --mode:int=1 --view --out",
-    "ensemble": f"scene --vary+ --count:int=100 --seed:int --workers:int --out {RUN} --json!",
-    "import": "file --out --without= --keyframe= --pose:_coordinate=[]+ --close=[]+ --hold=[]+",
-    "export": "scene --out",
+    "run": f"scene {RUN} --json! --out:output_file --columns=[]+ --branch=[]+ --estimate=auto",
+    "plot": f"scene columns* --out:output_file {RUN}",
+    "equilibrium": "scene --starts:int=24 --number:int --json! --out:output_file",
+    "modes": "scene --starts:int=24 --number:int --json! --mode:int=1 --view --out:output_file",
+    "ensemble": f"scene --vary+ --count:int=100 --seed:int --workers:int --out:output_file {RUN} --json!",
+    "import": "file --out:output_file --without= --keyframe= --pose:_coordinate=[]+ --close=[]+ --hold=[]+",
+    "export": "scene --out:output_file",
     "list": "what?",
     "completion": "shell",
     "schema": "",
@@ -404,3 +404,19 @@ def test_a_scene_turned_by_a_right_angle():
     assert spring.points == ((2.0, 0.0, 0.0), (-2.0, 0.0, 1.0))
     assert torsion.natural_angle == pytest.approx(0.5 - math.pi / 2)
     assert found.body[0].orientation == pytest.approx(turned) and found.body[1].position == (5.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(("places", "length"), [([0.0, 0.3], 0.3), ([1e3, 1e3 + 5e-4, 1e3 + 4e-4], 5e-4)])
+def test_the_length_of_a_mechanism_is_its_largest_distance(places, length):
+    body = [LONE.body[0].model_copy(update={"name": f"b{x}", "position": (0.0, x, 0.0)}) for x in places]
+    assert Model(LONE.with_(body=body)).length == pytest.approx(length, rel=1e-9)
+
+
+def test_a_mechanism_at_one_point_counts_as_a_metre_long():
+    assert Model(LONE).length == 1.0
+    body = [LONE.body[0].model_copy(update={"name": name, "position": (7.0, 0.0, 0.0)}) for name in "bc"]
+    assert Model(LONE.with_(body=body)).length == 1.0
+    anchored = LONE.with_(
+        joint=({"type": "spherical", "name": "S", "bodies": ("ground", "b"), "anchor": (0.0, 3.0, 4.0)},)
+    )
+    assert Model(anchored).length == 5.0

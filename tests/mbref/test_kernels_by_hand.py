@@ -441,3 +441,100 @@ def test_a_pole_is_subtracted_from_every_variable_and_angle():
         expected[k] -= variable * past[order] * distance ** (order - k)
     assert memory.series.past.tolist() == expected.tolist()
     assert memory.series.past_angles.tolist() == [[10.0 - 40.0 / 4, 20.0 - 40.0 / 2, 40.0, 7.0]]
+
+
+# --- steps and orders of Adams ----------------------------------------------------------------------------
+def proposing(monkeypatch, **progress: float) -> tuple[Any, Any]:
+    """Memory of Adams whose next order is chosen to be 3, and its progress."""
+    numbers = {"restart": 1, "order": 5, "next_order": 4, "settled": 1, "failed": 0, "error": 0.5}
+    made = SimpleNamespace(**{**numbers, "error_below": 0.3, "equal_steps": 9, **progress})
+    past = SimpleNamespace(progress=made, differences=np.zeros((15, 4)))
+    monkeypatch.setattr(adams, "past_of", lambda memory: past)
+    monkeypatch.setattr(
+        adams, "remember", lambda h, order, y_rate, past: setattr(made, "remembered", (h, order))
+    )
+    monkeypatch.setattr(adams, "choose_order", lambda h, y, past, control: 3)
+    clock = SimpleNamespace(restart=1)
+    control = SimpleNamespace(order=12)
+    return SimpleNamespace(integrator=None, control=control, loop=SimpleNamespace(clock=clock)), past
+
+
+@pytest.mark.parametrize(
+    ("ratio", "settled", "error", "factor"),
+    [
+        (0.0, 0, 9.0, 2.0),
+        (1.0, 1, 1 / 32, 2.0),
+        (0.5, 1, 1.01 / 32, 1.0),
+        (0.5, 1, 0.5, 1.0),
+        (0.5, 1, 0.51, 0.9),
+        (0.5, 1, 1.0, 0.5**0.25),
+        (0.5, 1, 100.0, 0.5),
+    ],
+)
+def test_the_step_after_an_accepted_one(monkeypatch, ratio, settled, error, factor):
+    """At order 3 with the error 0.5 aimed at: doubled where 2⁴ times the error is less."""
+    memory, past = proposing(monkeypatch, settled=settled, error=error)
+    y = np.zeros(2)
+    assert adams.propose.function(0.1, 0.2, ratio, y, y, memory) == pytest.approx(0.1 * factor)
+    assert past.progress.order == 3 and past.progress.failed == 0 and past.progress.remembered == (0.1, 5)
+
+
+@pytest.mark.parametrize(
+    ("ratio", "failed", "error", "factor", "order"),
+    [
+        (1.001, 0, 8.0, 0.5, 4),
+        (1.001, 1, 8.0, 0.5, 4),
+        (1.001, 2, 8.0, 0.5, 1),
+        (1.001, 3, 8.0, 0.25, 1),
+        (1.001, 3, 2.0, 0.5, 1),
+        (-1.0, 3, 8.0, 0.5, 1),
+        (math.nan, 3, 8.0, 0.5, 1),
+    ],
+)
+def test_the_step_after_a_rejected_one(monkeypatch, ratio, failed, error, factor, order):
+    """Of order 1 from the third time on; from the fourth on as long as the error allows."""
+    memory, past = proposing(monkeypatch, failed=failed, error=error, settled=0)
+    y = np.zeros(2)
+    assert adams.propose.function(0.1, 0.2, ratio, y, y, memory) == pytest.approx(0.1 * factor)
+    assert (past.progress.order, past.progress.failed, past.progress.settled) == (order, failed + 1, 1)
+    assert not hasattr(past.progress, "remembered")
+
+
+def test_the_first_step_of_a_chart(monkeypatch):
+    memory, past = proposing(monkeypatch, restart=0)
+    forgotten = []
+    monkeypatch.setattr(adams, "forget", lambda past, restart: forgotten.append(restart))
+    monkeypatch.setattr(adams, "first_step", lambda y, y_rate, control: 10 * y[0] + y_rate[0])
+    assert adams.propose.function(0.1, 0.2, 0.5, np.array([1.0, 0]), np.array([2.0, 3.0]), memory) == 12.0
+    assert forgotten == [1] and past.differences[1].tolist() == [2.0, 3.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("progress", "above", "order", "error"),
+    [
+        ({"next_order": 4}, 0.0, 4, 0.3),  # the order below has the smaller error
+        ({"settled": 0}, 0.0, 6, 0.5),  # at the start the order grows
+        ({"settled": 0, "order": 12, "next_order": 12}, 0.4, 11, 0.3),  # the highest order
+        ({"equal_steps": 5}, 0.0, 5, 0.5),  # steps were changed lately
+        ({"equal_steps": 6}, 0.2, 6, 0.2),
+        ({"equal_steps": 6}, 0.3, 4, 0.3),  # equal errors: the lower order
+        ({"error_below": 0.6}, 0.5, 5, 0.5),
+        ({"error_below": 0.6}, 0.49, 6, 0.49),
+        ({"error_below": 0.6, "order": 12, "next_order": 12}, 0.1, 12, 0.5),
+        ({"order": 1, "next_order": 1, "error_below": 0.0}, 0.25, 1, 0.5),
+        ({"order": 1, "next_order": 1, "error_below": 0.0}, 0.24, 2, 0.24),
+    ],
+)
+def test_the_next_order(monkeypatch, progress, above, order, error):
+    numbers = {"order": 5, "next_order": 5, "settled": 1, "error": 0.5, "error_below": 0.3, "equal_steps": 13}
+    made = SimpleNamespace(**{**numbers, **progress})
+    past = SimpleNamespace(progress=made, differences=np.arange(15.0))
+    monkeypatch.setattr(adams, "GAMMA_STAR", 2.0 ** np.arange(15))
+
+    def norm(vector: float, y: object, control: object) -> float:
+        assert vector == made.order + 2
+        return above / 2.0 ** (made.order + 1)
+
+    monkeypatch.setattr(adams, "norm", norm)
+    assert adams.choose_order(1.0, None, past, SimpleNamespace(order=12)) == order
+    assert made.error == pytest.approx(error)

@@ -18,12 +18,15 @@ if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
 from mbref import energy, rotations
+from mbref.kernels.layout import OK
+from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.scenes.five_bar import five_bar
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
+from mbref.simulation.start_run import start_run
 from mbref.trajectory import Outcome, Trajectory
 from tests.coupled_scenes import gear_pair, planetary
 from tests.crosscheck.tree_scenes import every_joint
@@ -130,3 +133,59 @@ def test_velocities_that_agree_with_no_branch_are_refused():
     assert run.outcome == Outcome.COMPLETED and run.angular_velocity[-1, 1, 2] == pytest.approx(
         -30.0, rel=1e-3
     )
+
+
+SIZES = {  # natural variables, rows, functions that drivers prescribe, products
+    "four_bar": (4, 4, 2, 8),
+    "four_bar_gravity": (6, 5, 0, 12),
+    "five_bar_gravity": (8, 8, 0, 16),
+    "spatial_slider_crank": (8, 7, 0, 41),
+    "spatial_slider_crank_driven": (8, 8, 2, 15),
+    "planar_slider_crank": (3, 2, 0, 8),
+    "slider_crank_chain": (5, 4, 0, 12),
+    "point_pendulum": (2, 1, 0, 4),
+    "andrews_squeezer": (14, 13, 0, 28),
+    "bricard": (19, 19, 0, 107),
+    "flyball_governor": (17, 13, 0, 82),
+    "heavy_top": (9, 6, 0, 45),
+    "bennett": (9, 14, 0, 75),
+    "sarrus": (6, 5, 0, 16),
+    "h_frame": (2, 1, 0, 4),
+}
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_natural_coordinates_at_the_start(name):
+    """Directions at rest need no variables, and the poses of the scene obey all rows to rounding."""
+    scene = find_scene(name)
+    run = start_run(scene, Method.parse("taylor"), np.array([0.1]), Limits())
+    taylor = run.stepper.taylor
+    nz, nr = taylor.solver.pivot_columns.size, taylor.solver.pivot_rows.size
+    products = np.count_nonzero(taylor.polynomials.products.weight)
+    assert (nz, nr, taylor.polynomials.given.driver.size, products) == SIZES[name]
+    assert run.stepper.expand() == OK
+    assert taylor.step.violation <= 1e-14
+    freedoms = taylor.options.start_freedoms
+    assert taylor.partition.rank == nz - freedoms
+    run.stepper.release()
+    if name not in ("sarrus", "bricard", "bennett", "point_pendulum"):  # where both methods serve
+        series_, general = (
+            simulate(scene, method, [0.0]) for method in ("taylor", "alf-dual+projection/dop853")
+        )
+        for field in ("acceleration", "angular_acceleration"):
+            one, other = getattr(series_, field), getattr(general, field)
+            assert np.abs(one - other).max() <= 1e-9 * max(1.0, np.abs(other).max()), field
+
+
+@pytest.mark.parametrize("method", ["taylor", "lm1+none/dop853"])
+def test_quaternions_of_turning_bodies_keep_their_signs(method):
+    """The top turns by 150 rad/s, so that its quaternion changes its sign every 42 ms."""
+    times = np.linspace(0.0, 0.1, 21)
+    run = simulate(find_scene("heavy_top"), method, times, Limits(rtol=1e-8))
+    orientation = run.orientation[:, 0]
+    assert (np.einsum("ki,ki->k", orientation[1:], orientation[:-1]) > 0.9).all()
+    assert np.dot(orientation[0], orientation[8]) < -0.9, "a turn later"
+    momentum = np.array([0.234375, 0.46875, 0.234375]) + 15.0 * np.array([1.0, 0.0, 1.0])
+    own = rotations.rotate(rotations.conjugate(orientation), run.angular_velocity[:, 0])
+    vertical = rotations.rotate(orientation, momentum * own)[:, 2]
+    assert vertical == pytest.approx(vertical[0], rel=1e-7), "gravity has no moment about z"

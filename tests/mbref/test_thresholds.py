@@ -41,7 +41,11 @@ def test_parts_of_crossings_and_small_kernels_do_what_they_say():
     by_hand = (
         CHECKS.with_name(f"test_{name}.py") for name in ("kernels_by_hand", "written_code", "short_runs")
     )
-    files = interpreted_crossings.__file__, *map(str, by_hand)
+    files = (
+        interpreted_crossings.__file__,
+        str(CHECKS.with_name("interpreted_drivers.py")),
+        *map(str, by_hand),
+    )
     done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", *files)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-500:]

@@ -40,7 +40,7 @@ from crosscheck import engine as crosscheck_engine
 from tests.mutants.equivalent import reason
 from tests.mutants.importers import ADAPTERS, PACKAGES, SNAPSHOTS, engines, importers
 from tests.mutants.operators import Mutant, mutants
-from tests.mutants.order import ordered
+from tests.mutants.order import around, ordered
 
 ROOT = Path(__file__).parents[2]
 COPIED = (*PACKAGES, "tests", "examples", "benchmarks", "docs", "pyproject.toml", "README.md")
@@ -107,9 +107,10 @@ class Tree:
 
     def _seen(self, mutant: Mutant, source: str, files: Sequence[str], plain: bool) -> tuple[str, str]:
         """Return KILLED, SURVIVED or TIMED_OUT, and the test that fails or takes too long."""
+        words = [Path(mutant.file).stem, *around(source, mutant)]
         while True:
             with self._plant(mutant, source):
-                answer = self._ask(plain, files)
+                answer = self._ask(plain, files, words=words)
             test = answer["failed"]
             if answer["status"] in (0, 5):
                 late = [test for test in answer["ended"] if self._is_sound(test, plain)]
@@ -144,7 +145,9 @@ class Tree:
             path.write_text(source)
             os.utime(path, (before.st_atime, before.st_mtime))
 
-    def _ask(self, plain: bool, files: Sequence[str], only: str = "") -> dict[str, Any]:
+    def _ask(
+        self, plain: bool, files: Sequence[str], only: str = "", words: Sequence[str] = ()
+    ) -> dict[str, Any]:
         """Return the answer of a process that runs tests."""
         if plain not in self._workers:
             self._workers[plain] = subprocess.Popen(
@@ -166,6 +169,7 @@ class Tree:
             "files": files,
             "out": [test for test, is_sound in self._sound[plain].items() if not is_sound],
             "only": only,
+            "words": words,
             "known": {test: s for test, s in self._seconds.items() if test.split("::")[0] in files},
             "of_file": OF_FILE * self._budget,
             "budget": self._budget,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -148,7 +149,7 @@ def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
 
 def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
     """Imports take 7 s here; tests may take 5 s after them."""
-    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0, "known": {}}), [7.0]
+    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0, "known": {}, "words": []}), [7.0]
     monkeypatch.setattr(workers, "_cpu", lambda: now[0])
     session.pytest_collection_finish()
     now[0] = 11.9
@@ -156,6 +157,15 @@ def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
     now[0] = 12.1
     with pytest.raises(pytest.exit.Exception, match="long enough"):
         session.pytest_runtest_logfinish("a")
+
+
+def test_tests_of_a_file_with_a_word_run_first_and_then_the_quick_ones():
+    known = {"t.py::test_slow": 3.0, "t.py::test_quick": 0.1, "t.py::test_sum[total]": 9.0}
+    request = {"out": ["t.py::test_out"], "only": "", "of_file": 5.0, "known": known, "words": ["total"]}
+    names = [*known, "t.py::test_out", "t.py::test_new"]
+    items = [SimpleNamespace(nodeid=name) for name in names]
+    workers.Session(request).pytest_collection_modifyitems(items)
+    assert [item.nodeid[6:] for item in items] == ["test_sum[total]", "test_new", "test_quick", "test_slow"]
 
 
 def test_quick_tests_that_name_the_function_run_first():

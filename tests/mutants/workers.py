@@ -4,7 +4,8 @@ The process reads requests from its input, one JSON object a line, and answers i
 none of the project's packages: each fork imports them anew, with the mutant that stands in the tree.
 
 A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
-of the one test that runs; empty: all), ``known`` (CPU s of tests: the quickest of a file run first),
+of the one test that runs; empty: all), ``words`` and ``known`` (CPU s of tests: of a file those run first
+whose ids have one of the words, then the quickest),
 ``of_file`` and ``budget`` (CPU s of a file and of all files, after which no test begins; a test that takes
 longer than a file may is ended), ``limit`` (CPU s of the fork) and ``waiting`` (s of wall time).  The answer
 has ``status`` (pytest's exit status; none: the time was up), ``failed`` (the id of the test that failed
@@ -45,6 +46,7 @@ class Session:
 
     def __init__(self, request: dict[str, Any]) -> None:
         self._out, self._only, self._of_file = set(request["out"]), request["only"], request["of_file"]
+        self._words: list[str] = request["words"]
         self._known: dict[str, float] = request["known"]
         self._end = 0.0  # CPU s
         self.failed = ""
@@ -56,9 +58,13 @@ class Session:
         self._end = _cpu() + self._of_file
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leave out tests, and let the quickest begin."""
+        """Leave out tests, and let those with the words and the quickest begin."""
         kept = [item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)]
-        items[:] = sorted(kept, key=lambda item: self._known.get(item.nodeid, 0.0))
+        items[:] = sorted(kept, key=lambda item: self._rank(item.nodeid))
+
+    def _rank(self, test: str) -> tuple[bool, float]:
+        name = test.partition("::")[2]
+        return not any(word in name for word in self._words), self._known.get(test, 0.0)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
