@@ -161,10 +161,11 @@ def _rendered(options: Sequence[str]) -> int:
 
 @contextlib.contextmanager
 def passed_on(program: subprocess.Popen[Any]) -> Iterator[None]:
-    """Pass SIGINT and SIGTERM on to a program during the ``with`` block."""
+    """Pass SIGINT and SIGTERM on to a program during the ``with`` block, unless this process ignores them."""
     before = {
         number: signal.signal(number, lambda received, _: program.send_signal(received))
         for number in (signal.SIGINT, signal.SIGTERM)
+        if signal.getsignal(number) is not signal.SIG_IGN
     }
     try:
         yield

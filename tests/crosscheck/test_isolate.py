@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -374,12 +375,24 @@ def test_an_interrupt_ends_the_calls_of_threads(tmp_path: Path):
         assert calls[1].cancelled()
 
 
+WAITING = (
+    "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('begun', flush=True); "
+    "time.sleep(60)"
+)
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_signals_are_passed_on_to_a_program(number: signal.Signals):
-    command = ["sh", "-c", "echo begun; exec sleep 60"]
-    before = signal.getsignal(number)
-    with subprocess.Popen(command, stdout=subprocess.PIPE, process_group=0) as program, passed_on(program):
-        assert program.stdout is not None and program.stdout.readline()
-        signal.raise_signal(number)
-        assert program.wait() == -number
-    assert signal.getsignal(number) is before
+@pytest.mark.parametrize("handler", [signal.SIG_DFL, signal.SIG_IGN])
+def test_signals_are_passed_on_to_a_program_unless_they_are_ignored(handler: Any, number: signal.Signals):
+    command, before = [sys.executable, "-S", "-c", WAITING], signal.signal(number, handler)
+    try:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, process_group=0) as program:
+            with passed_on(program):
+                assert program.stdout is not None and program.stdout.readline() == b"begun\n"
+                signal.raise_signal(number)
+                if handler is signal.SIG_IGN:
+                    program.kill()
+                assert program.wait() == -(signal.SIGKILL if handler is signal.SIG_IGN else number)
+            assert signal.getsignal(number) is handler
+    finally:
+        signal.signal(number, before)

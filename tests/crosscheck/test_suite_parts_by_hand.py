@@ -18,6 +18,7 @@ from crosscheck.conformance.trial import NEIGHBOURS, Broken, Outside
 from crosscheck.engine import Setting
 from crosscheck.judge import precision, push_difference
 from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.tolerances import GRAINS
 from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, SceneError
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -309,12 +310,16 @@ def test_which_changes_explain_an_acceleration(monkeypatch):
 
     def found(own: float) -> Any:
         monkeypatch.setattr(hint, "_differences", lambda scene, bench: np.array([own]))
-        return hint.explanations(SimpleNamespace(scene=SCENE, close=still))
+        return hint.explanations(SimpleNamespace(scene=SCENE, close=still, rounding=rounding))
 
+    rounding = 0.0
     assert found(1.1) == {("loads", "near")}
     assert found(1.00099) is None and found(1.00101) == set(), "1e-3 of the acceleration"
     with pytest.raises(Broken, match="are not known"):
         found(math.nan)
+    speed, step = math.hypot(8.0, 2.0 * scene_length(SCENE)), 0.1
+    rounding = 1e-3 * step / (GRAINS * speed)  # changes velocities in a step by 1e-3 of it
+    assert found(1.00199) is None and found(1.00201) == set(), "and as much by rounding"
 
 
 # --- reduced scenes ---------------------------------------------------------------------------------------

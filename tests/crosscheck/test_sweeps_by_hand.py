@@ -318,13 +318,16 @@ def test_wrong_engines_with_other_accelerations_at_equal_states(monkeypatch):
 def test_models_differ_from_the_truth_or_from_the_first_run(monkeypatch):
     asked = []
 
-    def differences(scene, motions):
+    def differences(scene, motions, rounding):
         asked.append(motions)
+        assert rounding == ({"warp": 2.0**-23} if "b" in motions else {}), "of engines that are known"
         return {"b": 0.25, "c": 0.5}
 
     monkeypatch.setattr(fair_timing, "_motion", lambda scene, record: record["key"])
     monkeypatch.setattr(fair_timing, "differences", differences)
+    engines = {"a": "own", "b": "warp", "x": "newton"}
     records = [timed_record("a", 1.0), timed_record("b", 1.0), timed_record("x", 1.0, "NOT_FINITE")]
+    records = [{**record, "engine": engines[record["key"]]} for record in records]
     monkeypatch.setattr(fair_timing, "truth_for", lambda scene, seconds: None)
     assert fair_timing.model_differences(still("s"), records) == {"b": "0.25", "c": "0.5"}
     assert fair_timing.model_difference(still("s"), records) == "0.25" and asked == [["a", "b"]] * 2
