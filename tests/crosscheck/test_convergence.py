@@ -50,6 +50,10 @@ def test_order_above_a_floor(power: float) -> None:
     assert order(found) == pytest.approx(power, abs=0.05)
     assert order([run(0.1 / 2**k, 1e-9) for k in range(5)]) is None
     assert order(found[:2]) is None
+    for least, is_measured in ((1.0, False), (0.99, True)):
+        last = found[2] | {"metrics": {"error": 1e-3, "error_bound": least * 1e-3}}
+        line = [run(0.1 / 2**k, 1e-3 * 2 ** (power * (2 - k))) for k in range(2)]
+        assert (order([*line, last]) is not None) is is_measured, "the truth's own bound shows no order"
 
 
 def test_cells_by_hand() -> None:
