@@ -120,15 +120,22 @@ def work(request: dict[str, Any], answer: Path) -> None:
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(null, stream)
-    session, status = Session(request), 0
+    session = Session(request)
+
+    def report(status: int, failed: str) -> None:
+        found = {"status": status, "failed": failed, "ended": session.ended, "seconds": session.seconds}
+        answer.write_text(json.dumps(found))
+
+    report(0, "")
     for file in request["files"]:
+        report(CRASHED, file)  # the answer if this process does not return from the file
         begun = _cpu()
         status = int(pytest.main([*OPTIONS, file], plugins=[session]))
         session.seconds[file] = _cpu() - begun
-        if status not in (0, 5) or _cpu() > request["budget"]:
+        has_passed = status in (0, 5)
+        report(status, session.failed or ("" if has_passed else file))
+        if not has_passed or _cpu() > request["budget"]:
             break
-    found = {"status": status, "failed": session.failed, "ended": session.ended, "seconds": session.seconds}
-    answer.write_text(json.dumps(found))
 
 
 def answer_of(request: dict[str, Any]) -> dict[str, Any]:
@@ -144,9 +151,9 @@ def answer_of(request: dict[str, Any]) -> dict[str, Any]:
             finally:
                 os._exit(0)
         status = _wait(child, end)
-        if path.exists():
+        is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
+        if path.exists() and not is_late:
             return json.loads(path.read_text())
-    is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
     return {"status": None if is_late else CRASHED, "failed": "", "ended": [], "seconds": {}}
 
 
