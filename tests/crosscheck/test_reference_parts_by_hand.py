@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles
+from crosscheck.judge.gauss_principle import rank_of
 from crosscheck.judge.reference import certify, isostatic
 from crosscheck.judge.reference.certify import NotCertified
 from crosscheck.judge.reference.panels import LAST, Panel, Panels
 from crosscheck.judge.reference.stiff_panels import StiffPanels
+from crosscheck.judge.reference.vectors import saddle_solve
 from crosscheck.small_motions import records
 from crosscheck.small_motions.compare import error
 from crosscheck.small_motions.mechanisms import MECHANISMS
@@ -364,3 +366,34 @@ def test_slender_rods_and_a_pendulum():
     assert sorted(s.real for s in standing if s.real > 0) == pytest.approx(rates)
     below, above = by_name["pendulum"]
     assert below[0] == pytest.approx(1j * np.sqrt(13.734 / 1.28)) and above[1] == pytest.approx(below[0].imag)
+
+
+# --- linear equations -------------------------------------------------------------------------------------
+def test_a_saddle_point_system_by_hand():
+    """2 x + λ = 4, 3 y + λ = 6 and x + y = 1: λ = 3.6, x = 0.2, y = 0.8."""
+    arrays = (np.diag([2.0, 3.0]), np.array([[1.0, 1.0]]), np.array([4.0, 6.0]), np.array([1.0]))
+    found, distance = saddle_solve(*(array[None] for array in arrays))
+    assert found[0] == pytest.approx([0.2, 0.8], abs=1e-15) and 0.1 < distance[0] < 1.0
+    exact, _ = saddle_solve(*(EXTENDED.array(array[None]) for array in arrays))
+    assert np.abs(exact[0] - EXTENDED.array([1, 4]) / 5).max() < 1e-18
+    twice = [np.concatenate([a[None], a[None]]) for a in arrays]
+    twice[1][1] = 0.0
+    _, (regular, singular) = saddle_solve(*twice)
+    assert singular < 1e-3 < regular, "the second sample has lost its row"
+    nothing, distance = saddle_solve(
+        np.zeros((1, 0, 0)), np.zeros((1, 0, 0)), np.zeros((1, 0)), np.zeros((1, 0))
+    )
+    assert nothing.shape == (1, 0) and distance[0] == np.inf
+
+
+@pytest.mark.parametrize(("light", "entry"), [(1.5e-12, 1.0), (1e-12, 1.0), (0.5e-12, 0.5)])
+def test_light_masses_are_scaled_to_a_least_size(light, entry):
+    """Masses below 1e-12 of the largest are scaled like this size: the entry is the ratio."""
+    mass = np.diag([4.0, 4.0 * light])[None]
+    _, distance = saddle_solve(mass, np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 0)))
+    assert distance[0] == pytest.approx((1 + entry**-2) ** -0.25, rel=1e-9)
+
+
+def test_rank_is_relative_to_the_largest_singular_value():
+    assert rank_of(np.array([1e-3, 1.1e-12, 0.9e-12])) == 2 and rank_of(np.array([1e3, 1.1e-6, 0.9e-6])) == 2
+    assert rank_of(np.zeros(0)) == 0 == rank_of(np.zeros(2))
