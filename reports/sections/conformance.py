@@ -34,8 +34,8 @@ DRAWN = (
     "decided on."
 )
 CAUSES = (
-    "Causes of violated checks: the checks with the number of mechanisms that violate them, and the worst "
-    "violation."
+    "Causes of violated checks: the checks, the most violated one first, each with its number of mechanisms; "
+    "and the mechanism and numbers of the worst violation."
 )
 ANY_RANDOM = "random mechanisms"  # stands for all random mechanisms in the file of explanations
 UNEXPLAINED = "not explained yet"
@@ -105,7 +105,7 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
     for found in verified:
         for name in dict.fromkeys(v["property"] for v in found["violations"]):
             here = [v for v in found["violations"] if v["property"] == name]
-            worst = _worst(here)
+            worst = max(here, key=_excess)
             why = _explanation(found["engine"], worst, ANY_RANDOM)
             where = (str(len(here)), worst["scene"])
             rows.append((title(found["engine"]), worst["card"], *where, *_numbers(worst), *why))
@@ -166,14 +166,14 @@ def _violations(verified: Sequence[Verified]) -> list[Block]:
         groups.setdefault((engine, *_explanation(engine, verdict, verdict["scene"])), []).append(verdict)
     causes = []
     for (engine, cause, remedy), of in groups.items():
-        most = _worst(of)
-        where = f"{most['card']} on {most['scene']}"
-        causes.append((title(engine), _counted(of), where, *_numbers(most), cause, remedy))
+        worst = sorted(of, key=_excess, reverse=True)
+        numbers = worst[0]["scene"], *_numbers(worst[0])
+        causes.append((title(engine), _counted(worst), *numbers, cause, remedy))
     single = [(title(engine), v["scene"], v["card"], *_numbers(v)) for engine, v in failed]
-    worst = ("Worst", "Measured", "Allowed")
+    header = ("Engine", "Violated checks", "Worst on", "Measured", "Allowed", "Cause", "Remedy")
     return [
         Heading("Violations"),
-        Table(CAUSES, ("Engine", "Violated checks", *worst, "Cause", "Remedy"), causes, frozenset({3, 4})),
+        Table(CAUSES, header, causes, frozenset({3, 4})),
         Table(
             f"The {len(single)} violated checks, each with its number and limit.",
             ("Engine", "Mechanism", "Check", "Measured", "Allowed"),
@@ -185,14 +185,14 @@ def _violations(verified: Sequence[Verified]) -> list[Block]:
 
 
 def _counted(violations: Sequence[Verdict]) -> str:
-    """Return the names of violated checks, each with its number of mechanisms if there are several."""
+    """Return the names of violated checks in their order, each with its number of mechanisms."""
     counts = Counter(v["card"] for v in violations)
-    return ", ".join(f"{card} ({n} mechanisms)" if n > 1 else card for card, n in counts.items())
+    return ", ".join(f"{card} ({n})" for card, n in counts.items())
 
 
-def _worst(violations: Sequence[Verdict]) -> Verdict:
-    """Return the violation whose number is the largest multiple of its limit."""
-    return max(violations, key=lambda v: (v["measured"] or 0.0) / (v["allowed"] or 1.0))
+def _excess(verdict: Verdict) -> float:
+    """Return a violation's number as a multiple of its limit; 0 without a number."""
+    return (verdict["measured"] or 0.0) / (verdict["allowed"] or 1.0)
 
 
 def _explanation(engine: str, verdict: Verdict, scene: str) -> tuple[str, str]:

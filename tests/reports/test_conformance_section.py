@@ -44,7 +44,7 @@ def test_checks_of_every_engine_and_their_counts(verified):
 def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
     numbers, check = ("2.0e-03", "1.0e-06"), VERDICTS[1].check()
     [row] = violations(verified).rows
-    assert row == ("MuJoCo", check, f"{check} on pendulum", *numbers, conformance.UNEXPLAINED, "–")
+    assert row == ("MuJoCo", f"{check} (1)", "pendulum", *numbers, conformance.UNEXPLAINED, "–")
     known = {("mujoco", "truth", "pendulum"): explained.Explanation("It slips.", "Hold it.")}
     monkeypatch.setattr(conformance, "explanations", lambda: known)
     assert violations(verified).rows[0][-2:] == ("It slips.", "Hold it.")
@@ -55,7 +55,7 @@ def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
 
 def test_a_cause_is_stated_once_for_each_engine(monkeypatch):
     """Three violations of two checks by one cause, one by another cause, and one of another engine."""
-    found = [("truth", "a", 4e-6), ("truth", "b", 2e-6), ("closure", "a", 3e-6), ("energy", "a", 1.0)]
+    found = [("truth", "a", 4e-6), ("truth", "b", 2e-6), ("closure", "b", 5e-6), ("energy", "a", 1.0)]
     known = {
         ("mujoco", check, scene): explained.Explanation("It slips.", "Hold it.") for check, scene, _ in found
     }
@@ -68,9 +68,9 @@ def test_a_cause_is_stated_once_for_each_engine(monkeypatch):
     ]
     truth, closure, energy = (Verdict(name, "", "fail").check() for name in ("truth", "closure", "energy"))
     assert [(*row[:4], row[5]) for row in violations(records).rows] == [
-        ("MuJoCo", f"{truth} (2 mechanisms), {closure}", f"{truth} on a", "4.0e-06", "It slips."),
-        ("MuJoCo", energy, f"{energy} on a", "1.0e+00", "It leaks."),
-        ("Exudyn", truth, f"{truth} on a", "4.0e-06", "It slips."),
+        ("MuJoCo", f"{closure} (1), {truth} (2)", "b", "5.0e-06", "It slips."),
+        ("MuJoCo", f"{energy} (1)", "a", "1.0e+00", "It leaks."),
+        ("Exudyn", f"{truth} (1)", "a", "4.0e-06", "It slips."),
     ]
 
 
