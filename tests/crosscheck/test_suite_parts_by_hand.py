@@ -238,6 +238,14 @@ def test_accelerations_by_differences_of_order_8():
     assert hint._least(SCENE) == LENGTH / 0.25
 
 
+def test_rounding_of_velocities_over_the_step_is_no_acceleration():
+    """3 m/s and 4 m/s of turning, rounded to 2⁻²³ and 16 grains, over a quarter of a second."""
+    run = replace(motion(9), times=1.0 + 0.25 * np.arange(9))
+    run.velocity[NEIGHBOURS, 0], run.angular_velocity[NEIGHBOURS, 0] = (3.0, 0.0, 0.0), (0.0, 0.0, 4 / LENGTH)
+    bench = SimpleNamespace(scene=SCENE, close=run, rounding=2.0**-23)
+    assert hint._rounded(bench) == pytest.approx(16 * 2.0**-23 * 5.0 / 0.25, rel=1e-12)
+
+
 def test_parts_that_a_scene_needs():
     assert hint.parts_of(SCENE) == ["mass matrix", "gravity", "velocity terms", "constraints"]
     free = Scene(name="free", body=(WHEEL.model_copy(update={"velocity": None}),), gravity=O)
