@@ -10,10 +10,10 @@ in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engi
 The test files that killed other mutants of the folder run first, then files that are quick and name the
 mutant's function or module, each for 5 s of CPU time at most, until a test fails or 20 s are over; other
 work on the machine does not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out
-that fails or takes longer than a file may without the mutant, too. Results stay
-in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted run goes
-on where it ended. Tests of mbref and of kernels run as plain Python, so that no kernel is compiled for a
-mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
+that fails or takes longer than a file may without the mutant, too, or that fails only after other tests.
+Results stay in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted
+run goes on where it ended. Tests of mbref and of kernels run as plain Python, so that no kernel is compiled
+for a mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
 survives, is seen by a stored text alone or runs out of time.
 """
 
@@ -120,7 +120,9 @@ class Tree:
             if not test and self._ask(plain, files)["status"] not in (0, 5):
                 raise RuntimeError(f"the tests end early without a mutant, too: {' '.join(files)}")
             if not test or self._is_sound(test, plain):
-                return KILLED, test
+                if not test or self._fails_alone(mutant, source, test, plain):
+                    return KILLED, test
+                self._sound[plain][test] = False  # it fails after other tests alone
             files = [file for file in files if file != test]
 
     def _is_sound(self, test: str, plain: bool) -> bool:
@@ -130,6 +132,12 @@ class Tree:
             answer = self._ask(plain, [test.split("::", maxsplit=1)[0]], only)
             self._sound[plain][test] = answer["status"] == 0 and not answer["ended"]
         return self._sound[plain][test]
+
+    def _fails_alone(self, mutant: Mutant, source: str, test: str, plain: bool) -> bool:
+        """Return whether a test that fails after other tests fails without these, too."""
+        with self._plant(mutant, source):
+            answer = self._ask(plain, [test.split("::", maxsplit=1)[0]], test if "::" in test else "")
+        return answer["status"] not in (0, 5)
 
     @contextmanager
     def _plant(self, mutant: Mutant, source: str) -> Iterator[None]:
