@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from mbref import formats
-from mbref.cli import commands, pictures
+from mbref.cli import commands, options, pictures
 from mbref.design import placed
 from mbref.drawing import film, labels, shapes
 from mbref.equations.model import Model
@@ -90,6 +90,25 @@ def test_faults_have_the_lines_of_a_scene_file_alone(tmp_path):
         ]
     assert list(commands._with_lines(argparse.Namespace(), ["a"])) == ["a"]
     assert list(commands._with_lines(argparse.Namespace(scene="none.toml"), ["a"])) == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "names"),
+    [({"rtol": -1.0}, "--rtol: "), ({"max_step": -1.0}, "--max-step: "), ({"code": "fast"}, "--code: ")],
+)
+def test_limits_that_are_refused_name_their_option(changed, names):
+    given = argparse.Namespace(**{"rtol": 1e-9, "max_step": 0.5, "code": "generic", **changed})
+    with pytest.raises(ValueError, match=rf"^{names}"):
+        options.limits_of(given)
+    with pytest.raises(ValueError, match=r"^--branch"):
+        options.limits_of(argparse.Namespace(rtol=1e-9, max_step=0.5, code="auto"), {1: 0})
+    found = options.limits_of(argparse.Namespace(rtol=1e-7, max_step=0.5, code="generic"), {2: 3})
+    assert (found.rtol, found.largest_step, found.code, dict(found.branches)) == (
+        1e-7,
+        0.5,
+        "generic",
+        {2: 3},
+    )
 
 
 def test_options_of_an_import():

@@ -21,7 +21,7 @@ from mbref import rotations
 from mbref.equations import coordinates
 from mbref.integrators import adams, dop853, one_step, rk4
 from mbref.kernels.layout import OK
-from mbref.linear_algebra import vectors
+from mbref.linear_algebra import elimination, vectors
 from mbref.stabilisation import partitioning
 from mbref.taylor import angles, coefficients, samples, saved_state
 from mbref.taylor.crossing import determinants, rounding_pole
@@ -538,3 +538,31 @@ def test_the_next_order(monkeypatch, progress, above, order, error):
     monkeypatch.setattr(adams, "norm", norm)
     assert adams.choose_order(1.0, None, past, SimpleNamespace(order=12)) == order
     assert made.error == pytest.approx(error)
+
+
+# --- elimination ------------------------------------------------------------------------------------------
+def test_elimination_with_full_pivoting():
+    """Pivots 8 and 2 of a matrix of rank 2; the order of rows and columns, and the factors below them."""
+    a = np.array([[1.0, 2.0, 0.0], [0.0, 8.0, 4.0], [2.0, 4.0, 0.0]])
+    rows, columns = np.zeros(3, int), np.zeros(3, int)
+    assert elimination.full_pivot(a, 3, 3, rows, columns, 1e-12) == 2
+    assert rows.tolist() == [1, 2, 0] and columns.tolist() == [1, 0, 2]
+    assert a.tolist() == [[8.0, 0.0, 4.0], [0.5, 2.0, -2.0], [0.25, 0.5, 0.0]]
+    a = np.array([[1.0, -2.0, 0.0, 7.0], [0.0, 4.0, 9.0, 7.0]])
+    rows, columns = np.zeros(2, int), np.zeros(3, int)
+    assert elimination.full_pivot(a, 2, 3, rows, columns, 0.0) == 2, "the last column is no part of it"
+    assert rows.tolist() == [1, 0] and columns.tolist() == [2, 1, 0]
+    for share, rank in ((0.25, 1), (0.2499, 2)):
+        a = np.diag([4.0, 1.0])
+        assert elimination.full_pivot(a, 2, 2, np.zeros(2, int), np.zeros(2, int), share) == rank, share
+
+
+def test_products_of_pivots_of_any_size():
+    assert elimination.product_of_pivots(np.array([2.0, -3.0, 4.0, 9.0]), 3) == (
+        True,
+        pytest.approx(math.log(24)),
+    )
+    negative, size = elimination.product_of_pivots(np.array([-1e200, -1e250, 1e300]), 3)
+    assert not negative and size == pytest.approx(750 * math.log(10))
+    negative, size = elimination.product_of_pivots(np.array([-1e-140, 1e-140, 1e-140]), 3)
+    assert negative and size == pytest.approx(-420 * math.log(10))

@@ -189,3 +189,31 @@ def test_quaternions_of_turning_bodies_keep_their_signs(method):
     own = rotations.rotate(rotations.conjugate(orientation), run.angular_velocity[:, 0])
     vertical = rotations.rotate(orientation, momentum * own)[:, 2]
     assert vertical == pytest.approx(vertical[0], rel=1e-7), "gravity has no moment about z"
+
+
+LONG = {  # s, about a step of the series
+    "arm": 0.02,
+    "driven arm": 0.05,
+    "planetary gear": 0.1,
+    "gear pair": 0.3,
+    "andrews_squeezer": 0.002,
+    "flyball_governor": 0.001,
+    "heavy_top": 0.01,
+    "bricard": 0.05,
+    "spatial_slider_crank_driven": 0.005,
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+def test_long_steps_of_the_series_and_steps_of_a_quarter_agree(name):
+    """Long steps need the high orders of all loads and rows."""
+    scene, end = SCENES[name]() if name in SCENES else find_scene(name), LONG[name]
+    long, short = (
+        simulate(scene, "taylor", [0.0, end], Limits(rtol=1e-9, largest_step=length))
+        for length in (0.0, end / 4)
+    )
+    assert long.outcome == short.outcome == Outcome.COMPLETED, long.message
+    assert short.cost.steps >= 4 and short.cost.steps > long.cost.steps
+    for field in ("position", "velocity", "angular_velocity", "acceleration"):
+        one, other = getattr(long, field), getattr(short, field)
+        assert np.abs(one - other).max() <= 1e-7 * max(1.0, np.abs(other).max()), field

@@ -36,6 +36,7 @@ REASONS: dict[tuple[str, str, str], str] = {
         "(place.of not in names)",
     ): "A primitive that is no part of a coupling or an armature names no joint in its field ``of``.",
     ("mbref/simulation/start_run.py", "if method.is_series:", "(not (method.is_series))"): AT_FIRST_CALL,
+    ("mbref/stepping/preparation.py", "prepare_all(kernels_of(method))", "pass"): AT_FIRST_CALL,
     ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES)", "pass"): AT_FIRST_CALL,
     ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES[::-1])", "pass"): AT_FIRST_CALL,
     ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES[::-1])", "(+1)"): AT_FIRST_CALL,
