@@ -10,6 +10,11 @@ import numpy as np
 import pytest
 
 import mbref
+from mbref.kernels.compilation import PLAIN
+
+if PLAIN:
+    pytest.skip("test_written_code.py compares the code with interpreted kernels", allow_module_level=True)
+
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.kernels.layout import OK
 from mbref.method import Method, MethodError
