@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mbref.ensembles.parameters import Parameters
+from mbref.ensembles.candidates import Parameters
 from mbref.kernels.memory_pool import SavedNumbers
 from mbref.kernels.named_memory import packed
 from mbref.kernels.records import record
