@@ -9,7 +9,7 @@ import numpy as np
 from mbref.formulations.base import Formulation
 from mbref.kernels.compilation import entry, pointer_to
 from mbref.kernels.layout import ACCELERATE, OperationCounts, Settings, SparseFactor, System
-from mbref.kernels.named_memory import packed
+from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 
@@ -29,7 +29,8 @@ def solve(
     Status is one of ``layout.OK``, ``SINGULAR``, ``NOT_CONVERGED``.
     """
     m, n = jacobian.shape
-    algebra, numbers = formulation.linear_algebra, np.ascontiguousarray(jacobian, dtype=float)
+    numbers = np.ascontiguousarray(jacobian, dtype=float)
+    scratch = allocate(formulation.scratch, {"m": m, "n": n}) if formulation.scratch else _factor(numbers)
     mass = np.ascontiguousarray(mass, dtype=float)
     chosen = {**formulation.options, **options}
     system = System(
@@ -44,7 +45,7 @@ def solve(
         settings=record(Settings(rank_tolerance=rank_tolerance)),
         counts=record(OperationCounts()),
         options=packed(record(formulation.numbers(**chosen))) if chosen else None,
-        scratch=packed(algebra.scratch(m, n, _factor(numbers) if algebra.sparse else None)),
+        scratch=packed(scratch),
     )
     status: Any = solved(formulation.accelerate.pointer, packed(system).argument)
     return status, system.acceleration, system.multipliers

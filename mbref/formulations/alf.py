@@ -16,7 +16,7 @@ from typing import Annotated, NamedTuple
 
 from numpy import sqrt
 
-from mbref.formulations.base import About, Dense, Formulation
+from mbref.formulations.base import About, Formulation
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
@@ -152,7 +152,7 @@ ALF = Formulation(
     about=ABOUT,
     equations="Eqs. 17-20",
     accelerate=accelerate,
-    linear_algebra=Dense(Scratch),
+    scratch=Scratch,
     needs_all_rows=True,
     crosses="by regularisation",
     handles_redundancy=True,

@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from mbref.formulations.alf import feedback
-from mbref.formulations.base import About, Formulation, Sparse
+from mbref.formulations.base import About, Formulation
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
@@ -199,7 +199,7 @@ ALF_DUAL = Formulation(
     about=ABOUT,
     equations="Eqs. 17-19 in the multipliers",
     accelerate=accelerate,
-    linear_algebra=Sparse(),
+    scratch=None,
     crosses="by regularisation",
     handles_redundancy=True,
     handles_singular_mass=False,

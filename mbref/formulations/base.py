@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from mbref.kernels.compilation import Exchangeable
-from mbref.kernels.layout import SparseFactor
-from mbref.kernels.named_memory import allocate
 from mbref.kernels.records import NoNumbers
 
 
@@ -25,50 +22,6 @@ class About(NamedTuple):
     fails: str
 
 
-class LinearAlgebra(ABC):
-    """Interface: which Jacobian a formulation reads, and the memory that its kernel needs."""
-
-    sparse: bool
-
-    @abstractmethod
-    def rows(self, m: int) -> int:
-        """Return the number of rows of the dense Jacobian that the kernel reads: m or 0."""
-
-    @abstractmethod
-    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
-        """Return the kernel's memory for m rows, n velocities and a sparse factor if one is used."""
-
-
-@dataclass(frozen=True)
-class Dense(LinearAlgebra):
-    """The kernel reads the dense Jacobian; ``memory`` is the schema of its working memory."""
-
-    memory: type
-    sparse = False
-
-    def rows(self, m: int) -> int:
-        return m
-
-    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
-        return allocate(self.memory, {"m": m, "n": n})
-
-
-@dataclass(frozen=True)
-class Sparse(LinearAlgebra):
-    """The kernel reads the nonzero numbers of the Jacobian, whose positions a sparse factor has.
-
-    The cost is proportional to the number of joints.
-    """
-
-    sparse = True
-
-    def rows(self, m: int) -> int:
-        return 0
-
-    def scratch(self, m: int, n: int, factor: SparseFactor | None) -> Any:
-        return factor
-
-
 @dataclass(frozen=True)
 class Formulation:
     """A method of solving M q̈ + Φ_qᵀ λ = g, Φ_q q̈ = γ (Eqs. 3 and 4), with its claims as data.
@@ -81,7 +34,8 @@ class Formulation:
     about: About
     equations: str  # equation numbers of the paper
     accelerate: Exchangeable
-    linear_algebra: LinearAlgebra
+    # schema of the kernel's memory; None for a kernel that reads no dense Jacobian, but a SparseFactor
+    scratch: type | None
     handles_redundancy: bool
     handles_singular_mass: bool
     crosses: Literal["no", "by regularisation"] = (
@@ -93,6 +47,11 @@ class Formulation:
     needs_all_rows: bool = False
     numbers: type = NoNumbers  # record of the method's own numbers with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
+
+    @property
+    def is_sparse(self) -> bool:
+        """True if the cost is proportional to the number of joints, by a sparse factor."""
+        return self.scratch is None
 
     @cached_property
     def options(self) -> Mapping[str, float]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import About, Dense, Formulation
+from mbref.formulations.base import About, Formulation
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Indices, Matrix, Vector, opener
@@ -80,7 +80,7 @@ LM1 = Formulation(
     about=ABOUT,
     equations="Eq. 5",
     accelerate=accelerate,
-    linear_algebra=Dense(Scratch),
+    scratch=Scratch,
     handles_redundancy=False,
     handles_singular_mass=True,
 )

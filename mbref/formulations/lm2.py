@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import About, Dense, Formulation
+from mbref.formulations.base import About, Formulation
 from mbref.kernels.compilation import exchangeable, kernel
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
@@ -88,7 +88,7 @@ LM2 = Formulation(
     about=ABOUT,
     equations="Eqs. 6-8",
     accelerate=accelerate,
-    linear_algebra=Dense(Scratch),
+    scratch=Scratch,
     handles_redundancy=False,
     handles_singular_mass=False,
 )

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import About, Dense, Formulation
+from mbref.formulations.base import About, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
@@ -64,7 +64,7 @@ MPI_GS = Formulation(
     about=ABOUT,
     equations="Eqs. 26, 29, 30",
     accelerate=accelerate,
-    linear_algebra=Dense(Scratch),
+    scratch=Scratch,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from mbref.formulations.base import About, Dense, Formulation
+from mbref.formulations.base import About, Formulation
 from mbref.formulations.moore_penrose import recover_solution, scaled_residual, transpose
 from mbref.kernels.compilation import exchangeable
 from mbref.kernels.layout import ACCELERATE, OK, SINGULAR
@@ -63,7 +63,7 @@ MPI_QR = Formulation(
     about=ABOUT,
     equations="Eq. 26 with a pivoted QR",
     accelerate=accelerate,
-    linear_algebra=Dense(Scratch),
+    scratch=Scratch,
     handles_redundancy=True,
     handles_singular_mass=False,
 )

@@ -75,7 +75,7 @@ class System(NamedTuple):
     that it writes.
 
     The constraint Jacobian stands as the blocks of the columns of each row's bodies, or as a dense matrix, or
-    both: ``LinearAlgebra`` declares which form a formulation reads.
+    both: ``Formulation.is_sparse`` says which form a formulation reads.
     """
 
     mass: Annotated[Vector, "n"]  # diagonal of M

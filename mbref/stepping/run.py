@@ -93,7 +93,7 @@ class Run:
         start = consistent_start(model)
         if model.kinematic and freedoms_left(model, start) > 0:
             raise SceneError(missing_masses(self.scene))
-        if not (self.method.formulation.linear_algebra.sparse or self.method.stabilisation.projects):
+        if not (self.method.formulation.is_sparse or self.method.stabilisation.projects):
             return model, start, None
         q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
         start = replace(start, q=q[0], v=v[0])
@@ -108,8 +108,8 @@ class Run:
 
     def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
         """Return the data of a scene with the primitives that the run needs; ``axis`` counts primitives."""
-        sparse = self.method.formulation.linear_algebra.sparse
-        return self.reduction.scene(data, axis) if self.reduction and sparse else data
+        is_sparse = self.method.formulation.is_sparse
+        return self.reduction.scene(data, axis) if self.reduction and is_sparse else data
 
     def _acquire_memory(self) -> Pooled:
         """Return memory with the numbers of this run."""
@@ -129,7 +129,7 @@ class Run:
     def _identity(self) -> tuple[Any, ...]:
         """Return everything of the method that is in its memory: kernels, schemas and options."""
         formulation, stabilisation, integrator = self.method.parts
-        schemas = formulation.linear_algebra, stabilisation.memory, integrator.schema
+        schemas = formulation.scratch, stabilisation.memory, integrator.schema
         numbers = formulation.numbers, stabilisation.numbers
         options = (tuple(self.method.options_of(part).items()) for part in self.method.parts)
         return self._kernels_on(stabilisation), schemas, numbers, *options
@@ -140,8 +140,8 @@ class Run:
         formulation, stabilisation, integrator = method.parts
         factor, active = self._factor()
         pivots = factor.symbolic.row.size
-        algebra = formulation.linear_algebra
-        sizes = {**model.sizes, "k": self.times.size, "dense_rows": algebra.rows(model.m), "pivots": pivots}
+        dense_rows = model.m if formulation.scratch else 0
+        sizes = {**model.sizes, "k": self.times.size, "dense_rows": dense_rows, "pivots": pivots}
         watched = stabilisation.projects and not method.is_series
         sizes["watched_rows"] = pivots if watched else 0
         sizes["watched_entries"] = factor.d.size if watched else 0
@@ -150,7 +150,7 @@ class Run:
             sizes,
             data,
             options=method.packed_options(formulation),
-            scratch=packed(algebra.scratch(model.m, model.n, factor)),
+            scratch=packed(allocate(formulation.scratch, sizes) if formulation.scratch else factor),
         )
         return Memory(
             equations=equations,
