@@ -184,7 +184,7 @@ def _cell(compared: dict[str, Any] | None) -> str:
 def with_torsion_spring(scene: Scene) -> Scene:
     """Return the scene with a torsion spring on the first joint that can have one."""
     for joint in scene.joint:
-        if joint.facts.takes_torsion_spring:
+        if "angle" in joint.facts.loaded:
             spring = TorsionSpring(joint=joint.name, stiffness=5.0, damping=0.1, natural_angle=0.3)
             return scene.with_(load=(*scene.load, spring))
     return scene

@@ -54,11 +54,6 @@ class JointFacts:
     loaded: tuple[Coordinate, ...] = ()
 
     @property
-    def takes_torsion_spring(self) -> bool:
-        """True if a torsion spring or a torque about the axis can act."""
-        return ANGLE in self.loaded
-
-    @property
     def rows(self) -> int:
         """Number of constraint rows without a driver."""
         return len(self.forbidden_translations) + len(self.forbidden_rotations) + bool(self.condition)

@@ -104,7 +104,9 @@ class JointLoad(LoadEntry):
     @property
     def action(self) -> Action:
         """Coefficients of the force or torque along the joint coordinate."""
-        raise NotImplementedError
+        amount = "torque" if self.coordinate == ANGLE else "force"
+        fields = "stiffness", "damping", f"natural_{self.coordinate}", amount
+        return Action(*(getattr(self, field, 0.0) for field in fields))
 
 
 class TorsionSpring(JointLoad):
@@ -116,10 +118,6 @@ class TorsionSpring(JointLoad):
     damping: NotNegative = 0.0
     natural_angle: Angle = 0.0
 
-    @property
-    def action(self) -> Action:
-        return Action(self.stiffness, self.damping, self.natural_angle)
-
 
 class SlideSpring(JointLoad):
     """Spring and damper along a joint's axis; N/m, N s/m; displacement measured from t = 0."""
@@ -130,10 +128,6 @@ class SlideSpring(JointLoad):
     damping: NotNegative = 0.0
     natural_displacement: Length = 0.0
 
-    @property
-    def action(self) -> Action:
-        return Action(self.stiffness, self.damping, self.natural_displacement)
-
 
 class JointTorque(JointLoad):
     """Torque (N m) about a joint's axis, constant or times a ``factor``: a motor of known torque."""
@@ -143,10 +137,6 @@ class JointTorque(JointLoad):
     torque: Real
     factor: Factor | None = None
 
-    @property
-    def action(self) -> Action:
-        return Action(amount=self.torque)
-
 
 class JointForce(JointLoad):
     """Force (N) along a joint's axis, constant or times a ``factor``: an actuator of known force."""
@@ -155,10 +145,6 @@ class JointForce(JointLoad):
     type: Literal["joint_force"] = "joint_force"
     force: Real
     factor: Factor | None = None
-
-    @property
-    def action(self) -> Action:
-        return Action(amount=self.force)
 
 
 Load = Annotated[

@@ -178,7 +178,7 @@ def _still(load: Load) -> Load:
 
 def _torsion(scene: Scene, rng: np.random.Generator) -> Iterator[TorsionSpring]:
     """Return a torsion spring about a joint that accepts one, for two of three mechanisms."""
-    joints = [joint.name for joint in scene.joint if joint.facts.takes_torsion_spring]
+    joints = [joint.name for joint in scene.joint if "angle" in joint.facts.loaded]
     if joints and rng.random() < 2 / 3:
         joint = str(rng.choice(joints))
         stiffness, damping, angle = rng.uniform((1.0, 0.0, -1.0), (9.0, 0.2, 1.0)).tolist()

@@ -58,7 +58,7 @@ def changes(scene: Scene) -> Iterator[Change]:
     weight = sum(body.mass or 0.0 for body in scene.body)
     unit = 1e-3 * weight * scene_length(scene) ** 2 / scene.duration
     for joint in scene.joint:
-        if joint.facts.takes_torsion_spring:
+        if "angle" in joint.facts.loaded:
             yield _damping(scene, joint.name, unit)
     for body in scene.body:
         yield _mass(scene, body.name)
