@@ -6,6 +6,7 @@ import math
 import operator
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 from mbref.input_error import InputError
@@ -110,10 +111,8 @@ def _pairs(value: Any) -> tuple[tuple[int, int], ...]:
     """Return pairs of whole numbers from 1, for a mapping or for pairs."""
     try:
         pairs = value.items() if isinstance(value, Mapping) else value
-        return tuple(
-            (operator.index(crossing), _count("branches", branch, 1, LARGEST_COUNT))
-            for crossing, branch in pairs
-        )
+        counts = partial(_count, "branches", least=1, largest=LARGEST_COUNT)
+        return tuple((counts(crossing), counts(branch)) for crossing, branch in pairs)
     except (TypeError, ValueError):
         raise InputError(
             f"branches: must be pairs of a crossing and a branch, counted from 1, got {shown(value)}"

@@ -98,7 +98,7 @@ def test_limits_of_a_run():
         ("rank_tolerance", (0.0, 1e-40, 0.99), (-1e-9, 0.995)),
         ("violation", (1e-40, 1e40), (0.0, 2e40)),
         ("most_steps", (1, 2**62), (0, 2**62 + 1, 1.5, True)),
-        ("branches", ({1: 2}, [(3, 1)], ()), ({1: 0}, [(1,)], 5, {1: 1.5})),
+        ("branches", ({1: 2}, [(3, 1)], ()), ({1: 0}, {0: 2}, {-3: 1}, [(1,)], 5, {1: 1.5})),
         ("compared", (True, False), (1, None)),
         ("code", ("auto", "generic", "generated"), ("fast",)),
         ("atol", (None, 1e-3), (0.0,)),
