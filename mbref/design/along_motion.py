@@ -13,6 +13,7 @@ from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
+from mbref.linear_algebra.least_norm import null_space
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
@@ -122,12 +123,10 @@ def general_pose(model: Model, seed: int = 1) -> np.ndarray:
     if model.m > MOST_ROWS_ALONG:
         return q
     for _ in range(5):
-        jacobian = scaled_jacobian(model, 0.0, q)
-        _, values, vt = np.linalg.svd(jacobian)
-        free = vt[int(np.sum(values > NEARLY * values.max(initial=0.0))) :]
-        if not len(free):
+        free = null_space(scaled_jacobian(model, 0.0, q), NEARLY)
+        if not free.size:
             return q
-        step = free.T @ random.normal(size=len(free))
+        step = free @ random.normal(size=free.shape[1])
         moved, phi = solve_positions(model, 0.0, displaced(q, 0.1 * step / np.abs(step).max()))
         if np.abs(phi).max(initial=0.0) > 1e-9:
             return q

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +11,9 @@ import numpy as np
 from mbref.design.along_motion import general_pose
 from mbref.design.placed import placed
 from mbref.equations.along_trajectory import without_armatures
-from mbref.equations.diagnosis import scaled_jacobian
+from mbref.equations.diagnosis import rank_of, scaled_jacobian
 from mbref.equations.model import Model
+from mbref.linear_algebra.least_norm import null_space
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
 from mbref.stepping.run import NEARLY
 
@@ -74,8 +75,7 @@ Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining row
 
 def _dependences(rows: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int]:
     """Return a basis of the c vanishing linear combinations of rows (d, n), by joint (d, c), and c."""
-    left, values, _ = np.linalg.svd(np.concatenate(list(rows.values())))
-    null = left[:, int(np.sum(values > NEARLY * values[0])) :]
+    null = null_space(np.concatenate(list(rows.values())).T, NEARLY)
     ends = np.cumsum([len(r) for r in rows.values()])[:-1]
     return dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1]
 
@@ -137,18 +137,14 @@ def _joint_by_joint(choices: Choices, number: int) -> Exchange | None:
 def _is_cure(rows: Mapping[str, np.ndarray], choices: Choices, exchange: Exchange) -> bool:
     """Return whether the remaining rows are independent, and their number equals the rank."""
     left = {**rows, **{name: choices[name][kind].rows for name, kind in exchange.items()}}
-    return _rank(left.values()) == _rank(rows.values()) == sum(map(len, left.values()))
+    remaining, every = (np.concatenate(list(of.values())) for of in (left, rows))
+    return rank_of(remaining, NEARLY) == rank_of(every, NEARLY) == len(remaining)
 
 
 def _rows(model: Model) -> dict[str, np.ndarray]:
     """Return the rows of Φ_q at the scene's poses, of unit length, by joint."""
     jacobian, owner = scaled_jacobian(model, 0.0, model.start()), np.array(model.row_joint)
     return {name: jacobian[owner == name] for name in dict.fromkeys(model.row_joint)}
-
-
-def _rank(rows: Iterable[np.ndarray]) -> int:
-    values = np.linalg.svd(np.concatenate(list(rows)), compute_uv=False)
-    return int(np.sum(values > NEARLY * values[0]))
 
 
 def _bearing(scene: Scene, name: str) -> list[str]:

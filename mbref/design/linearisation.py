@@ -13,7 +13,8 @@ import numpy as np
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
 from mbref.equations.initial_state import CLOSED, solve_positions
 from mbref.equations.model import Model, displaced
-from mbref.equations.units import row_lengths
+from mbref.equations.units import unit_rows
+from mbref.linear_algebra.least_norm import null_space
 
 TANGENT_RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
@@ -124,7 +125,4 @@ def unsteady(tangent: Tangent) -> str:
 
 def _null_space(jacobian: np.ndarray) -> np.ndarray:
     """Return an orthonormal basis (n, f) of the displacements that unit rows allow."""
-    if not len(jacobian):
-        return np.eye(jacobian.shape[1])
-    _, values, vectors = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None])
-    return np.asarray(vectors[int(np.sum(values > TANGENT_RANK * values[0])) :].T)
+    return null_space(unit_rows(jacobian), TANGENT_RANK)

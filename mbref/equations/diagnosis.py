@@ -11,7 +11,7 @@ import numpy as np
 from mbref.equations.initial_state import LARGE, Start, consistent_start, solve_positions
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model, displaced
-from mbref.equations.units import row_lengths
+from mbref.equations.units import unit_rows
 from mbref.linear_algebra.redundancy import Redundancy
 from mbref.scene import Scene
 from mbref.scene_services import Counts
@@ -175,12 +175,11 @@ def _redundancy(model: Model, start: Start) -> Redundancy:
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
-    """Return Φ_q (m, n) with rows of unit length, so that its rank does not depend on units."""
-    jacobian = model.terms(t, q).jacobian
-    return jacobian / row_lengths(jacobian)[:, None]
+    """Return Φ_q (m, n) with rows of unit length."""
+    return unit_rows(model.terms(t, q).jacobian)
 
 
-def rank_of(matrix: np.ndarray) -> int:
-    """Return the number of singular values above the rank tolerance times the largest singular value."""
+def rank_of(matrix: np.ndarray, tolerance: float = RANK_TOLERANCE) -> int:
+    """Return the number of singular values above the tolerance times the largest singular value."""
     values = np.linalg.svd(matrix, compute_uv=False)
-    return int(np.sum(values > RANK_TOLERANCE * values[0])) if values.size else 0
+    return int(np.sum(values > tolerance * values[0])) if values.size else 0

@@ -33,6 +33,11 @@ def row_lengths(matrix: np.ndarray) -> np.ndarray:
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
+def unit_rows(matrix: np.ndarray) -> np.ndarray:
+    """Return matrices (…, m, n) with rows of unit length, so that their rank does not depend on units."""
+    return matrix / row_lengths(matrix)[..., None]
+
+
 def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Return the length (…, nb) of every body (m).
 

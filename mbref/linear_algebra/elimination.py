@@ -18,24 +18,36 @@ def lu_factor(a, n, pivots, tolerance):
     ``pivots`` (n,) receives the row exchanged with each row.
     """
     for k in range(n):
-        best, size = k, abs(a[k, k])
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > size:
-                best, size = i, abs(a[i, k])
-        pivots[k] = best
-        if not size > tolerance:
+        pivots[k] = exchange_for_pivot(a, n, k)
+        if not abs(a[k, k]) > tolerance:
             return False
-        if best != k:
-            for j in range(n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, n):
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
+        eliminate_column(a, n, n, k, 1.0 / a[k, k])
     return True
+
+
+@inlined
+def exchange_for_pivot(a, n, k):
+    """Exchange row k of a[:n, :n] with the row below that has the largest entry in column k; return that
+    row."""
+    best = k
+    for i in range(k + 1, n):
+        if abs(a[i, k]) > abs(a[best, k]):
+            best = i
+    if best != k:
+        for j in range(n):
+            a[k, j], a[best, j] = a[best, j], a[k, j]
+    return best
+
+
+@inlined
+def eliminate_column(a, m, n, k, inverse):
+    """Subtract row k from the rows of a[:m, :n] below, whose entries in column k become the factors."""
+    for i in range(k + 1, m):
+        factor = a[i, k] * inverse
+        a[i, k] = factor
+        if factor != 0.0:
+            for j in range(k + 1, n):
+                a[i, j] -= factor * a[k, j]
 
 
 @kernel
@@ -72,23 +84,10 @@ def determinant(a, n):
     replace a."""
     negative, size, part = False, 0.0, 1.0
     for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if abs(a[i, k]) > abs(a[best, k]):
-                best = i
-        if best != k:
-            negative = not negative
-            for j in range(n):
-                a[k, j], a[best, j] = a[best, j], a[k, j]
-        if a[k, k] < 0.0:
-            negative = not negative
+        exchanged = exchange_for_pivot(a, n, k) != k
+        negative = negative != (exchanged != (a[k, k] < 0.0))
         size, part = multiplied(size, part, a[k, k])
-        inverse = 1.0 / a[k, k] if abs(a[k, k]) > 1e-150 else 0.0
-        for i in range(k + 1, n):
-            factor = a[i, k] * inverse
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
+        eliminate_column(a, n, n, k, 1.0 / a[k, k] if abs(a[k, k]) > 1e-150 else 0.0)
     return negative, size + log(part)
 
 
@@ -127,13 +126,7 @@ def full_pivot(a, m, n, rows, columns, tolerance):
             return k
         exchange_rows(a, n, k, best_row, rows)
         exchange_columns(a, m, k, best_column, columns)
-        inverse = 1.0 / a[k, k]
-        for i in range(k + 1, m):
-            factor = a[i, k] * inverse
-            a[i, k] = factor
-            if factor != 0.0:
-                for j in range(k + 1, n):
-                    a[i, j] -= factor * a[k, j]
+        eliminate_column(a, m, n, k, 1.0 / a[k, k])
     return min(m, n)
 
 

@@ -23,6 +23,11 @@ def least_norm_and_null_space(
     return x, right[int(rank) :].T
 
 
+def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return an orthonormal basis (n, k) of the null space of A (m, n)."""
+    return least_norm_and_null_space(matrix, np.zeros(len(matrix)), tolerance)[1]
+
+
 def _pseudo_solutions(
     left: np.ndarray, values: np.ndarray, right: np.ndarray, rhs: np.ndarray, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:

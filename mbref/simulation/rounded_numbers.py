@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.diagnosis import rank_of, scaled_jacobian
+from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.model import displaced
+from mbref.linear_algebra.least_norm import null_space
 from mbref.stepping.run import Run
 
 POSE_STEP = 0.1  # m and rad; largest change of a coordinate on the way to a nearby pose
@@ -32,8 +33,8 @@ def gap_of(run: Run) -> float:
     start."""
     model, q = run.model, run.start.q
     jacobian = scaled_jacobian(model, 0.0, q)
-    rank, vt = rank_of(jacobian), np.linalg.svd(jacobian)[2]
-    free = vt[rank:].sum(axis=0)
+    space = null_space(jacobian, RANK_TOLERANCE)
+    rank, free = model.n - space.shape[1], space.sum(axis=1)
     if not free.any() or rank == model.m:
         return 0.0
     q = displaced(q, POSE_STEP * free / np.abs(free).max())

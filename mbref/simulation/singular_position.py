@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.branches import MOST_BRANCHED_ROWS
-from mbref.equations.units import row_lengths
+from mbref.equations.units import unit_rows
 from mbref.stepping.run import Run
 
 TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored
@@ -63,8 +63,7 @@ def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.
     """Return singular values and left singular vectors (m, m) of Φ_q with unit rows and columns scaled to
     unit length."""
     terms, model = run.model.terms(t, q), run.model
-    jacobian = terms.jacobian * model.data.metric_root
-    left, values, _ = np.linalg.svd(jacobian / row_lengths(jacobian)[:, None])
+    left, values, _ = np.linalg.svd(unit_rows(terms.jacobian * model.data.metric_root))
     return np.concatenate([values, np.zeros(model.m)]), left
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.equations.model import Model
-from mbref.equations.units import row_lengths
+from mbref.equations.units import unit_rows
 from mbref.kernels.layout import SparseFactor, Symbolic
 from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.minimum_norm import factorise_once
@@ -55,7 +55,7 @@ def all_ranks(
     if rows.size > MOST_RANKED_ROWS or not rows.size:
         return [NO_RANKS] * len(blocks)
     jacobian = model.structure.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]
-    every = np.linalg.svd(jacobian / row_lengths(jacobian)[..., None], compute_uv=False)
+    every = np.linalg.svd(unit_rows(jacobian), compute_uv=False)
     return [_ranks(values, tolerance) for values in every]
 
 
