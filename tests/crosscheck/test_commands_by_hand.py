@@ -296,3 +296,64 @@ def test_singular_instants_are_small_minima_of_the_least_singular_value_of_rank(
     assert moving_picture.singular_instants(scene) == pytest.approx([0.3, 0.6])
     values[299:302, 1] = 0.01
     assert moving_picture.singular_instants(scene) == pytest.approx([0.301, 0.6]), "the last of equal values"
+
+
+# --- scenes of a command ----------------------------------------------------------------------------------
+def test_faults_name_their_scene_where_there_are_several(tmp_path):
+    (tmp_path / "bad.toml").write_text("gravity = 3\n")
+    bad = str(tmp_path / "bad.toml")
+    with pytest.raises(RequestError) as alone:
+        scene_request.read_scenes([bad])
+    with pytest.raises(RequestError) as beside:
+        scene_request.read_scenes(["heavy_top", bad, "nothing"])
+    faults = alone.value.faults
+    assert not faults[0].startswith(f"{bad}: {bad}") and len(beside.value.faults) == len(faults) + 1
+    assert beside.value.faults[: len(faults)] == tuple(f"{bad}: {fault}" for fault in faults)
+    assert beside.value.faults[-1].startswith("nothing: ")
+
+
+def test_scenes_are_asked_for_once(tmp_path):
+    found = scene_request.read_scenes(["heavy_top", "four_bar"])
+    assert [scene.name for scene in found] == ["heavy_top", "four_bar"]
+    with pytest.raises(RequestError) as refused:
+        scene_request.read_scenes(["four_bar", "heavy_top", "four_bar", "heavy_top", "five_bar"])
+    assert refused.value.faults == (
+        "scene 'four_bar' is asked for twice",
+        "scene 'heavy_top' is asked for twice",
+    )
+
+
+def test_velocities_that_contradict_the_joints_are_refused_with_their_line(tmp_path):
+    text = (
+        'name = "rod"\nduration = 1.0\n\n[[body]]\nname = "a"\nmass = 1.0\ninertia = [1.0, 1.0, 1.0]\n'
+        "position = [1.0, 0.0, 0.0]\nvelocity = [1.0, 0.0, 0.0]\nangular_velocity = [0.0, 0.0, 0.0]\n\n"
+        '[[joint]]\nname = "A"\ntype = "revolute"\nbodies = ["ground", "a"]\nanchor = [0.0, 0.0, 0.0]\n'
+        "axis = [0.0, 0.0, 1.0]\n"
+    )
+    (tmp_path / "rod.toml").write_text(text)
+    with pytest.raises(RequestError) as refused:
+        scene_request.find_scenes([str(tmp_path / "rod.toml")])
+    assert "line" in refused.value.faults[0] and "A" in refused.value.faults[0]
+    (tmp_path / "rod.toml").write_text(text.replace("velocity = [1.0", "velocity = [0.0"))
+    [scene] = scene_request.find_scenes([str(tmp_path / "rod.toml")])
+    assert scene.name == "rod"
+
+
+def test_files_of_other_programs_are_known_by_their_first_character(tmp_path, monkeypatch):
+    (tmp_path / "a.scene").write_text("\n  <mujoco/>")
+    (tmp_path / "b.scene").write_text("name = '<'")
+    assert scene_request._is_xml(str(tmp_path / "a.scene")) and not scene_request._is_xml(
+        str(tmp_path / "b.scene")
+    )
+    assert not scene_request._is_xml(str(tmp_path)) and not scene_request._is_xml(str(tmp_path / "none"))
+    asked: list[Any] = []
+    found = SimpleNamespace(left_out=["a sensor"], notes=["a note"], scene=SCENE, originals=("run",))
+    monkeypatch.setattr(
+        scene_request.formats, "read", lambda name, reading: asked.append((name, reading)) or found
+    )
+    monkeypatch.setattr(scene_request, "remember", lambda *given: asked.append(given))
+    name = str(tmp_path / "a.scene")
+    assert scene_request.read_scenes([name], notice=asked.append) == [SCENE]
+    options, *lines, remembered = asked
+    assert options[0] == name and lines == [f"{name}: left out: a sensor", f"{name}: a note"]
+    assert remembered == (SCENE, ("run",))
