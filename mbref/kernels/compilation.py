@@ -37,6 +37,7 @@ from mbref.kernels.disk_cache import (
     remove_damaged,
 )
 from mbref.kernels.file_lock import held, is_held
+from mbref.kernels.interrupts import interrupts_kept
 
 # No fastmath: the same bits with and without the JIT.  Without numba's runtime (``_nrt``, undocumented there)
 # no kernel can allocate, and none counts references to its arrays, which takes time.
@@ -186,7 +187,7 @@ class Exchangeable:
 
     def _compile(self, **options: Any) -> Function:
         """Return the compiled function, loaded if the cache has it."""
-        with cached_in(CACHE):
+        with cached_in(CACHE), interrupts_kept():
             return self._decorator(**{**OPTIONS, **options})(self.function)
 
     def _decorator(self, **options: Any) -> Function:

@@ -1,0 +1,70 @@
+"""Interrupts during a compilation / signals that this process sends to itself."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from mbref.kernels.interrupts import interrupts_kept
+
+
+@pytest.fixture(autouse=True)
+def _python_handler() -> Iterator[None]:
+    """Begin with Python's own handler, also where the shell has made this process ignore interrupts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_that_is_lost_is_raised_at_the_end_of_the_block():
+    """A function that LLVM calls loses the exception, as ``except`` does here."""
+    done = []
+    with pytest.raises(KeyboardInterrupt), interrupts_kept():
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            done.append("lost")
+        done.append("compiled")
+    assert done == ["lost", "compiled"] and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    with interrupts_kept():
+        done.append("again")
+    assert done[2:] == ["again"], "without an interrupt nothing is raised"
+
+
+def test_an_interrupt_ends_the_block():
+    done = []
+    with pytest.raises(KeyboardInterrupt), interrupts_kept():
+        signal.raise_signal(signal.SIGINT)
+        done.append("compiled")
+    assert not done and signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_error_of_the_block_is_raised_first():
+    with pytest.raises(ZeroDivisionError), interrupts_kept():
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        _ = 1 / 0
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_handler_of_the_program_and_other_threads_are_left_alone():
+    received = []
+    signal.signal(signal.SIGINT, lambda number, _: received.append(number))
+    with interrupts_kept():
+        signal.raise_signal(signal.SIGINT)
+    assert received == [signal.SIGINT]
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    seen = []
+
+    def compiled() -> None:
+        with interrupts_kept():
+            seen.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=compiled)
+    thread.start()
+    thread.join()
+    assert seen == [signal.default_int_handler]
