@@ -566,3 +566,94 @@ def test_products_of_pivots_of_any_size():
     assert not negative and size == pytest.approx(750 * math.log(10))
     negative, size = elimination.product_of_pivots(np.array([-1e-140, 1e-140, 1e-140]), 3)
     assert negative and size == pytest.approx(-420 * math.log(10))
+
+
+# --- coordinate partitioning ------------------------------------------------------------------------------
+def turning() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates q, velocities v, and the rates q' = (r', ½ p ω') of two bodies; accelerations."""
+    p = np.array([[0.5, -0.5, 0.1, 0.7], [0.3, 0.8, -0.4, 0.33]])
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
+    v = np.array([[1.0, 2.0, 3.0, 0.4, -0.7, 1.1], [-1.0, 0.5, 2.0, -0.3, 0.9, 0.2]])
+    rates = 0.5 * rotations.multiply(p, np.column_stack([np.zeros(2), v[:, 3:]]))
+    q = np.column_stack([np.array([[0.1, 0.2, 0.3], [7.0, 8.0, 9.0]]), p])
+    return q.ravel(), v.ravel(), np.column_stack([v[:, :3], rates]).ravel(), 0.7 * v.ravel() + 0.1
+
+
+def test_velocities_of_rates_of_euler_parameters():
+    q, v, rates, _ = turning()
+    state = SimpleNamespace(coordinates=q, velocities=np.zeros(12), coordinate_rates=rates)
+    partitioning.velocities_of_rates(state)
+    assert state.velocities == pytest.approx(v)
+
+
+def test_second_rates_of_euler_parameters():
+    """p'' = ½ p (0, ω̇') - ¼ ω² p: the derivative of ½ p (0, ω')."""
+    q, v, _, a = turning()
+    state = SimpleNamespace(coordinates=q, velocities=v, coordinate_second=np.zeros(14))
+    partitioning.second_rates(a, state)
+    found, p = state.coordinate_second.reshape(2, 7), q.reshape(2, 7)[:, 3:]
+    own, more = v.reshape(2, 6)[:, 3:], a.reshape(2, 6)[:, 3:]
+    expected = 0.5 * rotations.multiply(p, np.column_stack([np.zeros(2), more]))
+    expected -= 0.25 * (own * own).sum(axis=1)[:, None] * p
+    assert found[:, :3] == pytest.approx(a.reshape(2, 6)[:, :3]) and found[:, 3:] == pytest.approx(expected)
+
+
+def test_the_jacobian_by_euler_parameters():
+    """Its products with rates q' are the products of blocks with velocities; the last rows are 2 p."""
+    q, v, rates, _ = turning()
+    blocks = np.array(
+        [[1.0, 2, 3, 4, 5, 6, -1, -2, -3, 0.5, 0.25, 7], [0.0, 1, 0, -2, 3, 1, 9, 9, 9, 9, 9, 9]]
+    )
+    bodies = np.array([[0, 1], [1, 2]])  # body 2 is the fixed frame
+    equations = SimpleNamespace(
+        scene=SimpleNamespace(row_bodies=bodies), system=SimpleNamespace(blocks=blocks)
+    )
+    found = np.full((4, 14), 99.0)
+    partitioning.jacobian_by_euler_parameters(q, equations, found)
+    wanted = blocks[0] @ v, blocks[1, :6] @ v[6:]
+    assert found[:2] @ rates == pytest.approx(wanted)
+    assert found[2].tolist() == [0.0] * 3 + (2 * q[3:7]).tolist() + [0.0] * 7
+    assert found[3].tolist() == [0.0] * 10 + (2 * q[10:14]).tolist()
+
+
+def test_dependent_coordinates_are_predicted_from_the_last_step():
+    """u + h u' + ½ h² u'' at h = 0.5, of the first two coordinates in the order."""
+    scratch = SimpleNamespace(partition=SimpleNamespace(rank=2), column_order=np.array([2, 0, 1]))
+    previous = SimpleNamespace(
+        coordinates=np.array([1.0, 2.0, 3.0]),
+        coordinate_rates=np.array([10.0, 20.0, 30.0]),
+        coordinate_second=np.array([8.0, 16.0, 24.0]),
+    )
+    memory = SimpleNamespace(
+        state=SimpleNamespace(coordinates=np.full(3, -1.0)),
+        previous=previous,
+        watch=SimpleNamespace(accepted_time=1.0),
+        chart=scratch,
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(partitioning, "scratch_of", lambda chart: chart)
+        partitioning.predict_dependent(1.5, memory)
+        assert memory.state.coordinates.tolist() == [1.0 + 5.0 + 1.0, -1.0, 3.0 + 15.0 + 3.0]
+        y = np.zeros(6)
+        memory.state.coordinate_rates = np.array([0.1, 0.2, 0.3])
+        memory.state.coordinates[:] = 4.0, 5.0, 6.0
+        assert partitioning.gather_independent(y, memory) == 2
+        assert y.tolist() == [5.0, 0.2, 0.0, 0.0, 0.0, 0.0]
+
+
+def test_the_largest_violation_of_rows_and_unit_quaternions():
+    """Φ of row 1, and pᵀp - 1 = 3 of body 0; row 0 is no active row."""
+    q = np.array([0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0])
+    scratch = SimpleNamespace(
+        partition=SimpleNamespace(rank=2), row_order=np.array([2, 1, 0]), residual=np.zeros(4)
+    )
+    rows = SimpleNamespace(phi=np.array([99.0, -5.0]))
+    memory = SimpleNamespace(
+        state=SimpleNamespace(coordinates=q), equations=SimpleNamespace(rows=rows), chart=scratch
+    )
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(partitioning, "scratch_of", lambda chart: chart)
+        assert partitioning.find_violation(memory) == 5.0
+        assert scratch.residual.tolist() == [3.0, -5.0, 0.0, 0.0]
+        rows.phi[1] = math.nan
+        assert math.isnan(partitioning.find_violation(memory)), "it is no small violation"
