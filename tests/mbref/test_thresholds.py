@@ -6,8 +6,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from mbref.taylor.crossing import thresholds
-from tests.mbref import interpreted_crossings, interpreted_thresholds
+from tests.mbref import interpreted_thresholds
 
 NAMES = [name for name in vars(thresholds) if name.isupper()]
 CHECKS = Path(interpreted_thresholds.__file__)
@@ -37,15 +39,16 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
     assert f"{3 * len(NAMES)} passed" in done.stdout, done.stdout[-500:]
 
 
-def test_parts_of_crossings_and_small_kernels_do_what_they_say():
-    by_hand = (
-        CHECKS.with_name(f"test_{name}.py") for name in ("kernels_by_hand", "written_code", "short_runs")
-    )
-    files = (
-        interpreted_crossings.__file__,
-        str(CHECKS.with_name("interpreted_drivers.py")),
-        *map(str, by_hand),
-    )
-    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", *files)
+@pytest.mark.parametrize(
+    "files",
+    [
+        ("interpreted_crossings", "interpreted_drivers", "test_kernels_by_hand", "test_written_code"),
+        pytest.param(("test_short_runs", "interpreted_commands"), marks=pytest.mark.slow),
+    ],
+    ids=["parts", "runs"],
+)
+def test_interpreted_kernels_do_what_they_say(files):
+    paths = [str(CHECKS.with_name(f"{name}.py")) for name in files]
+    done = interpreted("-m", "pytest", "-q", "-p", "no:cacheprovider", *paths)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert " passed" in done.stdout and "skipped" not in done.stdout, done.stdout[-500:]
