@@ -14,6 +14,7 @@ from tests.meta.imports import ROOT, imported, module_name, sources
 PACKAGES = ("mbref", "crosscheck", "reports")
 ADAPTERS = "crosscheck/engines/"
 LISTS = ("BUILT_IN", "OPTIONAL", "GENERATORS", "LARGE", "ON_REQUEST")
+WHOLE = "tests/mbref/test_short_runs.py", "tests/mbref/interpreted_commands.py"  # they reach most of mbref
 FEWEST = 12  # test files that are run, where so many reach the source
 FARTHEST = 7  # imports between a test and the source
 NAMES = "test_*.py", "interpreted_*.py"  # files of tests; some of them run with interpreted kernels alone
@@ -26,7 +27,7 @@ SNAPSHOTS = (  # they see that a text changed, not that it is wrong
 
 def importers(file: str) -> list[str]:
     """Return the test files that import a source file, directly or through other sources, until there are
-    FEWEST of them; tests that only compare a stored text are left out."""
+    FEWEST of them, and WHOLE; tests that only compare a stored text are left out."""
     wanted, seen = {_module(file)}, {_module(file)}
     found: list[str] = []
     for _ in range(FARTHEST):
@@ -35,7 +36,7 @@ def importers(file: str) -> list[str]:
             break
         wanted = {module for module, targets in _arrows().items() if targets & seen}
         seen |= wanted
-    return found
+    return found + [test for test in WHOLE if file.startswith("mbref/") and test not in found]
 
 
 def _module(file: str) -> str:

@@ -13,6 +13,7 @@ STARTING = 1.0  # CPU s until the first test of a file runs
 PER_SECOND = 4000  # characters of a test file that take a second, before its time is known
 # part of the name, or text, of files whose tests are short: by hand, or with interpreted kernels alone
 BY_HAND, INTERPRETED, FASTER = "by_hand", "not PLAIN", 4.0
+NEARER = 4.0
 
 
 def ordered(
@@ -26,17 +27,21 @@ def ordered(
 
     Files that have killed most mutants of the same folder come first, then files with the least time for each
     of these names that they contain: the functions and classes around a mutant, its module, a part of the
-    module, and its package. Files with BY_HAND or INTERPRETED count as FASTER.
+    module, and its package. Files with BY_HAND or INTERPRETED count as FASTER, tests of the
+    mutant's package as NEARER.
     """
     package, module = ".".join(Path(mutant.file).parent.parts), Path(mutant.file).stem
+    folder = f"tests/{package.partition('.')[0]}/"
     words = {re.escape(package), module, rf"{module}(\.\w+| import)", *around(source, mutant)}
     places = list(tests)
 
     def rank(test: str) -> tuple[int, float, int]:
         named = sum(bool(re.search(rf"\b{word}\b", tests[test])) for word in words)
         needed = seconds.get(test, STARTING + len(tests[test]) / PER_SECOND)
-        is_short = BY_HAND in test or INTERPRETED in tests[test]
-        return -kills.get(test, 0), needed / (1 + named) / (FASTER if is_short else 1.0), places.index(test)
+        needed /= 1 + named
+        needed /= FASTER if BY_HAND in test or INTERPRETED in tests[test] else 1.0
+        needed /= NEARER if test.startswith(folder) else 1.0
+        return -kills.get(test, 0), needed, places.index(test)
 
     return sorted(tests, key=rank)
 
