@@ -44,6 +44,9 @@ CLOSED_ENOUGH = 1e-8  # m and rad; largest residual of a result
 REDUNDANT = 1e-7  # singular value / largest singular value; smaller values belong to redundant rows
 
 
+ROUNDED = 1e-13  # entry of a closure's row / largest entry of its two ends; smaller entries are rounding
+
+
 class Terms(NamedTuple):
     """An engine's terms at a state, velocities in the tree's order.
 
@@ -69,6 +72,14 @@ class Mechanism(Protocol):
 
     def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
         """Return the engine's terms at positions (nq,) and velocities (nv,)."""
+
+
+def _unrounded(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the rows ``second`` - ``first`` (n, nv), with zeros for rounding: a closure that the tree
+    satisfies anyway, such as a duplicate joint, has rows of zeros, which the least squares leave out."""
+    rows = second - first
+    rows[np.abs(rows) < ROUNDED * max(np.abs(first).max(), np.abs(second).max())] = 0.0
+    return rows
 
 
 def sweep(rate: float) -> list[Setting]:
@@ -243,7 +254,7 @@ class Simulation:
                 turned = self._rotation(terms, closure.links[1]) @ self._rotation(terms, closure.links[0]).T
                 gap = np.concatenate([gap, rotation_vector(rotations.from_matrix(turned))])
             residual.append(gap)
-            jacobian.append((second[1] - first[1])[:n])
+            jacobian.append(_unrounded(first[1][:n], second[1][:n]))
             drift.append((second[2] - first[2])[:n])
             places.append(second[0])
         residual.append(self.coupled @ self.at.of_velocities(q))

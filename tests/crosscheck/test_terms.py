@@ -89,6 +89,15 @@ def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
 
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart")])
+def test_a_duplicate_joint_changes_no_motion(name: str) -> None:
+    """The rows of its closure are zero but for rounding, which is no condition on the accelerations."""
+    scene = scenes()["spherical joint"]
+    twice = scene.joint[-1].model_copy(update={"name": "again"})
+    run = simulate(name, scene.with_(joint=(*scene.joint, twice)), TERMS, scene.duration / 16)
+    assert error(scene, run) < LATER
+
+
+@pytest.mark.parametrize("name", [of("drake"), of("dart")])
 def test_terms_at_a_dead_end(name: str) -> None:
     """Drivers that demand poses which the mechanism does not have end a run with a reason."""
     scene = dead_end()
