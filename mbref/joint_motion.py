@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,14 +76,27 @@ def along(found: JointMotion, coordinate: Coordinate) -> tuple[np.ndarray, np.nd
     return np.asarray(value), np.asarray(rate)
 
 
-def position_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:
-    """Return world positions (k, 3) of a point (world, t = 0) that moves with a body, or is fixed to the
-    ground."""
-    b = scene.body_index(name)
+def carried(points: np.ndarray, motion: Trajectory, body: int) -> np.ndarray:
+    """Return the world points (k, n, 3) of points (n, 3) in the frame of a body."""
+    return motion.position[:, body, None] + rotations.rotate(motion.orientation[:, body, None], points[None])
+
+
+def positions_of(
+    scene: Scene, motion: Trajectory, name: str, points: Sequence[Sequence[float]]
+) -> np.ndarray:
+    """Return world positions (k, n, 3) of points (n, 3, world, t = 0) that move with a body, or are fixed to
+    the ground."""
+    b, at_start = scene.body_index(name), np.array(points, dtype=float)
     if b < 0:
-        return np.tile(np.array(point), (len(motion.times), 1))
-    arm = np.array(point) - np.array(scene.body[b].position)
-    return np.asarray(motion.position[:, b] + rotations.rotate(turned_since_start(scene, motion, name), arm))
+        return np.broadcast_to(at_start, (len(motion.times), *at_start.shape))
+    body = scene.body[b]
+    turned_back = rotations.conjugate(np.array(body.orientation))
+    return carried(rotations.rotate(turned_back, at_start - np.array(body.position)), motion, b)
+
+
+def position_of(scene: Scene, motion: Trajectory, name: str, point: Sequence[float]) -> np.ndarray:
+    """Return ``positions_of`` one point: (k, 3)."""
+    return np.asarray(positions_of(scene, motion, name, [point])[:, 0])
 
 
 def velocity_of(scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]) -> np.ndarray:

@@ -10,8 +10,9 @@ import numpy as np
 
 from mbref.drawing import svg
 from mbref.drawing.marks import Stage
-from mbref.drawing.shapes import anchors, carried, shapes
+from mbref.drawing.shapes import anchors, shapes
 from mbref.drawing.svg import COLOURS, INK
+from mbref.joint_motion import carried
 
 LETTER, LINE_HEIGHT = 7.4, 15.0  # px; mean width of a letter, and height of a line
 SIGN = 8.0  # px; half the width of a joint's symbol

@@ -9,10 +9,11 @@ import numpy as np
 
 from mbref import rotations
 from mbref.drawing import svg
-from mbref.drawing.shapes import attached, attack
+from mbref.drawing.shapes import attack
 from mbref.drawing.svg import GREY, INK, PAPER
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page
+from mbref.joint_motion import position_of, positions_of
 from mbref.rotations import Vector3
 from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 from mbref.trajectory import Trajectory
@@ -33,11 +34,11 @@ class Stage(NamedTuple):
 
     def place(self, body: str, point: Vector3) -> np.ndarray:
         """Return the pixels (k, 2) of a point (world, t = 0) of a body."""
-        return self.page.pixels(attached(self.scene, self.motion, body, [point])[:, 0])
+        return self.page.pixels(position_of(self.scene, self.motion, body, point))
 
     def points(self, body: str, points: np.ndarray) -> np.ndarray:
         """Return the pixels (k, n, 2) of points (n, 3, world, t = 0) of a body."""
-        return self.page.pixels(attached(self.scene, self.motion, body, points.tolist()))
+        return self.page.pixels(positions_of(self.scene, self.motion, body, points.tolist()))
 
     def along(self, body: str, point: Vector3, axis: np.ndarray, px: float) -> np.ndarray:
         """Return the pixels (k, 2, 2) of the ends of an axis through a point, each at most ``px`` away."""
@@ -71,7 +72,7 @@ def _guide(stage: Stage, joint: Joint, side: int) -> np.ndarray:
     """Return the pixels (1, 2, 2) of the line along which a joint to the ground slides. The line is a little
     longer than the travel."""
     axis, point = rotations.unit(joint.directions[0]), np.array(joint.anchor_pair[side])
-    moving = attached(stage.scene, stage.motion, joint.bodies[1 - side], [joint.anchor_pair[1 - side]])[:, 0]
+    moving = position_of(stage.scene, stage.motion, joint.bodies[1 - side], joint.anchor_pair[1 - side])
     travel, over = (moving - point) @ axis, 42 / stage.page.scale
     ends = point + axis * np.array([[travel.min() - over], [travel.max() + over]])
     return stage.page.pixels(ends)[None]

@@ -10,11 +10,12 @@ import numpy as np
 from mbref.drawing import svg
 from mbref.drawing.labels import names
 from mbref.drawing.marks import Stage, coupling_mark, driver_mark, ground_mark, joint_mark, load_mark
-from mbref.drawing.shapes import Shape, anchors, at_rest, attack, carried, shapes
+from mbref.drawing.shapes import Shape, anchors, at_rest, attack, shapes
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import Page, View, round_length, view_of
 from mbref.input_error import InputError
+from mbref.joint_motion import carried
 from mbref.scene import GROUND, Scene
 from mbref.trajectory import Trajectory
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,25 +70,6 @@ def _ordered(points: np.ndarray) -> np.ndarray:
 
     order = ConvexHull(centred @ axes[:2].T).vertices
     return points[np.append(order, order[0])]
-
-
-def carried(points: np.ndarray, trajectory: Trajectory, body: int) -> np.ndarray:
-    """Return the world points (k, n, 3) of points (n, 3) in the frame of a body."""
-    q, r = trajectory.orientation[:, body, None], trajectory.position[:, body, None]
-    return r + rotations.rotate(q, points[None])
-
-
-def attached(
-    scene: Scene, trajectory: Trajectory, name: str, points: Sequence[Sequence[float]]
-) -> np.ndarray:
-    """Return the world points (k, n, 3) of points (n, 3, world at t = 0) that move with a body or are fixed
-    to the ground."""
-    b, at_start = scene.body_index(name), np.array(points, dtype=float)
-    if b < 0:
-        return np.broadcast_to(at_start, (len(trajectory.times), *at_start.shape))
-    body = scene.body[b]
-    turned_back = rotations.conjugate(np.array(body.orientation))
-    return carried(rotations.rotate(turned_back, at_start - np.array(body.position)), trajectory, b)
 
 
 def at_rest(scene: Scene) -> Trajectory:
