@@ -29,7 +29,6 @@ RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
 LONGER = "; --estimate yes and motion.error_estimate have no time limit"
-STEPS_PER_CHECK = 500  # steps of a second run between two checks of its time limit
 
 
 ProgressCallback = Callable[[float], None]
@@ -183,9 +182,8 @@ def _run(
     """Return a run within the time limit of second runs."""
     try:
         run = checked_run(scene(), method, times, limits)
-        run.memory.control.steps_per_call = STEPS_PER_CHECK
         motion = finish_run(run, check)
-    except (SceneError, MethodError, ValueError, _TooLong) as error:
+    except (SceneError, MethodError, InputError, _TooLong) as error:
         return _Made(None, 1.0, str(error))
     length = run.model.length
     run.release()

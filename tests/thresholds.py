@@ -73,7 +73,6 @@ COSTS = {
     "PARALLEL_SUMS",
     "AT_ONCE",
     "KEPT",
-    "STEPS_PER_CHECK",
     "SAMPLES",
     "POSES_ALONG",
     "MODE_SAMPLES",

@@ -81,7 +81,7 @@ def rank_at_start(model: Model, start: Start) -> int:
     """Return the rank of Φ_q at the corrected initial positions."""
     if model.m > LARGE:
         return _redundancy(model, start).rank
-    return rank_of(scaled_jacobian(model, 0.0, start.q))
+    return rank_of(scaled_jacobian(model, 0.0, start.q), RANK_TOLERANCE)
 
 
 def undriven_freedoms(scene: Scene) -> int:
@@ -96,7 +96,7 @@ def freedoms_left(model: Model, start: Start) -> int:
     freedoms = model.n - rank_at_start(model, start)
     if freedoms == 0 or not model.scene.driver:
         return freedoms
-    return model.n - rank_of(scaled_jacobian(model, *perturbed_state(model, start)))
+    return model.n - rank_of(scaled_jacobian(model, *perturbed_state(model, start)), RANK_TOLERANCE)
 
 
 def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
@@ -140,7 +140,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
     else:
         jacobian = scaled_jacobian(model, 0.0, start.q)
         left, values, _ = np.linalg.svd(jacobian)
-        rank = rank_of(jacobian)
+        rank = rank_of(jacobian, RANK_TOLERANCE)
         shared = take_part(left[:, rank:])
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
@@ -179,7 +179,7 @@ def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
     return unit_rows(model.terms(t, q).jacobian)
 
 
-def rank_of(matrix: np.ndarray, tolerance: float = RANK_TOLERANCE) -> int:
+def rank_of(matrix: np.ndarray, tolerance: float) -> int:
     """Return the number of singular values above the tolerance times the largest singular value."""
     values = np.linalg.svd(matrix, compute_uv=False)
     return int(np.sum(values > tolerance * values[0])) if values.size else 0

@@ -11,7 +11,7 @@ from mbref.kernels.layout import Control
 from mbref.method import Method
 from mbref.stepping.limits import Limits
 
-STEPS_PER_CALL = 5_000  # steps between returns to Python, which handles interrupts and progress
+STEPS_PER_CALL = 500  # steps between returns to Python, which handles interrupts, progress, time limits
 # rad; largest rotation of a body in a step if torsion springs need unwrapped angles: two bodies turn by less
 # than π
 UNWRAPPED = 1.0

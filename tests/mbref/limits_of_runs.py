@@ -168,7 +168,7 @@ def _(_):
 
 @check("stepping.control STEPS_PER_CALL")
 def _(_):
-    return control_with_angles().steps_per_call == 5_000
+    return control_with_angles().steps_per_call == 500
 
 
 def control_with_angles():
