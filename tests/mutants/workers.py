@@ -16,6 +16,7 @@ first, or the file that could not be collected), ``ended`` (the ids of tests tha
 from __future__ import annotations
 
 import contextlib
+import importlib
 import json
 import os
 import resource
@@ -33,10 +34,12 @@ import pydantic
 import pytest
 import rich.progress
 import scipy.integrate
+import scipy.interpolate
 import scipy.optimize
 import scipy.sparse.linalg
 
 LIBRARIES = (hypothesis, numba, pydantic, rich, scipy)
+OPTIONAL = ("jinja2", "matplotlib.figure", "matplotlib.backends.backend_svg", "mujoco", "pinocchio")
 OPTIONS = ("-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
 CRASHED = 3  # status of a fork that ended without an answer
 
@@ -173,6 +176,9 @@ def _wait(child: int, end: float) -> int:
 
 def main() -> None:
     """Answer requests until the input ends."""
+    for name in OPTIONAL:
+        with contextlib.suppress(ImportError):
+            importlib.import_module(name)
     sys.path.insert(0, os.getcwd())
     for line in sys.stdin:
         print(json.dumps(answer_of(json.loads(line))), flush=True)
