@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from typing import Any
 
 import numpy as np
 import pytest
 from test_figures_by_hand import SCENE, moving, plain
 
-from crosscheck.paper.runs import ALPHAS
+from crosscheck.paper.runs import ALPHAS, Label
 from mbref.trajectory import Outcome
 from reports import figures
+from reports.blocks import Figure
 from reports.runs import Run
 from reports.sections import paper_figures, paper_methods
 
@@ -154,3 +156,60 @@ def test_a_run_without_accelerations_has_no_digits():
     assert paper_methods._accelerations(turning((1.0,)).trajectory).shape == (2, 1, 1, 3)
     assert paper_methods._accelerations(turning(()).trajectory).shape == (0,)
     assert np.array_equal(paper_methods._accelerations(turning((2.0,)).trajectory)[1, 0, 0], [8, 0, 6])
+
+
+def test_the_paper_s_figures_in_its_order():
+    """Each figure shows its own methods, of its own mechanism and part; variants are left out."""
+    runs = iter(range(1, 99))
+
+    def labelled(part: str, column: str, *rows: str) -> dict[Label, dict[str, Any]]:
+        made = {Label(part, row, column): turning((1.0, 0.5 + next(runs))).record for row in rows}
+        return {k: r | {"violation": [1e-9, 1e-3 * k.row.count("S")]} for k, r in made.items()}
+
+    plain = ("ALF", "MPI (GS)", "MPI (SVD)")
+    held = tuple(f"{row} + CP" for row in plain)
+    branches = ("MPI (GS)", "MPI (GS) + B", paper_figures.TRUE_BRANCH)
+    records = {
+        **labelled("figures", paper_figures.HALF, *plain, "MPI (GS) + B", *held),
+        **labelled("figures", paper_figures.FIVE_BAR, *plain, *held),
+        **labelled("dynamic", paper_figures.HEAVY, *branches, *plain),
+        **labelled("dynamic", paper_figures.UNEQUAL, *held, *plain),
+        **labelled("dynamic", paper_figures.SPATIAL_DYNAMIC, *plain, *held),
+        paper_figures.PEAKS: turning((1.0, 40.0)).record,
+        Label("figures", "ALF", paper_figures.HALF, "another tolerance"): turning((1.0, -7.0)).record,
+    }
+    first, *blocks = paper_figures.render(records)
+    assert first.text == "Figures 4 to 8: kinematic analysis"
+    made = {block.name.removeprefix("paper-figure-"): block for block in blocks if isinstance(block, Figure)}
+    assert list(made) == ["4", "5", "6", "8", "11", "12", "13", "14", "15", "16"]
+    assert blocks[4].text == "Figures 11 to 16: dynamic analysis, 100 N m on the crank"
+    shown = {
+        "4": ("ALF", "MPI (GS)", "MPI (SVD)", "MPI (GS) + B"),
+        "5": ("MPI (GS)", "MPI (SVD)"),
+        "6": ("MPI (GS) + CP", "MPI (SVD) + CP"),
+        "8": ("MPI (GS)", "MPI (SVD)", "MPI (SVD) + CP"),
+        "11": branches,
+        "12": branches[:2],
+        "14": held,
+        "15": plain,
+        "16": held,
+    }
+    for name, rows in shown.items():
+        if name in ("5", "6"):
+            assert (
+                "at most: " + ", ".join(f"{row} {1e-3 * row.count('S'):.1e}" for row in rows)
+                in made[name].caption
+            )
+        else:
+            assert made[name].caption.count("to the end") == len(rows), name
+            assert ", ".join(f"{row} to the end" for row in rows) in made[name].caption, name
+    assert "up to 200;" in made["13"].caption, "five times 40"
+    assert "without partitioning" in made["5"].caption and "with partitioning" in made["6"].caption
+    rates = {name: points(made[name].draw())[0][1][1] for name in ("11", "14", "15", "16")}
+    expected = {
+        "11": records[Label("dynamic", branches[0], paper_figures.HEAVY)],
+        "14": records[Label("dynamic", held[0], paper_figures.UNEQUAL)],
+        "15": records[Label("dynamic", plain[0], paper_figures.SPATIAL_DYNAMIC)],
+        "16": records[Label("dynamic", held[0], paper_figures.SPATIAL_DYNAMIC)],
+    }
+    assert rates == {n: r["bodies"]["b"]["angular_velocity"][1][2] for n, r in expected.items()}
