@@ -20,9 +20,11 @@ if not PLAIN:
 from mbref import rotations
 from mbref.equations import coordinates
 from mbref.integrators import adams, dop853, one_step, rk4
-from mbref.kernels.layout import OK
+from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra import elimination, vectors
 from mbref.stabilisation import partitioning
+from mbref.stepping import loop
+from mbref.stepping.loop import STEP_TOO_SMALL
 from mbref.taylor import angles, coefficients, samples, saved_state
 from mbref.taylor.crossing import determinants, rounding_pole
 
@@ -657,3 +659,109 @@ def test_the_largest_violation_of_rows_and_unit_quaternions():
         assert scratch.residual.tolist() == [3.0, -5.0, 0.0, 0.0]
         rows.phi[1] = math.nan
         assert math.isnan(partitioning.find_violation(memory)), "it is no small violation"
+
+
+# --- the steps to a sample --------------------------------------------------------------------------------
+class Advanced:
+    """One call of ``loop.advance`` from 1 s towards 2 s, whose attempts have these error ratios."""
+
+    def __init__(
+        self, patch: pytest.MonkeyPatch, ratios: list[float], suggested: list[float], **numbers: float
+    ):
+        given = {"forced": 0.0, "first": 0.0, "smallest": 1e-3, "fixed": 0.0, "largest": 9.0, "end": math.inf}
+        given |= {"steps": 4, "accepted": OK, **numbers}
+        self.proposed: list[tuple[float, ...]] = []
+        self.tried: list[tuple[float, ...]] = []
+        self.accepted: list[tuple[float, ...]] = []
+        answers, errors = iter(suggested), iter(ratios)
+        self.clock = SimpleNamespace(
+            y_size=1, time=1.0, length=0.1, suggested=0.2, ratio=0.3, share=0.0, restart=0, attempt_end=0.0
+        )
+
+        def propose(h, before, ratio, y, y_rate, memory):
+            self.proposed.append((h, before, ratio))
+            return next(answers)
+
+        def step(rates, t, h, y, y_rate, y_new, memory):
+            self.tried.append((t, h))
+            return next(errors)
+
+        def accept(now, h, suggested, ratio, memory):
+            self.accepted.append((now, h, suggested, ratio))
+            self.clock.time = now
+            return given["accepted"]
+
+        self.counts = SimpleNamespace(steps=given["steps"], rejected=0)
+        memory = SimpleNamespace(
+            loop=SimpleNamespace(clock=self.clock, y_new=np.zeros(2)),
+            control=SimpleNamespace(
+                forced_step=given["forced"],
+                first_step=given["first"],
+                smallest_step=given["smallest"],
+                fixed_step=given["fixed"],
+            ),
+            equations=SimpleNamespace(system=SimpleNamespace(counts=self.counts)),
+            kernels=SimpleNamespace(propose=propose, step=step, rates=None),
+        )
+        patch.setattr(loop, "end_of_pieces", lambda equations: given["end"])
+        patch.setattr(loop, "largest_step", lambda memory: given["largest"])
+        patch.setattr(loop, "share", lambda suggested, memory: 0.5)
+        patch.setattr(loop, "accept_step", accept)
+        self.status = loop.advance(2.0, np.zeros(1), np.zeros(1), memory)
+
+
+@pytest.mark.parametrize(
+    ("suggested", "numbers", "h", "now"),
+    [
+        (0.3, {}, 0.3, 1.3),
+        (0.6, {}, 0.5, 1.5),
+        (1.0, {}, 1.0, 2.0),
+        (7.0, {}, 1.0, 2.0),
+        (7.0, {"end": 1.25}, 0.25, 1.25),
+        (0.3, {"largest": 0.2}, 0.2, 1.2),
+        (0.3, {"first": 0.1, "steps": 0}, 0.1, 1.1),
+        (0.3, {"first": 0.1}, 0.3, 1.3),
+        (0.01, {"forced": 0.2}, 0.2, 1.2),
+        (9.0, {"fixed": 0.3}, 0.25, 1.25),
+        (9.0, {"fixed": 0.25}, 0.25, 1.25),
+        (9.0, {"fixed": 4.0}, 1.0, 2.0),
+    ],
+)
+def test_the_length_of_a_step_towards_a_sample(monkeypatch, suggested, numbers, h, now):
+    run = Advanced(monkeypatch, [0.4], [suggested], **numbers)
+    assert run.status == OK and run.proposed == [(0.1, 0.2, 0.3)]
+    assert run.tried == [(1.0, pytest.approx(h))] and run.accepted[0][:2] == pytest.approx((now, h))
+    assert run.accepted[0][3] == 0.4 and run.counts.rejected == 0 and run.clock.share == 0.5
+    assert run.clock.restart == (4 if run.clock.time >= numbers.get("end", math.inf) else 0)
+
+
+def test_refused_steps_are_proposed_anew(monkeypatch):
+    """An error twice the tolerance, a failure of status 3 and a number that is none."""
+    run = Advanced(monkeypatch, [2.0, -3.0, math.nan, 1.0], [0.4, 0.3, 0.2, 0.1])
+    assert run.status == OK and run.counts.rejected == 3
+    assert [h for _, h in run.tried] == pytest.approx([0.4, 0.3, 0.2, 0.1])
+    assert run.proposed[1:] == [(0.4, 0.4, 2.0), (0.3, 0.3, -3.0), (0.2, 0.2, -float(NOT_FINITE))]
+    assert run.accepted == [(1.1, 0.1, 0.1, 1.0)]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "numbers", "status"),
+    [
+        (2.0, {}, STEP_TOO_SMALL),
+        (-3.0, {}, 3),
+        (-3.0, {"fixed": 0.5}, 3),
+        (2.0, {"fixed": 0.5}, OK),
+        (0.5, {"accepted": SINGULAR_AHEAD}, SINGULAR_AHEAD),
+        (0.5, {"accepted": 3}, 3),
+    ],
+)
+def test_steps_that_end_the_run(monkeypatch, ratio, numbers, status):
+    """The next step would be shorter than the shortest, or steps are fixed."""
+    assert Advanced(monkeypatch, [ratio], [0.4, 0.9e-3], **numbers).status == status
+
+
+def test_forced_steps_are_taken_whatever_their_error(monkeypatch):
+    run = Advanced(monkeypatch, [5.0], [0.1], forced=0.2)
+    assert run.status == OK and run.accepted == [(pytest.approx(1.2), 0.2, 0.2, 1.0)]
+    run = Advanced(monkeypatch, [5.0, 5.0], [0.4, 0.1], forced=0.2)
+    assert [h for _, h in run.tried] == [0.4, 0.2] and run.accepted[0][3] == 1.0

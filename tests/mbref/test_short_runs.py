@@ -217,3 +217,16 @@ def test_long_steps_of_the_series_and_steps_of_a_quarter_agree(name):
     for field in ("position", "velocity", "angular_velocity", "acceleration"):
         one, other = getattr(long, field), getattr(short, field)
         assert np.abs(one - other).max() <= 1e-7 * max(1.0, np.abs(other).max()), field
+
+
+def test_gears_that_have_turned_by_a_radian():
+    """Angles of couplings need sines and cosines far from the start."""
+    scene, times = gear_pair(), [0.0, 0.3]
+    one, other = (
+        simulate(scene, method, times, Limits(rtol=1e-9)) for method in ("taylor", "lm1+none/dop853")
+    )
+    assert one.outcome == other.outcome == Outcome.COMPLETED
+    turned = rotations.angle_between(one.orientation[0], one.orientation[1])
+    assert turned.max() > 1.0 and turned.max() == pytest.approx(2.0 * turned.min(), rel=1e-9)
+    for field in ("position", "orientation", "angular_velocity", "angular_acceleration"):
+        assert getattr(one, field) == pytest.approx(getattr(other, field), abs=1e-8), field
