@@ -16,9 +16,12 @@ from mbref import formats
 from mbref.cli import commands, options, pictures
 from mbref.design import placed
 from mbref.drawing import film, labels, shapes
+from mbref.equations.diagnosis import undriven_freedoms
 from mbref.equations.model import Model
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Factor, JointForce, JointTorque, Scene, Sine, SlideSpring, Spring, TorsionSpring
+from mbref.scene_validation import SceneError
+from mbref.scenes.four_bar import four_bar
 from mbref.simulation import comparison
 from mbref.stabilisation import STABILISATIONS
 from mbref.trajectory import Cost, Crossing, Outcome, Trajectory
@@ -439,3 +442,15 @@ def test_a_mechanism_at_one_point_counts_as_a_metre_long():
         joint=({"type": "spherical", "name": "S", "bodies": ("ground", "b"), "anchor": (0.0, 3.0, 4.0)},)
     )
     assert Model(anchored).length == 5.0
+
+
+def test_the_name_of_the_fixed_frame_is_reserved():
+    with pytest.raises(SceneError, match=r"body\[ground\]\.name: 'ground' is reserved for the fixed frame"):
+        LONE.with_(body=(LONE.body[0].model_copy(update={"name": "ground"}),))
+
+
+def test_freedoms_of_a_flat_four_bar():
+    """Flat, it has two velocities; with a driver they are counted beside the flat position."""
+    flat = four_bar(0.0)
+    assert undriven_freedoms(flat) == 0 and undriven_freedoms(flat.with_(driver=())) == 2
+    assert undriven_freedoms(four_bar(0.5).with_(driver=())) == 1

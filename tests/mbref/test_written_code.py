@@ -15,6 +15,7 @@ from typing import Any
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
+from llvmlite import ir
 from numba import types
 
 from mbref.kernels.compilation import PLAIN
@@ -27,7 +28,7 @@ from mbref.method import Method
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
-from mbref.taylor import correction, generated_calls, series, solver
+from mbref.taylor import correction, generated_calls, series, simd, solver
 from mbref.taylor.correction import subtract_violation, violation_in_loops, violation_rate_in_loops
 from mbref.taylor.generated import build, driven_orders
 from mbref.taylor.generated.instructions import levels
@@ -49,6 +50,15 @@ MECHANISMS = {  # functions besides the corrections
 STARTS: dict[str, np.ndarray] = {}  # values of the variables at the start, by name
 
 
+def target_machine() -> llvm.TargetMachine:
+    """Return this machine, for code without optimisation."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    return llvm.Target.from_default_triple().create_target_machine(
+        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=0, jit=True
+    )
+
+
 @functools.cache
 def written(name: str) -> tuple[TaylorMemory, Callable[..., None], tuple[str, ...]]:
     """Return the memory of a scene's series, a call of functions of its code, and their names."""
@@ -57,11 +67,7 @@ def written(name: str) -> tuple[TaylorMemory, Callable[..., None], tuple[str, ..
     assert run.stepper.expand() == OK
     taylor = run.stepper.taylor
     names = build.names_of_functions(taylor)
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_default_triple().create_target_machine(
-        cpu=llvm.get_host_cpu_name(), features=llvm.get_host_cpu_features().flatten(), opt=0, jit=True
-    )
+    machine = target_machine()
     module = llvm.parse_assembly(build.write_code(taylor, names))
     module.verify()
     engine = llvm.create_mcjit_compiler(module, machine)
@@ -358,3 +364,25 @@ def test_orders_call_the_code_and_motions_that_turn_back_need_multipliers(monkey
     assert series.expand_series.function(memory) == "multipliers" and memory.step.deceleration == 0.0
     memory.partition.rank, memory.code.expand_by_power = 2, 0
     assert series.expand_series.function(memory) == "multipliers" and len(called) == 2
+
+
+def test_the_largest_size_in_a_vector():
+    """Of each place and sign, by the instructions of a kernel."""
+    module = ir.Module()
+    double = ir.DoubleType().as_pointer()
+    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [double, double]), "largest")
+    builder = ir.IRBuilder(function.append_basic_block())
+    one, out = function.args
+    vector = builder.load(builder.bitcast(one, simd.SIMD_VECTOR.as_pointer()), align=8)
+    signature, emit = simd._max_abs._defn(None, simd.SIMD)
+    builder.store(emit(None, builder, signature, [vector]), out)
+    builder.ret_void()
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), target_machine())
+    engine.finalize_object()
+    call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("largest"))
+    for place in range(8):
+        for sign in (1.0, -1.0):
+            numbers, found = np.linspace(-0.5, 0.5, 8), np.zeros(1)
+            numbers[place] = sign * (1.0 + place)
+            call(numbers.ctypes.data, found.ctypes.data)
+            assert found[0] == 1.0 + place, (place, sign)
