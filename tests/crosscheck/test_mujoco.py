@@ -8,13 +8,14 @@ import numpy as np
 import psutil
 import pytest
 
+from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD, INTEGRATED_HERE, NEWTON
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.judge.metrics import order_of_convergence, violation_series
+from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene
@@ -199,6 +200,14 @@ def test_projected_driver_and_its_prescribed_motion_agree() -> None:
     scene = SCENES["spatial_slider_crank_driven"]()
     run = simulate(scene, 0.1, "projected", rtol=1e-8, min_step=1e-4, beta=600.0, hard=ADAPTIVE["projected"])
     assert error(run, scene) < MARGIN * PROJECTED, f"{error(run, scene):.2e}"
+
+
+def test_a_duplicate_joint_changes_no_projected_motion() -> None:
+    scene = moving_probes()["spherical joint"]
+    twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))
+    tight = {"rtol": 1e-8, "min_step": 6e-3, "beta": 25.0, "hard": ADAPTIVE["projected"]}
+    run, again = (simulate(s, 0.02, "projected", **tight) for s in (scene, twice))
+    assert float(error_series(scene, run, again).max()) < 1e-9
 
 
 def test_an_unknown_family_is_refused() -> None:

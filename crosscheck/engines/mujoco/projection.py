@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from crosscheck.engines.driver_motion import motion
+from crosscheck.engines.mujoco.context import NOTHING
 from crosscheck.engines.sampling import Failed
 from mbref.scene import Driver
 from mbref.trajectory import Outcome
@@ -42,7 +43,7 @@ def projected(
     for _ in range(ITERATIONS):
         load(t, np.concatenate((q, v)))
         mujoco.mj_forward(model, data)
-        jacobian = data.efc_J[: data.ne * model.nv].reshape(data.ne, model.nv)
+        jacobian = _unrounded(data.efc_J[: data.ne * model.nv].reshape(data.ne, model.nv), model.stat.extent)
         values, rates = data.efc_pos[: data.ne].copy(), np.zeros(data.ne)
         for row, driver in drivers():
             value, rate, _ = motion(driver, t)
@@ -54,6 +55,12 @@ def projected(
     if not abs(values).max(initial=0.0) < CLOSED_ENOUGH:
         raise Failed(Outcome.NOT_CONVERGED, t, f"the closures could not be met at {t:.6g} s")
     return np.concatenate((q, v + _least(root, jacobian, rates - jacobian @ v, t)))
+
+
+def _unrounded(jacobian: np.ndarray, extent: float) -> np.ndarray:
+    """Return the rows with zeros in place of rows of rounding, such as the rows of a duplicate joint."""
+    largest = np.abs(jacobian).max(axis=1, keepdims=True, initial=0.0)
+    return np.where(largest > NOTHING * max(1.0, extent), jacobian, 0.0)
 
 
 def _root_of_mass(mujoco: Any, model: Any, data: Any, t: float) -> np.ndarray:
