@@ -561,6 +561,7 @@ def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
 
 def test_report_command_and_the_program_it_starts(monkeypatch):
     started = []
+    monkeypatch.setattr(signal, "getsignal", lambda number: signal.SIG_DFL)  # also where a shell ignores it
 
     class Program(contextlib.nullcontext):
         def __init__(self, command: list[str], process_group: int) -> None:

@@ -22,6 +22,7 @@ from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
+from mbref.stepping.control import STEPS_PER_CALL
 
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
 OSCILLATOR = Scene(
@@ -184,8 +185,9 @@ def test_adams_and_scipy_need_as_many_evaluations_for_an_error(name):
     for code in ("lsoda", "vode"):
         theirs = evaluations_for(1e-6, [scipy_run(code, *problem, rtol) for rtol in tolerances])
         assert mine < 1.25 * theirs, f"{name}: {mine:.0f} evaluations at error 1e-6, {code} {theirs:.0f}"
-    steps = [(cost.rhs, 2 * cost.steps + cost.rejected) for _, cost in runs]
-    assert all(abs(rhs - two) <= 1 for rhs, two in steps), f"not two evaluations a step: {steps}"
+    for _, cost in runs:  # two evaluations a step, and one where a call of compiled code begins
+        calls = 1 + cost.steps // STEPS_PER_CALL
+        assert abs(cost.rhs - 2 * cost.steps - cost.rejected) <= calls, f"not two evaluations a step: {cost}"
 
 
 # stabilisation, its scene and end, error allowed in tolerances.  Partitioning multiplies errors before it

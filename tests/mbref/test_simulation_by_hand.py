@@ -77,7 +77,7 @@ def test_limits_of_a_run():
     usual = found("mpi-svd+none")
     assert (usual.order, usual.fixed_step, usual.smallest_step, usual.largest_step) == (8, 0.0, 2e-12, 2.0)
     assert (usual.rtol, usual.atol, usual.most_steps, usual.closed_loops) == (1e-9, 1e-9, 5_000_000, 3)
-    assert usual.violation == pytest.approx(3e-3 * 2.5) and usual.steps_per_call == 5000
+    assert usual.violation == pytest.approx(3e-3 * 2.5) and usual.steps_per_call == 500
     assert found("mpi-svd+none", has_angles=True).largest_turn == 1.0
     given = found("mpi-svd+none", atol=1e-3, smallest_step=0.1, largest_step=0.5, largest_turn=0.2, rtol=1e-5)
     assert (given.atol, given.smallest_step, given.largest_step, given.largest_turn) == (1e-3, 0.1, 0.5, 0.2)
