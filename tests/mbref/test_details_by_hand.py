@@ -18,6 +18,7 @@ from mbref.design import placed
 from mbref.drawing import film, labels, shapes
 from mbref.equations.diagnosis import undriven_freedoms
 from mbref.equations.model import Model
+from mbref.equations.parts import shape_of
 from mbref.method import Method, MethodError
 from mbref.scene import Body, Factor, JointForce, JointTorque, Scene, Sine, SlideSpring, Spring, TorsionSpring
 from mbref.scene_validation import SceneError
@@ -454,3 +455,44 @@ def test_freedoms_of_a_flat_four_bar():
     flat = four_bar(0.0)
     assert undriven_freedoms(flat) == 0 and undriven_freedoms(flat.with_(driver=())) == 2
     assert undriven_freedoms(four_bar(0.5).with_(driver=())) == 1
+
+
+def test_costs_begin_at_zero():
+    cost = Cost()
+    numbers = (
+        cost.seconds,
+        cost.build_seconds,
+        cost.steps,
+        cost.rejected,
+        cost.rhs,
+        cost.factorisations,
+        cost.newton,
+    )
+    assert numbers == (0.0, 0.0, 0, 0, 0, 0, 0)
+
+
+def test_times_around_a_crossing():
+    """From a quarter of a turn of the fastest body before it to 0.45 turns after it, within the run."""
+    turning = np.zeros((2, 3, 3))
+    turning[1, 2] = 0.0, 0.0, -2 * math.pi
+    at = Crossing(1.0, np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((2, 3, 3)), turning, 1, "passed")
+    assert at.instants(9.0, 8) == pytest.approx(np.linspace(0.75, 1.45, 8))
+    assert at.instants(1.2, 3) == pytest.approx([0.75, 0.975, 1.2])
+    early = Crossing(0.1, np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((2, 3, 3)), turning, 1, "passed")
+    assert early.instants(9.0, 2) == pytest.approx([0.0, 0.55])
+    still = Crossing(1.0, np.zeros((3, 3)), np.zeros((3, 4)), np.zeros((2, 3, 3)), 0 * turning, 1, "passed")
+    assert still.instants(9.0, 4) == pytest.approx([0.0, 3.0, 6.0, 9.0])
+
+
+def test_scenes_of_one_shape_have_armatures_at_the_same_joints():
+    def hinged(armature: float) -> Scene:
+        hinge = {
+            "type": "revolute",
+            "name": "A",
+            "bodies": ("ground", "b"),
+            "anchor": (0, 0, 0),
+            "axis": (0, 0, 1),
+        }
+        return LONE.with_(joint=({**hinge, "armature": armature},))
+
+    assert shape_of(hinged(0.2)) == shape_of(hinged(0.5)) != shape_of(hinged(0.0))

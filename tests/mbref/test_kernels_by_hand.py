@@ -765,3 +765,9 @@ def test_forced_steps_are_taken_whatever_their_error(monkeypatch):
     assert run.status == OK and run.accepted == [(pytest.approx(1.2), 0.2, 0.2, 1.0)]
     run = Advanced(monkeypatch, [5.0, 5.0], [0.4, 0.1], forced=0.2)
     assert [h for _, h in run.tried] == [0.4, 0.2] and run.accepted[0][3] == 1.0
+
+
+def test_the_fastest_turn_of_a_body():
+    v = np.array([9.0, 9, 9, 1, 2, 2, 9, 9, 9, 3, 0, -4, 9, 9, 9, 0, 0, 0])
+    assert coordinates.fastest_turn(v) == 5.0 and coordinates.fastest_turn(v[:6]) == 3.0
+    assert coordinates.fastest_turn(v[12:]) == 0.0
