@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.paper import illustration, singular, store
-from crosscheck.paper.runs import GROWTH, PEAKS, Label
+from crosscheck.paper import cells, illustration, singular, store
+from crosscheck.paper import runs as paper_runs
+from crosscheck.paper.runs import GROWTH, PEAKS, SPATIAL_DYNAMIC, Label
 from crosscheck.paper.settings import LINKAGES
 from crosscheck.study.grid import Case, key
 from mbref.scene import Body, Scene
@@ -168,3 +169,40 @@ def test_an_explanation_is_computed_once(monkeypatch, tmp_path):
     monkeypatch.setattr(illustration, "TURNED", 0.2)
     assert illustration.illustration(path)["fold"] == [2], "of another question"
     assert len(path.read_text().splitlines()) == 2
+
+
+# --- printed numbers and planned runs ---------------------------------------------------------------------
+def test_sums_of_the_printed_numbers():
+    """Sums of the columns of Tables III and IV, and of all end times that the paper prints."""
+    assert sum(steps for steps, _ in cells.COUNTS_III.values()) == 3 * 3303 + 3 * 3292 + 3286 + 4 * 103
+    assert sum(seconds for _, seconds in cells.COUNTS_III.values()) == pytest.approx(659.03, abs=1e-9)
+    assert sum(steps for steps, _ in cells.COUNTS_IV.values()) == 4 * 2428 + 1627 + 1768 + 1774 + 1368
+    assert sum(seconds for _, seconds in cells.COUNTS_IV.values()) == pytest.approx(348.3, abs=1e-9)
+    assert {row for row, (steps, _) in cells.COUNTS_III.items() if steps == 103} == {
+        f"{row} + CP" for row in ("LM2", "ALF", "MPI (SVD)", "MPI (GS)")
+    }
+    assert sum(cell.end or 0.0 for cell in cells.CELLS) == pytest.approx(47.136, abs=1e-9)
+
+
+def test_sample_times_of_the_paper_s_runs():
+    steps = {"SAMPLES": 0.2, "TURNS": 0.1, "FINE": 0.01, "SHORT": 0.002, "SECOND": 0.2, "TEACHING": 0.02}
+    ends = {"SHORT": 0.12, "SECOND": 1.0, "TEACHING": 2.0}
+    for name, step in steps.items():
+        times = getattr(paper_runs, name)
+        assert times[0] == 0.0 and times[-1] == ends.get(name, 20.0), name
+        assert np.diff(times) == pytest.approx(np.full(len(times) - 1, step)), name
+
+
+def test_runs_for_lectures_vary_one_number():
+    scene = SPATIAL_DYNAMIC
+    gains = paper_runs.gains()
+    assert list(gains) == [Label("gain", "LM2 + B", scene, f"{gain:g}") for gain in paper_runs.GAINS]
+    growing = paper_runs.growth()
+    assert list(growing) == [Label("growth", "LM2", scene, f"{rtol:g}") for rtol in paper_runs.ERRORS]
+    assert [case.setting.options["rtol"] for case in growing.values()] == list(paper_runs.ERRORS)
+    assert {case.setting.options["violation"] for case in growing.values()} == {1e9}
+    assert all(np.array_equal(c.times, paper_runs.TEACHING) for c in (*gains.values(), *growing.values()))
+    tight = paper_runs.tight()
+    assert [label.row for label in tight] == list(cells.COUNTS_IV) and {label.column for label in tight} == {
+        scene
+    }
