@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.cli import certifying, convergence, judging, listing, main, moving_picture, scene_request
+from crosscheck.cli import (
+    certifying,
+    comparing,
+    convergence,
+    judging,
+    listing,
+    main,
+    moving_picture,
+    scene_request,
+)
 from crosscheck.cli import closed_loops as loops
 from crosscheck.cli import modes as modes_of
 from crosscheck.cli.request import RequestError
@@ -357,3 +366,39 @@ def test_files_of_other_programs_are_known_by_their_first_character(tmp_path, mo
     options, *lines, remembered = asked
     assert options[0] == name and lines == [f"{name}: left out: a sensor", f"{name}: a note"]
     assert remembered == (SCENE, ("run",))
+
+
+# --- tune -------------------------------------------------------------------------------------------------
+def test_tune_asks_for_the_cheapest_settings_of_one_engine(monkeypatch, calls, capsys):
+    """The cheapest of the engine's own settings comes first, whatever crosscheck's integrators take."""
+    made = [
+        {"family": family, "cost": {"seconds": seconds}, "key": family}
+        for family, seconds in (("ours", 0.1), ("slow", 3.0), ("fast", 2.0))
+    ]
+    case = Case(SCENE, np.linspace(0.0, 2.0, 31), "e", Setting("slow", {"step": 0.1}))
+    found = SimpleNamespace(cases=["c"], reached=made, records=["all"])
+    calls.stand_in(monkeypatch, comparing.scene_request, "find_scenes", [SCENE])
+    calls.stand_in(monkeypatch, comparing.request, "find_engines", ["e"])
+    calls.stand_in(monkeypatch, comparing, "scouted", None)
+    calls.stand_in(monkeypatch, comparing, "engine", SimpleNamespace(integrated_here=("ours",)))
+    calls.stand_in(monkeypatch, comparing.request, "plan", [case])
+    calls.stand_in(monkeypatch, comparing, "study", lambda some, threads: ("records of", some))
+    calls.stand_in(monkeypatch, comparing, "tuned", found)
+    calls.stand_in(monkeypatch, comparing, "with_timings", list(made))
+    calls.stand_in(monkeypatch, comparing.tables, "print_tuning", None)
+    calls.stand_in(monkeypatch, comparing, "missing_truths", ["A sentence."])
+    asked = ["tune", "e", "s.toml", "--error", "1e-5", "--time-limit", "7", "--reference-time", "3"]
+    assert main(asked) == 0
+    cases, level, run, ours, advance, measure = calls["tuned"]
+    assert cases == [case._replace(reference_time=3.0)] and level == 1e-5 and ours == ("ours",)
+    assert callable(advance) and measure({"metrics": {"error": 0.25}}) == 0.25
+    assert run(["some"]) == ("records of", ["some"])
+    scenes, engines, choice, [times], limit, _ = calls["plan"]
+    assert (scenes, engines, limit, choice.is_quick, len(times)) == ([SCENE], ["e"], 7.0, False, 31)
+    assert calls["with_timings"][:3] == (["c"], made, None) and calls["scouted"] == ([SCENE], ["e"])
+    _, wanted, best, records, scene, path = calls["print_tuning"]
+    assert [r["family"] for r in best] == ["fast", "slow", "ours"] and records == ["all"]
+    assert (scene, path, wanted.level) == (SCENE, "s.toml", 1e-5)
+    assert capsys.readouterr().out == "A sentence.\n"
+    monkeypatch.setattr(comparing, "with_timings", lambda *_: [])
+    assert main(asked) == 1
