@@ -18,6 +18,12 @@ TITLES = {
     "sundials": "SUNDIALS IDA",
     "ondsel": "OndselSolver",
     "casadi": "CasADi",
+    "drake": "Drake",
+    "dart": "DART",
+    "bullet": "Bullet",
+    "mjx": "MJX",
+    "warp": "MuJoCo Warp",
+    "newton": "Newton",
 }
 LEVEL = ERROR_LEVELS[1]  # largest error of the runs whose speeds are compared in words
 SAID = f"{LEVEL:.0e}".replace("e-0", "e-")

@@ -12,17 +12,20 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from crosscheck.conformance.explained import explanations, proofs
-from crosscheck.conformance.suite import CANNOT, FAIL, MARKS, OUTSIDE, PASS, abouts
+from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, abouts
 from crosscheck.study.speed_sentences import title
 from reports.blocks import Block, Heading, Table, Text
 
 Verified = Mapping[str, Any]  # an engine, its version and its verdicts, as stored in JSON
 Verdict = Mapping[str, Any]
 
-CAPTION = (
-    "Checks of the conformance suite: the number of the suite's mechanisms on which an engine passes (✓) and "
-    "fails (✗); –: the engine runs none of the mechanisms, ○: the check applies to none of them. "
-    "Defects: the number of planted defects of an example engine that the check detects."
+ENGINES = (
+    "Each engine's verdicts, from `crosscheck verify ENGINE`: checks that it passes, checks that it "
+    "violates, checks on mechanisms that it refuses, and checks that do not apply to a mechanism."
+)
+CHECKS = (
+    "Checks of the conformance suite: the number of planted defects of an example engine that a check "
+    "detects, how many engines pass it on each of their mechanisms, and which engines violate it."
 )
 FAMILIES = (
     "Formulations and stabilisations of mbref on six moving mechanisms: the number of verdicts. Mechanisms "
@@ -50,7 +53,7 @@ def render(verified: Sequence[Verified]) -> list[Block]:
     engines = [found for found in verified if "verdicts" in found and not found.get("family")]
     blocks: list[Block] = [Heading("Conformance", 2)]
     if engines:
-        blocks += [Text(_engines(engines)), _checks(engines), *_violations(engines)]
+        blocks += [_engines(engines), _checks(engines), *_violations(engines)]
     if families:
         blocks += [Heading("Methods of mbref"), _families(families)]
     if drawn:
@@ -122,38 +125,41 @@ def _drawn_violations(verified: Sequence[Verified]) -> list[Block]:
     ]
 
 
-def _engines(verified: Sequence[Verified]) -> str:
-    """Return a sentence on each engine: its version and the counts of its verdicts."""
-    sentences = []
+def _engines(verified: Sequence[Verified]) -> Table:
+    """Return a table with one row for each engine: its version and the counts of its verdicts."""
+    rows = []
     for found in verified:
-        counts = {status: sum(v["status"] == status for v in found["verdicts"]) for status in MARKS}
-        violated = f"{counts[FAIL]} violated" if counts[FAIL] else "none violated"
-        sentences.append(
-            f"{title(found['engine'])} {found['version']}: {counts[PASS]} checks passed, {violated}, "
-            f"{counts[CANNOT]} do not apply because the engine refuses the mechanism, {counts[OUTSIDE]} do "
-            "not apply to the mechanism."
-        )
-    return f"The command crosscheck verify makes the checks of all engines. {' '.join(sentences)}"
+        counts = [sum(v["status"] == s for v in found["verdicts"]) for s in (PASS, FAIL, CANNOT, OUTSIDE)]
+        rows.append((title(found["engine"]), found["version"], *map(str, counts)))
+    header = ("Engine", "Version", "Passed", "Violated", "Refused", "Not applicable")
+    return Table(ENGINES, header, rows, frozenset({2, 3, 4, 5}))
 
 
 def _checks(verified: Sequence[Verified]) -> Table:
+    """Return a table with one row for each check: its meaning, and the engines that pass and violate it."""
     names = {v["property"]: v["card"] for found in verified for v in found["verdicts"]}
-    header = ("Check", "It checks", "Defects", *(title(found["engine"]) for found in verified))
-    rows = [
-        (
-            check,
-            abouts().get(name, ""),
-            str(sum(proof.check == name for proof in proofs())),
-            *(_cell([v["status"] for v in found["verdicts"] if v["property"] == name]) for found in verified),
+    rows = []
+    for name, check in names.items():
+        counts = {found["engine"]: _counts(found, name) for found in verified}
+        judged = {engine: (passed, failed) for engine, (passed, failed) in counts.items() if passed + failed}
+        violated = [f"{title(e)} on {f} of {p + f}" for e, (p, f) in judged.items() if f]
+        rows.append(
+            (
+                check,
+                abouts().get(name, ""),
+                str(sum(proof.check == name for proof in proofs())),
+                f"{len(judged) - len(violated)} of {len(judged)}",
+                ", ".join(violated) or "none",
+            )
         )
-        for name, check in names.items()
-    ]
-    return Table(CAPTION, header, rows, frozenset({2}))
+    header = ("Check", "It checks", "Defects", "Engines pass", "Violated by")
+    return Table(CHECKS, header, rows, frozenset({2, 3}))
 
 
-def _cell(statuses: Sequence[str]) -> str:
-    counts = [f"{MARKS[s][0]} {statuses.count(s)}" for s in (PASS, FAIL) if s in statuses]
-    return ", ".join(counts) or (MARKS[CANNOT][0] if CANNOT in statuses else MARKS[OUTSIDE][0])
+def _counts(found: Verified, check: str) -> tuple[int, int]:
+    """Return the numbers of mechanisms on which an engine passes and violates a check."""
+    statuses = [v["status"] for v in found["verdicts"] if v["property"] == check]
+    return statuses.count(PASS), statuses.count(FAIL)
 
 
 def _violations(verified: Sequence[Verified]) -> list[Block]:
