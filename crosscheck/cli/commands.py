@@ -30,6 +30,7 @@ from crosscheck.cli.running import (
     missing_truths,
     notice,
     print_json,
+    standard_output_kept,
     studied,
 )
 from crosscheck.study.grid import Record, key
@@ -104,7 +105,7 @@ def _verify(arguments: argparse.Namespace) -> int:
     if arguments.mechanisms:
         return _verify_random(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time, engine)
-    with counted("verifying", len(chosen) + 1) as advance:
+    with counted("verifying", len(chosen) + 1) as advance, standard_output_kept():
         runner = suite.runner(engine, arguments.time_limit, arguments.in_process)
         found = suite.held_against(runner, chosen, advance, arguments.family)
     if arguments.json:
@@ -123,7 +124,7 @@ def _verify_random(engine: str, arguments: argparse.Namespace) -> int:
     for other in beside:
         request.find_engines([other.partition("=")[0]], notice)
     plan = deep.Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
-    with counted("verifying, at most", deep.MOST * plan.mechanisms) as advance:
+    with counted("verifying, at most", deep.MOST * plan.mechanisms) as advance, standard_output_kept():
         found = deep.examined(plan, arguments.records, advance)
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))

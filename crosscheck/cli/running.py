@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
+import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +29,7 @@ from mbref.scene import Scene
 Document = dict[str, Any]
 COMPLETED, OTHERWISE = 0, 1
 SAMPLES = 101
+STANDARD_OUTPUT, STANDARD_ERROR = 1, 2  # file descriptors
 PIPED_WIDTH = 180  # characters of a line, so that no cell of a table is folded
 
 
@@ -96,6 +99,20 @@ def by_scene(cases: Sequence[Case], records: Sequence[Record]) -> list[Document]
 def print_json(documents: Sequence[Document]) -> None:
     """Print the JSON document of one scene, or a list of the documents of several scenes."""
     print(json.dumps(documents[0] if len(documents) == 1 else documents, allow_nan=False))
+
+
+@contextlib.contextmanager
+def standard_output_kept() -> Iterator[None]:
+    """Print on standard error what engines print in this process during the ``with`` block."""
+    sys.stdout.flush()
+    kept = os.dup(STANDARD_OUTPUT)
+    os.dup2(STANDARD_ERROR, STANDARD_OUTPUT)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, STANDARD_OUTPUT)
+        os.close(kept)
 
 
 def console(width: int = PIPED_WIDTH) -> Console:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 from types import SimpleNamespace
 from typing import Any
@@ -288,6 +289,15 @@ def test_a_report_runs_as_a_program_of_its_own(monkeypatch):
     assert ran[1] == ["-m", "reports", "--section", "paper", "--out", "p", "--depth", "whole"]
     assert main(["report"]) == 143, "128 and the number of the signal that ended the program"
     assert "--render" not in ran[2]
+
+
+def test_what_an_engine_prints_stays_out_of_the_standard_output(capfd):
+    """Libraries write to file descriptors, and their bytes would spoil the JSON object of `verify --json`."""
+    with pytest.raises(KeyboardInterrupt), running.standard_output_kept():
+        os.write(1, b"Module loaded\n")
+        raise KeyboardInterrupt
+    os.write(1, b"{}\n")
+    assert capfd.readouterr() == ("{}\n", "Module loaded\n")
 
 
 PLACES = [
