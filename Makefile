@@ -91,6 +91,7 @@ PAPER := reports/paper
 paper: $(VENV)/ready ## the committed page on the paper with its records, anew, into reports/paper/
 	rm -rf build/paper && $(BIN)/crosscheck paper --out build/paper
 	rm -rf $(PAPER) && mv build/paper $(PAPER)
+	$(BIN)/crosscheck report --section paper --render $(PAPER)
 
 KINDS := bennett 'slider_crank_chain[4]' planar_slider_crank_equal flyball_governor
 
