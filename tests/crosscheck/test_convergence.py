@@ -117,6 +117,7 @@ def test_measuring_stores_runs_and_refusals_and_resumes(tmp_path, monkeypatch) -
     monkeypatch.setattr(ladders, "ROWS", rows)
     monkeypatch.setattr(ladders, "MECHANISMS", MECHANISMS[2:3])
     monkeypatch.setattr(ladders, "study", fourth)
+    monkeypatch.setattr(ladders, "made_by", lambda: {"date": "today"})
     ladders.measure(["mujoco"], path, lines.append)
     *runs, refused = read(path)
     assert all(a == 2 * b for a, b in pairwise(made)) and len(runs) == len(made) == len(lines)
@@ -128,7 +129,7 @@ def test_measuring_stores_runs_and_refusals_and_resumes(tmp_path, monkeypatch) -
     assert refused["key"] == "mujoco, nothing four_bar_free" and refused["engine"] == "mujoco"
     assert refused["family"] == "nothing" and refused["scene"] == "four_bar_free"
     assert refused["outcome"] == "REFUSED" and refused["owner"] == "missing in the adapter"
-    assert refused["version"] == engine("mujoco").version() and refused["date"]
+    assert refused["version"] == engine("mujoco").version() and refused["date"] == "today"
     stored, count = read(path), len(made)
     ladders.measure(["mujoco"], path, lines.append)
     assert len(made) == len(lines) == count, "runs of the file are not made again"
