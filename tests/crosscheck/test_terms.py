@@ -90,7 +90,7 @@ def test_motion_and_reactions_of_terms_and_truth(name: str, label: str) -> None:
 
 @pytest.mark.parametrize("name", [of("drake"), of("dart")])
 def test_a_duplicate_joint_changes_no_motion(name: str) -> None:
-    """The rows of its closure are zero but for rounding, which is no condition on the accelerations."""
+    """The rows of its closure have entries of rounding only, and do not limit the accelerations."""
     scene = scenes()["spherical joint"]
     twice = scene.joint[-1].model_copy(update={"name": "again"})
     run = simulate(name, scene.with_(joint=(*scene.joint, twice)), TERMS, scene.duration / 16)

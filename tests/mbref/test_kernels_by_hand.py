@@ -494,7 +494,7 @@ def test_the_step_after_an_accepted_one(monkeypatch, ratio, settled, error, fact
     ],
 )
 def test_the_step_after_a_rejected_one(monkeypatch, ratio, failed, error, factor, order):
-    """Of order 1 from the third time on; from the fourth on as long as the error allows."""
+    """At the third rejection the order becomes 1; from the fourth on the error chooses the step."""
     memory, past = proposing(monkeypatch, failed=failed, error=error, settled=0)
     y = np.zeros(2)
     assert adams.propose.function(0.1, 0.2, ratio, y, y, memory) == pytest.approx(0.1 * factor)

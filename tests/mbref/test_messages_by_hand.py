@@ -45,7 +45,7 @@ def ended(time: float = 0.5, **changes: object) -> Any:
 
 @pytest.fixture
 def facts(monkeypatch):
-    """What a run's end is judged by; a test changes it."""
+    """Facts on which the message of a run's end depends; each test changes some of them."""
     found = {"dead": False, "rest": False, "no branch": False, "advice": "", "branches": 0}
     monkeypatch.setattr(outcome, "is_at_dead_position", lambda run: found["dead"])
     monkeypatch.setattr(outcome, "begins_at_rest", lambda run: found["rest"])

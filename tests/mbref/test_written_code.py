@@ -367,7 +367,7 @@ def test_orders_call_the_code_and_motions_that_turn_back_need_multipliers(monkey
 
 
 def test_the_largest_size_in_a_vector():
-    """Of each place and sign, by the instructions of a kernel."""
+    """A kernel finds the largest size wherever it stands in the vector, and whatever sign it has."""
     module = ir.Module()
     double = ir.DoubleType().as_pointer()
     function = ir.Function(module, ir.FunctionType(ir.VoidType(), [double, double]), "largest")
