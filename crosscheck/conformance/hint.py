@@ -105,9 +105,7 @@ def explanations(bench: Bench) -> Changes:
 def _differences(scene: Scene, bench: Bench) -> np.ndarray:
     """Return accelerations (6 nb,) from finite differences of neighbouring samples; angular ones are
     multiplied by the scene's length."""
-    motion = bench.close
-    rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=-1)
-    step = float(motion.times[1] - motion.times[0])
+    rates, step = _rates(scene, bench)
     found = sum(
         w * (rates[NEIGHBOURS + k] - rates[NEIGHBOURS - k]) for k, w in enumerate(WEIGHTS[:NEIGHBOURS], 1)
     )
@@ -116,9 +114,16 @@ def _differences(scene: Scene, bench: Bench) -> np.ndarray:
 
 def _rounded(bench: Bench) -> float:
     """Return the accelerations, as of `_differences`, that the rounding of the engine's velocities causes."""
+    rates, step = _rates(bench.scene, bench)
+    return GRAINS * bench.rounding * float(np.linalg.norm(rates[NEIGHBOURS])) / step
+
+
+def _rates(scene: Scene, bench: Bench) -> tuple[np.ndarray, float]:
+    """Return the velocities of neighbouring samples (k, nb, 6), angular ones multiplied by the scene's
+    length, and the time between two samples (s)."""
     motion = bench.close
-    rates = np.concatenate([motion.velocity, scene_length(bench.scene) * motion.angular_velocity], axis=-1)
-    return GRAINS * bench.rounding * float(np.linalg.norm(rates[NEIGHBOURS]) / np.diff(motion.times)[0])
+    rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=-1)
+    return rates, float(motion.times[1] - motion.times[0])
 
 
 def _least(scene: Scene) -> float:
