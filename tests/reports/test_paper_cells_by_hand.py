@@ -241,8 +241,15 @@ def test_the_planar_slider_cranks_of_the_paper_alone_are_counted(monkeypatch):
         ("a ≠ b", "MPI (GS)", "the settings"),
     ]
     names = [table.header[k] for k in sorted(table.right)]
-    assert names == ["Error", "Violation", "Off by 0.01 m from", "Passed by then", "Out of plane",
-                     "Crank, rad/s", "True"]  # fmt: skip
+    assert names == [
+        "Error",
+        "Violation",
+        "Off by 0.01 m from",
+        "Passed by then",
+        "Out of plane",
+        "Crank, rad/s",
+        "True",
+    ]
     assert {len(row) for row in table.rows} == {len(table.header)} and table.folded
 
 

@@ -171,8 +171,17 @@ def drawn(monkeypatch) -> list[dict[str, Any]]:
     asked: list[dict[str, Any]] = []
 
     def picture(scene, panels, words, timeline=None, view=None, form=None, shown=()) -> str:
-        asked.append({"scene": scene, "panels": panels, "words": words, "timeline": timeline, "form": form,
-                      "shown": shown, "view": view})  # fmt: skip
+        asked.append(
+            {
+                "scene": scene,
+                "panels": panels,
+                "words": words,
+                "timeline": timeline,
+                "form": form,
+                "shown": shown,
+                "view": view,
+            }
+        )
         return f"<svg>{words}</svg>"
 
     monkeypatch.setattr(mechanisms, "picture", picture)
