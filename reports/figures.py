@@ -116,8 +116,9 @@ def _lay_out(figure: Figure) -> None:
     """Find the layout of a figure as SVG; savefig would draw the figure once more to find it."""
     if engine := figure.get_layout_engine():
         FigureCanvasSVG(figure)
-        figure.dpi = DPI_OF_SVG
+        figure.dpi, dpi = DPI_OF_SVG, figure.dpi
         engine.execute(figure)
+        figure.dpi = dpi
         figure.set_layout_engine(None)
 
 

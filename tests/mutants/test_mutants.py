@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
@@ -9,10 +10,10 @@ from types import SimpleNamespace
 import pytest
 
 from tests.mutants import __main__ as runner
-from tests.mutants import order, workers
+from tests.mutants import drawing, tree, workers
 from tests.mutants.equivalent import REASONS
-from tests.mutants.importers import SNAPSHOTS, importers
 from tests.mutants.operators import KINDS, Mutant, mutants
+from tests.mutants.reach import Reach, around, lines_of
 
 ROOT = Path(__file__).parents[2]
 BY_KIND = {
@@ -64,27 +65,17 @@ def test_every_mutant_of_a_source_is_another_source_that_compiles():
 
 
 def test_a_seed_draws_the_same_mutants_and_another_seed_others():
-    first, again, other = (runner.drawn(seed, 20, "crosscheck/study") for seed in (1, 1, 2))
+    first, again, other = (drawing.drawn(seed, 20, "crosscheck/study") for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
     assert all(m.file.startswith("crosscheck/study/") for m in first)
-    assert len(runner.drawn(1, 10**6, "mbref/energy.py")) == len(
+    assert len(drawing.drawn(1, 10**6, "mbref/energy.py")) == len(
         set(mutants("mbref/energy.py", (ROOT / "mbref/energy.py").read_text()))
     )
 
 
-@pytest.mark.slow
-def test_tests_are_those_that_import_the_file_the_nearest_first():
-    found = importers("crosscheck/study/difference.py")
-    assert "tests/crosscheck/test_verdict.py" in found, found
-    assert not set(found) & set(SNAPSHOTS)
-    assert importers("tests/nothing.py") == []
-    assert "tests/crosscheck/test_ondsel.py" in importers("crosscheck/engines/ondsel/model.py")
-    assert "tests/crosscheck/test_clocks.py" in importers("crosscheck/engines/exudyn/dynamic.py")
-
-
 def test_no_mutant_is_drawn_of_an_engine_that_is_not_installed(monkeypatch):
-    monkeypatch.setattr(runner, "installed", lambda name: name != "bullet")
-    files = list(runner._files("crosscheck/engines/"))
+    monkeypatch.setattr(drawing, "installed", lambda name: name != "bullet")
+    files = list(drawing._files("crosscheck/engines/"))
     assert "crosscheck/engines/ondsel/model.py" in files
     assert not [name for name in files if "/bullet/" in name]
 
@@ -105,8 +96,8 @@ TINY = {
 
 
 @pytest.fixture(scope="module")
-def tree(tmp_path_factory):
-    """A tree of the tiny sources, whose tests may take 3 s."""
+def copy(tmp_path_factory):
+    """A copy of the tiny sources, whose tests may take 3 s."""
     folder = tmp_path_factory.mktemp("mutants")
     for name, text in TINY.items():
         (folder / "root" / name).parent.mkdir(parents=True, exist_ok=True)
@@ -114,10 +105,10 @@ def tree(tmp_path_factory):
     names = [name.partition("/")[0] for name in TINY]
     with (
         pytest.MonkeyPatch.context() as patch,
-        closing(runner.Tree(folder / "place", folder / "root", names, budget=2.0)) as made,
+        closing(tree.Tree(folder / "place", folder / "root", names, budget=2.0)) as made,
     ):
-        patch.setattr(runner, "SNAPSHOTS", ("test_text.py",))
-        patch.setattr(runner, "RENDERED", ("mbref/",))
+        patch.setattr(tree, "SNAPSHOTS", ("test_text.py",))
+        patch.setattr(tree, "RENDERED", ("mbref/",))
         yield made
 
 
@@ -139,17 +130,17 @@ def planted(new: str) -> Mutant:
         ([], "((a) - (b))", (runner.UNTESTED, "")),
     ],
 )
-def test_results_of_tests_that_see_it_or_not(tree, tests, new, expected):
+def test_results_of_tests_that_see_it_or_not(copy, tests, new, expected):
     """A time-out is no kill, and tests that fail without the mutant say nothing."""
-    assert tree.result(planted(new), tests) == expected
+    assert copy.result(planted(new), dict.fromkeys(tests)) == expected
     if expected[0] == runner.BY_TEXT:
-        assert tree.result(planted(new), tests, with_texts=False) == (runner.SURVIVED, "")
-    assert (tree.place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left"
+        assert copy.result(planted(new), dict.fromkeys(tests), with_texts=False) == (runner.SURVIVED, "")
+    assert (copy.place / "mbref/sums.py").read_text() == TINY["mbref/sums.py"], "the mutant was left"
 
 
 def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
     """Imports take 7 s here; tests may take 5 s after them."""
-    session, now = workers.Session({"out": [], "only": "", "of_file": 5.0, "known": {}, "words": []}), [7.0]
+    session, now = workers.Session(5.0, None, ()), [7.0]
     monkeypatch.setattr(workers, "_cpu", lambda: now[0])
     session.pytest_collection_finish()
     now[0] = 11.9
@@ -159,40 +150,129 @@ def test_the_time_of_a_file_begins_after_its_imports(monkeypatch):
         session.pytest_runtest_logfinish("a")
 
 
-def test_tests_of_a_file_with_a_word_run_first_and_then_the_quick_ones():
-    known = {"t.py::test_slow": 3.0, "t.py::test_quick": 0.1, "t.py::test_sum[total]": 9.0}
-    request = {"out": ["t.py::test_out"], "only": "", "of_file": 5.0, "known": known, "words": ["total"]}
-    names = [*known, "t.py::test_out", "t.py::test_new"]
-    items = [SimpleNamespace(nodeid=name) for name in names]
-    workers.Session(request).pytest_collection_modifyitems(items)
-    assert [item.nodeid[6:] for item in items] == ["test_sum[total]", "test_new", "test_quick", "test_slow"]
+@pytest.mark.parametrize(
+    ("wanted", "expected"), [(["c", "out", "a", "gone"], ["c", "a"]), (None, ["a", "b", "c"])]
+)
+def test_wanted_tests_run_in_their_order(wanted, expected):
+    items = [SimpleNamespace(nodeid=name) for name in ("a", "b", "out", "c")]
+    workers.Session(5.0, wanted, ["out"]).pytest_collection_modifyitems(items)
+    assert [item.nodeid for item in items] == expected
 
 
-def test_quick_tests_that_name_the_function_run_first():
+SOURCE = """\
+SCALE, OTHER = 2, 5
+UNUSED = 3
+
+
+class Sum:
+    first: int = 4
+
+    def total(self, second=6):
+        return SCALE * (
+            self.first + second
+        )
+
+
+def both(a):
+    if a > 0:
+        return [
+            a,
+            7,
+        ]
+    return None
+"""
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        (1, {9}),  # the line of the function that names SCALE
+        (2, set(range(200))),  # nobody names it: every line of the source
+        (6, {10}),
+        (8, {9, 10, 11}),  # a default: the lines of its function
+        (10, {9, 10, 11}),
+        (15, {15}),  # a condition, without what follows
+        (18, {16, 17, 18, 19}),
+        (20, {20}),
+    ],
+)
+def test_lines_whose_tests_see_a_change_of_a_line(line, expected):
+    assert {k for k in range(200) if lines_of(SOURCE, line) >> k & 1} == expected
+
+
+RECORDED = {
+    "tests/test_near.py": {"t::test_a": 3.0, "t::test_total": 5.0, "t::test_b": 0.1, "t::test_other": 0.2},
+    "tests/test_far.py": {"t::test_c": 0.3},
+    "tests/test_quick.py": {"t::test_d": 0.1},
+    "tests/test_import.py": {"t::test_e": 0.1},
+}
+
+
+@pytest.fixture
+def reach(tmp_path):
+    """Recordings of four test files: all tests but ``test_other`` and ``test_e`` run line 2 of sums.py."""
+    for name, text in {**dict.fromkeys(RECORDED, ""), "mbref/sums.py": TINY["mbref/sums.py"]}.items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    (tmp_path / "tests/test_near.py").write_text("from mbref.sums import total")
+    found = Reach(tmp_path / "lines.jsonl", tmp_path)
+    assert found.missing() == sorted(RECORDED)
+    inside = {name: list(tests) for name, tests in RECORDED.items()} | {"tests/test_import.py": []}
+    inside["tests/test_near.py"].remove("t::test_other")
+    for name, tests in RECORDED.items():
+        lines = {"outside": f"{0b10_0010:x}", "tests": [[f"{0b100:x}", inside[name]]]}
+        if name == "tests/test_quick.py":
+            lines = {"outside": f"{0b10_0110:x}", "tests": []}  # its fixture runs line 2
+        found.add(name, {"starting": 1.0, "seconds": tests, "reached": {"mbref/sums.py": lines}})
+    return found
+
+
+def test_tests_that_run_the_line_are_chosen_and_ordered(reach, tmp_path):
+    """Named functions count first, then time; of one file named tests come first."""
     mutant, source = planted("((a) - (b))"), TINY["mbref/sums.py"]
-    tests = ["test_broken.py", "test_wait.py", "test_weak.py", "test_total.py"]
-    seconds = {"test_weak.py": 1.5, "test_total.py": 0.9, "test_broken.py": 2.0, "test_wait.py": 0.8}
-    assert order.around(source, mutant) == ["total"]
-    texts = {test: TINY[test] for test in tests}
-    assert order.ordered(mutant, source, texts, seconds, {}) == [
-        "test_total.py",  # one name more in 0.9 s
-        "test_wait.py",  # names the module ``sums`` alone
-        "test_weak.py",  # the names of test_total.py in 1.5 s
-        "test_broken.py",
-    ]
-    kills = {"test_weak.py": 1, "test_broken.py": 2}
-    assert order.ordered(mutant, source, texts, seconds, kills)[:2] == ["test_broken.py", "test_weak.py"]
-    texts = {"word": "sums", "both": "sums total", "near": "from pack.part import sums, total", "none": ""}
-    texts |= {
-        "calls": "from pack.part import sums\nsums.total()",
-        "parts": "from pack.part.sums import other",
+    assert around(source, mutant) == ["total"]
+    expected = {
+        "tests/test_near.py": ["t::test_total", "t::test_b", "t::test_a"],  # names mbref, sums and total
+        "tests/test_quick.py": ["t::test_d"],
+        "tests/test_far.py": ["t::test_c"],
     }
-    deep = mutant._replace(file="pack/part/sums.py")
-    assert order.ordered(deep, source, texts, {}, {}) == [
-        "calls",
-        *("parts", "near"),
-        *("both", "word", "none"),
-    ]
+    found = reach.ordered(mutant, source, {})
+    assert found == expected and list(found) == list(expected)
+    assert next(iter(reach.ordered(mutant, source, {"tests/test_far.py": 1}))) == "tests/test_far.py"
+    again = Reach(tmp_path / "lines.jsonl", tmp_path)
+    assert again.missing() == [] and again.ordered(mutant, source, {}) == expected
+
+
+def test_a_line_that_no_test_runs_is_left_to_tests_that_import_its_source(reach):
+    mutant, source = planted("((n) + (1))"), TINY["mbref/sums.py"]  # line 7
+    assert set(reach.tests(mutant, source)) == set(RECORDED)
+    assert reach.tests(mutant._replace(file="mbref/none.py"), source) == {}
+
+
+def test_a_test_file_that_has_changed_is_recorded_again(reach, tmp_path):
+    """Of a source that has changed every test counts that ran one of its lines."""
+    (tmp_path / "tests/test_far.py").write_text("x = 1")
+    assert Reach(tmp_path / "lines.jsonl", tmp_path).missing() == ["tests/test_far.py"]
+    (tmp_path / "mbref/sums.py").write_text("\n" + TINY["mbref/sums.py"])
+    again = Reach(tmp_path / "lines.jsonl", tmp_path)
+    assert set(again.tests(planted("((a) - (b))"), TINY["mbref/sums.py"])) == set(RECORDED)
+
+
+def test_a_recording_has_the_lines_of_each_test(copy, tmp_path):
+    """``test_wait`` runs lines 6 and 7 of ``wait``; the import runs the lines of ``def``, 1 and 5."""
+    tests = copy.place / "tests"
+    tests.mkdir(exist_ok=True)
+    (tests / "test_wait.py").write_text(TINY["test_wait.py"])
+    seen = []
+    copy.record(True, tmp_path / "lines.jsonl", 2, lambda done, total: seen.append((done, total)))
+    [record] = [json.loads(line) for line in (tmp_path / "lines.jsonl").read_text().splitlines()]
+    assert seen == [(1, 1)] and record["file"] == "tests/test_wait.py"
+    assert set(record["seconds"]) == {"tests/test_wait.py::test_wait"}
+    reached = record["reached"]["mbref/sums.py"]
+    assert int(reached["outside"], 16) == 1 << 1 | 1 << 5
+    assert reached["tests"] == [[f"{1 << 6 | 1 << 7:x}", ["tests/test_wait.py::test_wait"]]]
+    found = copy.tests(planted("((n) + (1))"))
+    assert found == {"tests/test_wait.py": ["tests/test_wait.py::test_wait"]}
 
 
 def test_files_with_kernels_run_without_compilation():
@@ -202,10 +282,10 @@ def test_files_with_kernels_run_without_compilation():
         "mbref/scene.py",
         "crosscheck/engines/compiled/calls.py",
     ):
-        assert runner.is_plain(file, (ROOT / file).read_text()), file
+        assert tree.is_plain(file, (ROOT / file).read_text()), file
     compiling = ("mbref/kernels/disk_cache.py", "mbref/kernels/named_memory.py")
     for file in (*compiling, "crosscheck/study/grid.py"):
-        assert not runner.is_plain(file, (ROOT / file).read_text()), file
+        assert not tree.is_plain(file, (ROOT / file).read_text()), file
 
 
 def test_the_score_counts_no_equivalent_mutant_and_no_time_out():
@@ -219,10 +299,10 @@ def test_reasons_name_lines_that_are_there():
         assert why.endswith("."), (file, line, why)
 
 
-def test_a_crash_is_a_kill_only_where_the_mutant_causes_it(tree):
+def test_a_crash_is_a_kill_only_where_the_mutant_causes_it(copy):
     mutant = planted("((a) - (b))")
-    assert tree.result(mutant, ["test_crash.py"]) == (runner.KILLED, "")
-    path = tree.place / "test_crash.py"
+    assert copy.result(mutant, {"test_crash.py": None}) == (runner.KILLED, "")
+    path = copy.place / "test_crash.py"
     path.write_text("import os\n\n\ndef test_crash():\n    os._exit(1)\n")
     with pytest.raises(RuntimeError, match="end early without a mutant, too: test_crash"):
-        tree.result(mutant, [path.name])
+        copy.result(mutant, {path.name: None})

@@ -3,14 +3,17 @@
 The process reads requests from its input, one JSON object a line, and answers in one line each.  It imports
 none of the project's packages: each fork imports them anew, with the mutant that stands in the tree.
 
-A request has ``files`` (test files in order), ``out`` (ids of tests that are left out), ``only`` (the id
-of the one test that runs; empty: all), ``words`` and ``known`` (CPU s of tests: of a file those run first
-whose ids have one of the words, then the quickest),
-``of_file`` and ``budget`` (CPU s of a file and of all files, after which no test begins; a test that takes
-longer than a file may is ended), ``limit`` (CPU s of the fork) and ``waiting`` (s of wall time).  The answer
-has ``status`` (pytest's exit status; none: the time was up), ``failed`` (the id of the test that failed
-first, or the file that could not be collected), ``ended`` (the ids of tests that took too long) and
-``seconds`` (CPU s by file and by test).
+A request has ``tests`` (by test file, in order, the ids of the tests that run, in order; none: all tests
+of the file), ``out`` (ids of tests that are left out), ``of_file`` and ``budget`` (CPU s of a file and of all
+files, after which no test begins; a test that takes longer than a file may is ended), ``limit`` (CPU s of the
+fork) and ``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was
+up), ``failed`` (the id of the test that failed first, or the file that could not be collected) and ``ended``
+(the ids of tests that took too long).
+
+A request with ``packages``, names of folders, records one test file: the answer has ``starting`` (CPU s until
+its first test), ``seconds`` (CPU s of each test that passes) and ``reached``: by source file, the lines that
+these tests run, as pairs of a number whose bits are lines and the tests that run just these, and the lines
+that run outside of tests, at imports and in fixtures.
 """
 
 from __future__ import annotations
@@ -24,10 +27,12 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import FrameType
 from typing import Any
 
+import coverage
 import hypothesis
 import numba
 import pydantic
@@ -40,34 +45,27 @@ import scipy.sparse.linalg
 
 LIBRARIES = (hypothesis, numba, pydantic, rich, scipy)
 OPTIONAL = ("jinja2", "matplotlib.figure", "matplotlib.backends.backend_svg", "mujoco", "pinocchio")
-OPTIONS = ("-q", "-x", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRewriteWarning")
+AGAIN = 0.01  # CPU s until a test is ended that could not be
 CRASHED = 3  # status of a fork that ended without an answer
 
 
 class Session:
-    """A pytest plugin that leaves out tests and stops when the time is up."""
+    """A pytest plugin that runs the wanted tests of a file and stops when the time is up."""
 
-    def __init__(self, request: dict[str, Any]) -> None:
-        self._out, self._only, self._of_file = set(request["out"]), request["only"], request["of_file"]
-        self._words: list[str] = request["words"]
-        self._known: dict[str, float] = request["known"]
-        self._end = 0.0  # CPU s
+    def __init__(self, of_file: float, wanted: Sequence[str] | None, out: Collection[str]) -> None:
+        self._of_file, self._wanted, self._out, self._end = of_file, wanted, out, 0.0
         self.failed = ""
         self.ended: list[str] = []
-        self.seconds: dict[str, float] = {}
 
     def pytest_collection_finish(self) -> None:
         """Begin the time of a file after its imports, which take seconds in a new process."""
         self._end = _cpu() + self._of_file
 
     def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        """Leave out tests, and let those with the words and the quickest begin."""
-        kept = [item for item in items if item.nodeid not in self._out and self._only in ("", item.nodeid)]
-        items[:] = sorted(kept, key=lambda item: self._rank(item.nodeid))
-
-    def _rank(self, test: str) -> tuple[bool, float]:
-        name = test.partition("::")[2]
-        return not any(word in name for word in self._words), self._known.get(test, 0.0)
+        """Keep the wanted tests, in their order."""
+        found = {item.nodeid: item for item in items if item.nodeid not in self._out}
+        items[:] = [found[test] for test in self._wanted or found if test in found]
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
@@ -83,20 +81,18 @@ class Session:
 
     @contextlib.contextmanager
     def _limited(self, item: pytest.Item) -> Iterator[None]:
-        """End a test that takes longer than a file may, and note its time."""
+        """End a test that takes longer than a file may."""
 
         def end(signum: int, frame: object) -> None:
             self.ended.append(item.nodeid)
             raise pytest.skip.Exception("too long")
 
         signal.signal(signal.SIGPROF, end)
-        begun = _cpu()
         signal.setitimer(signal.ITIMER_PROF, self._of_file)
         try:
             yield
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
-            self.seconds[item.nodeid] = self.seconds.get(item.nodeid, 0.0) + _cpu() - begun
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """End where the time of the file is up."""
@@ -112,33 +108,122 @@ class Session:
         self.failed = self.failed or (report.nodeid if report.failed else "")
 
 
+class Recording:
+    """A pytest plugin that notes the time of each test that passes, and has its lines counted for it."""
+
+    def __init__(self, lines: coverage.Coverage, of_test: float, of_file: float) -> None:
+        self._lines, self._of_test, self._of_file, self._end = lines, of_test, of_file, 0.0
+        self.starting = 0.0
+        self.seconds: dict[str, float] = {}
+
+    def pytest_collection_finish(self) -> None:
+        """Note the time of the imports."""
+        self.starting = _cpu()
+        self._end = self.starting + self._of_file
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
+        """Count the lines of a test for it, and its time; one that takes too long counts as failed."""
+
+        def end(signum: int, frame: FrameType | None) -> None:
+            if _is_counting(frame):  # it may hold a lock
+                signal.setitimer(signal.ITIMER_PROF, AGAIN)
+            else:
+                raise TimeoutError(item.nodeid)
+
+        signal.signal(signal.SIGPROF, end)
+        begun = _cpu()
+        self._lines.switch_context(item.nodeid)
+        signal.setitimer(signal.ITIMER_PROF, self._of_test)
+        try:
+            result = yield
+            self.seconds[item.nodeid] = _cpu() - begun
+            return result
+        finally:
+            signal.setitimer(signal.ITIMER_PROF, 0.0)
+            self._lines.switch_context("")
+
+    def pytest_runtest_logfinish(self, nodeid: str) -> None:
+        """End where the time of the file is up."""
+        if _cpu() > self._end:
+            pytest.exit("long enough", returncode=5)
+
+
+def _is_counting(frame: FrameType | None) -> bool:
+    """Return whether a function of coverage runs."""
+    folder = str(Path(coverage.__file__).parent)
+    return frame is not None and (frame.f_code.co_filename.startswith(folder) or _is_counting(frame.f_back))
+
+
 def _cpu() -> float:
     """Return the CPU seconds of this process and of the children that have ended."""
     return sum(os.times()[:4])
 
 
 def work(request: dict[str, Any], answer: Path) -> None:
-    """Run the tests of a request in this process and write the answer."""
+    """Carry out a request in this process and write the answer."""
     resource.setrlimit(resource.RLIMIT_CPU, (int(request["limit"]), int(request["limit"]) + 5))
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(null, stream)
-    session = Session(request)
+    if "packages" in request:
+        answer.write_text(json.dumps(recorded(request)))
+    else:
+        run(request, answer)
+
+
+def run(request: dict[str, Any], answer: Path) -> None:
+    """Run tests until one fails or the time is up."""
+    ended: list[str] = []
 
     def report(status: int, failed: str) -> None:
-        found = {"status": status, "failed": failed, "ended": session.ended, "seconds": session.seconds}
-        answer.write_text(json.dumps(found))
+        answer.write_text(json.dumps({"status": status, "failed": failed, "ended": ended}))
 
     report(0, "")
-    for file in request["files"]:
+    for file, wanted in request["tests"].items():
         report(CRASHED, file)  # the answer if this process does not return from the file
-        begun = _cpu()
-        status = int(pytest.main([*OPTIONS, file], plugins=[session]))
-        session.seconds[file] = _cpu() - begun
+        session = Session(request["of_file"], wanted, request["out"])
+        status = int(pytest.main([*OPTIONS, "-x", file], plugins=[session]))
+        ended += session.ended
         has_passed = status in (0, 5)
         report(status, session.failed or ("" if has_passed else file))
         if not has_passed or _cpu() > request["budget"]:
             break
+
+
+def recorded(request: dict[str, Any]) -> dict[str, Any]:
+    """Return the times of the tests of one file, and which lines of the packages they run."""
+    place = Path.cwd()
+    [file] = request["tests"]
+    lines = coverage.Coverage(
+        data_file=None,
+        config_file=False,
+        source=[str(place / name) for name in request["packages"]],
+        messages=False,
+    )
+    session = Recording(lines, request["of_test"], request["of_file"])
+    lines.start()
+    pytest.main([*OPTIONS, file], plugins=[session])
+    lines.stop()
+    data = lines.get_data()
+    reached = {
+        Path(path).relative_to(place).as_posix(): _by_lines(data.contexts_by_lineno(path), session.seconds)
+        for path in data.measured_files()
+        if data.lines(path)
+    }
+    return {"starting": session.starting, "seconds": session.seconds, "reached": reached}
+
+
+def _by_lines(tests: Mapping[int, Sequence[str]], passed: Collection[str]) -> dict[str, Any]:
+    """Return the lines that tests run and those that run outside of them, from the tests of each line."""
+    bits: dict[str, int] = {}
+    for line, names in tests.items():
+        for name in names:
+            bits[name] = bits.get(name, 0) | 1 << line
+    outside, alike = bits.pop("", 0), {}
+    for name in sorted(bits.keys() & set(passed)):
+        alike.setdefault(bits[name], []).append(name)
+    return {"outside": f"{outside:x}", "tests": [[f"{lines:x}", names] for lines, names in alike.items()]}
 
 
 def answer_of(request: dict[str, Any]) -> dict[str, Any]:
@@ -157,7 +242,7 @@ def answer_of(request: dict[str, Any]) -> dict[str, Any]:
         is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
         if path.exists() and not is_late:
             return json.loads(path.read_text())
-    return {"status": None if is_late else CRASHED, "failed": "", "ended": [], "seconds": {}}
+    return {"status": None if is_late else CRASHED, "failed": "", "ended": []}
 
 
 def _wait(child: int, end: float) -> int:
