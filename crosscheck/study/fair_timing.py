@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
-from crosscheck.engine import Setting, engine, engine_names
+from crosscheck.engine import Setting, engine
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
@@ -53,10 +54,18 @@ def model_differences(
         exact = []
     done = [record for record in records if is_completed(record)]
     runs = [_motion(scene, r) for r in done]
-    known = {record["engine"] for record in done} & set(engine_names())
-    rounding = {name: engine(name).rounding for name in known}
-    found = differences(scene, [*exact, *runs], rounding) if exact or runs else {}
+    found = differences(scene, [*exact, *runs], _roundings(done)) if exact or runs else {}
     return {name: str(difference) for name, difference in found.items()}
+
+
+def _roundings(records: Sequence[Record]) -> dict[str, float]:
+    """Return the relative rounding that each engine declares, by the engine's name in its records; engines
+    that are not on this machine are left out."""
+    found = {}
+    for record in records:
+        with contextlib.suppress(ImportError, LookupError, AttributeError):
+            found[record["engine"]] = engine(record["asked"]["engine"]).rounding
+    return found
 
 
 def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]:

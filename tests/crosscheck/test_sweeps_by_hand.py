@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import sys
 from contextlib import contextmanager
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from crosscheck.engine import Cannot, Owner, Setting
+from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.truth import NoSolution
 from crosscheck.paper import runs as paper_runs
 from crosscheck.paper.runs import Label
@@ -315,35 +316,61 @@ def test_wrong_engines_with_other_accelerations_at_equal_states(monkeypatch):
     assert fair_timing.force_differences(still("s"), wrong[:4]) == {"both": "off by 2"}
 
 
+class SingleEngine(Engine):
+    """An outsider's engine with 20 bits."""
+
+    name, package, rounding = "mine", "numpy", 2.0**-20
+
+    def settings(self, scene: Scene) -> list[Setting]:
+        return []
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Any:
+        raise NotImplementedError
+
+
 def test_models_differ_from_the_truth_or_from_the_first_run(monkeypatch):
     asked = []
 
     def differences(scene, motions, rounding):
         asked.append(motions)
-        assert rounding == ({"warp": 2.0**-23} if "b" in motions else {}), "of engines that are known"
+        single = {"warp": 2.0**-23, "mine": 2.0**-20} if "b" in motions else {}
+        assert rounding == single, "of engines on this machine, by the names in their records"
         return {"b": 0.25, "c": 0.5}
 
     monkeypatch.setattr(fair_timing, "_motion", lambda scene, record: record["key"])
     monkeypatch.setattr(fair_timing, "differences", differences)
-    engines = {"a": "own", "b": "warp", "x": "newton"}
-    records = [timed_record("a", 1.0), timed_record("b", 1.0), timed_record("x", 1.0, "NOT_FINITE")]
-    records = [{**record, "engine": engines[record["key"]]} for record in records]
+    outsider = ModuleType("an_outsiders_module")
+    vars(outsider).update(ENGINE=SingleEngine())
+    monkeypatch.setitem(sys.modules, "an_outsiders_module", outsider)
     monkeypatch.setattr(fair_timing, "truth_for", lambda scene, seconds: None)
+    engines = {
+        "a": ("own", "own"),
+        "b": ("warp", "warp"),
+        "c": ("mine", "an_outsiders_module:ENGINE"),
+        "d": ("elsewhere", "no_such_module:ENGINE"),
+        "e": ("nameless", "an_outsiders_module:NONE"),
+        "x": ("newton", "newton"),
+    }
+    records = [timed_record(key, 1.0, "NOT_FINITE" if key == "x" else "COMPLETED") for key in engines]
+    for record in records:
+        name, asked_for = engines[record["key"]]
+        record.update(engine=name, asked={"engine": asked_for})
+    motions = list("abcde")
     assert fair_timing.model_differences(still("s"), records) == {"b": "0.25", "c": "0.5"}
-    assert fair_timing.model_difference(still("s"), records) == "0.25" and asked == [["a", "b"]] * 2
+    assert fair_timing.model_difference(still("s"), records) == "0.25" and asked == [motions] * 2
     assert fair_timing.model_difference(still("s"), []) is None and len(asked) == 2
     exact = SimpleNamespace(poses=lambda times: "exact")
     monkeypatch.setattr(fair_timing, "truth_for", lambda scene, seconds: exact)
     fair_timing.model_differences(still("s"), records)
     fair_timing.model_differences(still("s"), [])
-    assert asked[2:] == [["exact", "a", "b"], ["exact"]]
+    assert asked[2:] == [["exact", *motions], ["exact"]]
 
     def ends(times):
         raise NoSolution.ending("it locks", 0.1)
 
     monkeypatch.setattr(fair_timing, "truth_for", lambda scene, seconds: SimpleNamespace(poses=ends))
     fair_timing.model_differences(still("s"), records)
-    assert asked[4:] == [["a", "b"]]
+    assert asked[4:] == [motions]
 
 
 # --- the paper's runs -------------------------------------------------------------------------------------
