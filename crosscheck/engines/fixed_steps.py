@@ -99,15 +99,14 @@ def scouted_rate(engine: Engine, scene: Scene, family: str, **options: Any) -> f
     return fastest_rate(scene, coarse)
 
 
-def steps(scene: Scene, rate: float, default: float | None = None, finer: int = 0) -> list[float]:
+def steps(scene: Scene, rate: float, finer: int = 0, most: int = MOST_STEPS) -> list[float]:
     """Return steps (s), coarse to fine, in which a body turns by ANGLES at a rate (rad/s), and ``finer``
-    further steps, each a third of the previous step. The engine's own ``default`` step is included; steps so
-    short that a run takes too many are left out.
+    further steps, each a third of the previous step. Steps so short that a run takes more than ``most`` are
+    left out.
     """
     angles = [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))]
     found = [float(f"{angle / rate:.2g}") for angle in angles]
-    kept = [h for h in found if scene.duration / h <= MOST_STEPS] or found[:1]
-    return sorted({*kept, *([default] if default else [])}, reverse=True)
+    return [h for h in found if scene.duration / h <= most] or found[:1]
 
 
 class Loads:

@@ -52,8 +52,8 @@ def initial_rates(scene: Scene, tree: Tree) -> np.ndarray:
             rows.append((ends[1][1] - ends[0][1])[None] @ of_rates[3:])
             values.append(np.zeros(1))
     rates = np.linalg.lstsq(np.vstack(rows), np.concatenate(values))[0]
-    for driver in scene.driver:
-        rates[tree.coordinate(scene, driver.joint)] = motion(driver, 0.0)[1]
+    for i, driver in tree.driven(scene):
+        rates[i] = motion(driver, 0.0)[1]
     return rates
 
 

@@ -6,7 +6,9 @@ or divide by zero.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +73,24 @@ def pieces(tree: Tree, negligible: float) -> list[Piece]:
     return found
 
 
-def origin(of: list[Piece], piece: int) -> np.ndarray:
-    """Return the origin (3,) of a piece's frame, world at t = 0; for -1 the origin of the ground's frame."""
-    return of[piece].origin if piece >= 0 else O
+def assembled(
+    tree: Tree, negligible: float, ground: Any, add: Callable[[str, Piece, Any, np.ndarray, np.ndarray], Any]
+) -> tuple[list[Any], dict[int, Any]]:
+    """Add the pieces of a tree to an engine; returns the engine's bodies of the tree's links, and its joints
+    that move, by the first joint velocity of the tree.
+
+    ``add`` returns the engine's joint and body for a name, a piece, the engine's body of the piece's parent
+    (``ground`` for the ground), and the joint's place in the frames of the parent and of the piece.
+    """
+    parts = pieces(tree, negligible)
+    bodies: list[Any] = []
+    joints: dict[int, Any] = {}
+    for n, piece in enumerate(parts):
+        parent, start = (
+            (bodies[piece.parent], parts[piece.parent].origin) if piece.parent >= 0 else (ground, O)
+        )
+        joint, body = add(str(n), piece, parent, piece.anchor - start, piece.anchor - piece.origin)
+        bodies.append(body)
+        if piece.mobility:
+            joints[piece.velocity] = joint
+    return [body for piece, body in zip(parts, bodies, strict=True) if piece.link >= 0], joints

@@ -23,7 +23,7 @@ import numpy as np
 
 from crosscheck.engines.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
-from mbref.scene import Body, Distance, Joint, JointFacts, JointLoad, Scene, Spherical
+from mbref.scene import Body, Coupling, Distance, Driver, Joint, JointFacts, JointLoad, Scene, Spherical
 from mbref.scene_joints import DISPLACEMENT, Coordinate
 
 GROUND_LINK = -1
@@ -134,6 +134,19 @@ class Tree:
         kinds = [mobility.kind for mobility in found.mobilities]
         return self.starts[link] + sum(COORDINATES[k] for k in kinds[: kinds.index(SLIDE)])
 
+    def driven(self, scene: Scene) -> list[tuple[int, Driver]]:
+        """Return the index of each driver's velocity, and the driver."""
+        return [(self.coordinate(scene, driver.joint), driver) for driver in scene.driver]
+
+    def coupled(self, scene: Scene, coupling: Coupling) -> list[int]:
+        """Return the indices of the two velocities that a coupling relates."""
+        return [self.coordinate(scene, joint.name, kind) for joint, kind in scene.coupled(coupling)]
+
+    def armatures(self, scene: Scene) -> list[tuple[int, float]]:
+        """Return the index of the velocity of each joint with an armature, and its reflected inertia."""
+        geared = [joint for joint in scene.joint if joint.reflected_inertia]
+        return [(self.coordinate(scene, joint.name), joint.reflected_inertia) for joint in geared]
+
 
 @dataclass(frozen=True)
 class _Edge:
@@ -146,11 +159,12 @@ class _Edge:
     weight: int
 
 
-def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
+def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,), between_links: bool = False) -> Tree:
     """Return the scene as links and closures; bodies without mass (kinematics) have 1 kg and 1 kg m².
 
     ``closes`` are the types of joints that the engine closes by itself, without splitting a body, unless a
-    driver, coupling or load needs the joint's coordinate.
+    driver, coupling or load needs the joint's coordinate. With ``between_links`` no closure is at the ground:
+    of joints with equally many rows the ones at the ground are cut last, and such a cut splits a body.
     """
     nodes = [_body_link(b, body) for b, body in enumerate(scene.body)]
     edges = []
@@ -165,10 +179,15 @@ def spanning_tree(scene: Scene, closes: Collection[str] = (ROD_END,)) -> Tree:
             weight = joint.facts.rows + DRIVEN_WEIGHT * (joint.name in acting)
             anchor = np.array(joint.anchor_pair[0])
             edges.append(_Edge(joint.type, joint.facts, j, pair, anchor, _axes(joint), weight))
+    if between_links:
+        edges.sort(key=lambda edge: GROUND_LINK not in edge.nodes)
     kept, cut = _kruskal(len(nodes), edges)
     acting |= {load.joint for load in scene.load if isinstance(load, JointLoad)}
     needed = {j for j, joint in enumerate(scene.joint) if joint.name in acting}  # joints with a coordinate
-    closable = [edge.kind in closes and edge.joint not in needed for edge in cut]
+    barred = {GROUND_LINK} if between_links else set()
+    closable = [
+        edge.kind in closes and edge.joint not in needed and not barred & set(edge.nodes) for edge in cut
+    ]
     closures = _cut_open(nodes, kept, list(zip(cut, closable, strict=True)))
     return _depth_first(nodes, kept, closures, len(scene.body))
 

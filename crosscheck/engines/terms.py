@@ -24,7 +24,7 @@ from crosscheck.engines.driver_motion import motion, stated_rate
 from crosscheck.engines.geometry import cross_matrix
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.joint_coordinates import JointCoordinates, rotation_vector
-from crosscheck.engines.sampling import UNKNOWN, Adaptive, Counts, Failed, Sample
+from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample
 from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
 from crosscheck.engines.tree_reactions import LinkMotion, applied, sample_of, wrench
 from mbref import rotations
@@ -34,6 +34,7 @@ from mbref.trajectory import Outcome
 
 FAMILY = "terms"
 ABOUT = "the engine's mass matrix, bias and Jacobians; DOP853, closures solved and projected by crosscheck"
+OPTIONS = {"rtol": "relative tolerance of a step", "min_step": "shortest step, s"}
 RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest step
 # rad; a driver moves by at most this in one step, since closures may change branch within larger ones
@@ -106,7 +107,7 @@ class Simulation:
         self.mechanism, self.scene, self.tree = mechanism, mechanism.scene, mechanism.tree
         self.at = mechanism.coordinates
         self.counts = Counts()
-        self.driven = [(self.tree.coordinate(self.scene, d.joint), d) for d in self.scene.driver]
+        self.driven = self.tree.driven(self.scene)
         places = dict(zip(self.at.single.tolist(), self.at.single_q.tolist(), strict=True))
         self.driven_q = [places[i] for i, _ in self.driven]
         self.free = np.setdiff1d(np.arange(self.at.nv), [i for i, _ in self.driven])
@@ -121,18 +122,17 @@ class Simulation:
         """Rows J (couplings, nv) of q₂ - ratio q₁ = 0."""
         rows = np.zeros((len(self.scene.coupling), self.at.nv))
         for row, coupling in zip(rows, self.scene.coupling, strict=True):
-            for factor, (joint, kind) in zip(
-                (-coupling.ratio, 1.0), self.scene.coupled(coupling), strict=True
+            for factor, i in zip(
+                (-coupling.ratio, 1.0), self.tree.coupled(self.scene, coupling), strict=True
             ):
-                row[self.tree.coordinate(self.scene, joint.name, kind)] += factor
+                row[i] += factor
         return rows
 
     def _rotors(self) -> np.ndarray:
         """Diagonal matrix (nv, nv) of the armatures."""
         found = np.zeros(self.at.nv)
-        for joint in self.scene.joint:
-            if joint.reflected_inertia:
-                found[self.tree.coordinate(self.scene, joint.name)] = joint.reflected_inertia
+        for i, inertia in self.tree.armatures(self.scene):
+            found[i] = inertia
         return np.diag(found)
 
     def _terms(self, q: np.ndarray, v: np.ndarray) -> Terms:
@@ -225,11 +225,9 @@ class Simulation:
             terms.position,
             twists[:, :3],
             twists[:, 3:],
-            UNKNOWN,
-            UNKNOWN,
             self.at.of_velocities(q),
             v,
-            t,
+            time=t,
         )
 
     def _accelerated(self, terms: Terms, of: LinkMotion, a: np.ndarray) -> LinkMotion:

@@ -8,7 +8,7 @@ joint.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,18 +29,18 @@ class LinkMotion:
     """Motion of the links' frames in the world: rotation since t = 0 (n, 3, 3); all other arrays have the
     shape (n, 3).
 
-    Accelerations are UNKNOWN if the engine does not give them; ``coordinates`` and ``rates`` (nv,) are the
-    joint coordinates, meaningful if a joint has a single angle.
+    ``coordinates`` and ``rates`` (nv,) are the joint coordinates, meaningful if a joint has a single angle.
+    Accelerations are UNKNOWN if the engine does not give them.
     """
 
     rotation: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
     angular_velocity: np.ndarray
-    acceleration: np.ndarray
-    angular_acceleration: np.ndarray
     coordinates: np.ndarray
     rates: np.ndarray
+    acceleration: np.ndarray = field(default_factory=lambda: UNKNOWN)
+    angular_acceleration: np.ndarray = field(default_factory=lambda: UNKNOWN)
     time: float = 0.0  # s, at which loads over time act
 
 

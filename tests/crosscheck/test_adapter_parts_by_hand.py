@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -12,11 +13,15 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Owner, Setting
+from crosscheck.engines import own_steps
+from crosscheck.engines import pieces as pieces_module
 from crosscheck.engines.dart import adapter as dart_adapter
 from crosscheck.engines.dart.adapter import ENGINE as DART
+from crosscheck.engines.dart.adapter import Dart
 from crosscheck.engines.dart.model import Mechanism
+from crosscheck.engines.drake import adapter as drake_adapter
 from crosscheck.engines.joint_coordinates import JointCoordinates
-from crosscheck.engines.pieces import Piece
+from crosscheck.engines.pieces import Piece, assembled
 from crosscheck.engines.sampling import UNKNOWN, Failed, Sample
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN, Closure, Mobility, spanning_tree
 from crosscheck.engines.symbolic import generator
@@ -27,6 +32,7 @@ from mbref.trajectory import Cost, Outcome
 
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
 BODY = Body(name="b", mass=4.0, inertia=(1.0, 2.0, 2.5), position=(1.0, 0.0, 0.0))
+PULL = Force(body="b", point=(1.0, 0.0, 0.0), force=(0.0, 1.0, 0.0))
 ANCHOR = np.array([1.0, 2.0, 3.0])
 
 
@@ -221,17 +227,36 @@ def test_dart_adds_a_body_with_its_joint(kind: Any, name: str, axis: list[float]
         math=SimpleNamespace(Isometry3=Isometry),
         dynamics=SimpleNamespace(Inertia=lambda mass, offset, inertia: (mass, list(offset), inertia[1, 1])),
     )
-    given = mechanism(dart=dart, skeleton=Skeleton(), joints={})
-    first = piece(-1, None, 0)
-    second = piece(0, kind and Mobility(kind, np.array([0.0, 0.0, 2.0])), 7)
-    root = given._add([first], [], first)
-    given._add([first, second], [root], second)
-    one, other = given.skeleton.made
-    assert one["parent"] == () and one["above"] == [4.0, 4.0, 4.0] and one["below"] == [13.0, 12.0, 11.0]
-    assert other["kind"] == name and other["parent"] == (root,) and other.get("axis") == axis
-    assert other["above"] == [13.0, 12.0, 11.0] and other["below"] == [3.0, 2.0, 1.0]
-    assert other["collides"] is False and other["inertia"] == (5.0, [0.0, 0.0, 0.0], 1.0)
-    assert given.joints == ({7: other["joint"]} if kind else {})
+    given = mechanism(dart=dart, skeleton=Skeleton())
+    moving = piece(0, kind and Mobility(kind, np.array([0.0, 0.0, 2.0])), 7)
+    pair = given._add("1", moving, "parent", np.array([13.0, 12.0, 11.0]), np.array([3.0, 2.0, 1.0]))
+    [made] = given.skeleton.made
+    assert pair == (made["joint"], made["body"])
+    assert made["kind"] == name and made["parent"] == ("parent",) and made.get("axis") == axis
+    assert made["above"] == [13.0, 12.0, 11.0] and made["below"] == [3.0, 2.0, 1.0]
+    assert made["collides"] is False and made["inertia"] == (5.0, [0.0, 0.0, 0.0], 1.0)
+
+
+@pytest.mark.parametrize("kind", [SLIDE, None])
+def test_pieces_are_added_with_their_joints_places(kind: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first piece has its origin at (-9, -8, -7), the second at (1, 2, 3); anchors are at (4, 4, 4)."""
+    first, second = piece(-1, None, 0), piece(0, kind and Mobility(kind, np.zeros(3)), 7)
+    auxiliary = replace(piece(1, Mobility(TURN, np.zeros(3)), 9), link=-1)
+    monkeypatch.setattr(pieces_module, "pieces", lambda tree, share: [first, second, auxiliary])
+    added: list[Any] = []
+
+    def add(name: str, one: Piece, parent: Any, above: np.ndarray, below: np.ndarray) -> tuple[str, str]:
+        added.append((name, one, parent, above.tolist(), below.tolist()))
+        return f"joint {name}", f"body {name}"
+
+    found = assembled("tree", 0.5, "ground", add)  # type: ignore[arg-type]
+    assert added == [
+        ("0", first, "ground", [4.0, 4.0, 4.0], [13.0, 12.0, 11.0]),
+        ("1", second, "body 0", [13.0, 12.0, 11.0], [3.0, 2.0, 1.0]),
+        ("2", auxiliary, "body 1", [3.0, 2.0, 1.0], [-7.0, -8.0, -9.0]),
+    ]
+    joints = {9: "joint 2"} if kind is None else {7: "joint 1", 9: "joint 2"}
+    assert found == (["body 0", "body 1"], joints)
 
 
 def test_dart_builds_the_pieces_of_a_tree_and_keeps_the_nodes_of_its_links(
@@ -258,6 +283,7 @@ def test_dart_builds_the_pieces_of_a_tree_and_keeps_the_nodes_of_its_links(
     second = BODY.model_copy(update={"name": "c", "mass": 7.0})
     given = scene(body=(BODY, second), joint=(turn, ball), gravity=(0.0, 0.0, -9.0))
     found = Mechanism(given, spanning_tree(given))
+    assert skeleton.made[0]["parent"] == (None,)
     assert names == ["s"] and put == {"gravity": [0.0, 0.0, -9.0], "v": [0.0] * 5}
     light, first, last = (record["inertia"] for record in skeleton.made)
     assert 0 < light < 1e-20 and (first, last) == (4.0, 7.0)
@@ -324,8 +350,9 @@ def world(family: str, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Joint, lis
         return [record]
 
     driven, other = Joint(), Joint()
-    given = scene(driver=(Driver(joint="H", polynomial=(0.0, 2.0, 3.0)),), gravity=(0.0, -9.0, 0.0))
-    tree = SimpleNamespace(closures=("closure",), coordinate=lambda scene, joint: {"H": 1}.get(joint, 0))
+    driver = Driver(joint="H", polynomial=(0.0, 2.0, 3.0))
+    given = scene(driver=(driver,), load=(PULL,), gravity=(0.0, -9.0, 0.0))
+    tree = SimpleNamespace(closures=("closure",), driven=lambda scene: [(1, scene.driver[0])])
     dart = SimpleNamespace(
         simulation=SimpleNamespace(World=World),
         dynamics=SimpleNamespace(ActuatorType=SimpleNamespace(ACCELERATION="acceleration")),
@@ -339,8 +366,8 @@ def world(family: str, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Joint, lis
         constraints=constraints,
         nodes=["n0", Pushed(errors)],
     )
-    monkeypatch.setattr(dart_adapter, "Loads", lambda *given: SimpleNamespace(at=loads_at))
-    found = dart_adapter._World(model, family, 0.25)  # type: ignore[arg-type]
+    monkeypatch.setattr(own_steps, "Loads", lambda *given: SimpleNamespace(at=loads_at))
+    found = dart_adapter._World(model, family == "balls", 0.25)  # type: ignore[arg-type]
     assert asked == [family == "balls"] and other.log == []
     return found, driven, errors
 
@@ -390,9 +417,7 @@ def test_dart_runs_gears_and_armatures_only_by_its_terms() -> None:
     assert [DART.serves(GEARED, family) for family in ("terms", "defaults", "balls", "none")] == [1, 0, 0, 0]
     with pytest.raises(ValueError) as raised:
         DART.run(GEARED, np.array([0.0]), Setting("defaults", {"step": 0.1, "erp": 0.01}))
-    assert str(raised.value) == (
-        "DART's own steps have no couplings and armatures here; family 'terms' has them"
-    )
+    assert str(raised.value) == "family 'defaults' of dart cannot run the scene 's'"
 
 
 def test_dart_offers_its_own_steps_from_a_scouted_rate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -402,10 +427,12 @@ def test_dart_offers_its_own_steps_from_a_scouted_rate(monkeypatch: pytest.Monke
         asked.append((engine.name, given.name, family, options))
         return 3.0
 
-    monkeypatch.setattr(dart_adapter, "scouted_rate", scouted)
-    monkeypatch.setattr(dart_adapter, "steps", lambda given, rate, finer: [rate / 100, rate / 1000 * finer])
-    monkeypatch.setattr(dart_adapter, "DEFAULT_STEP", 0.01)
-    monkeypatch.setattr(dart_adapter.terms, "sweep", lambda rate: [Setting("terms", {"rtol": rate})])
+    monkeypatch.setattr(own_steps, "scouted_rate", scouted)
+    monkeypatch.setattr(
+        own_steps, "steps", lambda given, rate, finer, most: [rate / 100, rate / 1000 * finer]
+    )
+    monkeypatch.setattr(Dart, "default_steps", {"defaults": 0.01})
+    monkeypatch.setattr(own_steps.terms, "sweep", lambda rate: [Setting("terms", {"rtol": rate})])
     found = [(s.family, dict(s.options)) for s in DART.settings(scene())]
     assert asked == [("dart", "s", "defaults", {"erp": 0.01})]
     assert found == [
@@ -416,24 +443,112 @@ def test_dart_offers_its_own_steps_from_a_scouted_rate(monkeypatch: pytest.Monke
         ("balls", {"step": 0.03, "erp": 0.5}),
         ("balls", {"step": 0.006, "erp": 0.5}),
     ]
-    monkeypatch.setattr(dart_adapter, "stated_rate", lambda given: 7.0)
+    monkeypatch.setattr(own_steps, "stated_rate", lambda given: 7.0)
     assert [(s.family, dict(s.options)) for s in DART.settings(GEARED)] == [("terms", {"rtol": 7.0})]
 
 
-def test_dart_gives_no_reactions_of_a_plane_scene_closed_by_balls(monkeypatch: pytest.MonkeyPatch) -> None:
-    planar = scene(name="planar")
+def test_dart_closes_a_plane_scene_by_balls_with_the_fewest_coordinates(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     ran: list[Any] = []
 
     def simulated(engine: Any, given: Scene, times: Any, setting: Setting, create: Any) -> Any:
-        ran.append(given.name)
-        return trajectory([1.0], None)
+        ran.append((given.name, create()))
 
-    monkeypatch.setattr(dart_adapter, "simulated", simulated)
-    monkeypatch.setattr(dart_adapter, "planar_scene", lambda given: planar if given.name == "s" else given)
-    balls, defaults = (Setting(family, {"step": 0.1, "erp": 0.5}) for family in ("balls", "defaults"))
-    assert DART.run(scene(), np.array([0.0]), balls).reactions is None
-    assert DART.run(scene(), np.array([0.0]), defaults).reactions is not None
-    assert ran == ["planar", "s"]
+    def simulation(engine: Any, given: Scene, times: Any, setting: Setting) -> Any:
+        return given.name, setting.family
+
+    monkeypatch.setattr(own_steps, "simulated", simulated)
+    monkeypatch.setattr(Dart, "simulation", simulation)
+    monkeypatch.setattr(own_steps, "planar_scene", lambda given: given.with_(name="planar"))
+    for family in ("balls", "defaults"):
+        DART.run(scene(), np.array([0.0]), Setting(family, {"step": 0.1, "erp": 0.5}))
+    assert ran == [("planar", ("planar", "balls")), ("s", ("s", "defaults"))]
+
+
+# --- engines with own steps -------------------------------------------------------------------------------
+class Steps:
+    """A world that records the lengths of its steps."""
+
+    tree = "tree"
+
+    def __init__(self) -> None:
+        self.begun: list[float] = []
+
+    def begin(self, h: float) -> None:
+        self.begun.append(h)
+
+
+@pytest.mark.parametrize(
+    ("times", "begun"),
+    [([0.0, 0.5, 2.0], [0.25]), ([0.75], [0.25]), ([0.1], [0.1]), ([0.0], [])],
+)
+def test_the_first_step_is_prepared_before_the_timed_run(
+    times: list[float], begun: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    world = Steps()
+    monkeypatch.setattr(Dart, "world", lambda engine, given, setting: world)
+    run = DART.simulation(scene(), np.array(times), Setting("balls", {"step": 0.3, "erp": 0.5}))
+    assert world.begun == pytest.approx(begun)
+    assert (run.stepper, run.tree, run.longest) == (world, "tree", 0.3)  # type: ignore[attr-defined]
+
+
+def test_a_world_without_drivers_names_its_module() -> None:
+    with pytest.raises(NotImplementedError, match=r"drake\.adapter moves no joint"):
+        drake_adapter._Plant.drive(drake_adapter._Plant.__new__(drake_adapter._Plant), None, 1.0, 0.1)
+
+
+@pytest.mark.parametrize("sends_new", [False, True])
+def test_drake_receives_loads_again_if_they_or_the_plant_change(
+    sends_new: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Constant loads are one list; each length of step has one plant, which takes over the state."""
+    fixed: list[Any] = []
+    modules = {
+        "pydrake.common.value": {"Value": {list[SimpleNamespace]: lambda found: found}},
+        "pydrake.multibody.math": {"SpatialForce": lambda tau, f: (tau, f)},
+        "pydrake.multibody.plant": {"ExternallyAppliedSpatialForce": SimpleNamespace},
+    }
+    for name, content in modules.items():
+        vars(stand_in := ModuleType(name)).update(content)
+        monkeypatch.setitem(sys.modules, name, stand_in)
+
+    class Made:
+        scene, joints, coordinates = scene(load=(PULL,)), {}, None
+        tree = SimpleNamespace(driven=lambda given: [])
+        bodies = (None, SimpleNamespace(index=lambda: 7))
+
+        def __init__(self, given: Any, tree: Any, step: float) -> None:
+            port = SimpleNamespace(
+                FixValue=lambda context, value: fixed.append((step, value[0].body_index, value[0].F_Bq_W))
+            )
+            states = ["start"]
+            self.context = SimpleNamespace(
+                state=states,
+                SetDiscreteState=states.append,
+                get_discrete_state=lambda: SimpleNamespace(Clone=lambda: states[-1]),
+            )
+            self.plant = SimpleNamespace(
+                time_step=lambda: step,
+                get_applied_spatial_force_input_port=lambda: port,
+                EvalUniquePeriodicDiscreteUpdate=lambda context: f"{context.state[-1]}, {step:g}",
+            )
+
+    loads = [(1, "force", "moment")]
+    monkeypatch.setattr(drake_adapter, "Mechanism", Made)
+    monkeypatch.setattr(
+        own_steps,
+        "Loads",
+        lambda *given: SimpleNamespace(at=lambda t: list(loads) if sends_new else loads),
+    )
+    found = drake_adapter._Plant(Made(None, None, 0.5))  # type: ignore[arg-type]
+    found.step(0.0, 0.5, 2)
+    found.step(1.0, 0.25, 1)
+    found.step(1.25, 0.25, 1)
+    one, other = (0.5, 7, ("moment", "force")), (0.25, 7, ("moment", "force"))
+    assert fixed == ([one, one] if sends_new else [one]) + [other, other]
+    assert list(found.plants) == [0.5, 0.25] and found.mechanism is found.plants[0.25]
+    assert found.mechanism.context.state[-1] == "start, 0.5, 0.5, 0.25, 0.25"
 
 
 # --- code generators --------------------------------------------------------------------------------------
@@ -499,10 +614,10 @@ def test_a_sample_of_generated_code_has_the_bodies_of_the_scene(monkeypatch: pyt
         rows,
         rows + 10,
         rows + 20,
+        UNKNOWN,
+        UNKNOWN,
         rows + 30,
         rows + 40,
-        UNKNOWN,
-        UNKNOWN,
     )
     equations = SimpleNamespace(
         tree=SimpleNamespace(own=(1,)), link_motion=lambda y: (motion, [y]), has_own_joints=True

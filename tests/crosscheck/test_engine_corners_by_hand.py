@@ -11,11 +11,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.engine import Setting
+from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco import original
 from crosscheck.engines.mujoco.linearised import Linearised
 from crosscheck.engines.mujoco.original import FINER, STIFFER, STIFFER_RK4
-from crosscheck.engines.mujoco.ports import PortedModel, sweep
+from crosscheck.engines.mujoco.ports import PortedModel
 from crosscheck.engines.sampling import Failed
 from crosscheck.engines.sdf.frames import ORIGIN, Frames, Pose, numbers, pose_of
 from crosscheck.setting import AS_IN_FILE
@@ -212,7 +212,7 @@ def test_a_ported_model_moves_its_links():
 
 
 def test_settings_of_ports_are_coarse_to_fine():
-    found = sweep(pendulum(), ("defaults", "stock"))
+    found = engine("mjx").settings(pendulum())
     steps = {f: [s.options["step"] for s in found if s.family == f] for f in ("defaults", "stock")}
     assert all(of == sorted(of, reverse=True) for of in steps.values())
     assert {*steps["defaults"]} - {*steps["stock"]} <= {0.002} and 0.002 in steps["defaults"]

@@ -15,7 +15,7 @@ from crosscheck.engines.compiler import Compiler, NoLibrary
 from crosscheck.engines.fixed_steps import FixedSteps, held_points, steps, unended_piece
 from crosscheck.engines.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
 from crosscheck.engines.joint_coordinates import JointCoordinates, joint_coordinates
-from crosscheck.engines.pieces import origin, pieces
+from crosscheck.engines.pieces import pieces
 from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through, step_count
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN, Closure, Mobility
 from crosscheck.engines.written import Written
@@ -152,7 +152,7 @@ def test_the_factor_for_the_next_step(error, factor):
 def test_steps_of_a_scene():
     """Angles of 0.15 to 0.0015 rad at 3 rad/s; a run takes at most 250 000 steps."""
     assert steps(scene(), 3.0) == [0.05, 0.017, 0.005, 0.0017, 0.0005]
-    assert steps(scene(), 3.0, 0.01) == [0.05, 0.017, 0.01, 0.005, 0.0017, 0.0005]
+    assert steps(scene(), 3.0, most=400) == [0.05, 0.017, 0.005] and steps(scene(), 3.0, most=1) == [0.05]
     assert steps(scene(), 3.0, finer=2)[-2:] == [0.00017, 5.6e-05]
     assert steps(scene(duration=500.0), 3.0) == [0.05, 0.017, 0.005]
     assert steps(scene(duration=1250.0), 3.0) == [0.05, 0.017, 0.005], "250 000 steps of 5 ms"
@@ -374,9 +374,7 @@ def test_pieces_of_a_chain():
     assert aux.origin.tolist() == aux.anchor.tolist() == [1.0, 0.0, 0.0] and not aux.offset.any()
     assert first.origin.tolist() == [1.0, 1.0, 0.0] and first.anchor.tolist() == [1.0, 0.0, 0.0]
     assert first.mass == 2.0 and first.offset.tolist() == list(Z) and first.inertia[2, 2] == 3.0
-    whole = [aux, first, welded, ball]
-    assert origin(whole, 3).tolist() == [3.0, 1.0, 0.0] and origin(whole, -1).tolist() == [0.0, 0.0, 0.0]
-    assert origin(whole, 0).tolist() == [1.0, 0.0, 0.0]
+    assert ball.origin.tolist() == [3.0, 1.0, 0.0]
 
 
 # --- drivers ----------------------------------------------------------------------------------------------

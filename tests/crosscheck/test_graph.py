@@ -15,9 +15,11 @@ from mbref import rotations
 from mbref.scene import (
     JOINT_TYPES,
     Body,
+    Coupling,
     Distance,
     Driver,
     Fixed,
+    Revolute,
     Scene,
     Sine,
     Translational,
@@ -204,3 +206,55 @@ def test_a_scene_without_masses_needs_its_whole_motion_driven() -> None:
     )
     assert lacks_mass(prescribed) is None, f"a driven four-bar was refused: {lacks_mass(prescribed)}"
     assert "crank" in str(lacks_mass(open_)), f"an undriven four-bar without masses: {lacks_mass(open_)}"
+
+
+@given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))
+def test_a_tree_cut_between_links_has_no_closure_at_the_ground(scene, closes):
+    tree = spanning_tree(scene, closes, between_links=True)
+    assert all(GROUND_LINK not in closure.links for closure in tree.closures)
+    assert len(tree.closures) == len(spanning_tree(scene, closes).closures)
+
+
+def hinged(*pairs: tuple[str, str]) -> Scene:
+    """Bodies on parallel hinges, the first letter of a body's name its place."""
+    names = sorted({name for pair in pairs for name in pair} - {"ground"})
+    bodies = [
+        Body(name=n, mass=1.0, inertia=INERTIA, position=(float(k), 1.0, 0.0)) for k, n in enumerate(names)
+    ]
+    joints = [
+        Revolute(name=f"j{k}", bodies=pair, anchor=(float(k), 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+        for k, pair in enumerate(pairs)
+    ]
+    return Scene(name="hinged", body=bodies, joint=joints)
+
+
+def test_joints_at_the_ground_are_cut_last_and_split_a_body():
+    four_bar = hinged(("ground", "a"), ("a", "b"), ("b", "c"), ("c", "ground"))
+    [at_ground] = spanning_tree(four_bar, ("revolute",)).closures
+    assert at_ground.joint == 3 and GROUND_LINK in at_ground.links
+    [between] = spanning_tree(four_bar, ("revolute",), between_links=True).closures
+    assert between.joint == 2 and between.kind == "revolute"
+    # both hinges of a body are at the ground: one of the two loops is closed between links, one by halves
+    two_loops = hinged(("ground", "a"), ("a", "ground"), ("a", "b"), ("b", "ground"), ("b", "a"))
+    found = spanning_tree(two_loops, ("revolute",), between_links=True)
+    assert [(c.kind, c.joint) for c in found.closures] == [
+        ("weld", 1),
+        ("revolute", 2),
+        ("revolute", 4),
+    ]
+    assert sorted(link.mass for link in found.links) == [0.5, 0.5, 1.0]
+
+
+def test_coordinates_of_drivers_couplings_and_armatures():
+    """The hinges of a chain have the velocities 0, 1 and 2, in the order from the ground."""
+    chain = hinged(("ground", "a"), ("a", "b"), ("b", "c"))
+    geared = [joint.model_copy(update={"armature": 0.5 * k}) for k, joint in enumerate(chain.joint)]
+    scene = chain.with_(
+        joint=geared,
+        driver=(Driver(joint="j2", polynomial=(0.0, 1.0)),),
+        coupling=(Coupling(name="gears", joints=("j2", "j1"), ratio=3.0),),
+    )
+    tree = spanning_tree(scene)
+    assert tree.driven(scene) == [(2, scene.driver[0])]
+    assert tree.coupled(scene, scene.coupling[0]) == [2, 1]
+    assert tree.armatures(scene) == [(1, 0.5), (2, 1.0)]

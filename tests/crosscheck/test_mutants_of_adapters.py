@@ -26,7 +26,7 @@ from tests.crosscheck.tree_scenes import every_joint, ring
 
 FOLDER = Path(crosscheck.engines.__path__[0])
 # files that import models, in the order of their imports
-USERS = ("equations", "ida", "dynamic", "simulation", "library", "adapter")
+USERS = ("model", "equations", "ida", "dynamic", "simulation", "library", "adapter")
 GENERATORS = ("casadi", "heyoka")  # share the files of the folder symbolic, and keep compiled code
 TIMES = np.array([0.0, 0.05, 0.1])
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-3})
@@ -126,7 +126,7 @@ def mutant(name: str, defect: dict[str, str], patch: pytest.MonkeyPatch) -> Engi
     wrong, text = place(name, defect["file"]), defect["text"]
     source = (FOLDER / f"{wrong.replace('.', '/')}.py").read_text()
     assert source.count(text) == 1, f"{wrong} has {source.count(text)} times {text!r}"
-    users = ["symbolic.generator"] if name in GENERATORS else []
+    users = ["symbolic.generator"] if name in GENERATORS else ["own_steps"]
     users += [f"{name}.{part}" for part in USERS if (FOLDER / name / f"{part}.py").exists()]
     for part in dict.fromkeys((wrong, *users)):
         full = f"crosscheck.engines.{part}"
@@ -183,6 +183,6 @@ def test_the_example_of_the_documentation_is_the_adapter_of_bullet():
     (example,) = [block for block in page.split("```python\n")[1:] if "stepSimulation" in block]
     source = textwrap.dedent((FOLDER / "bullet" / "adapter.py").read_text().partition("class _World")[2])
     methods = [part.strip() for part in example.partition("```")[0].split("\n\n") if part.strip()]
-    assert len(methods) == 2
+    assert len(methods) == 4
     for method in methods:
         assert textwrap.indent(method, "    ") in source

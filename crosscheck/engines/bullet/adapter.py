@@ -8,108 +8,79 @@ velocity over a step, so that the prescribed position is reached at the end of t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Owner, Setting
+from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.bullet.model import STRONGEST, Mechanism
-from crosscheck.engines.driver_motion import mean_rate
-from crosscheck.engines.fixed_steps import FixedSteps, Loads, scouted_rate, simulated, steps, unended_piece
-from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.own_steps import STEP, SteppingEngine, World
 from crosscheck.engines.pieces import EVERYTHING
-from crosscheck.engines.planar_scene import planar_scene
 from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-DEFAULT_STEP, DEFAULT_ITERATIONS = 1 / 240, 50
-ITERATIONS = 1000
-FINER = 1  # number of further, finer steps, each a third of the previous one: the method is of first order
+ITERATED, DEFAULTS = "iterated", "defaults"
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
-    "iterated": "1000 iterations; a cut hinge closed by two points, in a planar mechanism by one",
-    "defaults": "50 iterations, the library's default; a cut hinge closed by two points",
+    ITERATED: "1000 iterations; a cut hinge closed by two points, in a planar mechanism by one",
+    DEFAULTS: "50 iterations, the library's default; a cut hinge closed by two points",
 }
-OPTIONS = {"step": "time step, s", "iterations": "iterations of the solver in a step"}
+OPTIONS = STEP | {"iterations": "iterations of the solver in a step"}
+OWN_STEPS = {ITERATED: {"iterations": 1000}, DEFAULTS: {"iterations": 50}}
+DEFAULT_STEPS = {DEFAULTS: 1 / 240}
 
 
-class Bullet(Engine):
+class Bullet(SteppingEngine):
     """Bullet (PyPI ``pybullet``)."""
 
     name = "bullet"
     package = "pybullet"
     modules = ("pybullet",)
     supports = EVERYTHING
-    families, options = FAMILIES, OPTIONS
+    families, options, own_steps, default_steps = FAMILIES, OPTIONS, OWN_STEPS, DEFAULT_STEPS
+    finer = 1  # the method is of first order
+    scout, planar = DEFAULTS, (ITERATED,)
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Refuse armatures, scenes without masses whose motion the drivers do not determine completely, and
         loads over time that have pieces."""
         if rotor := next((joint.name for joint in scene.joint if joint.reflected_inertia), ""):
             return Cannot(Owner.ENGINE, f"joint {rotor!r} has an armature, which Bullet's joints do not have")
-        return lacks_mass(scene) or unended_piece(scene)
-
-    def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Return settings whose steps are chosen by the angle that a body turns in one step."""
-        rate = scouted_rate(self, scene, "defaults", iterations=DEFAULT_ITERATIONS)
-        fine = steps(scene, rate, finer=FINER)
-        plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
-        return [
-            *(Setting("iterated", {"step": h, "iterations": ITERATIONS}) for h in fine),
-            *(Setting("defaults", {"step": h, "iterations": DEFAULT_ITERATIONS}) for h in plain),
-        ]
-
-    def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether the family exists; every family can run every scene."""
-        return family in FAMILIES
+        return super().refuses(scene)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate a scene; raises ValueError for an unknown family."""
+        """Simulate a scene in a client of its own; raises ValueError for an unknown family."""
         import pybullet
 
-        if setting.family == "iterated":
-            scene = planar_scene(scene)
         client = pybullet.connect(pybullet.DIRECT)
         try:
             pybullet.resetSimulation()
-            return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+            return super().run(scene, times, setting)
         finally:
             pybullet.disconnect(client)
 
-
-def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
-    tree = spanning_tree(scene, CLOSES)
-    world = _World(Mechanism(scene, tree), setting.options["iterations"])
-    return FixedSteps(scene, tree, world, setting.options["step"])
+    def world(self, scene: Scene, setting: Setting) -> World:
+        """Return PyBullet's world of a scene."""
+        return _World(Mechanism(scene, spanning_tree(scene, CLOSES)), setting.options["iterations"])
 
 
-class _World:
-    """A mechanism in PyBullet's world, with its loads and drivers."""
+class _World(World):
+    """A mechanism in PyBullet's world."""
 
     def __init__(self, mechanism: Mechanism, iterations: int):
-        self.mechanism, self.scene, self.tree = mechanism, mechanism.scene, mechanism.tree
+        super().__init__(mechanism)
         self.p = mechanism.p
-        left = {} if iterations == DEFAULT_ITERATIONS else {"solverResidualThreshold": 0.0}
+        left = {} if iterations == OWN_STEPS[DEFAULTS]["iterations"] else {"solverResidualThreshold": 0.0}
         self.p.setPhysicsEngineParameter(numSolverIterations=iterations, numSubSteps=0, **left)
-        self.driven = [
-            (mechanism.joints[self.tree.coordinate(self.scene, d.joint)], d) for d in self.scene.driver
-        ]
-        self.loads = Loads(self.scene, self.tree, self.motion)
 
-    def step(self, t: float, h: float, count: int) -> None:
-        """Take ``count`` steps of length h (s) from time t."""
-        p = self.p
-        p.setTimeStep(h)
-        for n in range(count):
-            for joint, driver in self.driven:
-                speed = mean_rate(driver, t + n * h, h)
-                p.setJointMotorControl2(*joint, p.VELOCITY_CONTROL, targetVelocity=speed, force=STRONGEST)
-            self._load(t + n * h)
-            p.stepSimulation()
+    def begin(self, h: float) -> None:
+        self.p.setTimeStep(h)
 
-    def _load(self, t: float) -> None:
-        loads = self.loads.at(t)
+    def drive(self, joint: Any, rate: float, h: float) -> None:
+        self.p.setJointMotorControl2(*joint, self.p.VELOCITY_CONTROL, targetVelocity=rate, force=STRONGEST)
+
+    def push(self, loads: Sequence[tuple[int, np.ndarray, np.ndarray]]) -> None:
         origins = self.motion().position if any(force.any() for _, force, _ in loads) else ()
         for link, force, moment in loads:
             place = self.mechanism.places[link]
@@ -118,9 +89,8 @@ class _World:
                 self.p.applyExternalForce(place.body, place.link, force.tolist(), at, self.p.WORLD_FRAME)
             self.p.applyExternalTorque(place.body, place.link, moment.tolist(), self.p.WORLD_FRAME)
 
-    def motion(self) -> LinkMotion:
-        """Return the motion of the links."""
-        return self.mechanism.motion()
+    def advance(self, t: float, h: float) -> None:
+        self.p.stepSimulation()
 
 
 ENGINE = Bullet()

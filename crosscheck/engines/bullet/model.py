@@ -17,7 +17,6 @@ from crosscheck.engines.fixed_steps import held_points
 from crosscheck.engines.geometry import unit
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.pieces import Piece, pieces
-from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref import rotations
@@ -85,25 +84,21 @@ class Mechanism:
         centre of mass."""
         p = self.p
         kinds = {SLIDE: p.JOINT_PRISMATIC, TURN: p.JOINT_REVOLUTE, BALL_JOINT: p.JOINT_SPHERICAL}
-        starts, turns = [], []
-        for piece in links:
-            on_base = piece.parent - up - 1 < 0
-            axes = _axes(base) if base and on_base else np.eye(3)
-            from_place = np.zeros(3) if on_base else links[piece.parent - up - 1].anchor
-            if base and on_base:
-                from_place = base.origin + base.offset
-            starts.append((axes.T @ (piece.anchor - from_place)).tolist())
-            turns.append(_xyzw(axes.T))
+        of_base = (base.origin + base.offset, _axes(base)) if base else (np.zeros(3), np.eye(3))
+        parents = [max(0, piece.parent - up) for piece in links]
+        frames = [(links[n - 1].anchor, np.eye(3)) if n else of_base for n in parents]
         moved = [piece.mobility for piece in links]
         return {
             "linkMasses": [piece.mass for piece in links],
             "linkCollisionShapeIndices": [-1] * len(links),
             "linkVisualShapeIndices": [-1] * len(links),
-            "linkPositions": starts,
-            "linkOrientations": turns,
+            "linkPositions": [
+                (axes.T @ (k.anchor - place)).tolist() for k, (place, axes) in zip(links, frames, strict=True)
+            ],
+            "linkOrientations": [_xyzw(axes.T) for _, axes in frames],
             "linkInertialFramePositions": [(k.origin + k.offset - k.anchor).tolist() for k in links],
             "linkInertialFrameOrientations": [_xyzw(_axes(piece)) for piece in links],
-            "linkParentIndices": [max(0, piece.parent - up) for piece in links],
+            "linkParentIndices": parents,
             "linkJointTypes": [kinds[m.kind] if m else p.JOINT_FIXED for m in moved],
             "linkJointAxis": [unit(m.axis).tolist() if m and m.kind in (SLIDE, TURN) else O for m in moved],
         }
@@ -142,10 +137,7 @@ class Mechanism:
 
     def _couple(self, coupling: Coupling) -> None:
         """Couple the rates of two joints: PyBullet's gear keeps q₁' + (gear ratio) q₂' = 0."""
-        first, second = (
-            self.joints[self.tree.coordinate(self.scene, joint.name, kind)]
-            for joint, kind in self.scene.coupled(coupling)
-        )
+        first, second = (self.joints[i] for i in self.tree.coupled(self.scene, coupling))
         gear = self.p.createConstraint(*first, *second, self.p.JOINT_GEAR, [0.0, 0.0, 1.0], O, O)
         self.p.changeConstraint(gear, gearRatio=-1 / coupling.ratio, maxForce=STRONGEST)
 
@@ -164,7 +156,7 @@ class Mechanism:
         coordinates, rates = np.zeros((2, self.tree.nv))
         for v, (body, j) in self.joints.items():
             coordinates[v], rates[v] = self.p.getJointState(body, j)[:2]
-        return LinkMotion(rotation, position, velocity, omega, UNKNOWN, UNKNOWN, coordinates, rates)
+        return LinkMotion(rotation, position, velocity, omega, coordinates, rates)
 
     def _state(self, place: Place) -> tuple[np.ndarray, ...]:
         if place.link == BASE:

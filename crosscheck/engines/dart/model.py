@@ -13,8 +13,7 @@ from crosscheck.engines.fixed_steps import held_points
 from crosscheck.engines.geometry import unit
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.joint_coordinates import joint_coordinates, rotation_vector
-from crosscheck.engines.pieces import Piece, origin, pieces
-from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.pieces import Piece, assembled
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.terms import Terms
 from crosscheck.engines.tree_reactions import LinkMotion
@@ -33,12 +32,7 @@ class Mechanism:
         self.dart, self.scene, self.tree = dartpy, scene, tree
         self.coordinates = joint_coordinates(tree, in_child=True)
         self.skeleton = dartpy.dynamics.Skeleton(scene.name)
-        self.joints: dict[int, Any] = {}  # keyed by joint velocity of the tree
-        parts = pieces(tree, NEGLIGIBLE)
-        built: list[Any] = []
-        for piece in parts:
-            built.append(self._add(parts, built, piece))
-        self.nodes = [node for piece, node in zip(parts, built, strict=True) if piece.link >= 0]
+        self.nodes, self.joints = assembled(tree, NEGLIGIBLE, None, self._add)
         self.skeleton.setGravity(np.array(scene.gravity))
         self.order = self._order()
         self.skeleton.setVelocities(self._in_order(initial_rates(scene, tree)))
@@ -55,19 +49,18 @@ class Mechanism:
             order[iv : iv + 6] = [*range(iv + 3, iv + 6), *range(iv, iv + 3)]
         return order
 
-    def _add(self, parts: list[Piece], built: list[Any], piece: Piece) -> Any:
+    def _add(
+        self, name: str, piece: Piece, parent: Any, on_parent: np.ndarray, on_child: np.ndarray
+    ) -> tuple[Any, Any]:
         kind = PAIRS[piece.mobility.kind] if piece.mobility else "Weld"
-        create = getattr(self.skeleton, f"create{kind}JointAndBodyNodePair")
-        joint, node = create(built[piece.parent]) if piece.parent >= 0 else create()
-        if piece.mobility:
-            self.joints[piece.velocity] = joint
-            if piece.mobility.kind in (SLIDE, TURN):
-                joint.setAxis(unit(piece.mobility.axis))
-        joint.setTransformFromParentBodyNode(self._place(piece.anchor - origin(parts, piece.parent)))
-        joint.setTransformFromChildBodyNode(self._place(piece.anchor - piece.origin))
+        joint, node = getattr(self.skeleton, f"create{kind}JointAndBodyNodePair")(parent)
+        if piece.mobility and piece.mobility.kind in (SLIDE, TURN):
+            joint.setAxis(unit(piece.mobility.axis))
+        joint.setTransformFromParentBodyNode(self._place(on_parent))
+        joint.setTransformFromChildBodyNode(self._place(on_child))
         node.setCollidable(False)
         node.setInertia(self.dart.dynamics.Inertia(piece.mass, piece.offset, piece.inertia))
-        return node
+        return joint, node
 
     def _place(self, place: np.ndarray) -> Any:
         frame = self.dart.math.Isometry3()
@@ -123,4 +116,4 @@ class Mechanism:
         linear = np.array([node.getLinearVelocity() for node in self.nodes])
         angular = np.array([node.getAngularVelocity() for node in self.nodes])
         rates = self.skeleton.getVelocities()[self.order]
-        return LinkMotion(*self._poses(), linear, angular, UNKNOWN, UNKNOWN, coordinates, rates)
+        return LinkMotion(*self._poses(), linear, angular, coordinates, rates)

@@ -14,8 +14,7 @@ from crosscheck.engines.fixed_steps import held_points
 from crosscheck.engines.geometry import unit
 from crosscheck.engines.initial_velocities import initial_rates
 from crosscheck.engines.joint_coordinates import joint_coordinates
-from crosscheck.engines.pieces import Piece, origin, pieces
-from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.pieces import Piece, assembled
 from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.terms import Terms
 from crosscheck.engines.tree_reactions import LinkMotion
@@ -43,8 +42,7 @@ class Mechanism:
         if time_step:
             self.plant.SetUseSampledOutputPorts(False)  # so that an update computes discrete states only
         self.plant.mutable_gravity_field().set_gravity_vector(scene.gravity)
-        self.joints: dict[int, Any] = {}  # keyed by first joint velocity of the tree
-        self.bodies = self._bodies()
+        self.bodies, self.joints = assembled(tree, NEGLIGIBLE, self.plant.world_body(), self._add)
         if time_step:
             self._constrain()
         self.plant.Finalize()
@@ -57,34 +55,22 @@ class Mechanism:
         for closure in self.tree.closures:
             self._close(closure)
         for coupling in self.scene.coupling:
-            first, second = (
-                self.joints[self.tree.coordinate(self.scene, joint.name, kind)]
-                for joint, kind in self.scene.coupled(coupling)
-            )
+            first, second = (self.joints[i] for i in self.tree.coupled(self.scene, coupling))
             self.plant.AddCouplerConstraint(second, first, coupling.ratio)
-        for joint in self.scene.joint:
-            if joint.reflected_inertia:
-                turned = self.joints[self.tree.coordinate(self.scene, joint.name)]
-                rotor = self.plant.AddJointActuator(joint.name, turned)
-                rotor.set_default_rotor_inertia(joint.reflected_inertia)
+        for i, inertia in self.tree.armatures(self.scene):
+            self.plant.AddJointActuator(str(i), self.joints[i]).set_default_rotor_inertia(inertia)
 
-    def _bodies(self) -> list[Any]:
-        parts = pieces(self.tree, NEGLIGIBLE)
-        built: list[Any] = []
-        for n, piece in enumerate(parts):
-            parent = built[piece.parent] if piece.parent >= 0 else self.plant.world_body()
-            built.append(self.plant.AddRigidBody(str(n), self._inertia(piece)))
-            places = piece.anchor - origin(parts, piece.parent), piece.anchor - piece.origin
-            frames = [
-                self.plant.AddFrame(
-                    self.parts.FixedOffsetFrame(f"{n} {end}", body.body_frame(), self._at(place))
-                )
-                for end, body, place in zip(("parent", "child"), (parent, built[n]), places, strict=True)
-            ]
-            joint = self.plant.AddJoint(self._joint(str(n), piece, frames))
-            if piece.mobility:
-                self.joints[piece.velocity] = joint
-        return [body for piece, body in zip(parts, built, strict=True) if piece.link >= 0]
+    def _add(
+        self, name: str, piece: Piece, parent: Any, on_parent: np.ndarray, on_child: np.ndarray
+    ) -> tuple[Any, Any]:
+        body = self.plant.AddRigidBody(name, self._inertia(piece))
+        frames = [
+            self.plant.AddFrame(
+                self.parts.FixedOffsetFrame(f"{name} {end}", of.body_frame(), self._at(place))
+            )
+            for end, of, place in (("parent", parent, on_parent), ("child", body, on_child))
+        ]
+        return self.plant.AddJoint(self._joint(name, piece, frames)), body
 
     def _inertia(self, piece: Piece) -> Any:
         c = piece.offset
@@ -162,11 +148,8 @@ class Mechanism:
     def motion(self) -> LinkMotion:
         """Return the motion of the links."""
         plant, context, coordinates = self.plant, self.context, np.zeros(self.tree.nv)
-        twists = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in self.bodies]
-        linear, angular = (
-            np.array([v.translational() for v in twists]),
-            np.array([v.rotational() for v in twists]),
-        )
+        found = [plant.EvalBodySpatialVelocityInWorld(context, body) for body in self.bodies]
+        linear, angular = np.array([[v.translational(), v.rotational()] for v in found]).swapaxes(0, 1)
         coordinates[self.coordinates.single] = plant.GetPositions(context)[self.q_single]
         rates = plant.GetVelocities(context)[self.v_index]
-        return LinkMotion(*self._poses(), linear, angular, UNKNOWN, UNKNOWN, coordinates, rates)
+        return LinkMotion(*self._poses(), linear, angular, coordinates, rates)

@@ -13,43 +13,32 @@ from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
-import numpy as np
-
-from crosscheck.engine import Cannot, Engine, Setting
+from crosscheck.engine import Setting
 from crosscheck.engines import kept
-from crosscheck.engines.fixed_steps import FixedSteps, simulated
-from crosscheck.engines.mujoco.ports import FAMILIES, OPTIONS, SUPPORTS, PortedModel, refusal, sweep
+from crosscheck.engines.mujoco.ports import FAMILIES, OWN_STEPS, Port, PortedModel
+from crosscheck.engines.own_steps import Steps
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 SINGLE = "stock, single"
 
 
-class Mjx(Engine):
+class Mjx(Port):
     """MuJoCo MJX (PyPI ``mujoco-mjx``)."""
 
     name = "mjx"
+    port = "MJX"
     package = "mujoco-mjx"
-    supports = SUPPORTS
     families = FAMILIES | {SINGLE: "like stock, in single precision, which is JAX's default"}
-    options = OPTIONS
+    own_steps = OWN_STEPS | {SINGLE: {}}
     compile_seconds = 300.0
 
     def prepare(self, families: Sequence[str]) -> None:
         _mjx()
 
-    def refuses(self, scene: Scene) -> Cannot | None:
-        """Refuse drivers, and scenes that MuJoCo's adapter refuses."""
-        return refusal(scene, "MJX")
-
-    def settings(self, scene: Scene) -> Sequence[Setting]:
-        """Return settings with steps chosen by the angle that a body turns in one step."""
-        return sweep(scene, self.families)
-
-    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        """Simulate a scene; raises ValueError for an unknown family."""
-        return simulated(self, scene, times, setting, lambda: _simulation(scene, setting))
+    def world(self, scene: Scene, setting: Setting) -> Steps:
+        """Return a model of MuJoCo in JAX."""
+        return _World(PortedModel(scene, setting), setting.family == SINGLE)
 
 
 def _mjx(is_single: bool = False) -> Any:
@@ -87,17 +76,12 @@ def _stepped(is_single: bool) -> Any:
     return jax.jit(stepped)
 
 
-def _simulation(scene: Scene, setting: Setting) -> FixedSteps:
-    world = _World(PortedModel(scene, setting), setting.family == SINGLE)
-    return FixedSteps(scene, world.ported.built.tree, world, setting.options["step"])
-
-
 class _World:
     """A model and its data in JAX, and compiled code that takes steps."""
 
     def __init__(self, ported: PortedModel, is_single: bool):
         _, mjx = _mjx(is_single)
-        self.ported = ported
+        self.ported, self.tree = ported, ported.built.tree
         self.model = mjx.put_model(ported.model)
         self.data = mjx.put_data(ported.model, ported.data)
 
@@ -105,10 +89,14 @@ class _World:
         self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
         kept.remove_oldest(kept.cache("mjx"))
 
+    def begin(self, h: float) -> None:
+        """Set the length of steps to h (s)."""
+        self.model = self.model.tree_replace({"opt.timestep": self.model.opt.timestep * 0 + h})
+
     def step(self, t: float, h: float, count: int) -> None:
         """Take ``count`` steps of length h (s)."""
-        model = self.model.tree_replace({"opt.timestep": self.model.opt.timestep * 0 + h})
-        self.data = self.stepped(model, self.data, count)
+        self.begin(h)
+        self.data = self.stepped(self.model, self.data, count)
         self.data.qpos.block_until_ready()
 
     def motion(self) -> LinkMotion:

@@ -133,9 +133,8 @@ def _built(mujoco: Any, scene: Scene, tree: Tree) -> _Builder:
         built.add_closure(k, closure)
     for coupling in scene.coupling:
         built.add_coupling(coupling)
-    for joint in scene.joint:
-        if joint.reflected_inertia:
-            built.joint[tree.coordinate(scene, joint.name)].armature = joint.reflected_inertia
+    for i, inertia in tree.armatures(scene):
+        built.joint[i].armature = inertia
     for driver in scene.driver:
         built.add_driver(driver)
     for k, load in enumerate(scene.load):
@@ -199,10 +198,7 @@ class _Builder:
 
     def add_coupling(self, coupling: Coupling) -> None:
         """Add the equality q₂ = ratio · q₁, as MuJoCo's polynomial of degree 1."""
-        first, second = (
-            self.joint[self.tree.coordinate(self.scene, joint.name, kind)].name
-            for joint, kind in self.scene.coupled(coupling)
-        )
+        first, second = (self.joint[i].name for i in self.tree.coupled(self.scene, coupling))
         kind, objects = self.mujoco.mjtEq.mjEQ_JOINT, self.mujoco.mjtObj.mjOBJ_JOINT
         equality = self._equality(kind, objects, COUPLING + coupling.name, second, first)
         equality.data[:5] = 0.0, coupling.ratio, 0.0, 0.0, 0.0

@@ -7,24 +7,20 @@ coordinates by MuJoCo in C, which adds only rounding.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
-from crosscheck.engines.driver_motion import stated_rate
-from crosscheck.engines.fixed_steps import steps
 from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.mujoco.model import SUPPORTS as OF_MUJOCO
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.engines.sampling import UNKNOWN
+from crosscheck.engines.own_steps import STEP, SteppingEngine
 from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
-DEFAULT_STEP = 2e-3  # s
 # impedance parameters; MuJoCo clamps the first two at this value
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 FAMILIES = {
@@ -32,24 +28,29 @@ FAMILIES = {
     "euler": "default closures, first-order integrator Euler",
     "defaults": "the library's own options",
 }
-OPTIONS = {"step": "time step, s"}
+OWN_STEPS: dict[str, dict[str, float]] = {family: {} for family in FAMILIES}
+DEFAULT_STEPS = {"defaults": 2e-3}
 
 
-def refusal(scene: Scene, port: str) -> Cannot | None:
-    """Return the refusal of drivers, which need a callback in the step, and of bodies without mass."""
-    if scene.driver:
-        reason = f"{port} has no callback in which the driver of joint {scene.driver[0].joint!r} could act"
-        return Cannot(Owner.ENGINE, reason)
-    return lacks_mass(scene)
+class Port(SteppingEngine):
+    """A port of MuJoCo, which steps MuJoCo's model with its own code.
 
+    Attributes
+    ----------
+    port : str
+        Name of the port in refusals.
+    """
 
-def sweep(scene: Scene, families: Collection[str] = FAMILIES) -> Sequence[Setting]:
-    """Return fixed steps chosen by the angle that a body turns in one step, coarse to fine in each family."""
-    fine = steps(scene, stated_rate(scene))
-    plain = sorted({*fine, DEFAULT_STEP}, reverse=True)
-    return [
-        Setting(family, {"step": h}) for family in families for h in (plain if family == "defaults" else fine)
-    ]
+    port: str
+    supports = SUPPORTS
+    families, options, own_steps, default_steps = FAMILIES, STEP, OWN_STEPS, DEFAULT_STEPS
+
+    def refuses(self, scene: Scene) -> Cannot | None:
+        """Refuse drivers, which need a callback in the step, and bodies without mass."""
+        if scene.driver:
+            driven = f"the driver of joint {scene.driver[0].joint!r}"
+            return Cannot(Owner.ENGINE, f"{self.port} has no callback in which {driven} could act")
+        return lacks_mass(scene)
 
 
 class PortedModel:
@@ -89,11 +90,9 @@ class PortedModel:
             data.xpos[links],
             twists[:, 3:],
             twists[:, :3],
-            UNKNOWN,
-            UNKNOWN,
             coordinates,
             data.qvel.copy(),
         )
 
 
-__all__ = ["FAMILIES", "OPTIONS", "SUPPORTS", "PortedModel", "refusal", "sweep"]
+__all__ = ["FAMILIES", "OWN_STEPS", "Port", "PortedModel"]

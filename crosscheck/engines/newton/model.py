@@ -15,7 +15,6 @@ import numpy as np
 
 from crosscheck.engines.geometry import unit
 from crosscheck.engines.initial_velocities import initial_rates, twist_maps
-from crosscheck.engines.sampling import UNKNOWN
 from crosscheck.engines.spanning_tree import (
     BALL_JOINT,
     FREE,
@@ -150,7 +149,7 @@ class Mechanism:
         twists = self.state.body_qd.numpy().astype(float)
         linear, angular = twists[:, :3] - cross(twists[:, 3:], arms), twists[:, 3:]
         nothing = np.zeros(self.tree.nv)
-        return LinkMotion(rotation, position, linear, angular, UNKNOWN, UNKNOWN, nothing, nothing)
+        return LinkMotion(rotation, position, linear, angular, nothing, nothing)
 
     def _poses(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return rotations (n, 3, 3) and origins (n, 3) of the links' frames, and the vectors (n, 3) from

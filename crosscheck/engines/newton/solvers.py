@@ -32,6 +32,7 @@ ALPHAS = {  # of the families of Kamino
     DEFAULTS: DEFAULT_ALPHA,
 }
 
+OWN_STEPS = {family: {"alpha": ALPHAS[family]} if family in ALPHAS else {} for family in FAMILIES}
 BOUND = (f"padmm{MOREAU}", f"dvi{MOREAU}", "dvi", DEFAULTS)  # these need a constraint
 
 

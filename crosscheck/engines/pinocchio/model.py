@@ -73,7 +73,7 @@ class Mechanism:
         models = [(k, self._closure(closure)) for k, closure in enumerate(self.tree.closures)]
         self.closed = [k for k, model in models if model is not None]  # indices of the tree's closures
         self.closures: list[Any] = [model for _, model in models if model is not None]
-        self.driven = [(self.tree.coordinate(scene, d.joint), d) for d in scene.driver]
+        self.driven = self.tree.driven(scene)
         self._make_heavy([i for i, _ in self.driven])
         joints = self.model.joints
         simple = [joints[j] for j in range(1, self.model.njoints) if joints[j].nq == 1]
@@ -107,9 +107,8 @@ class Mechanism:
 
     def _make_heavy(self, coordinates: list[int]) -> None:
         armature = self.model.armature.copy()
-        for joint in self.scene.joint:
-            if joint.reflected_inertia:
-                armature[self.tree.coordinate(self.scene, joint.name)] = joint.reflected_inertia
+        for i, inertia in self.tree.armatures(self.scene):
+            armature[i] = inertia
         armature[coordinates] = DRIVEN_ARMATURE
         self.model.armature = armature
 

@@ -138,10 +138,7 @@ class Mechanism:
     def _couple(self, k: int, coupling: Coupling) -> None:
         """Add q₂ = ratio q₁ as OpenSim's coupler."""
         o = self.opensim
-        first, second = (
-            self.coordinates[self.tree.coordinate(self.scene, joint.name, kind)].getName()
-            for joint, kind in self.scene.coupled(coupling)
-        )
+        first, second = (self.coordinates[i].getName() for i in self.tree.coupled(self.scene, coupling))
         names = o.ArrayStr()
         names.append(first)
         coupler = o.CoordinateCouplerConstraint()

@@ -156,7 +156,7 @@ class TreeEquations:
             for name in ("rotation", "origin", "velocity", "spin")
         }
         motion = LinkMotion(
-            of["rotation"], of["origin"], of["velocity"], of["spin"], np.array(along), np.array(about), q, v
+            of["rotation"], of["origin"], of["velocity"], of["spin"], q, v, np.array(along), np.array(about)
         )
         return motion, self._closing(frames, forces)
 
