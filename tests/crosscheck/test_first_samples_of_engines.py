@@ -1,0 +1,196 @@
+"""The first sample of each engine / velocities, accelerations and reactions by the judge's own equations.
+
+Every joint, load and driver of an engine is seen at t = 0: Gauss's principle gives the accelerations, and a
+balance of each body the reactions. A joint whose bodies are exchanged has the opposite reaction.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Engine, Setting, engine, installed
+from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
+from crosscheck.judge.gauss_principle import gauss
+from crosscheck.judge.joint_reactions import compare
+from crosscheck.judge.metrics import in_scene_order
+from crosscheck.judge.reaction_balance import with_exact_reactions
+from mbref.scene import (
+    Coupling,
+    Cylindrical,
+    Factor,
+    Joint,
+    JointForce,
+    JointTorque,
+    Planar,
+    Revolute,
+    Scene,
+    Sine,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
+from mbref.trajectory import Outcome, Trajectory
+from tests.crosscheck.driven_arm import driven_arm
+from tests.crosscheck.tree_scenes import body, driven, every_joint, ring
+
+WAYS = {  # engine: a setting, and the largest relative difference of its accelerations and reactions
+    "mujoco": (Setting("forward", {"rtol": 1e-9, "min_step": 1e-4, "beta": 100.0, "hard": 1e-7}), 1e-6),
+    "simbody": (Setting("merson", {"accuracy": 1e-9}), 1e-7),
+    "sundials": (Setting("ggl", {"rtol": 1e-8}), 1e-8),
+    "dart": (Setting("terms", {"rtol": 1e-9, "min_step": 1e-4}), 1e-8),
+    "exudyn": (Setting("trapezoidal", {"step": 1e-5}), 1e-4),
+    "pinocchio": (Setting("tuned", {"rtol": 1e-9, "min_step": 1e-4}), 1e-8),
+}
+TIMES = np.array([0.0, 1e-4])  # s
+FIELDS = ["velocity", "angular_velocity", "acceleration", "angular_acceleration"]
+
+
+def swapped(scene: Scene) -> Scene:
+    """The scene whose joints have their bodies exchanged, with their anchors and axes; no driver or load."""
+    acting = {d.joint for d in scene.driver} | {getattr(load, "joint", "") for load in scene.load}
+    joints = [joint if joint.name in acting else _exchanged(joint) for joint in scene.joint]
+    return scene.with_(name=f"{scene.name} swapped", joint=tuple(joints))
+
+
+def _exchanged(joint: Joint) -> Joint:
+    changes = {"bodies": joint.bodies[::-1]}
+    for name in ("anchors", "axes"):
+        if hasattr(joint, name):
+            changes[name] = getattr(joint, name)[::-1]
+    return joint.model_copy(update=changes)
+
+
+def loaded() -> Scene:
+    """Each load of a joint, between bodies in either order, some by factors that are not 1 at t = 0."""
+    bodies = (
+        body("arm", (0.5, 0.1, 0.0), (0.1, 0.2, 0.3), 1.3, angular_velocity=(0.0, 0.0, 2.0)),
+        body("sled", (0.0, 1.0, 0.3), (0.4, -0.2, 0.1), 0.8, velocity=(0.3, 0.4, 0.0)),
+        body("wheel", (0.2, 1.4, 0.2), (0.2, 0.3, -0.6), 0.5),
+        body("puck", (-0.8, 0.2, 0.1), (0.3, 0.1, 0.2), 0.7, velocity=(0.5, -0.2, 0.0)),
+    )
+    joints = (
+        Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+        Translational(name="C", bodies=("sled", "ground"), anchor=(0.0, 1.0, 0.3), axis=(0.6, 0.8, 0.0)),
+        Cylindrical(name="D", bodies=("sled", "wheel"), anchor=(0.1, 1.2, 0.2), axis=(0.0, 0.6, 0.8)),
+        Planar(name="P", bodies=("ground", "puck"), anchor=(-0.8, 0.2, 0.1), axis=(0.0, 0.0, 1.0)),
+    )
+    loads = (
+        TorsionSpring(joint="A", stiffness=4.0, damping=0.3, natural_angle=0.4),
+        JointTorque(joint="D", torque=0.7, factor=Factor(polynomial=(1.5, 2.0))),
+        SlideSpring(joint="D", stiffness=40.0, damping=0.8, natural_displacement=-0.1),
+        JointForce(joint="C", force=-5.0, factor=Factor(sine=Sine(amplitude=2.0, frequency=3.0, phase=0.4))),
+        Spring(
+            bodies=("wheel", "puck"),
+            points=((0.3, 1.4, 0.1), (-0.7, 0.3, 0.2)),
+            stiffness=30.0,
+            damping=0.5,
+            natural_length=1.0,
+        ),
+    )
+    return Scene(
+        name="loaded", gravity=(0.5, -9.81, 1.0), duration=1.0, body=bodies, joint=joints, load=loads
+    )
+
+
+def geared() -> Scene:
+    """A wheel that turns a second one 2.5 times as fast backwards, a slide by 0.2 m a turn, and rotors."""
+    bodies = (
+        body("first", (0.0, 0.0, 0.1), (0.1, 0.5, -0.2), angular_velocity=(0.0, 0.0, 2.0)),
+        body("second", (1.0, 0.2, -0.1), (0.3, 0.2, 0.4), 2.0, angular_velocity=(0.0, 0.0, -5.0)),
+        body("rack", (0.0, 2.0, 0.3), (0.2, -0.3, 0.1), 1.5, velocity=(0.4, 0.0, 0.0)),
+    )
+    joints = (
+        Revolute(
+            name="A", bodies=("ground", "first"), anchor=(0.02, 0.0, 0.0), axis=(0.0, 0.0, 1.0), armature=0.3
+        ),
+        Revolute(name="B", bodies=("ground", "second"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+        Translational(
+            name="C", bodies=("ground", "rack"), anchor=(0.0, 2.0, 0.0), axis=(1.0, 0.0, 0.0), armature=0.4
+        ),
+    )
+    gears = (
+        Coupling(name="gears", joints=("A", "B"), ratio=-2.5),
+        Coupling(name="teeth", joints=("A", "C"), ratio=0.2),
+    )
+    load = (JointTorque(joint="B", torque=1.25),)
+    return Scene(
+        name="geared",
+        gravity=(0.5, -9.0, 1.0),
+        duration=1.0,
+        body=bodies,
+        joint=joints,
+        coupling=gears,
+        load=load,
+    )
+
+
+SCENES = {
+    scene.name: scene
+    for scene in (
+        every_joint(),
+        swapped(every_joint()),
+        driven(),
+        driven_arm(),
+        loaded(),
+        geared(),
+        *(ring(kind) for kind in ("revolute", "cylindrical", "universal", "spherical")),
+        swapped(ring("spherical")),
+    )
+}
+
+
+@functools.cache
+def exact(name: str) -> Trajectory:
+    """The start of a scene with its true accelerations and reactions."""
+    scene = SCENES[name]
+    (position, orientation), (velocity, spin) = initial_poses(scene), initial_twists(scene)
+    both = gauss(scene)
+    count = len(scene.body)
+    states = position, orientation, velocity, spin, both[:count], both[count:] / scene_length(scene)
+    position, orientation, velocity, spin, linear, angular = (np.array(state)[None] for state in states)
+    bodies = tuple(body.name for body in scene.body)
+    start = Trajectory(
+        name, "judge", "", "", {}, TIMES[:1], bodies, position, orientation, velocity, spin,
+        acceleration=linear, angular_acceleration=angular,
+    )  # fmt: skip
+    return with_exact_reactions(scene, start)
+
+
+def able(name: str, scene: Scene) -> Engine:
+    if not installed(name):
+        pytest.skip(f"{name} is not installed")
+    if reason := engine(name).cannot(scene):
+        pytest.skip(str(reason))
+    return engine(name)
+
+
+@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("way", WAYS)
+def test_the_start_of_a_scene(way: str, name: str) -> None:
+    scene, (setting, near) = SCENES[name], WAYS[way]
+    run = in_scene_order(scene, able(way, scene).run(scene, TIMES, setting))
+    true = exact(name)
+    assert run.outcome is Outcome.COMPLETED, run.message
+    given = [field for field in FIELDS if getattr(run, field) is not None]
+    assert given == FIELDS or (way == "exudyn" and scene.driver and given == FIELDS[:2])
+    for field in given:
+        found, wanted = getattr(run, field)[0], getattr(true, field)[0]
+        apart = abs(found - wanted).max() / max(1.0, abs(wanted).max())
+        assert apart < near, f"{field} differs by {apart:.1e}"
+    if given != FIELDS:
+        return
+    compared = compare(scene, true, first(run))
+    off = {joint: reaction.unique for joint, reaction in compared.joints.items()}
+    assert max(off.values()) < near and compared.resultant < near, (off, compared.resultant)
+
+
+def first(run: Trajectory) -> Trajectory:
+    """The first sample of a run."""
+    arrays = ("times", "position", "orientation", "velocity", "angular_velocity", "acceleration")
+    parts = {field: getattr(run, field)[:1] for field in (*arrays, "angular_acceleration")}
+    return replace(run, **parts, reactions={joint: found[:1] for joint, found in run.reactions.items()})
