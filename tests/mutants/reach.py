@@ -53,7 +53,7 @@ class Reach:
 
     def add(self, file: str, answer: Mapping[str, Any]) -> None:
         """Keep the answer of a process that recorded a test file; it has no lines where its time was up."""
-        answer = {"starting": 0.0, "seconds": {}, "reached": {}} | dict(answer)
+        answer = {"starting": 0.0, "seconds": {}, "reached": {}, **answer}
         digests = {source: self._digest(source) for source in answer["reached"]}
         record = {"file": file, "digest": self._digest(file), "sources": digests, **answer}
         self._records[file] = record
@@ -65,8 +65,8 @@ class Reach:
             self._digests[file] = hashlib.sha256((self._root / file).read_bytes()).hexdigest()[:16]
         return self._digests[file]
 
-    def tests(self, mutant: Mutant, source: str) -> dict[str, dict[str, float]]:
-        """Return the tests that run a mutant's line, by file, each with its CPU s.
+    def tests(self, mutant: Mutant, source: str) -> dict[str, list[str]]:
+        """Return the tests that run a mutant's line, by file.
 
         Where no test runs it, those of every file that reaches the source, for instance in another process.
         """
@@ -76,42 +76,49 @@ class Reach:
             found = {file: self._of_file(file, mutant.file, -1) for file in found}
         return {file: tests for file, tests in found.items() if tests}
 
-    def _of_file(self, file: str, source: str, wanted: int) -> dict[str, float]:
+    def _of_file(self, file: str, source: str, wanted: int) -> list[str]:
         record = self._records.get(file, {})
         if source not in record.get("reached", ()):
-            return {}
-        reached, seconds = record["reached"][source], record["seconds"]
+            return []
+        reached = record["reached"][source]
         if record["sources"][source] != self._digest(source):
             wanted = -1
         if int(reached["outside"], 16) & wanted:
-            return dict(seconds)
-        names = [name for bits, tests in reached["tests"] if int(bits, 16) & wanted for name in tests]
-        return {name: seconds[name] for name in names}
+            return list(record["seconds"])
+        return [name for bits, tests in reached["tests"] if int(bits, 16) & wanted for name in tests]
 
     def ordered(self, mutant: Mutant, source: str, kills: Mapping[str, int]) -> dict[str, list[str]]:
-        """Return the test files in the order in which they run, each with its tests.
+        """Return the test files in the order in which they run, each with all of its tests.
 
         Files that have killed most mutants of the same folder come first, then files with the least time for
         each of these names that they contain: the functions and classes around a mutant, its module and its
-        package. In a file, tests with one of the names come first, then the quickest.
+        package. In a file, tests that run the line come first, then tests with one of the names, then the
+        quickest. Tests that do not run the line may use a result that another test has left in memory.
         """
         tests, names = self.tests(mutant, source), around(source, mutant)
         package, module = ".".join(Path(mutant.file).parent.parts), Path(mutant.file).stem
         words = [re.escape(package), module, rf"{module}(\.\w+| import)", *names]
+        named = re.compile("|".join(map(re.escape, [*names, module])))
 
         def rank(file: str) -> tuple[int, float]:
-            named = sum(bool(re.search(rf"\b{word}\b", self._texts[file])) for word in words)
-            needed = STARTING + self._records[file]["starting"] + min(tests[file].values())
+            count = sum(bool(re.search(rf"\b{word}\b", self._texts[file])) for word in words)
+            seconds = min(self._records[file]["seconds"][test] for test in tests[file])
+            needed = STARTING + self._records[file]["starting"] + seconds
             nearer = NEARER if file.startswith(f"tests/{package.partition('.')[0]}/") else 1.0
-            return -kills.get(file, 0), needed / (1 + named) / nearer
+            return -kills.get(file, 0), needed / (1 + count) / nearer
 
-        def quick(file: str) -> list[str]:
-            named = re.compile("|".join(map(re.escape, [*names, module])))
+        def in_order(file: str) -> list[str]:
+            seconds, running = self._records[file]["seconds"], set(tests[file])
             return sorted(
-                tests[file], key=lambda test: (not named.search(test.partition("::")[2]), tests[file][test])
+                seconds,
+                key=lambda test: (
+                    test not in running,
+                    not named.search(test.partition("::")[2]),
+                    seconds[test],
+                ),
             )
 
-        return {file: quick(file) for file in sorted(tests, key=rank)}
+        return {file: in_order(file) for file in sorted(tests, key=rank)}
 
 
 def lines_of(source: str, line: int) -> int:

@@ -228,11 +228,11 @@ def reach(tmp_path):
 
 
 def test_tests_that_run_the_line_are_chosen_and_ordered(reach, tmp_path):
-    """Named functions count first, then time; of one file named tests come first."""
+    """Named functions count first, then time; of one file tests that run the line, then named tests."""
     mutant, source = planted("((a) - (b))"), TINY["mbref/sums.py"]
     assert around(source, mutant) == ["total"]
     expected = {
-        "tests/test_near.py": ["t::test_total", "t::test_b", "t::test_a"],  # names mbref, sums and total
+        "tests/test_near.py": ["t::test_total", "t::test_b", "t::test_a", "t::test_other"],  # names it
         "tests/test_quick.py": ["t::test_d"],
         "tests/test_far.py": ["t::test_c"],
     }

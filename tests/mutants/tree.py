@@ -66,6 +66,8 @@ class Tree:
         """
         self._reach[plain] = reach = Reach(kept, self.place)
         missing = reach.missing()
+        if missing and not plain and (self.place / "tests/kernels.py").exists():
+            self._compile()
         workers = [self._worker(plain) for _ in range(min(processes, len(missing)))]
         idle = [*workers]
         request = {"packages": PACKAGES, "of_test": OF_TEST, "of_file": OF_RECORDED}
@@ -73,7 +75,7 @@ class Tree:
         def answer(file: str) -> dict[str, Any]:
             worker = idle.pop()
             try:
-                limits = {"limit": 2 * OF_RECORDED, "waiting": 10 * OF_RECORDED}
+                limits = {"limit": 3 * OF_RECORDED, "waiting": 10 * OF_RECORDED}
                 return ask(worker, {"tests": {file: None}, **request, **limits})
             finally:
                 idle.append(worker)
@@ -176,20 +178,24 @@ class Tree:
         }
         return ask(self._workers[plain], request)
 
+    def _compile(self) -> None:
+        """Compile the kernels that the tests need, which takes longer than a test file may."""
+        command = [sys.executable, "-P", "-m", "tests.kernels"]
+        subprocess.run(command, cwd=self.place, env=self._environment(False), check=True)
+
     def _worker(self, plain: bool) -> subprocess.Popen[str]:
         return subprocess.Popen(
             [sys.executable, "-P", str(WORKERS)],
             cwd=self.place,
-            env={
-                **os.environ,
-                "PYTHONPATH": str(self.place),
-                "HYPOTHESIS_PROFILE": "first",
-                **({"NUMBA_DISABLE_JIT": "1"} if plain else {}),
-            },
+            env=self._environment(plain),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
+
+    def _environment(self, plain: bool) -> dict[str, str]:
+        own = {"PYTHONPATH": str(self.place), "HYPOTHESIS_PROFILE": "first"}
+        return {**os.environ, **own, **({"NUMBA_DISABLE_JIT": "1"} if plain else {})}
 
     def close(self) -> None:
         """End the processes."""
