@@ -64,7 +64,7 @@ def run_all(scenes: Sequence[Scene], method: Method | str, times: np.ndarray, li
     method = Method.parse(method) if isinstance(method, str) else method
     runs = _Runs(scenes, method, times, limits)
     for places in _by_shape(scenes):
-        if len(places) > 1 and _can_lead(method, limits):
+        if _can_lead(method, limits):
             runs.in_batches(places)
         else:
             runs.alone(places)

@@ -258,6 +258,9 @@ def test_how_velocities_fit_branches(set_order):
     assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, 3.0])) == Fit(False, True)
     set_order(order([[[1.0, 0.0], [0.0, 0.0]]], kernel=PLANE))
     assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.0, 4.0])) == Fit(True, False)
+    for value, fits in ((b.SAME, False), (math.nextafter(b.SAME, 0.0), True)):
+        form = order([[[value, 0.0], [0.0, -1.0]]], kernel=PLANE)
+        assert b._fits(form, np.array([1.0, 0.0])) is fits
     for regular in (order([], kernel=PLANE), order([[[1.0]]], kernel=PLANE[:, :1])):
         set_order(regular)
         assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, 4.0])) is None

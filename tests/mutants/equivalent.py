@@ -48,6 +48,9 @@ REASONS: dict[tuple[str, str, str], str] = {
         "if value_at(middle, unit, memory) < 0.0:",
         "(value_at(middle, unit, memory) <= 0.0)",
     ): "A value of zero is the sign change; bisection comes to it from either side.",
+    ("mbref/stabilisation/partitioning.py", "for k in range(3):", "4"): (
+        "The fourth entry is overwritten afterwards."
+    ),
     (
         "mbref/scenes/flyball_governor.py",
         "reach = (rod * LENGTH / 2 + BALL * LENGTH) / mass",
