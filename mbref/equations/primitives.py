@@ -123,7 +123,9 @@ def dot1(p, t, equations):
         + 2.0 * dot(to_world(rotation, i, turn_i), to_world(rotation, j, turn_j))
         + dot(a_world, to_world(rotation, j, second_j))
     )
+    put(blocks, row, 0, NOTHING)
     put(blocks, row, 3, cross(a, to_body(rotation, i, b_world)))
+    put(blocks, row, 6, NOTHING)
     put(blocks, row, 9, cross(b, to_body(rotation, j, a_world)))
 
 
