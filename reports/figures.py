@@ -116,9 +116,8 @@ def _lay_out(figure: Figure) -> None:
     """Find the layout of a figure as SVG; savefig would draw the figure once more to find it."""
     if engine := figure.get_layout_engine():
         FigureCanvasSVG(figure)
-        figure.dpi, dpi = DPI_OF_SVG, figure.dpi
+        figure.dpi = DPI_OF_SVG
         engine.execute(figure)
-        figure.dpi = dpi
         figure.set_layout_engine(None)
 
 
