@@ -1,9 +1,10 @@
 """Estimated error of runs beside the true one: random mechanisms, sensitive motions, built-in scenes.
 
-``python benchmarks/error_estimate.py [COUNT]``, by default 500 random mechanisms. Truth is crosscheck's: a
-closed form or a reference with a bound. Samples beyond the end of the truth are left out. A run counts as
-underestimated if its true error minus the bound on the truth is more than ten times the estimate. A run
-counts as overestimated if the estimate is more than a hundred times the sum of the true error and the bound.
+``python benchmarks/error_estimate.py [COUNT] [--first SEED]``, by default 500 random mechanisms of the seeds
+from 0 on. Truth is crosscheck's: a closed form or a reference with a bound. Samples beyond the end of the
+truth are left out. A run counts as underestimated if its true error minus the bound on the truth is more than
+ten times the estimate. A run counts as overestimated if the estimate is more than a hundred times the sum of
+the true error and the bound.
 """
 
 import contextlib
@@ -60,10 +61,10 @@ class Case:
         return self.estimate > OVER * (self.true + self.bound)
 
 
-def main(count: int) -> None:
-    """Run and print."""
+def main(count: int, seed: int) -> None:
+    """Run and print; the random mechanisms have ``count`` seeds from ``seed`` on."""
     console = Console(width=110)
-    jobs = [*sensitive_jobs(), *built_in_jobs(), *random_jobs(count)]
+    jobs = [*sensitive_jobs(), *built_in_jobs(), *random_jobs(range(seed, seed + count))]
     cases: list[Case] = []
     with contextlib.suppress(KeyboardInterrupt):  # after an interrupt the finished runs are printed
         for job in track(jobs, console=Console(stderr=True)):
@@ -90,9 +91,9 @@ def main(count: int) -> None:
 Job = tuple[str, Scene, list[tuple[str, float]]]  # group, scene, methods and tolerances
 
 
-def random_jobs(count: int) -> Iterator[Job]:
+def random_jobs(seeds: range) -> Iterator[Job]:
     """Return jobs of random mechanisms, each with two methods and tolerances chosen by its seed."""
-    for seed in range(count):
+    for seed in seeds:
         random = np.random.default_rng([seed, 1])
         others = [METHODS[0], str(random.choice(METHODS[1:]))]
         chosen = [(method, float(random.choice(TOLERANCES))) for method in others]
@@ -280,4 +281,6 @@ def pendulum_on_four_bar() -> Scene:
 if __name__ == "__main__":
     parser = Parser(description=__doc__)
     parser.add_argument("count", nargs="?", type=int, default=500, help="random mechanisms; default: 500")
-    main(parser.parse_args().count)
+    parser.add_argument("--first", type=int, default=0, metavar="SEED", help="seed of the first; default: 0")
+    given = parser.parse_args()
+    main(given.count, given.first)

@@ -12,7 +12,14 @@ from mbref.cli.output import progress_bar, warn
 from mbref.formulations import FORMULATIONS
 from mbref.input_error import InputError
 from mbref.integrators import INTEGRATORS
-from mbref.method import SERIES_METHOD, SHORT_NAMES, SPARSE_METHOD, Method, default_method
+from mbref.method import (
+    SERIES_METHOD,
+    SHORT_NAMES,
+    SPARSE_METHOD,
+    Method,
+    MethodError,
+    default_method,
+)
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
@@ -20,6 +27,9 @@ from mbref.stabilisation import STABILISATIONS
 if TYPE_CHECKING:
     from mbref.motion import Motion
     from mbref.stepping.limits import Limits
+
+# option of a command line by the field of Limits that it sets
+LIMIT_OPTIONS = {"rtol": "--rtol", "largest_step": "--max-step", "branches": "--branch", "code": "--code"}
 
 
 def add_scene(parser: argparse.ArgumentParser) -> None:
@@ -77,7 +87,10 @@ class Request(NamedTuple):
         with progress_bar("simulating", float(self.times[-1])) as progress:
             if check:
                 check(simulate(*self._replace(times=self.times[:1]), progress))
-            return simulate(*self, progress)
+            try:
+                return simulate(*self, progress)
+            except (MethodError, InputError) as error:
+                raise type(error)(with_option(str(error))) from None
 
 
 def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Request:
@@ -114,8 +127,7 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
 
 
 def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = None) -> Limits:
-    """Return the limits; a ValueError names the field, which is the option except for --max-step and
-    --branch."""
+    """Return the limits; raises InputError that names the faulty option."""
     from mbref.stepping.limits import Limits
 
     try:
@@ -123,6 +135,10 @@ def limits_of(options: argparse.Namespace, branches: Mapping[int, int] | None = 
             rtol=options.rtol, largest_step=options.max_step, code=options.code, branches=branches or {}
         )
     except ValueError as error:
-        raise InputError(
-            f"--{error}".replace("largest_step", "max-step").replace("branches", "branch")
-        ) from None
+        raise InputError(with_option(str(error))) from None
+
+
+def with_option(message: str) -> str:
+    """Return a message that begins with a field of ``Limits`` with the option in place of the field."""
+    field, colon, rest = message.partition(":")
+    return f"{LIMIT_OPTIONS[field]}{colon}{rest}" if field in LIMIT_OPTIONS else message

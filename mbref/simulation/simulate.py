@@ -116,8 +116,8 @@ def _check_branches(run: Run) -> None:
     last, passed = max(dict(run.limits.branches), default=0), len(run.crossings)
     if last > passed:
         raise InputError(
-            f"branches: the motion passes {passed} singular positions up to t = {run.times[-1]:g} s, "
-            f"and no number {last}"
+            f"branches: the motion passes {passed} singular position{'s' * (passed != 1)} up to "
+            f"t = {run.times[-1]:g} s, and no number {last}"
         )
 
 

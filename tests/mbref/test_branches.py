@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.metrics import measure
+from mbref.cli import main
 from mbref.design.along_motion import along_motion
 from mbref.equations.branches import ALONE, MULTIPLE, second_order
 from mbref.equations.initial_state import consistent_start
@@ -103,6 +104,28 @@ def test_a_branch_that_is_not_there():
     for wrong in ({1: 0}, {1: "x"}, 3, [(1,)], {1: 1.5}):
         with pytest.raises(ValueError, match="branches: must be"):
             Limits(branches=wrong)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (
+            "0.1 --branch 2=3",
+            "--branch: the motion passes 0 singular positions up to t = 0.1 s, and no number 2",
+        ),
+        (
+            "0.5 --branch 2=3",
+            "--branch: the motion passes 1 singular position up to t = 0.5 s, and no number 2",
+        ),
+        ("0.5 --branch 1=3", "--branch: the crossing at t = "),
+        ("0.5 --branch 1=2 --method lm1", "--branch: lm1"),
+        ("0.5 --code generated --method lm1", "--code: lm1"),
+    ],
+)
+def test_a_message_on_a_branch_names_the_option(words, message, capsys):
+    assert main(["run", "four_bar_gravity", "--duration", *words.split()]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith(message) and said.count("\n") == 1, said
 
 
 def test_crossings_in_a_record_and_none_where_nothing_looks_for_them(tmp_path):
