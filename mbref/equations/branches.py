@@ -89,10 +89,13 @@ def branches(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Branches:
     roots, sort = _lines(found)
     if sort == CONE:
         return Branches(v[None], CONE)
-    velocities = [_velocity(model, found, a, v) for a in roots if _angle(a, mine) > SAME]
-    velocities = [w for w in velocities if w is not None]
     if freedoms == 2 and len(found.forms) == 1 and len(roots) == 1:
         return Branches(v[None], TANGENT)
+    if not mine.any():  # at rest, v is the velocity of each branch
+        count = max(1, len(roots))
+        return Branches(np.tile(v, (count, 1)), (f"{count} branches" if count > 1 else ALONE) + sort)
+    velocities = [_velocity(model, found, a, v) for a in roots if _angle(a, mine) > SAME]
+    velocities = [w for w in velocities if w is not None]
     sentence = f"{1 + len(velocities)} branches" if velocities else ALONE
     return Branches(np.array([v, *velocities]), sentence + sort)
 

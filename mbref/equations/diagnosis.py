@@ -140,7 +140,7 @@ def diagnose(scene: Scene | str | Path) -> Diagnosis:
     else:
         jacobian = scaled_jacobian(model, 0.0, start.q)
         left, values, _ = np.linalg.svd(jacobian)
-        rank = rank_of(jacobian, RANK_TOLERANCE)
+        rank = _count_above(values, RANK_TOLERANCE)
         shared = take_part(left[:, rank:])
         smallest = float(values[rank - 1]) if rank else 0.0
         largest = float(values[0]) if values.size else 0.0
@@ -181,5 +181,9 @@ def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
 
 def rank_of(matrix: np.ndarray, tolerance: float) -> int:
     """Return the number of singular values above the tolerance times the largest singular value."""
-    values = np.linalg.svd(matrix, compute_uv=False)
+    return _count_above(np.linalg.svd(matrix, compute_uv=False), tolerance)
+
+
+def _count_above(values: np.ndarray, tolerance: float) -> int:
+    """Return the number of singular values, largest first, above the tolerance times the largest one."""
     return int(np.sum(values > tolerance * values[0])) if values.size else 0

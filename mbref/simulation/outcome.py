@@ -192,7 +192,9 @@ def _message(run: Run, status: int) -> str:
     if status == UNDECIDED and run.memory.loop.clock.time == 0.0 and fits_no_branch(run):
         return NO_BRANCH
     if status != DONE:
-        return "; ".join(filter(None, (_cause(run, status), _rounded(run.ranks), _remedy(run, status))))
+        chosen = _left_from_rest(run) if run.memory.loop.clock.time > 0.0 else ""
+        parts = _cause(run, status), _rounded(run.ranks), _remedy(run, status), chosen
+        return "; ".join(filter(None, parts))
     found = report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))
     return "; ".join(filter(None, (_left_from_rest(run), found)))
 

@@ -6,12 +6,14 @@ scene decide.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mbref.equations.diagnosis import RANK_TOLERANCE, counts, scaled_jacobian
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
-from mbref.simulation.trial import trial_of
+from mbref.simulation.trial import passes_with, trial_of
 from mbref.stepping.loop import (
     CREEPING,
     LEFT_MOTION,
@@ -22,11 +24,11 @@ from mbref.stepping.loop import (
 )
 from mbref.stepping.run import Run
 
+OTHER = 2  # number of the first branch that is not the smooth one
 FOLLOWS, COMPLETES = "taylor crosses singular positions", "taylor completes this motion"
-BY_STATUS = {
-    VIOLATED: "+projection corrects violations after every step",
-    UNDECIDED: "a smaller rtol may determine the branch; --branch selects one",
-}
+CORRECTS = "+projection corrects violations after every step"
+FINE = 1e-13  # smallest tolerance that is tried where rounding would decide the branch
+MAY_DECIDE = "a smaller rtol or another branch may let the motion go on"
 
 
 def remedy(run: Run, status: int) -> str:
@@ -38,7 +40,33 @@ def remedy(run: Run, status: int) -> str:
         return _of_iteration(run)
     if status in (STEP_TOO_SMALL, TOO_MANY_STEPS, CREEPING):
         return _of_steps(run)
-    return _follows(run) if status == LEFT_MOTION else BY_STATUS.get(status, "")
+    if status == UNDECIDED:
+        return _of_branch(run)
+    if status == VIOLATED:
+        return CORRECTS
+    return _follows(run) if status == LEFT_MOTION else ""
+
+
+def _of_branch(run: Run) -> str:
+    """Return the advice on a tolerance and on the choice of a branch; both are tried first."""
+    number = len(run.crossings) + 1
+    changes: dict[str, dict[str, Any]] = {
+        f"rtol {FINE:g}": {"rtol": FINE, "atol": None},
+        f"--branch {number}={OTHER}": {"branches": {**dict(run.limits.branches), number: OTHER}},
+    }
+    if run.limits.rtol <= FINE:
+        changes.pop(f"rtol {FINE:g}")
+    passes = {change: passes_with(run, **limits) for change, limits in changes.items()}
+    if None in passes.values():
+        return MAY_DECIDE
+    good = [change for change, does in passes.items() if does]
+    if good:
+        return f"the motion goes on with {' or '.join(good)}"
+    neither = (
+        f"neither {' nor '.join(passes)} lets" if len(passes) > 1 else f"{next(iter(passes))} does not let"
+    )
+    end = ": end it before this time" if run.memory.loop.clock.time > 0.0 else ""
+    return f"{neither} the motion go on{end}"
 
 
 def _follows(run: Run) -> str:

@@ -3,13 +3,15 @@ reliable."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 from weakref import WeakKeyDictionary
 
+from mbref.input_error import InputError
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
-from mbref.stepping.loop import DONE
+from mbref.stepping.loop import DONE, UNDECIDED
 from mbref.stepping.run import Run
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 
@@ -36,6 +38,26 @@ def trial_of(run: Run) -> Trial | None:
     if run not in _TRIALS:
         _TRIALS[run] = _made(run)
     return _TRIALS[run]
+
+
+def passes_with(run: Run, **changes: Any) -> bool | None:
+    """Return whether a run of `taylor` that ended UNDECIDED passes its last singular position with changed
+    limits.
+
+    None if the motion has more than 100 bodies, or if the run took more than MOST_TRIAL_STEPS steps.
+    """
+    steps = int(run.memory.equations.system.counts.steps)
+    if not run.method.is_series or len(run.scene.body) > MOST_BODIES or steps > MOST_TRIAL_STEPS:
+        return None
+    limits = replace(run.limits, code=GENERIC, most_steps=MOST_TRIAL_STEPS, **changes)
+    trial = start_run(run.scene, run.method, run.times, limits)
+    try:
+        status, _ = trial.stepper.advance(None)
+    except InputError:  # a requested branch that does not exist
+        return False
+    passed = len(trial.crossings) > len(run.crossings)
+    trial.release()
+    return passed or status != UNDECIDED
 
 
 def _made(run: Run) -> Trial | None:

@@ -22,7 +22,8 @@ NO_FORCE = 1e-12  # force along a branch / largest force, below which the body s
 
 
 class Leaving(NamedTuple):
-    """Departure from a singular position at t = 0: velocities (n,), or accelerations (n,) from rest."""
+    """Departure from a singular position at t = 0: velocities (n,), and the acceleration (n,) along them, or
+    from rest."""
 
     coordinates: np.ndarray
     velocities: np.ndarray
@@ -40,7 +41,20 @@ def leaving(run: Run) -> Leaving | None:
     fit = fit_to_branches(run.model, 0.0, run.start.q, run.start.v)
     if fit is None or not (fit.fits and fit.is_simple):
         return None
-    return Leaving(run.start.q, run.start.v, np.zeros_like(run.start.v))
+    return Leaving(run.start.q, run.start.v, acceleration_along(run))
+
+
+def acceleration_along(run: Run) -> np.ndarray:
+    """Return the acceleration (n,) by which the forces increase the speed along the velocities of the start,
+    without drivers.
+
+    The acceleration is zero if the forces reduce the speed: a slow motion may return to the start.
+    """
+    q, v = run.start.q, run.start.v
+    push = float(v @ run.model.terms(0.0, q, v).force)
+    if run.scene.driver or push <= 0.0:
+        return np.zeros_like(v)
+    return v * (push / float(v @ (run.model.mass * v)))
 
 
 def fits_no_branch(run: Run) -> bool:

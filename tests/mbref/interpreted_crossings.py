@@ -380,14 +380,24 @@ def test_a_start_at_rest_is_left_along_its_acceleration(monkeypatch):
     assert q[1] == pytest.approx(DEPARTURE)
 
 
+def test_a_slow_start_is_left_by_its_acceleration(monkeypatch):
+    """r t + s t² / 2 = DEPARTURE has the root t = 1e-3 for r = 1 and s = 2 (DEPARTURE - 1e-3) / 1e-6."""
+    speed = np.array([0.0, 1.0, 0, 0, 0, 0])
+    way = Leaving(np.zeros(7), speed, 2.0 * (DEPARTURE - 1e-3) / 1e-6 * speed)
+    found, _, taken = leaving(monkeypatch, [0.0, 1.0])
+    assert found.from_start(way) == PAUSED
+    assert taken[0][2] == pytest.approx(1e-3) and taken[0][3][0][1] == pytest.approx(DEPARTURE)
+
+
 def test_a_start_in_motion_that_its_series_misses_is_undecided(monkeypatch):
     moving = Leaving(np.zeros(7), np.array([2.0, 0, 0, 0, 0, 0]), np.zeros(6))
-    found, _, taken = leaving(monkeypatch, [0.0, 1e-4])
+    found, clock, taken = leaving(monkeypatch, [0.0, 1e-4])
     assert found.from_start(moving) == PAUSED
     assert taken[0][2] == pytest.approx(0.5e-4), "at most half of the run"
     asked = []
     found._misses = lambda *given: asked.append(given) or True
-    assert found.from_start(moving) == UNDECIDED
+    clock.time = 0.5e-4
+    assert found.from_start(moving) == UNDECIDED and clock.time == 0.0
     (q, v, ahead), expected = asked[0], moving.coordinates
     assert q is expected and v is moving.velocities and ahead == taken[0][2]
 
@@ -400,6 +410,8 @@ def test_a_series_misses_a_start_from_which_it_is_further_than_a_distance(monkey
     found._state_at = lambda h: asked.append(h) or (np.array([0.0, 1.0 - moved]), v + changed)
     assert found._misses(np.array([0.0, 1.0]), v, 0.25) == bool(far)
     assert asked == [-0.25, 0.0], "the state at the series' beginning is put back"
+    found._state_at = lambda h: (np.array([0.0, 1.0 - moved]), v + changed if h else 1e7 * v)
+    assert found._misses(np.array([0.0, 1.0]), v, 0.25) == (moved > 0.5), "relative to the larger speed"
 
 
 @pytest.mark.parametrize(("velocity", "expected"), [([0.0, 2.0], 7.0), ([0.0, 0.0], 5.0)])

@@ -242,7 +242,6 @@ def test_taylor_is_advised_unless_its_trial_fails(monkeypatch, trial, advice):
 
 def test_remedies_that_need_no_trial():
     assert remedies.remedy(failed(), remedies.VIOLATED) == "+projection corrects violations after every step"
-    assert "--branch selects one" in remedies.remedy(failed(), remedies.UNDECIDED)
     assert remedies.remedy(failed(), 10) == "" == remedies.remedy(failed(loops=False), remedies.SINGULAR)
     for run in (failed(is_series=True), failed(loops=False)):
         assert {remedies.remedy(run, status) for status in STEPS} == {

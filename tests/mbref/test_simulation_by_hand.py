@@ -381,7 +381,6 @@ def test_costs_and_outcomes():
     ("method", "status", "found", "words"),
     [
         (FREE, VIOLATED, None, "+projection corrects violations after every step"),
-        (FREE, UNDECIDED, None, "a smaller rtol may determine the branch; --branch selects one"),
         (FREE, LEFT_MOTION, None, "taylor crosses singular positions"),
         (FREE, LEFT_MOTION, Trial(True, 2.0), "taylor completes this motion"),
         (FREE, LEFT_MOTION, Trial(False, 1.0), ""),
@@ -401,6 +400,36 @@ def test_costs_and_outcomes():
 def test_remedies_by_status(monkeypatch, method, status, found, words):
     monkeypatch.setattr(remedies, "trial_of", lambda made: found)
     assert remedies.remedy(run(method), status) == words
+
+
+@pytest.mark.parametrize(
+    ("rtol", "time", "passing", "words"),
+    [
+        (1e-9, 0.5, {"rtol", "branches"}, "the motion goes on with rtol 1e-13 or --branch 3=2"),
+        (1e-9, 0.5, {"branches"}, "the motion goes on with --branch 3=2"),
+        (1e-13, 0.5, {"rtol"}, "--branch 3=2 does not let the motion go on: end it before this time"),
+        (
+            1e-9,
+            0.5,
+            set(),
+            "neither rtol 1e-13 nor --branch 3=2 lets the motion go on: end it before this time",
+        ),
+        (1e-9, 0.0, set(), "neither rtol 1e-13 nor --branch 3=2 lets the motion go on"),
+        (1e-9, 0.5, None, "a smaller rtol or another branch may let the motion go on"),
+    ],
+)
+def test_the_remedy_of_an_undecided_motion_is_tried(monkeypatch, rtol, time, passing, words):
+    tried = []
+
+    def passes(made: Any, **changes: Any) -> bool | None:
+        tried.append(changes)
+        return None if passing is None else bool(passing & set(changes))
+
+    monkeypatch.setattr(remedies, "passes_with", passes)
+    made = run(time=time, crossings=[1, 2], limits=Limits(rtol=rtol, branches={1: 2}))
+    assert remedies.remedy(made, UNDECIDED) == words
+    assert {"branches": {1: 2, 3: 2}} in tried
+    assert ({"rtol": 1e-13, "atol": None} in tried) == (rtol > 1e-13)
 
 
 def test_steps_of_an_open_chain_are_diagnosed(monkeypatch):

@@ -62,6 +62,64 @@ def test_velocities_on_no_branch_are_refused(method):
     assert run.outcome.name == "UNDECIDED" and "agree with none of the branches" in run.message
 
 
+def falling_parallelogram(rate: float, length: float = 0.3) -> Scene:
+    """Two cranks and a coupler of 1 kg in one line, with a small rate (rad/s) of the first crank."""
+    z = (0.0, 0.0, 1.0)
+    inertia = (0.01, 0.02, 0.02)
+    given = {"angular_velocity": (0.0, 0.0, rate), "velocity": (0.0, rate * length / 2, 0.0)}
+    crank = Body(name="crank", mass=1.0, inertia=inertia, position=(length / 2, 0.0, 0.0), **given)
+    coupler = Body(name="coupler", mass=1.0, inertia=inertia, position=(length + 0.25, 0.0, 0.0))
+    rocker = Body(name="rocker", mass=1.0, inertia=inertia, position=(0.5 + length / 2, 0.0, 0.0))
+    places = (
+        (0.0, GROUND, "crank"),
+        (length, "crank", "coupler"),
+        (length + 0.5, "coupler", "rocker"),
+        (0.5, "rocker", GROUND),
+    )
+    hinges = tuple(
+        Revolute(name=f"P{k}", bodies=(a, b), anchor=(x, 0.0, 0.0), axis=z)
+        for k, (x, a, b) in enumerate(places)
+    )
+    return Scene(name="falls", gravity=(0.0, -9.81, 0.0), body=(crank, coupler, rocker), joint=hinges)
+
+
+@pytest.mark.parametrize("rate", [-1e-6, -1e-3, -1e-2, -0.03, -0.3])
+def test_a_slow_start_along_the_forces(rate):
+    """The cranks keep ½ I ω² + m g l sin φ, I = 2 (0.02 + m l² / 4) + m l², and the coupler does not turn."""
+    run = simulate(falling_parallelogram(rate), "taylor", np.linspace(0.0, 0.4, 9))
+    assert run.outcome.name == "COMPLETED", run.message
+    x, y = run["crank"].position[:, :2].T
+    inertia, rates = 2 * (0.02 + 0.3**2 / 4) + 0.3**2, run["crank"].angular_velocity[:, 2]
+    energy = 0.5 * inertia * rates**2 + 2 * 9.81 * 0.3 * np.sin(np.arctan2(y, x))
+    assert np.abs(energy - 0.5 * inertia * rate**2).max() < 1e-9
+    assert np.abs(run["coupler"].angular_velocity).max() < 1e-9 and rates[-1] < -5.0
+
+
+def test_a_slow_start_against_the_forces_ends_at_its_singular_position():
+    """The motion turns back after 1e-6 rad. A run had ended "at t = 0.25 s" without a step or a sample."""
+    run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
+    assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
+    assert run.message.endswith(
+        "at t = 0 s (taylor); neither rtol 1e-13 nor --branch 1=2 lets the motion go on"
+    )
+
+
+def test_a_motion_that_ends_early_reports_the_branch_at_its_start():
+    """The swing ends at rest in the other flat position, where neither a tolerance nor a branch helps."""
+    run = simulate(falling_parallelogram(0.0), "taylor", np.linspace(0.0, 1.0, 9))
+    assert run.outcome.name == "UNDECIDED" and run.t_end > 0.1
+    cause, advice, start = run.message.split("; ")
+    assert cause.startswith("rounding errors would decide the motion beyond a singular position")
+    assert advice == "neither rtol 1e-13 nor --branch 1=2 lets the motion go on: end it before this time"
+    assert start == (
+        "the motion begins at rest on a singular position and takes, of the 2 branches that meet there, the "
+        "branch of Gauss's principle of least constraint"
+    )
+    held = simulate(falling_parallelogram(0.0), "mpi-svd+projection", [0.0, 0.1])
+    [met] = held.crossings
+    assert met.sentence == "2 branches" and not np.any(met.angular_velocity)
+
+
 def test_a_run_that_ends_where_the_series_begins():
     scene = upright_slider_crank(-30.0)
     for end in (1e-6, 1e-4):

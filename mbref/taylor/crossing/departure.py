@@ -50,27 +50,28 @@ class Departure:
         return self._come_from(passed, velocities, ahead, moved)
 
     def from_start(self, way: Leaving) -> int:
-        """Continue from a singular position at t = 0; return PAUSED or the failure status."""
+        """Continue from a singular position at t = 0; return PAUSED or the failure status, with time 0."""
         q, v, acceleration = way
         moves = np.any(v)
-        ahead = self._time_in_which(v) if moves else self._time_in_which(0.5 * acceleration) ** 0.5
-        ahead = min(ahead, 0.5 * float(self._run.times[-1]))
+        ahead = min(self._time_along(v, acceleration), 0.5 * float(self._run.times[-1]))
         moved = displaced(q, ahead * v + 0.5 * ahead**2 * acceleration), v + ahead * acceleration
         status = self._come_from(Passed(0.0, q, v, SMOOTH), v, ahead, moved)
         if status == PAUSED and moves and self._misses(q, v, ahead):
-            return UNDECIDED
+            status = UNDECIDED
         if status == PAUSED:
             self._put_samples_before(ahead, way)
+        else:
+            self._run.memory.loop.clock.time = 0.0
         return status
 
     def _misses(self, q: np.ndarray, v: np.ndarray, ahead: float) -> bool:
         """Return whether the series, evaluated a time ``ahead`` (s) before its beginning, differs from
-        coordinates and velocities."""
+        coordinates and velocities. The difference is relative to the larger of both speeds."""
         there = self._state_at(-ahead)
         moved, changed = displacement(q, there[0]), there[1] - v
-        self._state_at(0.0)
+        speed = max(np.abs(v).max(), np.abs(self._state_at(0.0)[1]).max())
         is_far = np.abs(moved).max() > self._taylor.options.start_distance
-        return bool(is_far or np.abs(changed).max() > START_ERROR * np.abs(v).max())
+        return bool(is_far or np.abs(changed).max() > START_ERROR * speed)
 
     def _put_samples_before(self, ahead: float, way: Leaving) -> None:
         """Put the samples from a singular position at t = 0 until the time (s) about which the series
@@ -152,6 +153,16 @@ class Departure:
 
     def _time_in_which(self, velocities: np.ndarray) -> float:
         """Return the time (s) in which the fastest body moves by DEPARTURE."""
+        return self._time_along(velocities, np.zeros_like(velocities))
+
+    def _time_along(self, velocities: np.ndarray, acceleration: np.ndarray) -> float:
+        """Return the time (s) t of r t + s t² / 2 = DEPARTURE, with the largest rate r of a body and its
+        largest change s."""
+        rate, change = self._largest_rate(velocities), self._largest_rate(acceleration)
+        return float(2.0 * DEPARTURE / (rate + np.sqrt(rate**2 + 2.0 * change * DEPARTURE)))
+
+    def _largest_rate(self, velocities: np.ndarray) -> float:
+        """Return the largest of the bodies' velocities over their lengths (1/s) and angular velocities."""
         rates = velocities.reshape(-1, 6)
         places = np.abs(rates[:, :3] / self._run.model.data.lengths[:, None]).max()
-        return DEPARTURE / float(max(places, np.abs(rates[:, 3:]).max()))
+        return float(max(places, np.abs(rates[:, 3:]).max()))
