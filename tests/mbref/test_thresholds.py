@@ -42,7 +42,13 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
 @pytest.mark.parametrize(
     "files",
     [
-        ("interpreted_crossings", "interpreted_drivers", "test_kernels_by_hand", "test_written_code"),
+        (
+            "interpreted_crossings",
+            "interpreted_drivers",
+            "interpreted_solutions",
+            "test_kernels_by_hand",
+            "test_written_code",
+        ),
         pytest.param(("test_short_runs", "interpreted_commands"), marks=pytest.mark.slow),
     ],
     ids=["parts", "runs"],
