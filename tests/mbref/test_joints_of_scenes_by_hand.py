@@ -77,10 +77,11 @@ def check_joints(scene: Scene, listed: str) -> None:
     for joint, text in zip(scene.joint, listed.split(", "), strict=True):
         name, kind, first, second, *axes = text.split()
         assert (joint.name, joint.type, joint.bodies) == (name, kind, (first, second))
+        found = np.array(joint.directions).reshape(-1, 3)
+        assert np.allclose(np.linalg.norm(found, axis=1), 1.0, rtol=0, atol=1e-14), name
         if scene.name == "bennett":  # its axes are skew
             continue
         wanted = np.array([AXES[letter] for letter in axes]).reshape(-1, 3)
-        found = np.array([axis / np.linalg.norm(axis) for axis in joint.directions]).reshape(-1, 3)
         assert found.shape == wanted.shape and np.allclose(found, wanted, rtol=0, atol=1e-14), name
 
 

@@ -1,0 +1,235 @@
+"""Which code is generated for a scene, and from which tables / counts worked out by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.kernels.machine_code import NoGeneratedCode
+from mbref.taylor.generated import build, orders, power_orders
+
+WIDTH = 8
+
+
+def products(levels: list[list[list[tuple[int, int, float]]]]) -> SimpleNamespace:
+    """Return tables of products: blocks of eight lanes, each with levels of (lane, left, right, weight)."""
+    left, right, weight, start = [], [], [], [0]
+    for block in levels:
+        for level in block:
+            slots = [(0, 0, 0.0)] * WIDTH
+            for lane, *term in level:  # type: ignore[misc]
+                slots[lane] = tuple(term)  # type: ignore[assignment]
+            left += [s[0] for s in slots]
+            right += [s[1] for s in slots]
+            weight += [s[2] for s in slots]
+        start.append(len(weight))
+    return SimpleNamespace(
+        left=np.array(left), right=np.array(right), weight=np.array(weight), start=np.array(start)
+    )
+
+
+def series_of(tables: Any, nz: int, nr: int, freedoms: int = 1, drivers: int = 0, lanes: int = 16) -> Any:
+    return SimpleNamespace(
+        options=SimpleNamespace(start_freedoms=freedoms),
+        polynomials=SimpleNamespace(
+            products=tables,
+            given=SimpleNamespace(driver=np.zeros(drivers)),
+            torsions=SimpleNamespace(row=np.zeros(0), damping=np.zeros(0)),
+            springs=SimpleNamespace(damping=np.zeros(0)),
+            slides=SimpleNamespace(damping=np.zeros(0)),
+            timed=SimpleNamespace(function=np.zeros(0)),
+        ),
+        solver=SimpleNamespace(pivot_columns=np.zeros(nz), pivot_rows=np.zeros(nr)),
+        series=SimpleNamespace(terms=np.zeros((3, lanes))),
+    )
+
+
+def level(*lanes: int) -> list[Any]:
+    return [(lane, 1, 2, 0.5) for lane in lanes]
+
+
+@pytest.mark.parametrize(
+    ("blocks", "nz", "nr", "serves"),
+    [
+        ([[level(3, 4), level(3), level(0)]], 3, 2, True),  # 2 of a row: 16 + 8 of 24
+        ([[level(3, 4), level(3), level(3)]], 3, 2, False),  # 3 of a row: 24 + 8 of 24
+        ([[level(5), level(0), level(0), level(0)]], 3, 2, True),  # lane 5 is no row
+        ([[level(0)], [level(1), level(1), level(1)]], 9, 2, False),  # 24 + 16 of 32
+        ([[level(0)] * 5, [level(1), level(1), level(1)]], 9, 2, True),  # 24 + 16 of 64
+    ],
+)
+def test_scenes_that_power_serves(blocks, nz, nr, serves):
+    """Vectors of the rows' products and of the variables, at most as many as products with multipliers."""
+    tables = products(blocks)
+    assert power_orders.serves(series_of(tables, nz, nr)) is serves
+    assert not power_orders.serves(series_of(tables, nz, nr, freedoms=2))
+    assert not power_orders.serves(series_of(tables, nz, nr, drivers=1))
+
+
+def test_rows_in_groups_of_eight():
+    """Rows in lanes 2 to 10: one vector for the first eight, three for the last one, one for variables."""
+    second = [level(0, 2), level(2), level(2)]
+    assert power_orders.serves(series_of(products([[level(2), level(1, 7)], second]), 2, 9))
+    assert not power_orders.serves(series_of(products([[level(2)], second]), 2, 9))
+
+
+def test_forces_that_are_linear_in_the_variables():
+    """Nine variables: two vectors, of two levels and of one."""
+    source = np.zeros(24, dtype=int)
+    weight = np.zeros(24)
+    for slot, variable, value in ((0, 3, 2.0), (5, 8, -1.0), (8, 4, 0.5), (8 + 5, 8, -3.0), (16, 0, 7.0)):
+        source[slot], weight[slot] = variable, value
+    inertia: Any = SimpleNamespace(start=np.array([0, 16, 24]), source=source, weight=weight)
+    expected = np.zeros((9, 9))
+    expected[0, 3], expected[5, 8], expected[0, 4], expected[8, 0] = 2.0, -4.0, 0.5, 7.0
+    assert power_orders.moments_of(inertia, 9).tolist() == expected.tolist()
+
+
+def test_products_of_each_row():
+    """Rows in lanes 6 to 9 of two vectors; a product has the opposite sign on the other side."""
+    tables = products(
+        [
+            [[(6, 1, 2, 0.5), (0, 3, 3, 9.0)], [(6, 4, 5, -2.0), (7, 0, 1, 1.5)]],
+            [[(0, 2, 3, 4.0), (2, 1, 1, 8.0)]],
+        ]
+    )
+    assert orders.terms_of_rows(series_of(tables, 6, 4)) == [
+        [(1, 2, -0.5), (4, 5, 2.0)],
+        [(0, 1, -1.5)],
+        [(2, 3, -4.0)],
+        [],
+    ]
+
+
+# --- choices ----------------------------------------------------------------------------------------------
+def test_addresses_are_put_into_memory(monkeypatch):
+    code = SimpleNamespace(address=lambda name: f"address of {name}")
+    asked: list[Any] = []
+    monkeypatch.setattr(build, "names_of_functions", lambda taylor: ("expand", "close"))
+    monkeypatch.setattr(build, "code_of", lambda taylor, names: asked.append(names) or code)
+
+    class Addresses(dict):  # type: ignore[type-arg]
+        rank = 0
+
+    taylor = series_of(None, 7, 6)
+    taylor.code = Addresses()
+    assert build.put_code(taylor) is code and asked == [("expand", "close")]
+    assert taylor.code == {"expand": "address of expand", "close": "address of close"}
+    assert taylor.code.rank == 6 == build.rank_of_rows(taylor)
+
+
+def test_scenes_without_code(monkeypatch, tmp_path):
+    monkeypatch.setattr(build, "CACHE", tmp_path)
+    monkeypatch.setattr(build, "_key", lambda taylor, names: f"key {names}")
+    monkeypatch.setattr(build, "code_at", lambda path, write: (path, write()))
+    monkeypatch.setattr(build, "write_code", lambda taylor, names: f"code of {names}")
+    monkeypatch.setattr(build, "MOST_VECTORS", 32)
+    taylor = series_of(None, 7, 6, lanes=16)
+    monkeypatch.setattr(build, "PLAIN", True)
+    with pytest.raises(NoGeneratedCode, match="without the JIT there is no machine code"):
+        build.code_of(taylor, "ab")
+    monkeypatch.setattr(build, "PLAIN", False)
+    path, text = build.code_of(taylor, "ab")
+    assert path == tmp_path / "scenes" / "key ab.code" and text == "code of ab"  # 16 · 16 / 8 = 32 vectors
+    with pytest.raises(NoGeneratedCode, match="takes 72 products of vectors, more than 32"):
+        build.code_of(series_of(None, 7, 6, lanes=24), "ab")
+    taylor.polynomials.torsions.row = np.array([-1, -1])
+    assert build.code_of(taylor, "ab")[1] == "code of ab"
+    taylor.polynomials.torsions.row = np.array([-1, 0])
+    with pytest.raises(NoGeneratedCode, match="rows of couplings of angles"):
+        build.code_of(taylor, "ab")
+
+
+@pytest.mark.parametrize(
+    ("varies", "power", "nz", "nr", "names"),
+    [
+        (False, True, 3, 2, ["expand", "expand_by_power", "factorise"]),
+        (False, False, 3, 2, ["expand", "factorise"]),
+        (True, True, 3, 2, ["factorise"]),
+        (False, False, 5, 3, ["expand"]),
+    ],
+)
+def test_functions_of_a_scene(monkeypatch, varies, power, nz, nr, names):
+    """Ranks of 2 and 4 and 16 lanes: (4 + 6) 16 / 8 = 20 and (16 + 15) 16 / 8 = 62 vectors, of 20."""
+    monkeypatch.setattr(build, "MOST_VECTORS", 20)
+    monkeypatch.setattr(build, "varies", lambda polynomials: varies)
+    monkeypatch.setattr(power_orders, "serves", lambda taylor: power)
+    found = build.names_of_functions(series_of(None, nz, nr))
+    assert found == (*names, "violation", "close", "close_rate")
+
+
+def test_all_that_the_code_depends_on_is_in_its_key():
+    def taylor(change: int = -1) -> Any:
+        arrays = [np.arange(3.0) + 10 * k + (change == k) for k in range(7)]
+        made = series_of(None, 3, 2)
+        made.polynomials = SimpleNamespace(
+            products=arrays[:1],
+            inertia=arrays[1:2],
+            rows=arrays[2:4],
+            given=SimpleNamespace(driver=arrays[4]),
+        )
+        made.solver = SimpleNamespace(linear=arrays[5], pivot_columns=arrays[6], pivot_rows=np.zeros(2))
+        return made
+
+    key = build._key(taylor(), ("a", "b"))
+    others = [build._key(taylor(k), ("a", "b")) for k in range(7)]
+    more = [build._key(taylor(), ("a",))]
+    two = taylor()
+    two.options.start_freedoms = 2
+    more.append(build._key(two, ("a", "b")))
+    shaped = taylor()
+    shaped.solver.linear = shaped.solver.linear.reshape(1, 3)
+    more.append(build._key(shaped, ("a", "b")))
+    assert len({key, *others, *more}) == 11 and build._key(taylor(), ("a", "b")) == key and len(key) == 32
+
+
+@pytest.mark.parametrize(
+    ("names", "rank", "made"),
+    [
+        (("expand",), 2, ["expand MultiplierOrders"]),
+        (("expand",), 3, ["expand DrivenOrders"]),
+        (("expand_by_power",), 2, ["expand_by_power PowerOrders"]),
+        (("factorise",), 2, ["factorise ResponseCode 2"]),
+        (("expand_by_power", "factorise"), 2, ["expand_by_power PowerOrders", "factorise RowResponseCode 2"]),
+    ],
+)
+def test_parts_of_the_code(monkeypatch, names, rank, made):
+    written: list[str] = []
+
+    class Writes:
+        def __init__(self, module: Any, name: str, *pointers: Any, counts: Any = None) -> None:
+            self.name = name
+            written.append(f"begin {name}")
+
+        def end(self) -> None:
+            written.append(f"end {self.name}")
+
+    def part(kind: str) -> Any:
+        def make(taylor: Any, *given: Any) -> Any:
+            *ranks, write = given
+            text = " ".join([write.name, kind, *map(str, ranks)])
+            return SimpleNamespace(put=lambda: written.append(text))
+
+        return make
+
+    for kind in ("MultiplierOrders", "DrivenOrders", "PowerOrders", "ResponseCode", "RowResponseCode"):
+        monkeypatch.setattr(build, kind, part(kind))
+    monkeypatch.setattr(build, "Instructions", Writes)
+    corrected = lambda taylor, write: SimpleNamespace(  # noqa: E731
+        **{
+            name: lambda name=name: written.append(f"{write.name} {name}")
+            for name in build.corrections.POINTERS
+        }
+    )
+    monkeypatch.setattr(build, "Correction", corrected)
+    text = build.write_code(series_of(None, 3, 2, freedoms=3 - rank), names)
+    expected = [
+        step for name, of in zip(names, made, strict=True) for step in (f"begin {name}", of, f"end {name}")
+    ]
+    expected += [
+        step for n in ("violation", "close", "close_rate") for step in (f"begin {n}", f"{n} {n}", f"end {n}")
+    ]
+    assert written == expected and text.startswith("; ModuleID")
