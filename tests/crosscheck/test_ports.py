@@ -10,6 +10,7 @@ import pytest
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.geared_forms import screw
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.ports import FAMILIES
 from crosscheck.findings.finding import FOLDER
@@ -46,9 +47,9 @@ def test_drivers_are_refused_by_name(name: str) -> None:
     assert engine(name).cannot(SCENES["four_bar_gravity"]()) is None
 
 
-def test_warp_has_the_finest_steps_only_for_loops() -> None:
+def test_warp_has_the_finest_steps_only_for_loops_and_couplings() -> None:
     """In single precision the rounding of a tree's motion grows with the number of steps."""
-    for scene, fewer in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0)):
+    for scene, fewer in ((SCENES["heavy_top"](), 1), (SCENES["bennett"](), 0), (screw()[0], 0)):
         for family in FAMILIES:
             steps = [
                 [s.options["step"] for s in engine(n).settings(scene) if s.family == family] for n in MODULES

@@ -25,7 +25,7 @@ def pulled() -> Scene:
 
 
 def newton_world(setting: Setting) -> of_newton._World:
-    return of_newton._simulation(pulled(), np.array([0.0, COUNT * STEP]), setting).stepper
+    return of_newton.ENGINE.simulation(pulled(), np.array([0.0, COUNT * STEP]), setting).stepper
 
 
 @pytest.mark.parametrize("family", solvers.FAMILIES)
@@ -49,7 +49,7 @@ def test_recorded_steps_of_newton_are_its_steps(family: str) -> None:
 def test_recorded_steps_of_mujoco_warp_are_its_steps(family: str) -> None:
     warp = pytest.importorskip("mujoco_warp")
     scene = DIFFICULTIES[0].make()
-    recorded, plain = (of_warp._simulation(scene, Setting(family, {"step": STEP})).stepper for _ in range(2))
+    recorded, plain = (of_warp.ENGINE.world(scene, Setting(family, {"step": STEP})) for _ in range(2))
     recorded.step(0.0, STEP, COUNT)
     plain.model.opt.timestep.fill_(STEP)
     for _ in range(COUNT):

@@ -28,11 +28,12 @@ class Warp(Port):
     def settings(self, scene: Scene) -> Sequence[Setting]:
         """Return settings with steps chosen by the angle that a body turns in one step.
 
-        Without loops the finest step of a family is left out: there, rounding in single precision exceeds the
-        error of RK4 at longer steps already. Closures become stiffer with finer steps.
+        Without loops and couplings the finest step of a family is left out: there, rounding in single
+        precision exceeds the error of RK4 at longer steps already. Closures and couplings become stiffer with
+        finer steps.
         """
         found = super().settings(scene)
-        if spanning_tree(scene).closures:
+        if scene.coupling or spanning_tree(scene).closures:
             return found
         return [
             s
