@@ -19,11 +19,13 @@ from mbref.equations import couplings, reduction
 from mbref.equations.joints import driver_primitive
 from mbref.error_estimate import ErrorEstimate
 from mbref.input_error import InputError
+from mbref.joint_motion import joint_motion
 from mbref.method import Method, MethodError
 from mbref.scene import (
     Body,
     Coupling,
     Distance,
+    Inline,
     JointForce,
     Revolute,
     Scene,
@@ -321,3 +323,27 @@ def test_the_last_accepted_state_of_a_run():
     clock.time = 0.5
     q, v = singular_position._accepted(run)
     assert q.tolist() == [1.0] and v.tolist() == [2.0] and q is not previous.coordinates
+
+
+def test_a_displacement_is_along_the_axis_that_the_first_body_carries():
+    """The first body turns by 0.3 rad about z, the second one by 1.1 rad about x, 0.7 m along the axis."""
+    line = Inline(name="J", bodies=("a", "b"), anchor=(1.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
+    scene = Scene(name="s", body=(body("a", 0.0, 0.0, 0.0), body("b", 1.0, 0.0, 0.0)), joint=(line,))
+    c, s = np.cos(0.3), np.sin(0.3)
+    at, still = np.array([0.2, 0.1, 0.0]), [1.0, 0.0, 0.0, 0.0]
+    motion: Any = SimpleNamespace(
+        times=np.array([0.0, 0.5]),
+        bodies=("a", "b"),
+        position=np.array([[[0, 0, 0], [1, 0, 0]], [at, at + 1.7 * np.array([c, s, 0.0])]]),
+        orientation=np.array(
+            [[still, still], [[np.cos(0.15), 0, 0, np.sin(0.15)], [np.cos(0.55), np.sin(0.55), 0, 0]]]
+        ),
+        velocity=np.array([[[0.0] * 3] * 2, [[1, 2, 0], [3, -1, 0]]]),
+        angular_velocity=np.array([[[0.0] * 3] * 2, [[0, 0, 0.5], [0.4, 0, 0]]]),
+        reactions=None,
+        open_reactions=None,
+    )
+    found = joint_motion(scene, motion, "J")
+    assert found.displacement == pytest.approx([0.0, 0.7])
+    assert found.displacement_rate == pytest.approx([0.0, 2 * c - 3 * s])
+    assert found.angle is None and found.rate is None
