@@ -66,9 +66,9 @@ def test_starts_whose_motion_rounding_hides(
 @pytest.mark.parametrize(
     ("free", "started", "speed", "part", "hidden"),
     [
-        (1, 1, 0.0, 1.01, False),
+        (1, 1, 0.0, 1.0, False),
         (1, 1, 0.0, 0.99, True),
-        (1, 1, 2.0, 1.01, False),
+        (1, 1, 2.0, 1.0, False),
         (1, 1, 2.0, 0.99, True),
         (0, 0, 2.0, 0.5, False),
         (0, 1, 2.0, 2.0, True),
@@ -88,7 +88,7 @@ def test_a_rank_that_rounding_hides(monkeypatch, free, started, speed, part, hid
 
 @pytest.mark.parametrize(
     ("free", "speed", "part", "near"),
-    [(1, 0.0, 0.99, True), (1, 0.0, 1.01, False), (0, 0.0, 0.99, False), (1, 1.0, 0.99, False)],
+    [(1, 0.0, 0.99, True), (1, 0.0, 1.0, False), (0, 0.0, 0.99, False), (1, 1.0, 0.99, False)],
 )
 def test_a_motion_from_rest_near_a_singular_position(monkeypatch, free, speed, part, near):
     Patched(monkeypatch, start, freedoms=free, least_pivot=part * start.REST_PIVOT)
@@ -100,10 +100,10 @@ def test_a_motion_from_rest_near_a_singular_position(monkeypatch, free, speed, p
     ("rests", "pivot", "correction", "turned", "after"),
     [
         (True, 0.81, 1.01, True, True),
-        (True, 0.81, 0.99, False, True),
+        (True, 0.81, 1.0, False, True),
         (True, 0.81, math.nan, True, True),
         (False, 0.81, 1.01, False, False),
-        (True, 1.01, 9.0, False, False),
+        (True, 1.0, 9.0, False, False),
     ],
 )
 def test_rounding_that_turns_a_motion_from_rest(monkeypatch, rests, pivot, correction, turned, after):
@@ -121,16 +121,16 @@ def test_rounding_that_turns_a_motion_from_rest(monkeypatch, rests, pivot, corre
     [
         (0.5, 0.0, 1, False),
         (-0.51, 0.0, 1, True),
-        (0.0, -0.99, 1, False),
+        (0.0, -1.0, 1, False),
         (0.0, -1.01, 1, True),
-        (0.0, 0.99, 0, False),
+        (0.0, 1.0, 0, False),
         (0.0, 1.01, 0, True),
     ],
 )
 def test_a_series_that_misses_its_start(monkeypatch, moved, changed, free, misses):
     """Distances up to 0.5, changes relative to the largest velocity, 4, and the allowed error."""
     allowed = start.START_ERROR if free else start.START_ERROR_DRIVEN
-    q, v = np.array([1.0, -2.0]), np.array([0.5, -4.0])
+    q, v = np.array([1.0, -2.0]), np.array([0.0, -4.0])
     state = SimpleNamespace(coordinates=q.copy(), velocities=v.copy())
     before = SimpleNamespace(coordinates=np.zeros(2), velocities=np.zeros(2))
     memory = SimpleNamespace(
@@ -330,7 +330,7 @@ def test_attempts_that_are_longer_than_a_regular_step(monkeypatch):
     [
         (1, 0.4, 0.5, 20, 1.0, 11),
         (0, 0.9, 0.5, 20, 1.0, 11),
-        (0, 1.1, 0.5, 20, 0.3, 20),
+        (0, 1.0, 0.5, 20, 0.3, 20),
         (1, 0.4, 0.3, 20, 0.7, 20),
         (1, 0.4, 0.5, 11, 0.3, 20),
     ],
@@ -550,7 +550,7 @@ def perturbed(monkeypatch: pytest.MonkeyPatch, places: float, rates: float, **ch
         loop=SimpleNamespace(clock=SimpleNamespace(time=2.5)),
         equations=SimpleNamespace(system=SimpleNamespace(counts=counts)),
     )
-    terms = np.array([[1.0, 2.0, 0.0], [-3.0, 1.0, 0.0]])
+    terms = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 0.0]])
     memory = SimpleNamespace(
         run=run,
         crossing_end=np.zeros((2, 3)),
@@ -576,13 +576,13 @@ def perturbed(monkeypatch: pytest.MonkeyPatch, places: float, rates: float, **ch
 def test_perturbed_runs_that_agree(monkeypatch):
     near = min(uniqueness.MAX_GAIN * 1e-5, uniqueness.MAX_APART)
     of_rates = uniqueness.RATE_FACTOR * near * 3.0
-    assert perturbed(monkeypatch, 0.99 * near, 0.99 * of_rates)
+    assert perturbed(monkeypatch, near, of_rates)
     assert not perturbed(monkeypatch, 1.01 * near, 0.0) and not perturbed(monkeypatch, 0.0, 1.01 * of_rates)
     assert not perturbed(monkeypatch, 0.0, 0.0, reaches=False)
     strict = uniqueness.STRICTER
     assert perturbed(monkeypatch, 0.99 * strict * near, 0.99 * strict * of_rates, more=1)
     assert not perturbed(monkeypatch, 1.01 * strict * near, 0.0, more=1)
-    assert perturbed(monkeypatch, 0.99 * uniqueness.MAX_APART, 0.0, rtol=1.0)
+    assert perturbed(monkeypatch, uniqueness.MAX_APART, 0.0, rtol=1.0)
     assert not perturbed(monkeypatch, 1.01 * uniqueness.MAX_APART, 0.0, rtol=1.0)
     least = uniqueness.MAX_GAIN * uniqueness.MIN_CHANGE
     assert perturbed(monkeypatch, 0.99 * least, 0.0, rtol=1e-15)
@@ -744,7 +744,7 @@ def test_pivots_that_fall_towards_a_singular_position(
 
 @pytest.mark.parametrize(
     ("pivot", "leaving", "start_pivot", "ends"),
-    [(0.99, 0, 0.5, True), (1.01, 0, 0.5, False), (0.99, 1, 0.5, False), (0.99, 1, 0.99, True)],
+    [(0.99, 0, 0.5, True), (1.0, 0, 0.5, False), (0.99, 1, 0.5, False), (0.99, 1, 0.99, True)],
 )
 def test_a_step_that_ends_near_a_singular_position(pivot, leaving, start_pivot, ends):
     scale = detection.PIVOT_AHEAD * 2.0
@@ -800,8 +800,11 @@ def contains(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> bool:
 
 
 def test_steps_that_contain_a_singular_position(monkeypatch):
-    short = {"moved": 0.49 / detection.PIVOT_SLOPE}
-    longer = {"moved": 0.51 / detection.PIVOT_SLOPE}
+    monkeypatch.setattr(detection, "PIVOT_SLOPE", 0.25)
+    assert contains(monkeypatch, moved=2.0, keeps=True, sign=True), "0.3 + 0.2 is not more than 0.25 · 2"
+    assert contains(monkeypatch, moved=2.0, replaced=0.2, sign=True)
+    short = {"moved": 1.96}
+    longer = {"moved": 2.04}
     assert contains(monkeypatch) and not contains(monkeypatch, dips=False)
     assert not contains(monkeypatch, **short, keeps=True, sign=True)
     assert contains(monkeypatch, **longer, keeps=True, sign=True)

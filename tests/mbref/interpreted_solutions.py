@@ -366,6 +366,7 @@ def rounding(monkeypatch: pytest.MonkeyPatch) -> None:
         (0.49 * acceptance.MIN_PIVOT_RATIO_ACROSS, False, 0, {}, STEP_TOO_SMALL),
         (0.49 * acceptance.MIN_PIVOT_RATIO_ACROSS, False, 1, {}, OK),
         (0.5 * acceptance.MIN_PIVOT_RATIO_ACROSS, False, 0, {}, OK),
+        (0.4, False, 1, {"start_pivot": acceptance.MIN_PIVOT_ACROSS}, OK),
         (0.4, False, 0, {"start_pivot": 0.9 * acceptance.MIN_PIVOT_ACROSS}, UNDECIDED),
         (0.4, False, 0, {"start_pivot": 0.9 * acceptance.MIN_PIVOT_ACROSS, "entry_pivot": 0.0}, OK),
         (0.4, False, 0, {"start_pivot": 1.5 * acceptance.MIN_PIVOT_ACROSS, "largest_pivot": 2.0}, UNDECIDED),
@@ -381,6 +382,8 @@ def test_steps_across_a_singular_position(pivot, turned, last, changes, status):
     [
         (0.6, False, 0, {}, OK),
         (0.49 * acceptance.MIN_PIVOT_RATIO, False, 0, {}, STEP_TOO_SMALL),
+        (0.5 * acceptance.MIN_PIVOT_RATIO, False, 0, {}, OK),
+        (0.6, False, 0, {"violation": 1e-15}, OK),
         (0.6, False, 0, {"violation": 2e-15}, STEP_TOO_SMALL),
         (0.6, False, 0, {"violation": math.nan}, STEP_TOO_SMALL),
         (0.6, False, 0, {"correction": 0.61 * acceptance.MAX_SHIFT}, UNDECIDED),
@@ -400,7 +403,7 @@ def test_pivots_that_are_resolved(monkeypatch):
         monkeypatch.setattr(acceptance, "freedoms", lambda memory, free=free: free)
         for entry in (1e9, 0.5 * least / acceptance.ENTRY_RATIO):
             resolved = min(least, acceptance.ENTRY_RATIO * entry)
-            for part, status in ((0.99, UNDECIDED), (1.01, OK)):
+            for part, status in ((0.99, UNDECIDED), (1.0, OK)):
                 memory = judged(start_pivot=1.0, entry_pivot=entry, largest_pivot=0.0)
                 assert acceptance.judge_approach(0.25, part * resolved, False, 1, memory) == status
                 asked: list[Any] = []
@@ -427,7 +430,7 @@ def test_pivots_that_are_resolved(monkeypatch):
         ({"off": math.inf}, NOT_FINITE),
         ({"off": math.nan}, NOT_FINITE),
         ({"off": 1.0}, STEP_TOO_SMALL),
-        ({"part": 0.5, "off": 7.9e-9}, OK),
+        ({"part": 0.5, "off": 2 * (1e-8 * 1.6 * 0.25)}, OK),
         ({"part": 0.5, "off": 8.1e-9}, STEP_TOO_SMALL),
         ({"part": 0.0, "off": 8.1e-9}, OK),
     ],
@@ -460,7 +463,7 @@ def test_the_error_that_a_step_may_have(monkeypatch):
     )
     for size in (0.0, 3.0):
         most = stepping.LOST_MOTION * 36 * 1e-8 + stepping.MOTION_ROUNDING * size
-        for part, status in ((0.999, OK), (1.001, STEP_TOO_SMALL)):
+        for part, status in ((1.0, OK), (1.001, STEP_TOO_SMALL)):
             monkeypatch.setattr(stepping, "error_of_motion", lambda *_, off=part * most: (off, size))  # noqa: B023
             assert stepping.judge_step(0.25, 0, memory) == status
     lost = stepping.LOST_ROWS * 1e-9 + stepping.ROW_ROUNDING
