@@ -86,14 +86,17 @@ def _integrated(groups: Sequence[Judged]) -> str:
 def _by_crosscheck(groups: Sequence[Judged], name: str, families: Sequence[str]) -> str:
     quoted = listed(f"“{family}”" for family in families)
     text = f" {title(name)}'s fastest runs are integrated by crosscheck ({quoted})"
-    if all(is_integrated_here(r) for group in groups for r in group.comparable if r["engine"] == name):
+    runs = [r for group in groups for r in group.comparable if r["engine"] == name]
+    others = dict.fromkeys(f"“{r['family']}”" for r in runs if not is_integrated_here(r))
+    if not others:
         return f"{text}, as all of its runs here are."
+    runs_by_own = f"the runs by its own integrators ({listed(others)})"
     own = [group.fastest(LEVEL, without=is_integrated_here).get(name) for group in groups]
     reached = [found for found in own if found is not None]
     if not reached:
-        return f"{text}; its own integrators do not reach {SAID}."
+        return f"{text}; {runs_by_own} do not reach {SAID}."
     if len(groups) > 1:
-        return f"{text}; its own integrators reach {SAID} on {len(reached)} of {len(groups)} scenes."
+        return f"{text}; {runs_by_own} reach {SAID} on {len(reached)} of {len(groups)} scenes."
     [(cost, record)] = reached
     return f"{text}; its own integrator needs {seconds(cost)} (“{record['family']}”)."
 

@@ -216,10 +216,15 @@ def by_crosscheck(text: str, records: Sequence[Record], name: str, family: str, 
     if not own:
         assert end.startswith(", as all of its runs here are."), text
     elif there is None:
-        assert end.startswith("; its own integrators do not reach 1e-6."), text
+        assert end.startswith(f"; the runs by its own integrators ({quoted(own)}) do not reach 1e-6."), text
     else:
         said = re.match(r"; its own integrator needs (\S+ \S+) \(“(.*?)”\)\.", end)
         assert said and said[2] == there[1] and in_seconds(said[1]) == rounded(there[0]), (text, there)
+
+
+def quoted(names: Sequence[str]) -> str:
+    """Return ``“a”, “b” and “c”``."""
+    return " and ".join(filter(None, [", ".join(f"“{n}”" for n in names[:-1]), f"“{names[-1]}”"]))
 
 
 def in_seconds(text: str) -> float:
