@@ -124,7 +124,8 @@ def _measured(
 
 
 def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> list[Family]:
-    """Return cases of further families for engines without a right run on a scene.
+    """Return cases of further families for engines without a right run on a scene, or without a completed run
+    if the motion is unknown.
 
     After these runs it is known whether the engine completes no run or is inaccurate.
     """
@@ -134,7 +135,8 @@ def _other_families(groups: Sequence[Family], records: Mapping[str, Record]) -> 
         by_pair.setdefault((group[0].scene.name, group[0].engine), []).append(group)
     for run in by_pair.values():
         case = run[0][0]
-        if Grade.RIGHT in {grade(records[key(c)]) for group in run for c in group if key(c) in records}:
+        grades = {grade(records[key(c)]) for group in run for c in group if key(c) in records}
+        if grades & {Grade.RIGHT, Grade.UNJUDGED}:
             continue
         cases, _ = default_cases(case.scene, [case.engine], None, case.times, case.time_limit)
         there = {group[0].setting.family for group in run}

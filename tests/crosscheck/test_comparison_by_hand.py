@@ -146,6 +146,27 @@ def test_families_that_have_run_are_no_other_families(machine, monkeypatch):
     assert comparison._other_families([group], {key(group[0]): record(group[0])}) == []
 
 
+@pytest.mark.parametrize(
+    ("grades", "has_others"),
+    [
+        ((Grade.UNJUDGED, Grade.FAILED), False),
+        ((Grade.FAILED, Grade.FAILED), True),
+        ((Grade.WRONG, Grade.FAILED), True),
+        ((Grade.INACCURATE, Grade.WRONG), True),
+        ((Grade.FAILED, Grade.RIGHT), False),
+    ],
+)
+def test_no_further_family_runs_if_one_is_right_or_completes_an_unknown_motion(
+    machine, monkeypatch, grades, has_others
+):
+    group = cases(steps=(0.2, 0.1))
+    of = dict(zip((0.2, 0.1), grades, strict=True))
+    monkeypatch.setattr(comparison, "default_cases", lambda *given: (cases(family="b", steps=(0.3,)), []))
+    monkeypatch.setattr(comparison, "grade", lambda r: of[r["step"]])
+    done = {key(case): record(case) for case in group}
+    assert bool(comparison._other_families([group], done)) == has_others
+
+
 @pytest.mark.parametrize(("is_quick", "long"), [(True, sweep.QUICK_LONG), (False, sweep.LONG)])
 def test_runs_that_are_timed_again(machine, is_quick, long):
     machine.measured(cases(), is_quick, repeats=4)
