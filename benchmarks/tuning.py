@@ -99,11 +99,12 @@ def cheapest(family: Sequence[Case], level: float, limit: float, most: float) ->
     return None, count
 
 
-def compared(scene: Scene, name: str, level: float, with_compiled: bool) -> list[Row]:
-    """A row for each family of an engine, in the order of its grid."""
+def compared(scene: Scene, name: str, level: float, compiled: bool) -> list[Row]:
+    """A row for each family of an engine that is compiled first, or for each other family, in the order of
+    its grid."""
     times = [np.linspace(0.0, scene.duration, SAMPLES)]
     cases = request.plan([scene], [name], Choice(is_quick=False), times, LIMIT, lambda _: None)
-    cases = [case for case in cases if with_compiled or not case.setting.family.endswith(COMPILED)]
+    cases = [case for case in cases if case.setting.family.endswith(COMPILED) == compiled]
     found = tuned(cases, level, lambda some: [run_here(c) for c in some], engine(name).integrated_here)
     reached = {record["family"]: record for record in found.reached}
     limit = min((record["cost"]["seconds"] for record in found.reached), default=LIMIT)
@@ -189,7 +190,9 @@ def main() -> None:
     parser.add_argument("--engine", action="append", help="default: the engines that are installed")
     parser.add_argument("--mechanism", action="append", choices=MECHANISMS, help="default: all ten")
     parser.add_argument("--error", action="append", type=float, help="default: 1e-3 and 1e-6")
-    parser.add_argument("--compiled", action="store_true", help="families that are compiled first, too")
+    parser.add_argument(
+        "--compiled", action="store_true", help="families that are compiled first, in their own column"
+    )
     parser.add_argument("--into", type=Path, default=Path("build/tuning.jsonl"), metavar="FILE")
     parser.add_argument("--page", type=Path, metavar="FILE", help="print the tables, run nothing")
     given = parser.parse_args()
@@ -198,13 +201,14 @@ def main() -> None:
         return
     given.into.parent.mkdir(parents=True, exist_ok=True)
     done = {(r["mechanism"], r["engine"], r["error"]) for r in _records(given.into)}
+    suffix = COMPILED if given.compiled else ""
     asked = itertools.product(given.error or LEVELS, given.mechanism or MECHANISMS, given.engine or ENGINES)
     for level, mechanism, name in asked:
         scene = _scene(mechanism, MECHANISMS[mechanism])
-        if (mechanism, name, level) in done or not installed(name) or engine(name).cannot(scene):
+        if (mechanism, name + suffix, level) in done or not installed(name) or engine(name).cannot(scene):
             continue
         for record in as_records(mechanism, name, level, compared(scene, name, level, given.compiled)):
-            line = json.dumps(record, ensure_ascii=False)
+            line = json.dumps({**record, "engine": name + suffix}, ensure_ascii=False)
             print(line, flush=True)
             with given.into.open("a") as file:
                 print(line, file=file)

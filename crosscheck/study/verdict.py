@@ -74,11 +74,16 @@ class Judged:
 
     @property
     def is_judged(self) -> bool:
-        """True if a run of a judged engine has an error, or if no engine completes a known motion."""
+        """True if the motion is known, and a run of a judged engine has an error or no engine completes the
+        motion.
+
+        Of an unknown motion the start alone is known, and a run that ends there has an error of 0.
+        """
         runs = self.comparable
-        if any(record["metrics"].get("error") is not None for record in runs):
-            return True
-        return bool(self.truth.get("kind") and runs) and not any(map(is_completed, runs))
+        if not (self.truth.get("kind") and runs):
+            return False
+        has_error = any(record["metrics"].get("error") is not None for record in runs)
+        return has_error or not any(map(is_completed, runs))
 
     def grade(self, record: Record) -> Grade:
         """Return the grade of a record; UNJUDGED if its engine simulates another mechanism."""

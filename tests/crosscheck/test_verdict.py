@@ -116,6 +116,21 @@ def test_sentences_of_one_scene():
     assert "known to 3e-14: two formulations that share no code agree; it took 2.4 s" in truth([group()])
 
 
+def test_an_unknown_motion_is_not_judged_by_runs_that_end_at_its_start():
+    """Every run agrees with the scene at t = 0. This error of 0 had led to "unjudged at best: off by –"."""
+    ended = record("exudyn", "defaults", 0.0, outcome="SINGULAR_MATRIX", t_end=0.0)
+    completed = [{**record(n, "tuned", None), "times": [0.0, 1.0]} for n in ("mbref", "mujoco")]
+    unknown = {"kind": "", "bound": None, "until": 0.0, "reason": "it starts in a singular position"}
+    found = group([ended], **unknown)
+    assert not found.is_judged and not group([ended, *completed], **unknown).is_judged
+    assert group([ended]).is_judged, "the motion is known, and no engine completes it"
+    assert headline([found]).startswith("There is no reference for this motion"), headline([found])
+    assert right([found]) == (
+        f"{REDUNDANT.name}: no two engines completed the motion, so nothing can be compared."
+    )
+    assert fast([found]) == "Without a truth no error is known, so speeds are not compared."
+
+
 def test_the_time_of_an_engines_own_integrator_is_given_beside_crosschecks():
     both = [record("mujoco", "newton, compiled", 1e-9, 0.002), record("mujoco", "tuned", 1e-7, 0.05)]
     others = [record("mbref", "own", 1e-9, 0.004)]
