@@ -8,10 +8,11 @@ the unit tests of the file.  Mutants that change nothing are listed with the rea
 in ``tests/mutants/equivalent.py``.  No mutant is drawn of an adapter whose engine is not installed.
 
 First every test runs once, and its lines are recorded in ``build/``; later runs record only test files that
-have changed. Against a mutant run the tests that run its line, those first that are quick and name its
-function or module: of a test file for 5 s of CPU time at most, until a test fails or 20 s are over; other
-work on the machine does not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out
-that fails or takes longer than a file may without the mutant, too, or that fails only after other tests.
+have changed. Remove ``build/lines*.jsonl`` after you add a source, since no test is known to run its lines.
+Against a mutant run the test files that run its line, those first that are quick and name its function or
+module: each for 5 s of CPU time at most, until a test fails or 20 s are over; other work on the machine does
+not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out that fails or takes longer
+than a file may without the mutant, too, or that fails only after other tests.
 Results stay in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted
 run goes on where it ended. Tests of mbref and of kernels run as plain Python, so that no kernel is compiled
 for a mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
