@@ -301,8 +301,21 @@ def test_reasons_name_lines_that_are_there():
 
 def test_a_crash_is_a_kill_only_where_the_mutant_causes_it(copy):
     mutant = planted("((a) - (b))")
-    assert copy.result(mutant, {"test_crash.py": None}) == (runner.KILLED, "")
-    path = copy.place / "test_crash.py"
-    path.write_text("import os\n\n\ndef test_crash():\n    os._exit(1)\n")
-    with pytest.raises(RuntimeError, match="end early without a mutant, too: test_crash"):
-        copy.result(mutant, {path.name: None})
+    assert copy.result(mutant, {"test_crash.py": None}) == (runner.KILLED, "test_crash.py")
+    path = copy.place / "test_always.py"
+    path.write_text("import os\n\n\ndef test_always():\n    os._exit(1)\n")
+    assert copy.result(mutant, {path.name: None, "test_weak.py": None}, False) == (runner.SURVIVED, "")
+
+
+def test_a_test_that_fails_only_after_another_kills_nothing(copy):
+    """The first test of the file fails alone, so that it needs no second run."""
+    mutant = planted("((a) - (b))")
+    texts = {
+        "test_first.py": "from mbref.sums import total\n\n\ndef test_first():\n    assert total(1, 1) == 2\n",
+        "test_after.py": "import sys\n\nfrom mbref.sums import total\n\n\ndef test_before():\n"
+        "    sys.seen = total(1, 1)\n\n\ndef test_after():\n    assert getattr(sys, 'seen', 2) == 2\n",
+    }
+    for name, text in texts.items():
+        (copy.place / name).write_text(text)
+    assert copy.result(mutant, {"test_after.py": None}, False) == (runner.SURVIVED, "")
+    assert copy.result(mutant, {"test_first.py": None}, False) == (runner.KILLED, "test_first.py::test_first")

@@ -31,7 +31,7 @@ BUDGET = 20.0  # CPU s of all files of a mutant, after which no test begins
 # parts of the budget after which no test of a file begins, and after which a test is ended
 OF_FILE, LIMIT = 1 / 4, 3 / 2
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
-OF_TEST, OF_RECORDED = 1.5, 12.0  # CPU s of a test and of the tests of a file that are recorded
+OF_TEST, OF_RECORDED = 3.0, 20.0  # CPU s of a test and of the tests of a file that are recorded
 COMPILING = (  # plain Python does not run them
     "mbref/kernels/compilation.py",
     "mbref/kernels/disk_cache.py",
@@ -132,7 +132,7 @@ class Tree:
             if not test and self._ask(plain, tests)["status"] not in (0, 5):
                 raise RuntimeError(f"the tests end early without a mutant, too: {' '.join(tests)}")
             if not test or self._is_sound(test, plain):
-                if not test or self._fails_alone(mutant, source, test, plain):
+                if not test or answer["alone"] or self._fails_alone(mutant, source, test, plain):
                     return KILLED, test
                 self._sound[plain][test] = False  # it fails after other tests alone
             tests = {file: wanted for file, wanted in tests.items() if file != test}

@@ -7,8 +7,8 @@ A request has ``tests`` (by test file, in order, the ids of the tests that run, 
 of the file), ``out`` (ids of tests that are left out), ``of_file`` and ``budget`` (CPU s of a file and of all
 files, after which no test begins; a test that takes longer than a file may is ended), ``limit`` (CPU s of the
 fork) and ``waiting`` (s of wall time).  The answer has ``status`` (pytest's exit status; none: the time was
-up), ``failed`` (the id of the test that failed first, or the file that could not be collected) and ``ended``
-(the ids of tests that took too long).
+up), ``failed`` (the id of the test that failed first, or the file that could not be collected), ``alone``
+(whether no test ran before it) and ``ended`` (the ids of tests that took too long).
 
 A request with ``packages``, names of folders, records one test file: the answer has ``starting`` (CPU s until
 its first test), ``seconds`` (CPU s of each test that passes) and ``reached``: by source file, the lines that
@@ -55,7 +55,7 @@ class Session:
 
     def __init__(self, of_file: float, wanted: Sequence[str] | None, out: Collection[str]) -> None:
         self._of_file, self._wanted, self._out, self._end = of_file, wanted, out, 0.0
-        self.failed = ""
+        self.failed, self.begun = "", 0
         self.ended: list[str] = []
 
     def pytest_collection_finish(self) -> None:
@@ -69,7 +69,8 @@ class Session:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_setup(self, item: pytest.Item) -> Iterator[None]:
-        """Limit the time of the fixtures."""
+        """Limit the time of the fixtures, and count the test."""
+        self.begun += 1
         with self._limited(item):
             return (yield)
 
@@ -175,9 +176,11 @@ def work(request: dict[str, Any], answer: Path) -> None:
 def run(request: dict[str, Any], answer: Path) -> None:
     """Run tests until one fails or the time is up."""
     ended: list[str] = []
+    begun = 0
 
     def report(status: int, failed: str) -> None:
-        answer.write_text(json.dumps({"status": status, "failed": failed, "ended": ended}))
+        found = {"status": status, "failed": failed, "ended": ended, "alone": begun <= 1}
+        answer.write_text(json.dumps(found))
 
     report(0, "")
     for file, wanted in request["tests"].items():
@@ -185,6 +188,7 @@ def run(request: dict[str, Any], answer: Path) -> None:
         session = Session(request["of_file"], wanted, request["out"])
         status = int(pytest.main([*OPTIONS, "-x", file], plugins=[session]))
         ended += session.ended
+        begun += session.begun
         has_passed = status in (0, 5)
         report(status, session.failed or ("" if has_passed else file))
         if not has_passed or _cpu() > request["budget"]:
@@ -220,7 +224,8 @@ def _by_lines(tests: Mapping[int, Sequence[str]], passed: Collection[str]) -> di
     for line, names in tests.items():
         for name in names:
             bits[name] = bits.get(name, 0) | 1 << line
-    outside, alike = bits.pop("", 0), {}
+    outside = bits.pop("", 0)
+    alike: dict[int, list[str]] = {}
     for name in sorted(bits.keys() & set(passed)):
         alike.setdefault(bits[name], []).append(name)
     return {"outside": f"{outside:x}", "tests": [[f"{lines:x}", names] for lines, names in alike.items()]}
@@ -242,7 +247,7 @@ def answer_of(request: dict[str, Any]) -> dict[str, Any]:
         is_late = os.WIFSIGNALED(status) and os.WTERMSIG(status) in (signal.SIGXCPU, signal.SIGKILL)
         if path.exists() and not is_late:
             return json.loads(path.read_text())
-    return {"status": None if is_late else CRASHED, "failed": "", "ended": []}
+    return {"status": None if is_late else CRASHED, "failed": "", "ended": [], "alone": False}
 
 
 def _wait(child: int, end: float) -> int:
