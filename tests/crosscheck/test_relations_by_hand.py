@@ -191,6 +191,13 @@ def test_functions_of_time_in_other_units(large):
     assert (sliding.sine.amplitude, sliding.sine.frequency) == pytest.approx((0.6, 2.5))
 
 
+def test_bodies_joints_and_loads_in_reverse_order():
+    scene, changed = loaded(), RELATIONS["reordered"].change(loaded(), None)
+    assert [body.name for body in changed.body] == ["puck", "wheel", "sled", "arm"]
+    assert [joint.name for joint in changed.joint] == ["P", "D", "C", "A"]
+    assert changed.load == scene.load[::-1] != scene.load
+
+
 def test_positions_and_directions_shaken_by_rounding():
     """Changes of some 1e-16, other for each seed; masses, loads and velocities stay."""
     scene = every_joint()
