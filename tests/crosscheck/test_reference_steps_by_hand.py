@@ -12,7 +12,7 @@ import pytest
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED
 from crosscheck.judge.reference import bound, crossing, stiff_panels, taylor, tree
 from crosscheck.judge.reference.expansion import Series, value
-from crosscheck.judge.reference.held_rows import cos_sin_series, function_series, independent
+from crosscheck.judge.reference.held_rows import Drives, cos_sin_series, function_series, independent
 from crosscheck.judge.reference.panels import Panel, Panels, _cosines, _summed
 from crosscheck.judge.reference.saddle_point import SaddlePoint
 from crosscheck.judge.reference.taylor import Ended, Stepper
@@ -80,6 +80,22 @@ def test_series_of_cosine_and_sine():
     orders = np.exp(0.3j) * np.array([1.0, b, c + b**2 / 2, d + b * c + b**3 / 6])
     cosine, sine = cos_sin_series(np.array([0.3, 0.5, -0.2, 0.7]))
     assert cosine == pytest.approx(orders.real) and sine == pytest.approx(orders.imag)
+
+
+@pytest.mark.parametrize("shape", [(), (2,), (3, 2)])
+def test_rows_that_a_driven_angle_turns(shape):
+    """Row 1 is cos ψ · product 1 + sin ψ · product 2, by series; of row 0 its product stays."""
+    rng = np.random.default_rng(2)
+    cosine, sine = np.array([2.0, 3.0, 5.0]), np.array([7.0, -1.0, 4.0])
+    drives = Drives(np.zeros((3, 2)), [(1, 2, cosine, sine)])
+    products, multipliers = rng.normal(size=(3, 3, *shape)), rng.normal(size=(3, 2))
+    for k in range(3):
+        first = sum(cosine[i] * products[k - i, 1] for i in range(k + 1))
+        second = sum(sine[i] * products[k - i, 2] for i in range(k + 1))
+        found = drives.combined(products, k)
+        assert found[0] == pytest.approx(products[k, 0]) and found[1] == pytest.approx(first + second)
+        turned = [sum(s[i] * multipliers[k - i, 1] for i in range(k + 1)) for s in (cosine, sine)]
+        assert drives.spread(multipliers, k) == pytest.approx([multipliers[k, 0], *turned])
 
 
 def test_independent_rows_by_their_weights():
