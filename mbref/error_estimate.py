@@ -125,7 +125,7 @@ class ErrorEstimate:
         begin = self.exceeds_rtol_from
         above = "" if begin is None else f", above rtol {self.rtol:g} from t = {begin:.3g} s on"
         ends = f"; {self.reason}" if self.reason else ""
-        return f"estimated error: at most {self.largest:.1e}{above}{ends}"
+        return f"largest estimated error: {self.largest:.1e}{above}{ends}"
 
     def to_record(self) -> dict[str, Any]:
         """Return numbers, lists and text, for JSON.

@@ -76,7 +76,7 @@ def test_lines_of_a_run_by_series(capsys):
     text = printed(capsys, "run", "point_pendulum", *SHORT)
     lines = text.splitlines()
     assert lines[0] == "point_pendulum by taylor: COMPLETED at t = 0.02 s"
-    assert lines[1].startswith("estimated error: at most ") and lines[2].startswith("1 steps, 0 rejected, ")
+    assert lines[1].startswith("largest estimated error: ") and lines[2].startswith("1 steps, 0 rejected, ")
     assert "largest reaction 0.057742 N in joint pivot at t = 0.02 s" in lines
     assert "state at t = 0.02 s" in text and "-0.1962" in text
 

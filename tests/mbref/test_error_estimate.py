@@ -98,10 +98,10 @@ def dead() -> Scene:
 def test_numbers_and_sentences_of_an_estimate():
     found = estimate(0.0, 5e-10, 3e-9, 2e-9)
     assert found.largest == 3e-9 and found.exceeds_rtol_from == 1.0 and found.exceeds_from(1e-8) is None
-    assert found.sentence == "estimated error: at most 3.0e-09, above rtol 1e-09 from t = 1 s on"
+    assert found.sentence == "largest estimated error: 3.0e-09, above rtol 1e-09 from t = 1 s on"
     assert found.warning == ""
     quiet = estimate(0.0, 1e-10, 2e-10, np.nan, reason="the second run ended at t = 1.2 s")
-    assert quiet.sentence == "estimated error: at most 2.0e-10; the second run ended at t = 1.2 s"
+    assert quiet.sentence == "largest estimated error: 2.0e-10; the second run ended at t = 1.2 s"
 
 
 @pytest.mark.parametrize(
@@ -131,7 +131,7 @@ def test_a_motion_that_a_smaller_tolerance_cures_is_not_called_sensitive():
 
 def test_a_method_in_fixed_steps_has_an_error_and_no_warning():
     found = estimate(0.0, 0.1, 0.2, 0.3, rtol=None)
-    assert not found.warning and found.sentence == "estimated error: at most 3.0e-01"
+    assert not found.warning and found.sentence == "largest estimated error: 3.0e-01"
 
 
 def test_the_estimate_is_the_true_error_of_an_oscillation(oscillator):
@@ -247,7 +247,7 @@ def test_command_prints_the_estimate_unless_told_not_to(capsys, pendulums, tmp_p
     command = ["run", str(path), "--rtol", "1e-4"]
     assert main(command) == 0
     said = " ".join(capsys.readouterr().out.split())
-    assert "sensitive motion: error about" in said and "estimated error: at most" in said
+    assert "sensitive motion: error about" in said and "largest estimated error: 1." in said
     assert main([*command, "--json"]) == 0
     record = json.loads(capsys.readouterr().out)["records"][0]
     assert "sensitive motion" in record["message"] and record["error_estimate"]["largest"] > 0.1
