@@ -34,6 +34,7 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
 )
+from mbref.scenes import SCENES as SHIPPED
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.driven_arm import driven_arm
 from tests.crosscheck.tree_scenes import body, driven, every_joint, ring
@@ -44,6 +45,7 @@ WAYS = {  # engine: a setting, and the largest relative difference of its accele
     "sundials": (Setting("ggl", {"rtol": 1e-8}), 1e-8),
     "dart": (Setting("terms", {"rtol": 1e-9, "min_step": 1e-4}), 1e-8),
     "exudyn": (Setting("trapezoidal", {"step": 1e-5}), 1e-4),
+    "ondsel": (Setting("kinematics", {"step": 1e-5}), 1e-4),
     "pinocchio": (Setting("tuned", {"rtol": 1e-9, "min_step": 1e-4}), 1e-8),
 }
 TIMES = np.array([0.0, 1e-4])  # s
@@ -63,6 +65,13 @@ def _exchanged(joint: Joint) -> Joint:
         if hasattr(joint, name):
             changes[name] = getattr(joint, name)[::-1]
     return joint.model_copy(update=changes)
+
+
+def reversed_arm() -> Scene:
+    """The driven arm whose joints go from the second body to the first."""
+    arm = driven_arm()
+    joints = tuple(joint.model_copy(update={"bodies": joint.bodies[::-1]}) for joint in arm.joint)
+    return arm.with_(name="reversed arm", joint=joints)
 
 
 def loaded() -> Scene:
@@ -136,6 +145,8 @@ SCENES = {
         swapped(every_joint()),
         driven(),
         driven_arm(),
+        reversed_arm(),
+        SHIPPED["spatial_slider_crank_driven"](),
         loaded(),
         geared(),
         *(ring(kind) for kind in ("revolute", "cylindrical", "universal", "spherical")),
