@@ -1,6 +1,8 @@
 """The section on conformance: what `crosscheck verify --json` prints / counts, violations, causes."""
 
 import json
+from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -13,6 +15,7 @@ from reports import stored
 from reports.blocks import Table
 from reports.sections import conformance
 
+ROOT = Path(__file__).parents[2]
 VERDICTS = (
     Verdict("truth", "door", "pass", 1e-12, 1e-6),
     Verdict("truth", "pendulum", "fail", 2e-3, 1e-6),
@@ -137,3 +140,38 @@ def test_random_violations_are_counted_by_check_with_the_worst_of_each(tmp_path)
         ("MuJoCo", truth, "2", "drawn_1", "1.0e-03", "1.0e-06"),
         ("MuJoCo", closure, "2", "drawn_2", "5.0e-02", "1.0e-02"),
     ]
+
+
+def committed() -> list[dict]:
+    folder = ROOT / "reports" / "reference" / "conformance"
+    return [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
+
+
+def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
+    known = explained.explanations()
+    for found in committed():
+        failed = [v for v in found.get("verdicts", ()) if v["status"] == "fail"]
+        unknown = [(v["property"], v["scene"]) for v in failed]
+        unknown = [pair for pair in unknown if (found["engine"], *pair) not in known]
+        assert not unknown, (found["engine"], unknown)
+
+
+def test_the_page_on_engines_counts_the_violations_of_warp_by_cause():
+    """The table's rows are the causes; the sentence before them has the numbers of verdicts."""
+    [warp] = [found for found in committed() if found["engine"] == "warp"]
+    failed = [v for v in warp["verdicts"] if v["status"] == "fail"]
+    causes = Counter(explained.explanations()["warp", v["property"], v["scene"]].cause for v in failed)
+    page = (ROOT / "docs" / "engines.md").read_text()
+    rows = page.partition("| mechanisms | violated checks |")[2].partition("\n\n")[0].splitlines()[2:]
+    cells = [[cell.strip() for cell in row.strip("| ").split("|")] for row in rows]
+    assert sorted(int(row[1]) for row in cells) == sorted(causes.values())
+    passed = sum(v["status"] == "pass" for v in warp["verdicts"])
+    refused = sum(v["property"] == "refusal" and v["status"] == "cannot" for v in warp["verdicts"])
+    words = " ".join(page.split())
+    assert f"passes {passed} checks, refuses {refused} mechanisms, and violates {len(failed)}. " in words, (
+        passed,
+        refused,
+        len(failed),
+    )
+    largest = max(v["measured"] for v in failed if v["property"] == "truth")
+    assert max(float(row[2]) for row in cells) == float(f"{largest:.1e}")
