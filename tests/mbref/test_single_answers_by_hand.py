@@ -347,3 +347,72 @@ def test_a_displacement_is_along_the_axis_that_the_first_body_carries():
     assert found.displacement == pytest.approx([0.0, 0.7])
     assert found.displacement_rate == pytest.approx([0.0, 2 * c - 3 * s])
     assert found.angle is None and found.rate is None
+
+
+def near_run(loops: int, reference: float, smallest: float) -> Any:
+    watch = SimpleNamespace(reference_pivot=reference, smallest_pivot=smallest)
+    return SimpleNamespace(memory=SimpleNamespace(watch=watch), model=SimpleNamespace(closed_loops=loops))
+
+
+def test_a_run_that_ends_near_a_singular_position():
+    near = singular_position.NEAR_PIVOT * 0.5
+    for loops, reference, smallest, is_near in (
+        (1, 0.5, 0.99 * near, True),
+        (1, 0.5, near, False),
+        (0, 0.5, 0.99 * near, False),
+        (1, 0.0, -1.0, False),
+    ):
+        assert singular_position.is_near(near_run(loops, reference, smallest)) is is_near
+
+
+@pytest.mark.parametrize(
+    ("inside", "part", "rows", "time", "q", "v", "joints"),
+    [
+        (True, 0.25, 1, 2.125, 7.0, [1.5, -1.0], ("rank 4", 2.125, 7.0)),
+        (False, 0.25, 1, 2.0, 3.0, [1.0, -2.0], ("rank 4", 2.0, 3.0)),
+        (True, 0.0, 1, 2.0, 3.0, [1.0, -2.0], ("rank 4", 2.0, 3.0)),
+        (True, 0.25, 10**6, 2.125, 7.0, [1.5, -1.0], ()),
+    ],
+)
+def test_the_singular_position_inside_a_step(monkeypatch, inside, part, rows, time, q, v, joints):
+    """A quarter of a step from 2 s to 2.5 s, in which velocities change from (1, -2) to (3, 2)."""
+    run: Any = SimpleNamespace(
+        memory=SimpleNamespace(
+            loop=SimpleNamespace(
+                clock=SimpleNamespace(time=2.0, attempt_end=2.5), ends=SimpleNamespace(pose=np.array([7.0]))
+            ),
+            watch=SimpleNamespace(singular_part=part),
+            state=SimpleNamespace(velocities=np.array([3.0, 2.0])),
+        ),
+        model=SimpleNamespace(m=rows),
+    )
+    monkeypatch.setattr(singular_position, "_accepted", lambda run: (np.array([3.0]), np.array([1.0, -2.0])))
+    monkeypatch.setattr(singular_position, "_rank", lambda run, t, q: 4 * (t == 2.0) * (q[0] == 3.0))
+    monkeypatch.setattr(singular_position, "_joints", lambda run, t, q, rank: (f"rank {rank}", t, q[0]))
+    found = singular_position.met_by(run, inside)
+    assert found.time == time and found.coordinates.tolist() == [q] and found.velocities.tolist() == v
+    assert found.joints == joints
+
+
+def test_joints_whose_rows_lose_rank():
+    """Two parallel unit rows of joints B and C: the lost combination has equal parts of both."""
+    jacobian = np.array([[1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 3.0, 0.0]])
+    terms = SimpleNamespace(jacobian=jacobian)
+    model = SimpleNamespace(
+        terms=lambda t, q: terms, m=3, data=SimpleNamespace(metric_root=np.ones(3)), row_joint=("A", "B", "C")
+    )
+    run: Any = SimpleNamespace(
+        model=model,
+        limits=SimpleNamespace(rank_tolerance=1e-9),
+        memory=SimpleNamespace(watch=SimpleNamespace(generic_rank=0)),
+    )
+    assert singular_position._rank(run, 0.5, "q") == 2  # type: ignore[arg-type]
+    assert singular_position._joints(run, 0.5, "q", 3) == ("B", "C")  # type: ignore[arg-type]
+    assert singular_position._joints(run, 0.5, "q", 2) == ("A", "B", "C")  # type: ignore[arg-type]
+    run.memory.watch.generic_rank = 3
+    assert singular_position._rank(run, 0.5, "q") == 3  # type: ignore[arg-type]
+    terms.jacobian = np.zeros((3, 3))
+    run.memory.watch.generic_rank = 0
+    assert singular_position._rank(run, 0.5, "q") == 1  # type: ignore[arg-type]
+    values, _ = singular_position._singular_values(run, 0.5, "q")  # type: ignore[arg-type]
+    assert values.size == 6

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import ast
+
 from tests.mutants.operators import Mutant
 
 ERRORS = "position_error_series(scene, trajectory, exact), rotation_error_series(scene, trajectory, exact)"
 AT_FIRST_CALL = (
     "Kernels that are not prepared are compiled or loaded at their first call, with equal results."
 )
+COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
+COMMUTES = "A sum or a product is the same for its two parts in any order."
+"""Functions of mbref whose first two arguments may be exchanged, and the reason."""
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
@@ -69,6 +74,14 @@ REASONS: dict[tuple[str, str, str], str] = {
     ("mbref/stabilisation/partitioning.py", "for k in range(3):", "4"): (
         "The fourth entry is overwritten afterwards."
     ),
+    ("mbref/scenes/flyball_governor.py", "mass = DENSITY * LENGTH * SIDE**2", "((DENSITY) / (LENGTH))"): (
+        "The rods are 1 m long."
+    ),
+    (
+        "mbref/scenes/flyball_governor.py",
+        "reach = (rod * LENGTH / 2 + BALL * LENGTH) / mass",
+        "((BALL) / (LENGTH))",
+    ): "The rods are 1 m long.",
     (
         "mbref/scenes/flyball_governor.py",
         "reach = (rod * LENGTH / 2 + BALL * LENGTH) / mass",
@@ -90,5 +103,15 @@ REASONS: dict[tuple[str, str, str], str] = {
 
 def reason(mutant: Mutant, source: str) -> str:
     """Return why a mutant of a source changes nothing; empty where it does."""
+    if mutant.file.startswith("mbref/") and mutant.kind == "argument order" and exchanges_parts(mutant):
+        return COMMUTES
     line = source.splitlines()[mutant.line - 1].strip()
     return REASONS.get((mutant.file, line, mutant.new), "")
+
+
+def exchanges_parts(mutant: Mutant) -> bool:
+    """Return whether a mutant exchanges the first two arguments of a function in COMMUTATIVE."""
+    old, new = (ast.parse(text, mode="eval").body for text in (mutant.old, mutant.new))
+    assert isinstance(old, ast.Call) and isinstance(new, ast.Call)
+    first, second = (list(map(ast.unparse, call.args[:2])) for call in (old, new))
+    return ast.unparse(old.func) in COMMUTATIVE and first == second[::-1]

@@ -11,7 +11,7 @@ import pytest
 
 from tests.mutants import __main__ as runner
 from tests.mutants import drawing, tree, workers
-from tests.mutants.equivalent import REASONS
+from tests.mutants.equivalent import COMMUTES, REASONS, reason
 from tests.mutants.operators import KINDS, Mutant, mutants
 from tests.mutants.reach import Reach, around, lines_of
 
@@ -291,6 +291,17 @@ def test_files_with_kernels_run_without_compilation():
 def test_the_score_counts_no_equivalent_mutant_and_no_time_out():
     results = [runner.KILLED] * 3 + [runner.SURVIVED, runner.TIMED_OUT, runner.EQUIVALENT]
     assert runner.score(results) == "3 of 5 killed (60%), 1 timed out, 1 survived, 1 equivalent"
+
+
+def test_parts_of_sums_and_products_may_be_exchanged():
+    source = "x = product_order(a[c], b, k) + cross(a, b)\n"
+    orders = [m for m in mutants("mbref/a.py", source) if m.kind == "argument order"]
+    assert [(m.new, bool(reason(m, source) == COMMUTES)) for m in orders] == [
+        ("product_order(a[c], k, b)", False),
+        ("product_order(b, a[c], k)", True),
+        ("cross(b, a)", False),
+    ]
+    assert not reason(orders[1]._replace(file="crosscheck/a.py"), source)
 
 
 def test_reasons_name_lines_that_are_there():
