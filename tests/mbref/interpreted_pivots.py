@@ -1,0 +1,313 @@
+"""Pivots of steps that may cross a singular position, with interpreted kernels / numbers worked out by hand.
+
+``test_thresholds.py`` runs this file in a process whose kernels are interpreted, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.kernels.compilation import PLAIN
+
+if not PLAIN:
+    pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
+
+from mbref.kernels.layout import CHANGED, NOT_CONVERGED, OK, SINGULAR, SINGULAR_AHEAD
+from mbref.stabilisation import partitioning
+from mbref.stepping import singular_crossing as crossing
+
+
+# --- pivots at both ends of a step ------------------------------------------------------------------------
+def two_ends(pivots: list[float], squared: list[float], product: list[float]) -> Any:
+    """Memory with pivots at the start, squared ones at the end, and those of the product; reference 2."""
+    return SimpleNamespace(
+        loop=SimpleNamespace(
+            ends=SimpleNamespace(
+                gradient="gradient", squared_pivots=np.array(squared), pivots=np.array(product)
+            )
+        ),
+        factor="factor",
+        pivots=np.array(pivots),
+        watch=SimpleNamespace(reference_pivot=2.0),
+    )
+
+
+def passed(monkeypatch: pytest.MonkeyPatch, memory: Any, at_pose: dict[int, float]) -> tuple[bool, list[Any]]:
+    """Whether the rank drops where pivots k change their signs, with the least pivots at these poses."""
+    calls: list[Any] = []
+    looked: list[int] = []
+    monkeypatch.setattr(crossing, "factorise_product", lambda *given: calls.append("product"))
+    monkeypatch.setattr(crossing, "put_rates", lambda memory: calls.append("rates"))
+    monkeypatch.setattr(
+        crossing, "zero_of_pivot", lambda k, h, memory: looked.append(k) or calls.append(k) or 0.25
+    )
+    monkeypatch.setattr(crossing, "pivot_at_pose", lambda memory: at_pose[looked[-1]])
+    monkeypatch.setattr(crossing, "keep_position", lambda part, h, memory: calls.append(("kept", part, h)))
+    monkeypatch.setattr(
+        crossing, "expand_product_at", lambda part, h, memory: calls.append(("back", part, h))
+    )
+    return bool(crossing.passes_singular_position(0.5, memory)), calls
+
+
+def test_pivots_that_change_their_signs_and_vanish(monkeypatch):
+    reached, vanished = crossing.REACHED * 2.0, crossing.VANISHED * 2.0
+    memory = two_ends([2 * reached, 2 * reached, 0.0], [0.0, 0.0, 0.0], [-1.0, -1.0, 1.0])
+    found, calls = passed(monkeypatch, memory, {0: vanished, 1: 0.99 * vanished})
+    assert found and calls == ["product", "rates", 0, ("back", 1.0, 0.5), 1, ("kept", 0.25, 0.5)]
+    found, calls = passed(monkeypatch, memory, {0: vanished, 1: vanished})
+    assert not found and calls[-1] == ("back", 1.0, 0.5) and calls.count("rates") == 1
+    small = two_ends([reached, 0.0], [0.0, reached**2], [-1.0, -1.0])
+    assert passed(monkeypatch, small, {}) == (False, ["product"]), "redundant rows"
+    grown = two_ends([0.0, 0.0], [0.0, (1.01 * reached) ** 2], [1.0, -1.0])
+    assert passed(monkeypatch, grown, {1: 0.0})[0]
+    assert not passed(monkeypatch, two_ends([1.0], [1.0], [0.0]), {})[0]
+
+
+def test_the_pose_inside_a_step_is_a_cubic(monkeypatch):
+    """x(t) = 1 + 2 t - t² + 3 t³ over 0.5 s, from its values and rates at both ends."""
+    monkeypatch.setattr(crossing, "normalise", lambda q: None)
+    x = np.polynomial.Polynomial([1.0, 2.0, -1.0, 3.0])
+    rate, h = x.deriv(), 0.5
+    ends = SimpleNamespace(rates=np.array([[rate(0.0)], [rate(h)]]), pose=np.zeros(1))
+    memory = SimpleNamespace(
+        loop=SimpleNamespace(ends=ends),
+        previous=SimpleNamespace(coordinates=np.array([x(0.0)])),
+        state=SimpleNamespace(coordinates=np.array([x(h)])),
+    )
+    for part in (0.0, 0.2, 0.7, 1.0):
+        crossing.put_pose(part, h, memory)
+        assert ends.pose[0] == pytest.approx(x(part * h))
+
+
+def test_rates_at_both_ends_of_a_step(monkeypatch):
+    monkeypatch.setattr(
+        crossing, "coordinate_rates", lambda q, v, rates: rates.__setitem__(slice(None), q + v)
+    )
+    memory = SimpleNamespace(
+        loop=SimpleNamespace(ends=SimpleNamespace(rates=np.zeros((2, 1)))),
+        previous=SimpleNamespace(coordinates=np.array([1.0]), velocities=np.array([0.5])),
+        state=SimpleNamespace(coordinates=np.array([2.0]), velocities=np.array([0.25])),
+    )
+    crossing.put_rates(memory)
+    assert memory.loop.ends.rates.tolist() == [[1.5], [2.25]]
+
+
+@pytest.mark.parametrize(
+    ("function", "zero"),
+    [
+        (lambda s: 1.0 - 4.0 * s, 0.25),
+        (lambda s: 1.0 - (s / 0.8) ** 5, 0.8),
+        (lambda s: (0.1 - s) / (0.2 + s), 0.1),
+        (lambda s: math.exp(-5.0 * s) - math.exp(-3.0), 0.6),
+    ],
+)
+def test_the_place_where_a_pivot_vanishes(monkeypatch, function, zero):
+    asked: list[float] = []
+    ends = SimpleNamespace(
+        pivots=np.array([9.0, function(1.0)]), squared_pivots=np.array([9.0, function(0.0)])
+    )
+    memory = SimpleNamespace(loop=SimpleNamespace(ends=ends))
+
+    def expand(part: float, h: float, memory: Any) -> None:
+        asked.append(part)
+        ends.pivots[1] = function(part)
+
+    monkeypatch.setattr(crossing, "expand_product_at", expand)
+    found = crossing.zero_of_pivot(1, 0.5, memory)
+    assert found == pytest.approx(zero, abs=2 * crossing.PLACE_ERROR) and asked[-1] == found
+    first = function(0.0) / (function(0.0) - function(1.0))
+    assert asked[0] == pytest.approx(first) and len(asked) <= 12
+
+
+def test_the_least_pivot_of_the_independent_rows(monkeypatch):
+    """Squares of 9, 4, 1 and 0.25: with three independent rows the least pivot is 1."""
+    factor = SimpleNamespace(squared_pivots=np.array([9.0, 0.25, 4.0, 1.0]))
+    monkeypatch.setattr(crossing, "find_squared_pivots", lambda factor: None)
+    monkeypatch.setattr(crossing, "sort", lambda squares: squares.sort())
+    memory = SimpleNamespace(factor=factor, watch=SimpleNamespace(generic_rank=3))
+    assert crossing.pivot_at_pose(memory) == 1.0
+    memory.watch.generic_rank = 4
+    assert crossing.pivot_at_pose(memory) == 0.5
+    memory.watch.generic_rank = 0
+    assert crossing.pivot_at_pose(memory) == 1.0
+
+
+def test_an_accepted_step_is_remembered(monkeypatch):
+    kept: list[Any] = []
+    monkeypatch.setattr(crossing, "keep_end", kept.append)
+    for near, nearest in ((0.5, 0.4), (0.3, 0.3)):
+        monkeypatch.setattr(crossing, "relative_pivot", lambda watch, near=near: near)
+        watch = SimpleNamespace(past_pivot=9.0, smallest_pivot=0.125, nearest=0.4)
+        memory = SimpleNamespace(watch=watch)
+        crossing.remember_watch(memory)
+        assert (watch.past_pivot, watch.nearest) == (0.125, nearest) and kept[-1] is memory
+
+
+def test_the_product_inside_of_a_step(monkeypatch):
+    calls: list[Any] = []
+    for name in ("put_pose", "evaluate", "factorise_constraints", "factorise_product"):
+        monkeypatch.setattr(crossing, name, lambda *given, name=name: calls.append((name, *given)))
+    ends = SimpleNamespace(pose="pose", gradient="gradient")
+    memory = SimpleNamespace(
+        loop=SimpleNamespace(ends=ends, clock=SimpleNamespace(time=2.0)),
+        state=SimpleNamespace(velocities="v"),
+        equations="equations",
+        factor="factor",
+    )
+    crossing.expand_product_at(0.25, 0.5, memory)
+    assert calls == [
+        ("put_pose", 0.25, 0.5, memory),
+        ("evaluate", 2.125, "pose", "v", "equations"),
+        ("factorise_constraints", memory),
+        ("factorise_product", "factor", "gradient", crossing.PRODUCT_ALPHA, ends),
+    ]
+
+
+# --- coordinate partitioning ------------------------------------------------------------------------------
+def part_memory(**changes: Any) -> Any:
+    """Four coordinates, of which 2 and 0 depend on 3 and 1."""
+    counts = SimpleNamespace(newton=0, factorisations=0)
+    chart = SimpleNamespace(
+        column_order=np.array([2, 0, 3, 1]),
+        row_order=np.array([1, 2, 0]),
+        partition=SimpleNamespace(rank=2, pivot=0.5, chosen_pivot=1.0),
+        residual=np.array([0.5, 0.25, 9.0]),
+        dependent=np.zeros((2, 2)),
+        exchanges="exchanges",
+        jacobian=np.arange(12.0).reshape(3, 4),
+    )
+    memory = SimpleNamespace(
+        chart=chart,
+        state=SimpleNamespace(coordinates=np.zeros(4), velocities="v", coordinate_rates=np.zeros(4)),
+        previous="previous",
+        equations=SimpleNamespace(
+            rows=SimpleNamespace(nu=np.array([5.0, 7.0])),
+            system=SimpleNamespace(counts=counts, settings=SimpleNamespace(newton_tolerance=1e-6)),
+        ),
+        watch=SimpleNamespace(accepted_time=0.0),
+        chart_options=SimpleNamespace(kept=0.6),
+    )
+    vars(chart.partition).update(changes)
+    return memory
+
+
+@pytest.fixture
+def parts(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Open the parts of memory as they are."""
+    monkeypatch.setattr(partitioning, "scratch_of", lambda chart: chart)
+    monkeypatch.setattr(partitioning, "options_of", lambda options: options)
+    return monkeypatch
+
+
+@pytest.mark.parametrize(
+    ("violations", "factors", "status", "newton"),
+    [
+        ([1e-6], [True], OK, 0),
+        ([1e-3, 1e-7], [True, True], OK, 1),
+        ([2e-6, 2e-6], [True, True], OK, 1),
+        ([0.5, 0.5, 1e-7], [True] * 3, OK, 2),
+        ([1e-3], [False], NOT_CONVERGED, 0),
+        ([1e-3, 1e-4], [True, False], NOT_CONVERGED, 1),
+        ([0.5] * 99, [True] * 99, NOT_CONVERGED, partitioning.MOST_DEPENDENT_STEPS),
+    ],
+)
+def test_newton_steps_of_the_dependent_coordinates(parts, violations, factors, status, newton):
+    """A residual of (0.5, 0.25) is subtracted from coordinates 2 and 0; one that stays is rounding."""
+    memory, left, good = part_memory(), list(violations), list(factors)
+    evaluated: list[Any] = []
+    parts.setattr(partitioning, "predict_dependent", lambda t, memory: evaluated.append("predicted"))
+    parts.setattr(partitioning, "evaluate", lambda t, q, v, equations: evaluated.append(q.tolist()))
+    parts.setattr(partitioning, "find_violation", lambda memory: left.pop(0))
+    parts.setattr(partitioning, "factorise_dependent", lambda memory: good.pop(0))
+    parts.setattr(partitioning, "lu_solve", lambda a, rank, exchanges, b: None)
+    y = np.array([8.0, 9.0, 1.0, 1.0])
+    assert partitioning.solve_dependent_coordinates(0.5, y, memory) == status
+    assert memory.equations.system.counts.newton == newton
+    assert memory.state.coordinates.tolist() == [-0.25 * newton, 9.0, -0.5 * newton, 8.0]
+    assert evaluated[:2] == ["predicted", [0.0, 9.0, 0.0, 8.0]]
+
+
+def test_rates_of_the_dependent_coordinates(parts):
+    """Rows 1 and 2, the latter of Euler parameters; independent rates 10 and 20 of coordinates 3 and 1."""
+    memory = part_memory()
+    found: list[Any] = []
+    parts.setattr(partitioning, "lu_solve", lambda a, rank, exchanges, b: found.append(b[:2].tolist()))
+    parts.setattr(partitioning, "velocities_of_rates", lambda state: found.append("velocities"))
+    partitioning.solve_dependent_rates(np.array([8.0, 9.0, 10.0, 20.0]), memory)
+    residual = [7.0 - (7.0 * 10 + 5.0 * 20), 0.0 - (11.0 * 10 + 9.0 * 20)]
+    assert found == [residual, "velocities"]
+    assert memory.state.coordinate_rates.tolist() == [residual[1], 20.0, residual[0], 10.0]
+
+
+def test_the_factor_of_the_dependent_coordinates(parts):
+    """Rows 1 and 2 of columns 2 and 0; pivots 4 and -0.5 have the ratio 0.125."""
+    memory = part_memory()
+    parts.setattr(partitioning, "jacobian_by_euler_parameters", lambda *_: None)
+    seen: list[Any] = []
+
+    pivots: list[tuple[float, float]] = []
+
+    def factor(lu: np.ndarray, rank: int, exchanges: Any, least: float) -> bool:
+        seen.append(lu.copy().tolist())
+        lu[0, 0], lu[1, 1] = pivots[-1]
+        return bool(lu[0, 0] != 4.0 or lu[1, 1] < 0.0)
+
+    parts.setattr(partitioning, "lu_factor", factor)
+    for first, second, regular in ((4.0, -0.5, True), (-0.5, 4.0, True), (4.0, 0.5, False)):
+        pivots.append((first, second))
+        assert partitioning.factorise_dependent(memory) is regular
+        assert memory.chart.partition.pivot == 0.125
+    assert seen[0] == [[6.0, 4.0], [10.0, 8.0]]
+    assert memory.equations.system.counts.factorisations == 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "rank", "status", "chosen"),
+    [
+        ({"pivot": 0.6, "chosen_pivot": 1.0}, 2, OK, False),
+        ({"pivot": 0.59, "chosen_pivot": 1.0}, 2, CHANGED, True),
+        ({"pivot": 0.59, "chosen_pivot": 1.0}, 1, SINGULAR_AHEAD, True),
+        ({"pivot": 0.01, "chosen_pivot": 0.0}, 2, OK, False),
+    ],
+)
+def test_when_the_partition_is_chosen_anew(parts, changes, rank, status, chosen):
+    memory, calls = part_memory(**changes), []
+
+    def choose(memory: Any) -> None:
+        calls.append("chosen")
+        memory.chart.partition.rank = rank
+
+    parts.setattr(partitioning, "solve_dependent_coordinates", lambda *_: OK)
+    parts.setattr(partitioning, "solve_dependent_rates", lambda *_: calls.append("rates"))
+    parts.setattr(partitioning, "copy_state", lambda *given: calls.append("copied"))
+    parts.setattr(partitioning, "choose_coordinates", choose)
+    parts.setattr(partitioning, "gather_independent", lambda y, memory: calls.append("gathered"))
+    assert partitioning.accept.function(0.75, "y", memory) == status
+    gathered = ["gathered"] * (status == CHANGED)
+    assert calls == ["rates", "copied", *["chosen"] * chosen, *gathered]
+    assert memory.watch.accepted_time == 0.75
+    if changes["chosen_pivot"] == 0.0:
+        assert memory.chart.partition.chosen_pivot == 0.01
+    parts.setattr(partitioning, "solve_dependent_coordinates", lambda *_: NOT_CONVERGED)
+    assert partitioning.accept.function(0.75, "y", memory) == NOT_CONVERGED
+
+
+@pytest.mark.parametrize(
+    ("solved", "accelerated", "status"), [(OK, OK, OK), (SINGULAR, OK, SINGULAR), (OK, SINGULAR, SINGULAR)]
+)
+def test_rates_of_the_independent_coordinates(parts, solved, accelerated, status):
+    memory = part_memory()
+    memory.state.coordinate_second = np.array([1.0, 2.0, 3.0, 4.0])
+    memory.equations.system.acceleration = "acceleration"
+    memory.kernels = SimpleNamespace(accelerate=lambda system: accelerated)
+    for name in ("solve_dependent_rates", "assemble_system", "second_rates"):
+        parts.setattr(partitioning, name, lambda *_: None)
+    parts.setattr(partitioning, "solve_dependent_coordinates", lambda *_: solved)
+    rates = np.zeros(4)
+    assert partitioning.rates.function(0.5, np.array([8.0, 9.0, 10.0, 20.0]), rates, memory) == status
+    assert rates.tolist() == ([10.0, 20.0, 4.0, 2.0] if solved == OK else [0.0] * 4)
