@@ -21,6 +21,7 @@ from mbref.formulations import alf_dual, mpi_svd
 from mbref.kernels.layout import CHANGED, NOT_CONVERGED, NOT_FINITE, OK, SINGULAR, SINGULAR_AHEAD
 from mbref.linear_algebra import minimum_norm
 from mbref.linear_algebra.minimum_norm import ALPHA
+from mbref.linear_algebra.orthogonal_factorisations import gram_schmidt_pivoted
 from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.stepping import loop
 from mbref.stepping.loop import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED, VIOLATED
@@ -471,3 +472,27 @@ def test_the_error_that_a_step_may_have(monkeypatch):
     for part, status in ((1.0, OK), (1.001, STEP_TOO_SMALL)):
         memory.step.violation = part * lost
         assert stepping.judge_step(0.25, 0, memory) == status
+
+
+# --- orthogonalisation ------------------------------------------------------------------------------------
+def test_nearly_parallel_rows_become_orthogonal_to_rounding():
+    """Rows (1, e, 0, 0), (1, 0, e, 0) and (1, 0, 0, e) of Läuchli: one subtraction leaves 1e-8."""
+    small = 1e-8
+    rows = np.hstack([np.ones((3, 1)), small * np.diag([1.0, 1.0, 1.0])])
+    a, order, r = rows.copy(), np.zeros(3, dtype=np.int64), np.ones((3, 3))
+    assert gram_schmidt_pivoted(a, 3, order, r, 1e-12) == 3
+    assert np.abs(a @ a.T - np.eye(3)).max() < 1e-14
+    assert np.abs(r.T @ a - rows[order]).max() < 1e-15 and sorted(order) == [0, 1, 2]
+
+
+def test_the_largest_remaining_row_comes_first():
+    """Lengths 5, 13 and 3, of which 0 remains of the third row."""
+    rows = np.array([[3.0, 4.0, 0.0], [5.0, 12.0, 0.0], [0.0, 3.0, 0.0]])
+    a, order, r = rows.copy(), np.zeros(3, dtype=np.int64), np.ones((3, 3))
+    assert gram_schmidt_pivoted(a, 3, order, r, 1e-9) == 2
+    left = np.abs(rows[[0, 2]] @ np.array([12.0, -5.0, 0.0]) / 13.0)
+    assert order[0] == 1 and order[1] == (0 if left[0] > left[1] else 2)
+    assert a[0] == pytest.approx([5 / 13, 12 / 13, 0.0]) and r[0, 0] == pytest.approx(13.0)
+    assert abs(a[1]) == pytest.approx([12 / 13, 5 / 13, 0.0]) and r[1, 1] == pytest.approx(left.max())
+    assert r[:2].T @ a[:2] == pytest.approx(rows[order], abs=1e-14)
+    assert gram_schmidt_pivoted(np.zeros((2, 3)), 2, order[:2].copy(), np.ones((2, 2)), 1e-9) == 0

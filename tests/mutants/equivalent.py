@@ -54,6 +54,9 @@ REASONS: dict[tuple[str, str, str], str] = {
         "if not place.part or place.of not in names:",
         "(place.of not in names)",
     ): "A primitive that is no part of a coupling or an armature names no joint in its field ``of``.",
+    ("mbref/records.py", "text = json.dumps(_finite(value), allow_nan=False)", "True"): (
+        "No number is infinite or NaN there any more."
+    ),
     ("mbref/simulation/start_run.py", "if method.is_series:", "(not (method.is_series))"): AT_FIRST_CALL,
     ("mbref/stepping/preparation.py", "prepare_all(kernels_of(method))", "pass"): AT_FIRST_CALL,
     ("mbref/taylor/preparation.py", "prepare_all(KERNELS_OF_SERIES)", "pass"): AT_FIRST_CALL,
