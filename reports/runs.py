@@ -130,7 +130,12 @@ class SceneRuns:
 
     def difference(self) -> str | None:
         """Return the first quantity in which an engine's mechanism differs; None if all agree."""
-        return model_difference(self.scene, self.gate) if self.gate else None
+        return model_difference(self.scene, self.gate, motions=self._records) if self.gate else None
+
+    @property
+    def _records(self) -> Sequence[Record]:
+        """Return the records of the runs."""
+        return [run.record for run in self.runs]
 
     @cached_property
     def differences(self) -> Mapping[str, str]:
@@ -138,8 +143,8 @@ class SceneRuns:
         without a truth."""
         if not (self.truth and self.truth["kind"]):
             return {}
-        at_start = model_differences(self.scene, self.gate) if self.gate else {}
-        return at_start | force_differences(self.scene, [run.record for run in self.runs])
+        at_start = model_differences(self.scene, self.gate, motions=self._records) if self.gate else {}
+        return at_start | force_differences(self.scene, self._records)
 
     def exact(self, times: np.ndarray) -> Trajectory | None:
         """Return the true motion at times (k,), computed within the CPU time that the truth's record used;

@@ -225,7 +225,7 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
     compared = []
     for group in judged(found.scenes, found.truths, found.records):
         scene, gates = group.scene, [r for r in found.identities if r["scene"] == group.scene.name]
-        differences = model_differences(scene, gates, reference_time)
+        differences = model_differences(scene, gates, reference_time, group.records)
         if group.truth["kind"]:
             differences |= force_differences(scene, group.records)
         first = next(iter(differences.values()), None)

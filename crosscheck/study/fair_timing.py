@@ -35,18 +35,30 @@ def _called_from_python(found: Sequence[Setting]) -> Sequence[Setting]:
     return [setting for setting in found if not setting.family.endswith(COMPILED)] or found
 
 
-def model_difference(scene: Scene, records: Sequence[Record], reference_time: float = SECONDS) -> str | None:
+def model_difference(
+    scene: Scene,
+    records: Sequence[Record],
+    reference_time: float = SECONDS,
+    motions: Sequence[Record] = (),
+) -> str | None:
     """Return a sentence on the first quantity in which the records of `identity_cases` differ; None if all
     records agree. Records are compared with the truth; without a truth, with the first record. Runs that did
     not complete are ignored.
     """
-    return next(iter(model_differences(scene, records, reference_time).values()), None)
+    return next(iter(model_differences(scene, records, reference_time, motions).values()), None)
 
 
 def model_differences(
-    scene: Scene, records: Sequence[Record], reference_time: float = SECONDS
+    scene: Scene,
+    records: Sequence[Record],
+    reference_time: float = SECONDS,
+    motions: Sequence[Record] = (),
 ) -> dict[str, str]:
-    """Return for each engine that differs the sentence on its first different quantity."""
+    """Return for each engine that differs the sentence on its first different quantity.
+
+    An engine with a right run among ``motions`` is left out: it simulates the scene, and the difference is an
+    error of the settings of its short run.
+    """
     truth = truth_for(scene, reference_time)
     try:
         exact = [] if truth is None else [truth.poses(gate_times(scene))]
@@ -55,7 +67,8 @@ def model_differences(
     done = [record for record in records if is_completed(record)]
     runs = [_motion(scene, r) for r in done]
     found = differences(scene, [*exact, *runs], _roundings(done)) if exact or runs else {}
-    return {name: str(difference) for name, difference in found.items()}
+    right = {record["engine"] for record in motions if grade(record) is Grade.RIGHT}
+    return {name: str(difference) for name, difference in found.items() if name not in right}
 
 
 def _roundings(records: Sequence[Record]) -> dict[str, float]:

@@ -373,6 +373,23 @@ def test_models_differ_from_the_truth_or_from_the_first_run(monkeypatch):
     assert asked[4:] == [motions]
 
 
+@pytest.mark.parametrize(
+    ("errors", "is_left_out"), [((1.1e-8,), False), ((1e-8,), True), ((0.5, 1e-9), True), ((None,), False)]
+)
+def test_an_engine_with_a_right_motion_simulates_the_scene(monkeypatch, errors, is_left_out):
+    """Its short run has an error of its settings, as of soft constraints of a linkage of 1 km."""
+    monkeypatch.setattr(fair_timing, "_motion", lambda scene, record: record["key"])
+    monkeypatch.setattr(fair_timing, "truth_for", lambda scene, seconds: SimpleNamespace(poses=lambda t: "x"))
+    monkeypatch.setattr(fair_timing, "differences", lambda *given: {"b": 0.25, "c": 0.5})
+    gates = [{**timed_record(key, 1.0, "COMPLETED"), "engine": key} for key in "bc"]
+    for gate in gates:
+        gate["asked"] = {"engine": gate["engine"]}
+    runs = [{**timed_record("run", 1.0, "COMPLETED"), "engine": "b", "metrics": {"error": e}} for e in errors]
+    found = fair_timing.model_differences(still("s"), gates, motions=runs)
+    assert found == ({"c": "0.5"} if is_left_out else {"b": "0.25", "c": "0.5"})
+    assert fair_timing.model_difference(still("s"), gates, motions=runs) == next(iter(found.values()))
+
+
 # --- the paper's runs -------------------------------------------------------------------------------------
 def test_labels_of_the_paper_s_runs():
     assert str(Label("II", "LM2", "four-bar")) == "Table II, LM2, four-bar"
