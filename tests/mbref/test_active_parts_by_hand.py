@@ -1,0 +1,179 @@
+"""Lengths, ranks and moving parts of a scene / arrays worked out by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.equations import active_coordinates as active
+from mbref.equations import diagnosis, units
+from mbref.equations.active_coordinates import RandomStates
+
+
+# --- lengths and metrics ----------------------------------------------------------------------------------
+def test_moments_of_inertia_of_a_projection():
+    """A mass of 2 kg and a length of 3 m give at least 2 (0.5 · 3)² = 4.5 kg m²."""
+    mass = np.array([2.0, 2.0, 2.0, 0.1, 4.5, 9.0, 1.0, 1.0, 1.0, 0.1, 0.2, 0.3])
+    found = units.metric(mass, np.array([3.0, 0.4]))
+    assert found.tolist() == pytest.approx([2, 2, 2, 4.5, 4.5, 9, 1, 1, 1, 0.1, 0.2, 0.3])
+    assert mass[3] == 0.1, "the masses stay"
+    both = units.metric(np.stack([mass, 2 * mass]), np.array([[3.0, 0.4], [1.0, 2.0]]))
+    assert both[0].tolist() == found.tolist()
+    assert both[1].tolist() == pytest.approx([4, 4, 4, 1, 9, 18, 2, 2, 2, 2, 2, 2])
+
+
+def test_inverse_roots_and_lengths_of_rows():
+    assert units.inverse_root(np.array([4.0, 0.25, 0.0])).tolist() == [0.5, 2.0, 1.0]
+    rows = np.array([[3.0, 4.0], [0.0, 0.0], [0.0, -2.0]])
+    assert units.row_lengths(rows).tolist() == [5.0, 1.0, 2.0]
+    assert units.unit_rows(rows).tolist() == [[0.6, 0.8], [0.0, 0.0], [0.0, -1.0]]
+
+
+def test_lengths_of_bodies_are_means_of_their_arms():
+    """Arms of 5 m and 1 m of body 0, of 2 m of body 1; body 2 has its anchor in the centre."""
+    arms = np.array([[3.0, 4.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -2.0], [0.0, 0.0, 0.0]])
+    shares = np.array([[0.5, 0, 0], [0.5, 0, 0], [0, 1, 0], [0, 0, 1]])
+    assert units.body_lengths(arms, shares).tolist() == [3.0, 2.0, 2.5]
+    assert units.body_lengths(arms[:3], shares[:3, :2]).tolist() == [3.0, 2.0]
+    assert units.body_lengths(0 * arms, shares).tolist() == [1.0, 1.0, 1.0]
+    arms[3, 0] = 0.9 * units.SHORTEST_LENGTH * 3.0
+    assert units.body_lengths(arms, shares)[2] == 2.5
+    arms[3, 0] = 1.1 * units.SHORTEST_LENGTH * 3.0
+    assert units.body_lengths(arms, shares)[2] == arms[3, 0]
+    two = units.body_lengths(np.stack([arms, 2 * arms]), shares)
+    assert two[1].tolist() == (2 * two[0]).tolist()
+
+
+# --- ranks ------------------------------------------------------------------------------------------------
+def test_counts_of_singular_values_and_rows_that_take_part():
+    assert diagnosis._count_above(np.array([4.0, 2.0, 1.0]), 0.25) == 2
+    assert diagnosis._count_above(np.zeros(0), 0.25) == 0
+    assert diagnosis.rank_of(np.diag([3.0, 1.0, 1e-3]), 1e-2) == 2
+    left = np.array([[0.6e-8, 0.8e-8], [0.6e-8, 0.81e-8], [0.0, -1.0]])
+    assert diagnosis.take_part(left).tolist() == [False, True, True]
+    assert diagnosis.take_part(np.zeros((2, 0))).tolist() == [False, False]
+    model: Any = SimpleNamespace(n=6, m=4, row_joint=("A", "A", "B", "A"))
+    found = diagnosis._counts(model, 3)
+    assert (found.coordinates, found.rank, found.degrees_of_freedom) == (6, 3, 3)
+    assert found.rows_by_joint == {"A": 3, "B": 1} and (found.rows, found.redundant) == (4, 1)
+
+
+@pytest.mark.parametrize(("spin", "time"), [(2.0, 0.005), (0.0, 1.0), (1e-3, 1.0)])
+def test_a_state_near_the_start(monkeypatch, spin, time):
+    """The fastest body turns by 0.01 rad; accelerations of least norm obey γ."""
+    terms = SimpleNamespace(jacobian=np.array([[0.0, 2.0, 0.0, 0.0, 0.0, 0.0]]), gamma=np.array([6.0]))
+    model: Any = SimpleNamespace(terms=lambda t, q, v: terms)
+    start: Any = SimpleNamespace(q="q", v=np.array([9.0, 0.0, 0.0, 0.5 * spin, -spin, 0.0]))
+    monkeypatch.setattr(diagnosis, "displaced", lambda q, x: (q, x.tolist()))
+    monkeypatch.setattr(diagnosis, "solve_positions", lambda model, t, q: ((t, *q), None))
+    t, (at, q, moved) = diagnosis.perturbed_state(model, start)
+    assert t == at == pytest.approx(time) and q == "q"
+    expected = [9.0 * t, 1.5 * t * t, 0.0, 0.5 * spin * t, -spin * t, 0.0]
+    assert moved == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("rank", "driver", "later", "freedoms"), [(6, (), 5, 0), (4, (), 5, 2), (4, (1,), 5, 1), (6, (1,), 5, 0)]
+)
+def test_degrees_of_freedom_beside_drivers(monkeypatch, rank, driver, later, freedoms):
+    model: Any = SimpleNamespace(n=6, scene=SimpleNamespace(driver=driver))
+    monkeypatch.setattr(diagnosis, "rank_at_start", lambda model, start: rank)
+    monkeypatch.setattr(diagnosis, "perturbed_state", lambda model, start: (0.5, "q"))
+    monkeypatch.setattr(diagnosis, "scaled_jacobian", lambda model, t, q: (t, q))
+    monkeypatch.setattr(diagnosis, "rank_of", lambda matrix, tolerance: later if matrix == (0.5, "q") else 99)
+    assert diagnosis.freedoms_left(model, "start") == freedoms  # type: ignore[arg-type]
+
+
+# --- parts that move --------------------------------------------------------------------------------------
+def test_random_states_of_some_velocities():
+    states = RandomStates(np.array([0.5, 0.25]), np.ones((2, 3)), 2 * np.ones((2, 3)))
+    some = states.of(np.array([True, False, True]))
+    assert some.part.tolist() == [0.5, 0.25]
+    assert some.displacement.tolist() == [[1, 0, 1]] * 2 and some.velocity.tolist() == [[2, 0, 2]] * 2
+    found = active.random_states(3, 4)
+    assert found.part.shape == (3,) and found.displacement.shape == found.velocity.shape == (3, 4)
+    assert ((found.part >= 0.1) & (found.part <= 1.0)).all() and len(set(found.velocity.ravel())) == 12
+    assert active.random_states(3, 4) is found
+
+
+def model_of(columns: list[list[int]]) -> Any:
+    return SimpleNamespace(n=12, entry_columns=np.array(columns))
+
+
+def test_blocks_that_a_force_or_a_row_reaches():
+    """Row 0 connects columns 0 and 7, row 1 columns 7 and 3, row 2 column 5 and the fixed frame (12)."""
+    model = model_of([[0, 7], [7, 3], [5, 12]])
+    entries, none = np.ones((3, 2), dtype=bool), np.zeros(12, dtype=bool)
+    rows = np.zeros(3, dtype=bool)
+    found, reached = active.reached(model, entries, rows, none | (np.arange(12) == 3))
+    assert np.flatnonzero(found).tolist() == [0, 3, 7] and reached.tolist() == [True, True, False]
+    found, reached = active.reached(model, entries, np.array([False, False, True]), none)
+    assert np.flatnonzero(found).tolist() == [5] and reached.tolist() == [False, False, True]
+    entries[1, 0] = False
+    found, reached = active.reached(model, entries, rows, none | (np.arange(12) == 3))
+    assert np.flatnonzero(found).tolist() == [3] and reached.tolist() == [False, True, False]
+    assert found.shape == (12,)
+
+
+def test_entries_rows_and_columns_that_are_not_zero():
+    """Two states: an entry counts where it is not zero at one of them; entries of the fixed frame never."""
+    blocks = np.zeros((2, 3, 2))
+    blocks[0, 0, 0] = blocks[1, 1, 1] = blocks[0, 2, 1] = 5.0
+    numbers = np.zeros((3, 2, 3))
+    numbers[0, 0, 0] = numbers[1, 1, 1] = 1e-300
+    numbers[2, 0, 1] = -1.0
+    force = np.array([[0.0, 2.0, 0.0], [0.0, 0.0, -1.0]])
+    terms: Any = SimpleNamespace(blocks=blocks, phi=numbers[0], nu=numbers[1], gamma=numbers[2], force=force)
+    bodies = np.array([[True, True], [True, True], [True, False]])
+    model: Any = SimpleNamespace(structure=SimpleNamespace(of_bodies=bodies))
+    entries, rows, columns = active.patterns(model, terms)
+    assert entries.tolist() == [[True, False], [False, True], [False, False]]
+    assert rows.tolist() == [True, True, False] and columns.tolist() == [False, True, True]
+
+
+def test_numbers_of_the_size_of_rounding_become_zero():
+    """Positions relative to a length of 10 m, Euler parameters to 1, velocities to the largest one."""
+    still = active.STILL
+    q = np.array([[9.9 * still, 10.1 * still, 5.0, 1.0, 0.9 * still, 1.1 * still, -0.9 * still]])
+    v = np.array([[4.0, 3.9 * still, 4.1 * still, -3.9 * still, -3.9 * still, 0.0]])
+    given = np.array([[0.0, 0.0, 0.0, 0.0, 1.0, 0.0]])
+    places, rates = active.without_rounding(q, v, given, np.array([10.0]))
+    assert places.tolist() == [[0.0, 10.1 * still, 5.0, 1.0, 0.0, 1.1 * still, 0.0]]
+    assert rates.tolist() == [[4.0, 0.0, 4.1 * still, 0.0, -3.9 * still, 0.0]]
+    two = (np.vstack([numbers] * 2) for numbers in (q, v, given))
+    both = active.without_rounding(*two, np.array([10.0, 1.0]))
+    assert both[0][1, 0] == 9.9 * still and both[0][0, 0] == 0.0
+
+
+@pytest.mark.parametrize(
+    ("q", "velocities", "found"),
+    [
+        ([0, 0, 0, 1, 0, 0, 0], [0, 2], [0, 2]),
+        ([0, 0, 0, 1, 0, 0, 0], [5], [3, 6]),
+        ([0, 0, 0, 1, 0, 0, 0], [3], [3, 4]),
+        ([0, 0, 0, 1, 0, 0, 0], [4], [3, 5]),
+        ([0, 0, 0, 0, 1, 0, 0], [5], [4, 5]),
+        ([0, 0, 0, 0, 0, 1, 0], [3], [5, 6]),
+        ([0, 0, 0, 0, 0, 0, 1], [4], [4, 6]),
+        ([0, 0, 0, 0.6, 0.8, 0, 0], [3], [3, 4]),
+        ([0, 0, 0, 0.6, 0.8, 0, 0], [5], [3, 4, 5, 6]),
+        ([0, 0, 0, 1, 0, 0, 0], [3, 4], [3, 4, 5, 6]),
+        ([0, 0, 0, 1, 0, 0, 0] * 2, [1, 7, 11], [1, 8, 10, 13]),
+    ],
+)
+def test_coordinates_that_velocities_change(q, velocities, found):
+    """A rotation about axis k mixes the parameters 0 and k, and the two others."""
+    changed = active.active_coordinates(np.array(q, dtype=float), np.array(velocities))
+    assert changed.tolist() == found
+
+
+def test_primitives_that_contain_rows():
+    """Rows 0 to 2 are of primitive 0; primitives 2 and 3 share row 4."""
+    model: Any = SimpleNamespace(structure=SimpleNamespace(row=np.array([0, 3, 4, 4, 5])))
+    assert active.primitives_with(model, np.array([1, 3])).tolist() == [0, 1]
+    assert active.primitives_with(model, np.array([4])).tolist() == [2, 3]
+    assert active.primitives_with(model, np.array([7])).tolist() == [4]
+    assert active.primitives_with(model, np.zeros(0, dtype=int)).tolist() == []
