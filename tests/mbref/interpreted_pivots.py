@@ -20,6 +20,7 @@ if not PLAIN:
 from mbref.kernels.layout import CHANGED, NOT_CONVERGED, OK, SINGULAR, SINGULAR_AHEAD
 from mbref.stabilisation import partitioning
 from mbref.stepping import singular_crossing as crossing
+from mbref.taylor import step_start
 
 
 # --- pivots at both ends of a step ------------------------------------------------------------------------
@@ -311,3 +312,70 @@ def test_rates_of_the_independent_coordinates(parts, solved, accelerated, status
     rates = np.zeros(4)
     assert partitioning.rates.function(0.5, np.array([8.0, 9.0, 10.0, 20.0]), rates, memory) == status
     assert rates.tolist() == ([10.0, 20.0, 4.0, 2.0] if solved == OK else [0.0] * 4)
+
+
+# --- the start of a step ----------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("tolerance", "rank", "parity"), [(0.13, 3, True), (0.15, 2, True), (1.6, 1, False), (4.1, 0, False)]
+)
+def test_the_partition_by_complete_pivoting(monkeypatch, tolerance, rank, parity):
+    """Pivots -4, then 1.5 of the first row, then -0.14 of the last row; each exchange changes the parity."""
+    gradient = np.zeros((3, 8))
+    gradient[:, :4] = [[1.0, 2.0, 0.0, 0.5], [0.1, -4.0, 3.0, 1.0], [0.0, 0.0, 0.2, 0.1]]
+    gradient[:, 5] = 99.0  # no variable
+    solver = SimpleNamespace(
+        pivot_rows=np.array([7, 7, 7]),
+        pivot_columns=np.array([7, 7, 7, 7]),
+        tableau=gradient,
+        row_max=np.zeros(3),
+        left=np.zeros(8),
+    )
+    put: list[int] = []
+    monkeypatch.setattr(step_start, "put_rows", lambda memory: put.append(1))
+    settings = SimpleNamespace(rank_tolerance=tolerance)
+    memory = SimpleNamespace(
+        solver=solver,
+        series=SimpleNamespace(variable=np.array([1.0] * 4 + [0.0] * 4)),
+        partition=SimpleNamespace(partition_id=6, parity=None),
+        run=SimpleNamespace(equations=SimpleNamespace(system=SimpleNamespace(settings=settings))),
+    )
+    assert step_start.choose.function(memory) == rank and memory.partition.parity is parity
+    assert memory.partition.partition_id == 7 and put == [1]
+    if rank >= 2:
+        assert solver.pivot_rows.tolist() == [1, 0, 2] and solver.pivot_columns.tolist() == [1, 2, 0, 3]
+    if rank == 3:
+        assert solver.row_max[2] == pytest.approx(0.14) and solver.row_max[0] == pytest.approx(1.5)
+
+
+def test_the_series_at_the_start_of_a_step_is_saved():
+    terms = np.arange(40.0).reshape(5, 8)
+    size = step_start.TORSION_SERIES
+    torsions = np.arange(2.0 * size * 5).reshape(2 * size, 5)
+    series = SimpleNamespace(
+        terms=terms, past=np.zeros((5, 8)), past_angles=np.full((2, 5), 7.0), torsions=torsions
+    )
+    step = SimpleNamespace(last_order=0, used_order=0, time_to_pole=9.0)
+    step_start.save_series(SimpleNamespace(series=series, step=step, mode=SimpleNamespace(order=3)))
+    assert series.past.tolist() == [*terms[:4].tolist(), [0.0] * 8]
+    for s in range(2):
+        angles = torsions[size * s + step_start.TORSION]
+        assert series.past_angles[s].tolist() == [*angles[:3], 0.0, 7.0]
+    assert (step.last_order, step.used_order, step.time_to_pole) == (3, 3, 0.0)
+
+
+@pytest.mark.parametrize(("chosen", "calls"), [(4, []), (5, ["partition", "pivots"])])
+def test_a_failed_attempt_returns_to_the_start_of_the_step(monkeypatch, chosen, calls):
+    past, terms, found = np.arange(24.0).reshape(3, 8), np.zeros((3, 8)), []
+    memory = SimpleNamespace(
+        series=SimpleNamespace(past=past, terms=terms),
+        step=SimpleNamespace(start_violation=0.0, start_partition_id=4),
+        partition=SimpleNamespace(partition_id=chosen, rank=0),
+        kernels=SimpleNamespace(partition=lambda memory: found.append("partition"), choose=lambda memory: 5),
+    )
+    monkeypatch.setattr(step_start, "violation", lambda memory: 0.25)
+    monkeypatch.setattr(step_start, "save_start_pivots", lambda memory: found.append("pivots"))
+    assert step_start.return_to_start.function(memory) == OK and found == calls
+    assert terms.tolist() == [*past[:2].tolist(), [0.0] * 8] and memory.step.start_violation == 0.25
+    monkeypatch.setattr(step_start, "factorise_anew", lambda memory: found.append("factor"))
+    assert step_start.choose_partition.function(memory) == 5 == memory.partition.rank
+    assert found[-1] == "factor"
