@@ -46,6 +46,7 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
             "interpreted_crossings",
             "interpreted_decisions",
             "interpreted_drivers",
+            "interpreted_loads",
             "interpreted_pivots",
             "interpreted_solutions",
             "test_kernels_by_hand",
