@@ -214,7 +214,7 @@ def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Jud
     when = "do not end within the time limit" if outcomes == {TIMED_OUT} else when
     rows = [g.redundant for g in scenes]
     cause = ""
-    if all(rows):
+    if all(rows) and outcomes != {TIMED_OUT}:
         cause = (
             ", where constraints are redundant"
             if len(rows) > 1 or rows[0] > 1
