@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 from tests.mutants.operators import Mutant
 
@@ -13,6 +14,7 @@ AT_FIRST_CALL = (
 COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
+UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length."
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
@@ -108,6 +110,9 @@ def reason(mutant: Mutant, source: str) -> str:
     """Return why a mutant of a source changes nothing; empty where it does."""
     if mutant.file.startswith("mbref/") and mutant.kind == "argument order" and exchanges_parts(mutant):
         return COMMUTES
+    before = source.encode()[: mutant.start].decode()
+    if re.search(r"reshape\([^()]*-$", before) and (mutant.old, mutant.new) == ("1", "2"):
+        return UNKNOWN_LENGTH
     line = source.splitlines()[mutant.line - 1].strip()
     return REASONS.get((mutant.file, line, mutant.new), "")
 

@@ -11,7 +11,7 @@ import pytest
 
 from tests.mutants import __main__ as runner
 from tests.mutants import drawing, tree, workers
-from tests.mutants.equivalent import COMMUTES, REASONS, reason
+from tests.mutants.equivalent import COMMUTES, REASONS, UNKNOWN_LENGTH, reason
 from tests.mutants.operators import KINDS, Mutant, mutants
 from tests.mutants.reach import Reach, around, lines_of
 
@@ -302,6 +302,12 @@ def test_parts_of_sums_and_products_may_be_exchanged():
         ("cross(b, a)", False),
     ]
     assert not reason(orders[1]._replace(file="crosscheck/a.py"), source)
+
+
+def test_any_negative_length_is_unknown():
+    source = "x = a.reshape(n, -1) + b[-1] + f(-1).reshape(1, 2)\n"
+    found = [m for m in mutants("mbref/a.py", source) if (m.old, m.new) == ("1", "2")]
+    assert [reason(m, source) == UNKNOWN_LENGTH for m in found] == [True, False, False, False]
 
 
 def test_reasons_name_lines_that_are_there():
