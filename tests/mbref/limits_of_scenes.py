@@ -12,7 +12,7 @@ from mbref.equations import branches
 from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene, SceneError, Universal
-from mbref.simulation import comparison, dead_position, outcome, start_run, trial
+from mbref.simulation import comparison, dead_position, outcome, remedies, start_run, trial
 from mbref.stepping.limits import Limits
 from mbref.stepping.ranks import Ranks
 from mbref.taylor import driven, mode, sample_completion, stepper
@@ -337,6 +337,27 @@ def _(monkeypatch):
     monkeypatch.setattr(trial, "KERNELS_OF_SERIES", ())
     run = SimpleNamespace(scene=hinged(), times=None, method=SimpleNamespace(is_series=False))
     return limits_of(monkeypatch, trial, lambda: trial._made(run)).most_steps == 2000
+
+
+def tried_changes(monkeypatch, rtol):
+    """The changes of the limits that are tried where rounding decides the branch at t = 0."""
+    tried = []
+    monkeypatch.setattr(remedies, "passes_with", lambda _, **changes: tried.append(changes) or False)
+    clock = SimpleNamespace(loop=SimpleNamespace(clock=SimpleNamespace(time=0.0)))
+    remedies._of_branch(SimpleNamespace(crossings=(), limits=Limits(rtol=rtol), memory=clock))
+    return tried
+
+
+@check("simulation.remedies FINE")
+def _(monkeypatch):
+    """The tolerance is tried only where it is smaller than the run's."""
+    tried = tried_changes(monkeypatch, 1.02e-13)[0].get("rtol", math.inf)
+    return near(tried, 1e-13) and len(tried_changes(monkeypatch, 0.98e-13)) == 1
+
+
+@check("simulation.remedies OTHER")
+def _(monkeypatch):
+    return tried_changes(monkeypatch, 1e-9)[1] == {"branches": {1: 2}}
 
 
 @check("simulation.dead_position ROUNDED")
