@@ -1,4 +1,4 @@
-"""The coefficients of DOP853 / those of SciPy, and the conditions of their order."""
+"""The coefficients of DOP853 / SciPy's coefficients, and the order conditions."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """C functions on MuJoCo's data, as plain Python on stand-ins for its memory / values worked out by hand.
 
-In place of addresses the context has the arrays themselves, and in place of MuJoCo's functions those of a
-mechanism whose closures are known.
+The context has arrays instead of addresses, and functions of a mechanism whose closures are known instead of
+MuJoCo's functions.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ ROBOT = Scene(
 
 
 class Solver:
-    """A stand-in for IDA: it notes what it is given; ``results`` are those of its steps."""
+    """A stand-in for IDA that records its arguments; its steps return ``results``."""
 
     made: ClassVar[list[Solver]] = []
     results: ClassVar[list[Any]] = []

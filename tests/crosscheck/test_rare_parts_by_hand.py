@@ -89,7 +89,7 @@ def test_the_least_change_by_kinetic_energy():
 
 # --- drivers of MuJoCo ------------------------------------------------------------------------------------
 def test_a_driver_moves_the_reference_of_its_first_row():
-    """Rows 1 and 3 are those of equality 7; 2 t + 3 t² is 1.75 after 0.5 s, with rates 5 and 6."""
+    """Equality 7 has rows 1 and 3; 2 t + 3 t² is 1.75 after 0.5 s, with rates 5 and 6."""
     driver = Driver(joint="A", polynomial=(0.0, 2.0, 3.0))
     data = SimpleNamespace(
         efc_type=np.array([0, 0, 5, 0]),
@@ -149,7 +149,7 @@ def test_frames_by_their_names(frames):
     ],
 )
 def test_texts_of_closures(frames, text, kind, axis):
-    """The axis is that of both frames; that of the site is turned about y."""
+    """Both frames have the joint's axis; the frame of the site is turned about y."""
     [found] = asked_closures.asked([text], frames)
     first, second = found.frames
     assert (found.name, found.type, first.body, second.body) == ("tip=ground", kind, 1, 0)
@@ -208,7 +208,7 @@ def motion(count: int, seconds: float, reason: str = "", contradiction: float = 
 
 
 def planned(monkeypatch, a: list[Any], b: list[Any]) -> list[tuple]:
-    """What the formulations are asked for; each returns the given motions in turn."""
+    """Record the requests to the formulations; each returns the given motions in turn."""
     asked: list[tuple] = []
 
     def of(name: str, motions: list[Any]) -> Any:
@@ -228,7 +228,7 @@ OTHER_A = {"order": reference.SECOND_RUN_ORDER, "seed": reference.SECOND_RUN_SEE
 
 
 def test_both_formulations_run_and_a_runs_twice(monkeypatch):
-    """Of 100 s A has its share, the second run of A that of the rest, and B what is left."""
+    """A gets its share of 100 s, the second run of A its share of the rest, and B what is left."""
     a, again, b = motion(5, 10.0), motion(5, 20.0), motion(5, 1.0)
     asked = planned(monkeypatch, [a, again], [b])
     assert reference.runs(None, np.arange(5.0), 100.0) == (a, again, b)

@@ -129,7 +129,7 @@ PANELS = Panels(DOUBLE, NODES)
 
 
 def test_chebyshev_points_and_their_matrices():
-    """Of T₃ the series is the fourth unit vector; the integral of t³ from -1 is (t⁴ - 1) / 4."""
+    """The coefficients of T₃ are the fourth unit vector; the integral of t³ from -1 is (t⁴ - 1) / 4."""
     places = -np.cos(np.pi * np.arange(NODES) / (NODES - 1))
     assert PANELS.nodes == pytest.approx(places, abs=1e-15)
     third = 4 * places**3 - 3 * places
@@ -194,7 +194,7 @@ def test_factors_on_the_next_panel():
     assert found.settled and found.factor == pytest.approx(0.9 * 1.3) and found.foreseen is None
     assert progress(third, 1e-14, 34).factor == 1.6 and progress(third, 1e-14, 35).factor == 1.0
     assert progress(third, 1e-4, 3) is None, "not settled, and long enough"
-    assert progress(third, 2e-3, 3) is None, "not yet told"
+    assert progress(third, 2e-3, 3) is None, "not yet reported"
     rough = np.sign(x)[:, None]
     short = progress(rough, 1e-4, 3)
     assert not short.settled and short.factor == 0.5 and (short.crossing, short.sweeps) == (None, 0)

@@ -74,7 +74,7 @@ def test_the_start_of_a_changed_scene(relation: str, name: str) -> None:
     if isinstance(changed, Outside):
         pytest.skip(str(changed))
     expected, found = RELATIONS[relation].expect(scene, made), start(changed)
-    if relation == "split":  # the expected motion is that of the whole bodies, from the motion of the halves
+    if relation == "split":  # the whole bodies' motion is expected, computed from the halves
         expected, found = made, RELATIONS[relation].expect(scene, found)
     order = [found.bodies.index(body) for body in expected.bodies]
     for field in FIELDS:
@@ -213,7 +213,7 @@ def test_positions_and_directions_shaken_by_rounding():
 
 
 def test_expected_motions_by_hand():
-    """Four times as large: angular accelerations are a quarter, moments four times those of before."""
+    """Angular accelerations become a quarter, and moments four times as large."""
     still = np.zeros((1, 1, 3))
     made = Trajectory(
         "s",

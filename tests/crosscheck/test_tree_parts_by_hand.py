@@ -123,7 +123,7 @@ def acting(k: int) -> tuple[np.ndarray, np.ndarray]:
     stretching = (pace(1, LOADS[2].points[1]) - pace(0, LOADS[2].points[0])) @ along
     tension = (20.0 * (length - 0.4) + 3.0 * stretching) * along
     pull(tension if k == 0 else -tension, ends[k])
-    # the tree goes from a to b, so that the angle of B is that of a against b about -x of b
+    # the tree goes from a to b, so that angle B is the angle of a against b about -x of b
     spring = -5.0 * (-0.35 - 0.25) - 2.0 * -2.2
     twist = spring * (motion.rotation[1] @ [-1.0, 0.0, 0.0])
     if k == 1:
@@ -148,7 +148,7 @@ def inertial(k: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_reactions_balance_each_body():
-    """Newton's and Euler's equations of b give the reaction at B on it; those of a the one at A."""
+    """The Newton-Euler equations of b give the reaction at B; the equations of a give the one at A."""
     tree = spanning_tree(ROBOT)
     assert [link.body for link in tree.links] == [0, 1] and not tree.closures
     found = joint_reactions(ROBOT, tree, moving(), ())
@@ -268,7 +268,7 @@ def test_joints_in_the_plane_whose_normal_is_z(joint, kind):
     ],
 )
 def test_velocities_within_the_plane(velocity, spin, is_within):
-    """Of a size of 4 m/s or 2 rad/s, a part of 1e-12 may leave the plane."""
+    """Velocities of 4 m/s or 2 rad/s may have a component of 1e-12 of their size off the plane."""
     free = Scene(name="s", body=(body("a", *O, velocity=velocity, angular_velocity=spin),))
     assert planar_scene._starts_within(free, np.array(Z)) is is_within
 
