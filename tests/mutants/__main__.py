@@ -14,9 +14,10 @@ module: each for 5 s of CPU time at most, until a test fails or 20 s are over; o
 not end them. ``--budget 8`` gives them 8 s in all and 2 s each. A test is left out that fails or takes longer
 than a file may without the mutant, too, or that fails only after other tests.
 Results stay in ``build/mutants.jsonl`` as long as the file and its tests are the same, so that an interrupted
-run goes on where it ended. Tests of mbref and of kernels run as plain Python, so that no kernel is compiled
-for a mutant. A mutant that only a test of a stored text sees is counted apart. Exit status 1 where a mutant
-survives, is seen by a stored text alone or runs out of time.
+run goes on where it ended. ``--budget 100`` runs mutants again that survived a smaller budget. Tests of files
+beside kernels run as plain Python, so that no kernel is compiled for a mutant. A mutant that only a test of a
+stored text sees is counted apart. Exit status 1 where a mutant survives, is seen by a stored text alone or
+runs out of time.
 """
 
 from __future__ import annotations
@@ -62,9 +63,13 @@ def key(mutant: Mutant, tests: Iterable[str], root: Path) -> str:
     return hashlib.sha256("\0".join(texts).encode()).hexdigest()[:16]
 
 
-def known(path: Path = KEPT) -> dict[str, str]:
-    """Return the results of runs before, by key."""
-    return {record["key"]: record["result"] for record in _records(path) if "result" in record}
+def known(budget: float, path: Path = KEPT) -> dict[str, str]:
+    """Return the results of runs before, by key; a kill, or what tests with at least that budget found."""
+    return {
+        record["key"]: record["result"]
+        for record in _records(path)
+        if record["result"] == KILLED or record.get("budget", BUDGET) >= budget
+    }
 
 
 def _records(path: Path) -> list[dict[str, Any]]:
@@ -78,7 +83,7 @@ def run(
 
     Test files that run ``alone`` replace the tests that run the mutant's line.
     """
-    found, before, end = {}, known(), time.monotonic() + seconds
+    found, before, end = {}, known(budget), time.monotonic() + seconds
     with closing(Tree(TREE, budget=budget)) as tree:
         if not alone:
             recorded(tree, chosen)
@@ -92,8 +97,8 @@ def run(
                     break
                 before[name], by = tree.result(mutant, tests, not alone)
                 with KEPT.open("a") as file:
-                    record = {"key": name, "result": before[name], "by": by, "mutant": _line(mutant)}
-                    print(json.dumps(record), file=file)
+                    record = {"key": name, "result": before[name], "by": by, "budget": budget}
+                    print(json.dumps({**record, "mutant": _line(mutant)}), file=file)
             found[mutant] = before[name]
             print(f"{k:3} of {len(chosen)}: {found[mutant]:10} {_line(mutant)}  {why or by}", flush=True)
     return found

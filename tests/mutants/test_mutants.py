@@ -264,7 +264,7 @@ def test_a_recording_has_the_lines_of_each_test(copy, tmp_path):
     tests.mkdir(exist_ok=True)
     (tests / "test_wait.py").write_text(TINY["test_wait.py"])
     seen = []
-    copy.record(True, tmp_path / "lines.jsonl", 2, lambda done, total: seen.append((done, total)))
+    copy.record(False, tmp_path / "lines.jsonl", 2, lambda done, total: seen.append((done, total)))
     [record] = [json.loads(line) for line in (tmp_path / "lines.jsonl").read_text().splitlines()]
     assert seen == [(1, 1)] and record["file"] == "tests/test_wait.py"
     assert set(record["seconds"]) == {"tests/test_wait.py::test_wait"}
@@ -275,17 +275,45 @@ def test_a_recording_has_the_lines_of_each_test(copy, tmp_path):
     assert found == {"tests/test_wait.py": ["tests/test_wait.py::test_wait"]}
 
 
-def test_files_with_kernels_run_without_compilation():
+def test_a_test_that_takes_too_long_to_be_recorded_keeps_its_lines(copy, tmp_path, monkeypatch):
+    """``test_forever`` is ended in line 7 of ``wait``; ``test_failing`` fails and keeps none."""
+    (copy.place / "tests").mkdir(exist_ok=True)
+    (copy.place / "tests/test_forever.py").write_text(
+        "from mbref.sums import total, wait\n\n\n"
+        "def test_forever():\n    wait(float('inf'))\n\n\n"
+        "def test_failing():\n    assert total(1, 1) == 3\n"
+    )
+    monkeypatch.setattr(tree, "OF_TEST", 0.2)
+    copy.record(True, tmp_path / "lines.jsonl", 1, lambda done, total: None)
+    records = map(json.loads, (tmp_path / "lines.jsonl").read_text().splitlines())
+    [record] = [record for record in records if record["file"] == "tests/test_forever.py"]
+    [(name, seconds)] = record["seconds"].items()
+    assert name == "tests/test_forever.py::test_forever" and seconds > 0.0
+    assert record["reached"]["mbref/sums.py"]["tests"] == [[f"{1 << 6 | 1 << 7:x}", [name]]]
+
+
+def test_files_beside_kernels_run_without_compilation():
     for file in (
         "mbref/taylor/series.py",
         "mbref/equations/loads.py",
-        "mbref/scene.py",
         "crosscheck/engines/compiled/calls.py",
     ):
         assert tree.is_plain(file, (ROOT / file).read_text()), file
     compiling = ("mbref/kernels/disk_cache.py", "mbref/kernels/named_memory.py")
-    for file in (*compiling, "crosscheck/study/grid.py"):
+    for file in (*compiling, "mbref/scene.py", "mbref/simulation/outcome.py", "crosscheck/study/grid.py"):
         assert not tree.is_plain(file, (ROOT / file).read_text()), file
+
+
+def test_a_larger_budget_runs_survivors_again(tmp_path):
+    """A kill stays a kill."""
+    kept = tmp_path / "mutants.jsonl"
+    assert runner.known(20.0, kept) == {}
+    results = {"a": (runner.KILLED, 20.0), "b": (runner.SURVIVED, 20.0), "c": (runner.TIMED_OUT, 100.0)}
+    lines = [json.dumps({"key": k, "result": r, "budget": b}) for k, (r, b) in results.items()]
+    kept.write_text("\n".join(lines))
+    assert runner.known(20.0, kept) == {k: result for k, (result, _) in results.items()}
+    assert runner.known(100.0, kept) == {"a": runner.KILLED, "c": runner.TIMED_OUT}
+    assert runner.known(101.0, kept) == {"a": runner.KILLED}
 
 
 def test_the_score_counts_no_equivalent_mutant_and_no_time_out():

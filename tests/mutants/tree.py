@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from mbref.kernels.compilation import WITH_KERNELS
 from tests.mutants.operators import Mutant
 from tests.mutants.reach import SNAPSHOTS, Reach
 
@@ -32,6 +33,7 @@ BUDGET = 20.0  # CPU s of all files of a mutant, after which no test begins
 OF_FILE, LIMIT = 1 / 4, 3 / 2
 WAITING = 50.0  # wall time / CPU time, after which tests wait for something that does not come
 OF_TEST, OF_RECORDED = 3.0, 20.0  # CPU s of a test and of the tests of a file that are recorded
+KERNELS = tuple(f"mbref/{folder}/" for folder in WITH_KERNELS)
 COMPILING = (  # plain Python does not run them
     "mbref/kernels/compilation.py",
     "mbref/kernels/disk_cache.py",
@@ -223,6 +225,7 @@ def end(worker: subprocess.Popen[str]) -> None:
 
 
 def is_plain(file: str, source: str) -> bool:
-    """Return whether the tests of a file run without compilation: of mbref, and where it has kernels."""
-    has_kernels = file.startswith("mbref/") or re.search(r"^(from|import) numba\b", source, re.MULTILINE)
-    return bool(has_kernels) and file not in COMPILING
+    """Return whether the tests of a file run without compilation: where its change would compile kernels
+    anew."""
+    has_kernels = re.search(r"^(from|import) numba\b", source, re.MULTILINE)
+    return bool(has_kernels or file.startswith(KERNELS)) and file not in COMPILING

@@ -11,9 +11,9 @@ up), ``failed`` (the id of the test that failed first, or the file that could no
 (whether no test ran before it) and ``ended`` (the ids of tests that took too long).
 
 A request with ``packages``, names of folders, records one test file: the answer has ``starting`` (CPU s until
-its first test), ``seconds`` (CPU s of each test that passes) and ``reached``: by source file, the lines that
-these tests run, as pairs of a number whose bits are lines and the tests that run just these, and the lines
-that run outside of tests, at imports and in fixtures.
+its first test), ``seconds`` (CPU s of each test that passes or that ``of_test`` ends) and ``reached``: by
+source file, the lines that these tests run, as pairs of a number whose bits are lines and the tests that run
+just these, and the lines that run outside of tests, at imports and in fixtures.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ class Session:
 
 
 class Recording:
-    """A pytest plugin that notes the time of each test that passes, and has its lines counted for it."""
+    """A pytest plugin that notes the time of each test, and counts its lines."""
 
     def __init__(self, lines: coverage.Coverage, of_test: float, of_file: float) -> None:
         self._lines, self._of_test, self._of_file, self._end = lines, of_test, of_file, 0.0
@@ -124,12 +124,13 @@ class Recording:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_call(self, item: pytest.Item) -> Iterator[None]:
-        """Count the lines of a test for it, and its time; one that takes too long counts as failed."""
+        """Count the lines of a test for it, and its time; one that takes too long is ended."""
 
         def end(signum: int, frame: FrameType | None) -> None:
             if _is_counting(frame):  # it may hold a lock
                 signal.setitimer(signal.ITIMER_PROF, AGAIN)
             else:
+                self.seconds[item.nodeid] = _cpu() - begun
                 raise TimeoutError(item.nodeid)
 
         signal.signal(signal.SIGPROF, end)
@@ -218,15 +219,16 @@ def recorded(request: dict[str, Any]) -> dict[str, Any]:
     return {"starting": session.starting, "seconds": session.seconds, "reached": reached}
 
 
-def _by_lines(tests: Mapping[int, Sequence[str]], passed: Collection[str]) -> dict[str, Any]:
-    """Return the lines that tests run and those that run outside of them, from the tests of each line."""
+def _by_lines(tests: Mapping[int, Sequence[str]], timed: Collection[str]) -> dict[str, Any]:
+    """Return the lines that timed tests run and the lines that run outside of tests, from the tests of each
+    line."""
     bits: dict[str, int] = {}
     for line, names in tests.items():
         for name in names:
             bits[name] = bits.get(name, 0) | 1 << line
     outside = bits.pop("", 0)
     alike: dict[int, list[str]] = {}
-    for name in sorted(bits.keys() & set(passed)):
+    for name in sorted(bits.keys() & set(timed)):
         alike.setdefault(bits[name], []).append(name)
     return {"outside": f"{outside:x}", "tests": [[f"{lines:x}", names] for lines, names in alike.items()]}
 
