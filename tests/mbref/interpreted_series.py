@@ -1,0 +1,470 @@
+"""The series of a small system, with interpreted kernels / its equations solved densely, and by convolutions.
+
+Three variables x, y, z have the rows ½ (x² + y² - 1) + ¼ z and x y + z² / 2 - z / 3 - ⅙, a mass matrix
+without zeros, a constant force and a force that is linear in the variables.
+``test_thresholds.py`` runs this file in a process whose kernels are interpreted, so that nothing is compiled.
+"""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.kernels.compilation import PLAIN
+
+if not PLAIN:
+    pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
+
+from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
+from mbref.taylor import correction, partition, polynomials, series, solver, step_start
+from mbref.taylor.crossing import determinants, uniqueness
+from mbref.taylor.expressions import ONE
+from mbref.taylor.numbers import OneScene
+from mbref.taylor.polynomial_layout import Inertia
+
+NZ, LANES, LAST = 3, 8, 5
+CIRCLE = {(ONE, ONE): -0.5, (0, 0): 0.5, (1, 1): 0.5, (ONE, 2): 0.25}
+SADDLE = {(ONE, ONE): -1 / 6, (0, 1): 1.0, (2, 2): 0.5, (ONE, 2): -1 / 3}
+PLANE = {(ONE, ONE): -1.0, (ONE, 0): 2.0, (ONE, 2): -1.0}
+MASS = np.array([[2.0, 0.3, 0.1], [0.3, 1.5, -0.2], [0.1, -0.2, 1.0]])
+FORCE, LINEAR = np.array([0.4, -0.7, 0.2]), np.array([[0.1, 0.0, 0.3], [0.0, -0.2, 0.0], [0.5, 0.6, 0.0]])
+PLACE, RATE = np.array([0.6, 0.7, 0.5]), np.array([0.3, -0.4, 0.8])
+
+
+def system(
+    rows: list[Any], given: Any = (), driven: bool = False, mass: np.ndarray = MASS, **more: Any
+) -> Any:
+    """Memory of a system with the variables 0, 1, 2; prescribed functions have the next numbers."""
+    nr, kept = len(rows), [0, 1, 2]
+    of = SimpleNamespace(
+        rows=rows, kept=kept, given={v: (0, 0) for v in given}, driven=driven, numbers=OneScene()
+    )
+    lane = {0: 0, 1: 1, 2: 2} | {v: NZ + nr + g for g, v in enumerate(given)}
+    table, products = polynomials._rows(of, lane, LANES), polynomials._products(of, lane, LANES)
+    linear, place = polynomials._tableau(table, NZ, nr, LANES)
+    terms: Any = [[(j, 3 * i + j) for j in range(3) if LINEAR[i, j]] for i in range(3)] + [[]] * 5
+    slots, start = polynomials._slots(terms, (0, 9))
+    weights = np.append(LINEAR.ravel(), 0.0)
+    coupled = np.nonzero(mass)
+    inertia = Inertia(
+        np.pad(mass, ((0, 0), (0, LANES - NZ))),
+        coupled[1],
+        np.searchsorted(coupled[0], np.arange(NZ + 1)),
+        np.pad(FORCE, (0, LANES - NZ)),
+        np.array([j for j, _ in slots]),
+        weights[[k for _, k in slots]],
+        start,
+    )
+    grown = np.arange(1.0, LAST + 2) * np.arange(2.0, LAST + 3)
+    scale, growth = np.zeros((LAST + 1, LANES)), np.ones((LAST + 1, LANES))
+    scale[:, :NZ], scale[:, NZ : NZ + nr], growth[:, NZ : NZ + nr] = -1 / grown[:, None], -1.0, grown[:, None]
+    variable = np.array([1.0] * NZ + [0.0] * (LANES - NZ))
+    size = (LAST + 3, LANES)
+    memory = SimpleNamespace(
+        polynomials=SimpleNamespace(
+            rows=table,
+            products=products,
+            inertia=inertia,
+            given=SimpleNamespace(driver=np.zeros(len(of.given), int)),
+            torsions=SimpleNamespace(row=np.zeros(0, int)),
+        ),
+        series=SimpleNamespace(
+            terms=np.zeros(size),
+            past=np.zeros(size),
+            left=np.zeros((LAST + 3, products.left.size)),
+            right=np.zeros((LAST + 3, products.left.size)),
+            sums=np.full((LAST + 1, LANES), 9.0),
+            scale=scale,
+            growth=growth,
+            variable=variable,
+        ),
+        solver=SimpleNamespace(
+            pivot_rows=np.arange(nr),
+            pivot_columns=np.arange(NZ),
+            work=np.full((nr, NZ), 9.0),
+            left=np.zeros(LANES),
+            row_max=np.zeros(nr),
+            first=np.zeros(NZ),
+            last=np.zeros(NZ),
+            past=np.zeros(NZ),
+            past_motion=np.zeros(NZ),
+            place=place,
+            linear=linear,
+            tableau=np.full((nr + 1, LANES), 9.0),
+            null_space=np.zeros((NZ, LANES)),
+            **{name: np.full((NZ, LANES), 9.0) for name in ("particular", "momentum", "forces")},
+            reduced=np.full((NZ, NZ), 9.0),
+            response=np.zeros((LANES, LANES)),
+            **{name: np.zeros(LANES) for name in ("rhs", "phi", "change")},
+        ),
+        partition=SimpleNamespace(rank=0, partition_id=4, parity=7, replaced_pivot=0.0),
+        step=SimpleNamespace(
+            start_partition_id=5, start_parity=0, start_pivot=0.0, violation=9.0, correction=9.0
+        ),
+        progress=SimpleNamespace(largest_pivot=0.1),
+        mode=SimpleNamespace(order=LAST + 2, tolerance=1e-10),
+        code=SimpleNamespace(violation=0, close=0, close_rate=0, factorise=0, rank=-1),
+        run=SimpleNamespace(
+            equations=SimpleNamespace(
+                system=SimpleNamespace(
+                    counts=SimpleNamespace(factorisations=0), settings=SimpleNamespace(rank_tolerance=1e-9)
+                )
+            )
+        ),
+        kernels=SimpleNamespace(choose=step_start.choose.function, respond=solver.respond_in_loops.function),
+    )
+    memory.series.terms[0, :NZ], memory.series.terms[1, :NZ] = PLACE, RATE
+    for name, value in more.items():
+        setattr(memory.code, name, value)
+    return memory
+
+
+def values(rows: list[Any], place: np.ndarray) -> np.ndarray:
+    """Φ of the rows, by their polynomials."""
+    at = {ONE: 1.0, **dict(enumerate(place))}
+    return np.array([sum(c * at[i] * at[j] for (i, j), c in row.items()) for row in rows])
+
+
+def gradient(rows: list[Any], place: np.ndarray, count: int = NZ) -> np.ndarray:
+    """G of the rows, by differences of polynomials of second degree, which have no error but rounding."""
+    steps = np.eye(place.size)[:count]
+    return np.array([(values(rows, place + e) - values(rows, place - e)) / 2 for e in steps]).T
+
+
+def dense(rows: np.ndarray, mass: np.ndarray = MASS) -> np.ndarray:
+    """The inverse of [[M, Gᵀ], [G, 0]]."""
+    corner = np.zeros((len(rows), len(rows)))
+    return np.linalg.inv(np.block([[mass, rows.T], [rows, corner]]))
+
+
+def respond(memory: Any) -> np.ndarray:
+    assert step_start.choose_partition.function(memory) == memory.partition.rank
+    return memory.solver.response
+
+
+@pytest.mark.parametrize("rows", [[CIRCLE], [CIRCLE, SADDLE], [SADDLE, CIRCLE], [PLANE, SADDLE]])
+def test_the_response_is_the_inverse_of_the_equations(rows):
+    memory = system(rows)
+    response, count = respond(memory), NZ + len(rows)
+    assert memory.partition.rank == len(rows) and memory.partition.partition_id == 5
+    assert response[:count, :count] == pytest.approx(dense(gradient(rows, PLACE)), abs=1e-11)
+    assert not response[:count, count:].any()
+    assert (memory.solver.first > 0).all() and (memory.solver.first == abs(memory.solver.last)).all()
+
+
+def test_the_response_with_a_dependent_row():
+    """The second row is twice the first: it has no multiplier."""
+    twice = {key: 2.0 * c for key, c in SADDLE.items()}
+    memory = system([SADDLE, CIRCLE, twice])
+    response = respond(memory)
+    assert memory.partition.rank == 2 and sorted(memory.solver.pivot_rows[:2]) == [1, 2]
+    lanes = [0, 1, 2, 4, 5]
+    expected = dense(gradient([CIRCLE, twice], PLACE))
+    assert response[np.ix_(lanes, lanes)] == pytest.approx(expected, abs=1e-11)
+    assert not response[3].any() and not response[:, 3].any()
+
+
+def test_the_response_without_freedom_is_the_inverse_of_the_gradient():
+    rows = [CIRCLE, SADDLE, PLANE]
+    memory = system(rows)
+    response = respond(memory)
+    inverse = response[NZ:6, :NZ].T
+    assert inverse == pytest.approx(np.linalg.inv(gradient(rows, PLACE)), abs=1e-13)
+    assert not response[:NZ].any() and not response[:, NZ:].any()
+
+
+def test_prescribed_functions_move_their_rows():
+    """Lane 5 is a function that enters one row linearly, the other in a product with x."""
+    driven = {**SADDLE, (0, 3): -2.0}
+    rows = [{**PLANE, (ONE, 3): 0.5}, driven]
+    memory = system(rows, given=(3,))
+    memory.series.terms[0, 5] = 0.9
+    respond(memory)
+    memory.run.equations.system.counts.factorisations = 2
+    assert solver.factorise_equations(memory) == OK and memory.run.equations.system.counts.factorisations == 3
+    found, place = memory.solver.response, np.append(PLACE, 0.9)
+    inverse, along = dense(gradient(rows, place)), gradient(rows, place, 4)[:, 3]
+    assert found[:5, :5] == pytest.approx(inverse, abs=1e-13) and not found[:5, 5:].any()
+    assert found[5, :5] == pytest.approx(-along @ inverse[NZ:], abs=1e-13)
+    assert found[5, 5:].tolist() == [1.0, 0.0, 0.0]
+
+
+def test_pivots_are_chosen_by_the_largest_entries():
+    """G is [[0, 0, ¼], [2, 0, -1]] at the origin: 2 first, then ¼; rows are exchanged, and two columns."""
+    memory = system([CIRCLE, PLANE])
+    memory.series.terms[:] = 0.0
+    assert respond(memory) is memory.solver.response and memory.partition.rank == 2
+    assert memory.solver.pivot_rows.tolist() == [1, 0] and memory.solver.pivot_columns.tolist() == [0, 2, 1]
+    assert memory.solver.last[:2].tolist() == [2.0, 0.25] and memory.partition.parity == 0
+    memory.run.equations.system.settings.rank_tolerance = 0.25
+    assert step_start.choose.function(memory) == 1 and memory.partition.parity == 1
+    memory.series.terms[0, :NZ] = [0.0, 4.0, 0.0]
+    assert step_start.choose.function(memory) == 2
+    assert memory.solver.pivot_rows.tolist() == [0, 1] and memory.solver.pivot_columns.tolist() == [1, 0, 2]
+    assert memory.partition.parity == 1 and memory.partition.partition_id == 7
+
+
+@pytest.mark.parametrize("change", [0.0, 0.49, 0.51])
+def test_small_pivots_choose_rows_and_variables_anew(change):
+    """Pivots below half of the first ones; the partition's number counts the choices."""
+    memory = system([CIRCLE, SADDLE])
+    respond(memory)
+    memory.solver.past[:] = memory.solver.last
+    smallest, first = np.abs(memory.solver.last[:2]).min(), memory.solver.first.copy()
+    memory.solver.first[:] = abs(memory.solver.last) * (1.0 if change == 0.0 else 1.0 / change)
+    assert solver.factorise_equations(memory) == OK
+    assert memory.partition.partition_id == (6 if change == 0.49 else 5)
+    assert memory.partition.replaced_pivot == (smallest if change == 0.49 else 0.0)
+    if change == 0.49:
+        assert memory.solver.first == pytest.approx(first, rel=1e-14)
+
+
+def test_pivots_at_half_of_the_first_ones_are_not_sharp():
+    numbers = SimpleNamespace(first=np.array([1.0, 2.0]), last=np.array([-0.5001, 1.0001]))
+    assert solver.is_sharp(numbers)
+    numbers.last[1] = 1.0
+    assert not solver.is_sharp(numbers)
+    numbers.last[:] = np.nan, 2.0
+    assert not solver.is_sharp(numbers)
+
+
+def test_a_rank_that_changes_is_singular():
+    memory = system([CIRCLE, SADDLE])
+    respond(memory)
+    memory.series.terms[:] = 0.0
+    memory.series.terms[0, 2] = 1 / 3
+    assert solver.factorise_equations(memory) == SINGULAR
+
+
+@pytest.mark.parametrize(
+    ("part", "status"), [(0.99, SINGULAR), (1.0, SINGULAR), (1.01, OK), (-5.0, SINGULAR)]
+)
+def test_motions_without_inertia(part, status):
+    memory = system([CIRCLE], mass=np.diag([1.0, 4.0, 2.0]))
+    memory.partition.rank = 1
+    memory.solver.first[:] = 0.0, part * 4e-13, 1.0
+    assert solver.inertia_left(memory) == status
+    memory.solver.first[:] = 0.0, 1.0, part * 4e-13
+    assert solver.inertia_left(memory) == status
+
+
+def test_the_inverse_of_a_pivot():
+    assert [solver.inverse_or_zero(p) for p in (4.0, -0.5, 0.0)] == [0.25, -2.0, 0.0]
+
+
+def test_the_solution_adds_every_row_of_the_response():
+    memory = system([CIRCLE])
+    memory.solver.response[:] = np.cos(np.arange(64.0)).reshape(8, 8)
+    memory.solver.rhs[:] = np.sin(1 + np.arange(8.0))
+    assert solver.solution(memory.solver, 0) == pytest.approx(memory.solver.rhs @ memory.solver.response)
+    wide = SimpleNamespace(response=np.cos(np.arange(256.0)).reshape(16, 16), rhs=np.sin(2 + np.arange(16.0)))
+    assert solver.solution(wide, 8) == pytest.approx((wide.rhs @ wide.response)[8:])
+
+
+# --- violations and corrections -----------------------------------------------------------------------------
+def test_violations_of_rows_and_of_their_rates():
+    rows = [CIRCLE, {**SADDLE, (0, 3): -2.0, (ONE, 3): 0.75}]
+    memory = system(rows, given=(3,))
+    memory.series.terms[0, 5], memory.series.terms[1, 5] = 0.9, -0.2
+    expected = values(rows, np.append(PLACE, 0.9))
+    assert correction.violation(memory) == pytest.approx(abs(expected).max(), rel=1e-14)
+    assert memory.solver.phi[NZ:5] == pytest.approx(expected, abs=1e-15)
+    correction.violation_rate_in_loops(memory)
+    rate = gradient(rows, np.append(PLACE, 0.9), 4) @ [*RATE, -0.2]
+    assert memory.solver.phi[NZ:5] == pytest.approx(rate, abs=1e-15)
+    assert not memory.solver.phi[:NZ].any() and not memory.solver.phi[5:].any()
+
+
+@pytest.mark.parametrize("order", [0, 1])
+def test_the_least_change_that_removes_a_violation(order):
+    memory = system([CIRCLE, SADDLE])
+    respond(memory)
+    memory.solver.phi[NZ:5] = 0.02, -0.03
+    before = memory.series.terms.copy()
+    correction.subtract_violation(order, memory)
+    expected = -dense(gradient([CIRCLE, SADDLE], PLACE))[:NZ, NZ:] @ [0.02, -0.03]
+    assert memory.solver.change[:NZ] == pytest.approx(expected, abs=1e-15)
+    assert (memory.series.terms - before)[order, :NZ] == pytest.approx(expected, abs=1e-15)
+    assert not (memory.series.terms - before)[1 - order].any() and not memory.solver.change[NZ:].any()
+    assert correction.largest_change(memory) == pytest.approx(abs(expected).max(), rel=1e-14)
+
+
+def test_a_corrected_state_satisfies_rows_and_rates():
+    rows = [CIRCLE, SADDLE]
+    memory = system(rows)
+    respond(memory)
+    first = abs(values(rows, PLACE)).max()
+    assert correction.correct_state.function(memory) == OK and memory.step.violation == pytest.approx(first)
+    place, rate = memory.series.terms[:2, :NZ]
+    assert abs(values(rows, place)).max() < 1e-12 and abs(gradient(rows, place) @ rate).max() < 1e-9
+    assert 0.0 < memory.step.correction < 1e-6
+    along = np.linalg.solve(MASS, gradient(rows, place).T)
+    assert rate - RATE == pytest.approx(along @ np.linalg.lstsq(along, rate - RATE, rcond=None)[0], abs=1e-9)
+
+
+def test_corrections_that_never_meet():
+    """x² + y² = -1 has no solution; eight corrections, or as many factorisations, are made."""
+    memory = system([{(ONE, ONE): 0.5, (0, 0): 0.5, (1, 1): 0.5}])
+    respond(memory)
+    assert correction.correct_state.function(memory) == NOT_CONVERGED
+    assert memory.run.equations.system.counts.factorisations == correction.MAX_CORRECTIONS == 8
+
+
+@pytest.mark.parametrize(
+    ("left", "change", "pivot", "changes"),
+    [
+        (0.99e-4, 0.0, -0.1, False),
+        (1.01e-4, 0.0, 0.1, True),
+        (1e-4, 0.99e-3, 0.2, False),
+        (1e-4, 1.01e-3, 0.2, True),
+        (3.99e-4, 0.0, 0.2, False),
+        (4.01e-4, 0.0, -0.2, True),
+    ],
+)
+def test_corrections_that_change_the_factor(left, change, pivot, changes):
+    """A tolerance of 0.01: Φ over 0.01 pivot², or the square of the change over 0.01 Φ."""
+    memory = system([CIRCLE])
+    memory.mode.tolerance, memory.step.correction, memory.partition.rank = 1e-2, change, 1
+    memory.solver.last[0] = pivot
+    assert bool(correction.changes_factor(left, memory)) is changes
+
+
+# --- orders -------------------------------------------------------------------------------------------------
+def consistent(rows: list[Any], **more: Any) -> Any:
+    memory = system(rows, **more)
+    respond(memory)
+    for _ in range(3):
+        assert correction.correct_state.function(memory) == OK
+    return memory
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.convolve(a, b)[: a.size]
+
+
+@pytest.mark.parametrize("rows", [[CIRCLE], [CIRCLE, SADDLE], [SADDLE, PLANE]])
+def test_orders_of_a_motion_satisfy_its_equations(rows):
+    """Φ(z(t)) = 0 and M z'' + Gᵀ λ = f + L z, order by order; multipliers stand two orders later."""
+    memory = consistent(rows)
+    series.start_sums(memory)
+    series.expand_without_loads(LAST, memory)
+    z, multipliers = memory.series.terms[:, :NZ].T, memory.series.terms[2:, NZ : NZ + len(rows)].T
+    one = np.eye(1, z.shape[1])[0]
+    at = {ONE: one, **dict(enumerate(z))}
+    off = [sum(c * product(at[i], at[j]) for (i, j), c in row.items()) for row in rows]
+    assert np.abs(off).max() < 1e-11
+    orders = np.arange(LAST + 1)
+    force = FORCE[:, None] * one[: LAST + 1] + LINEAR @ z[:, : LAST + 1]
+    inertia = MASS @ (z[:, 2:] * (orders + 1) * (orders + 2))
+    for row, of_row in zip(rows, multipliers, strict=True):
+        for (i, j), c in row.items():
+            for one_factor, other in ((i, j), (j, i)):
+                if one_factor != ONE:
+                    inertia[one_factor] += c * product(at[other][: LAST + 1], of_row)
+    assert inertia == pytest.approx(force, abs=1e-9) and np.abs(multipliers).min() > 1e-6
+    assert not memory.series.terms[:, NZ + len(rows) :].any()
+
+
+def test_orders_of_a_driven_motion():
+    """The third row drives x with -0.3 + 0.3 t + 0.2 t² - 0.1 t³; the rows determine all orders."""
+    rows = [CIRCLE, SADDLE, {(ONE, 0): 1.0, (ONE, 3): -1.0}]
+    memory = system(rows, given=(3,), driven=True)
+    memory.series.terms[0, :NZ], memory.series.terms[:4, 6] = (-0.3, 0.55, 1.2), (-0.3, 0.3, 0.2, -0.1)
+    respond(memory)
+    for _ in range(3):
+        assert correction.correct_state.function(memory) == OK
+    series.start_sums(memory)
+    series.expand_without_loads(LAST, memory)
+    at = {
+        ONE: np.eye(1, LAST + 3)[0],
+        **dict(enumerate(memory.series.terms[:, :NZ].T)),
+        3: memory.series.terms[:, 6],
+    }
+    off = [sum(c * product(at[i], at[j]) for (i, j), c in row.items()) for row in rows]
+    assert np.abs(off).max() < 1e-10 and memory.series.terms[:, 0] == pytest.approx(
+        [-0.3, 0.3, 0.2, -0.1, 0, 0, 0, 0], abs=1e-12
+    )
+
+
+def test_slowest_motions_and_starts_at_rest():
+    memory = SimpleNamespace(
+        step=SimpleNamespace(deceleration=4.0),
+        run=SimpleNamespace(loop=SimpleNamespace(clock=SimpleNamespace(length=0.0))),
+        series=SimpleNamespace(terms=np.zeros((2, 8))),
+        solver=SimpleNamespace(pivot_columns=np.zeros(2)),
+    )
+    assert not series.turns_back_in(0.5, memory) and series.turns_back_in(0.51, memory)
+    memory.step.deceleration = np.nan
+    assert series.turns_back_in(0.1, memory)
+    memory.series.terms[1, 2] = memory.series.terms[0, 0] = 1.0
+    assert series.starts_at_rest(memory)
+    memory.series.terms[1, 1] = -1e-9
+    assert not series.starts_at_rest(memory)
+    memory.series.terms[1, 1], memory.run.loop.clock.length = 0.0, 0.1
+    assert not series.starts_at_rest(memory)
+
+
+# --- gradients ----------------------------------------------------------------------------------------------
+def test_gradients_at_other_variables(monkeypatch):
+    """The function of lane 5 is no variable: its column is left out; angles are added at the end."""
+    rows = [{**CIRCLE, (ONE, 3): 0.5}, {**SADDLE, (1, 3): -2.0}]
+    memory, added = system(rows, given=(3,)), []
+    monkeypatch.setattr(determinants, "add_angle_gradients", lambda *found: added.append(found))
+    at = np.zeros((1, LANES))
+    at[0, :NZ], at[0, 5] = PLACE[::-1], 0.8
+    assert determinants.evaluate_gradient.function(at, memory) == OK
+    assert memory.solver.work == pytest.approx(gradient(rows, np.append(PLACE[::-1], 0.8)), abs=1e-15)
+    assert [found[1] is memory.solver.work for found in added] == [True]
+
+
+def test_the_tableau_has_ones_for_the_multipliers():
+    rows = [CIRCLE, {**SADDLE, (1, 3): -2.0}]
+    memory = system(rows, given=(3,))
+    memory.series.terms[0, 5] = 0.8
+    partition.put_rows(memory)
+    expected = np.hstack([gradient(rows, np.append(PLACE, 0.8)), np.eye(2), np.zeros((2, 3))])
+    assert memory.solver.tableau[:2] == pytest.approx(expected, abs=1e-15)
+
+
+def test_pivots_at_the_start_of_a_step():
+    memory = system([CIRCLE, SADDLE])
+    memory.partition.rank, memory.partition.parity = 2, 1
+    memory.solver.last[:] = -0.3, 0.2, 0.05
+    memory.solver.null_space[0, :NZ] = 1.0, -2.0, 3.0
+    partition.save_start_pivots(memory)
+    assert memory.solver.past.tolist() == [-0.3, 0.2, 0.05]
+    assert memory.solver.past_motion.tolist() == [1.0, -2.0, 3.0]
+    assert (
+        vars(memory.step).items() >= {"start_partition_id": 4, "start_parity": 1, "start_pivot": 0.2}.items()
+    )
+    assert memory.progress.largest_pivot == 0.2 and partition.freedoms(memory) == 1
+    memory.progress.largest_pivot = 0.7
+    partition.save_start_pivots(memory)
+    assert memory.progress.largest_pivot == 0.7
+    memory.solver.last[:] = -0.3, -0.2, 0.05
+    partition.save_replaced_pivot(memory)
+    assert memory.partition.replaced_pivot == -np.inf
+    memory.solver.last[:] = -0.1, 0.15, -9.0
+    partition.save_replaced_pivot(memory)
+    assert memory.partition.replaced_pivot == 0.1
+    assert partition.replaced_pivot(memory) == -np.inf
+    memory.partition.partition_id = 5
+    assert partition.replaced_pivot(memory) == 0.1
+    memory.partition.partition_id = 6
+    assert partition.replaced_pivot(memory) == -np.inf
+
+
+def test_rows_below_a_pivot_are_eliminated():
+    work = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [0.0, 8.0, 9.0], [2.0, 0.0, 1.0]])
+    partition.eliminate_below(work, np.array([2, 1, 3, 0]), np.array([1, 2, 0]), 1)
+    assert work[[2, 1]].tolist() == [[0.0, 8.0, 9.0], [4.0, 5.0, 6.0]]
+    assert work[3].tolist() == pytest.approx([2 - 4 / 6, 0.0, 0.0])
+    assert work[0].tolist() == pytest.approx([1 - 4 * 0.5, 2.0, 0.0])
+
+
+def test_twice_the_kinetic_energy():
+    memory = system([CIRCLE])
+    assert uniqueness.kinetic_energy(memory.series.terms, memory) == pytest.approx(RATE @ MASS @ RATE)
