@@ -120,7 +120,7 @@ class Poses:
         """Return the least change (nv,), weighted with the masses, that closes the linearised loops."""
         free = [k for k in range(self.model.nv) if k not in held]
         mass = self.mass()[np.ix_(free, free)]
-        root = np.linalg.cholesky(mass + 1e-9 * np.trace(mass) / len(free) * np.eye(len(free)))
+        root = np.linalg.cholesky(mass + 1e-9 * np.trace(mass) / self.model.nv * np.eye(len(free)))
         weighted = np.linalg.solve(root, rows[:, free].T).T
         step = np.zeros(self.model.nv)
         step[free] = np.linalg.solve(root.T, -np.linalg.pinv(weighted, rcond=RANK) @ r)
