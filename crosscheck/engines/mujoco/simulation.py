@@ -136,13 +136,14 @@ class Simulation:
 
     def advance(self, t0: float, t1: float) -> None:
         """Move the data from t0 to t1, with pieces of functions of time in turn; raises Failed."""
+        t = t0
         try:
-            while t0 < t1:
-                self.since, stop = t0, min(t1, next_end(self.scene, t0))
-                self.step(t0, stop)
-                t0 = self.since = self.data.time = stop
+            while t < t1:
+                self.since, stop = t, min(t1, next_end(self.scene, t))
+                self.step(t, stop)
+                t = self.since = self.data.time = stop
         except self.mujoco.FatalError as error:
-            raise Failed(Outcome.STEP_FAILED, t0, f"MuJoCo stopped after {t0:.6g} s: {error}") from error
+            raise Failed(Outcome.STEP_FAILED, t, f"MuJoCo stopped after {t:.6g} s: {error}") from error
         self.data.time = t1
         if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
             message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
