@@ -15,6 +15,7 @@ COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
 UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length."
+ALIKE = "The comparison treats both arrays alike."
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
@@ -38,9 +39,14 @@ REASONS: dict[tuple[str, str, str], str] = {
     ): "One panel more is integrated where a panel ends at a full turn; the motion is the same.",
     (
         "crosscheck/engines/mujoco/importing/agreement.py",
-        'self._same(ours, data.qfrc_bias - data.qfrc_passive, "bias forces")',
-        "self._same(data.qfrc_bias - data.qfrc_passive, ours, 'bias forces')",
-    ): "The comparison treats both arrays alike.",
+        'self._same(twists.T @ forces, data.qfrc_bias - data.qfrc_passive, "bias forces", largest)',
+        "self._same(data.qfrc_bias - data.qfrc_passive, twists.T @ forces, 'bias forces', largest)",
+    ): ALIKE,
+    (
+        "crosscheck/engines/mujoco/importing/agreement.py",
+        'self._same(ours, self.poses.mass(), "mass matrix")',
+        "self._same(self.poses.mass(), ours, 'mass matrix')",
+    ): ALIKE,
     (
         "crosscheck/judge/reference/natural_joints.py",
         "on_axis, on_apart = (convolved(force[:, None], v, k) for v in (self._apart, self._axis))",
