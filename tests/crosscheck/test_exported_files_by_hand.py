@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engines.mujoco import original, projection, writing
-from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
+from crosscheck.engines.mujoco.families import MAX_STEPS
 from crosscheck.engines.mujoco.importing import agreement, asked_closures, reading
 from crosscheck.engines.mujoco.importing.closures import Closure, Frame
 from crosscheck.engines.mujoco.importing.groups import Groups
@@ -378,6 +378,86 @@ def test_weight_and_springs_of_massless_bodies() -> None:
     assert not agreement._masses(given, pose[1])[6:9].any()
 
 
+class Posed:
+    """Poses that can or cannot be closed."""
+
+    def __init__(self, closes: bool, extent: float = 1.0) -> None:
+        self.data: Any = SimpleNamespace(qpos=np.array([5.0, 6.0]))
+        self.extent, self.closes, self.places = extent, closes, 0
+
+    def place(self) -> None:
+        self.places += 1
+
+    def close(self) -> None:
+        if not self.closes:
+            raise SceneError(["open"])
+
+
+def comparison(poses: Posed, steps: list[np.ndarray]) -> agreement.Agreement:
+    found: Any = object.__new__(agreement.Agreement)
+    found.poses, found.model = poses, SimpleNamespace(nv=2)
+
+    def integrate(model: Any, qpos: np.ndarray, step: np.ndarray, dt: float) -> None:
+        steps.append(step.copy())
+        assert qpos.tolist() == [5.0, 6.0] and dt == 1.0
+        qpos += step
+
+    found.mujoco = SimpleNamespace(mj_integratePos=integrate)
+    return found
+
+
+@pytest.mark.parametrize(("extent", "reach"), [(0.5, 0.125), (3.0, 0.25)])
+def test_random_poses_come_nearer_until_one_can_be_closed(extent: float, reach: float) -> None:
+    steps: list[np.ndarray] = []
+    start = np.array([5.0, 6.0])
+    open_ones = Posed(False, extent)
+    assert not comparison(open_ones, steps)._random_pose(start, np.random.default_rng(3))
+    drawn = np.random.default_rng(3).uniform(-reach, reach, (12, 2))
+    assert np.array(steps) == pytest.approx(drawn * 0.7 ** np.arange(12)[:, None]) and open_ones.places == 12
+    steps.clear()
+    assert comparison(Posed(True, extent), steps)._random_pose(start, np.random.default_rng(3))
+    assert len(steps) == 1
+
+
+def test_a_file_is_compared_at_its_pose_and_at_two_random_poses() -> None:
+    compared: list[list[float]] = []
+    for closes, count in ((True, 3), (False, 1)):
+        compared.clear()
+        poses = Posed(closes)
+        found: Any = comparison(poses, [])
+        found._at_pose = lambda scene, tree, random, poses=poses: compared.append(poses.data.qpos.tolist())
+        found.check(scene(), ["H"])
+        assert len(compared) == count and compared[0] == [5.0, 6.0] == poses.data.qpos.tolist()
+        assert [5.0, 6.0] not in compared[1:] and poses.places == (3 if closes else 25)
+
+
+def test_gaps_are_noted_from_a_millionth_of_the_extent_on() -> None:
+    for gap, notes in (
+        (3.9e-6, []),
+        (4.1e-6, ["closure 'r' was open by 4.1e-06 m or rad; the joints moved"]),
+    ):
+        reader: Any = object.__new__(reading._Reader)
+        reader.notes, closed = [], []
+        reader.poses = SimpleNamespace(
+            extent=4.0,
+            gaps=lambda gap=gap: {"r": gap},
+            close=lambda closed=closed: closed.append(1),
+            data=SimpleNamespace(qvel=0),
+        )
+        reader._close()
+        assert [note.partition(" to close it")[0] for note in reader.notes] == notes and closed == [1]
+
+
+def test_velocities_lose_what_independent_rows_forbid() -> None:
+    """A row counts from 1e-9 of the largest singular value on."""
+    for small, wanted in ((1.5e-9, [0.0, 0.0]), (0.9e-9, [0.0, 7.0])):
+        reader: Any = object.__new__(reading._Reader)
+        data = SimpleNamespace(qvel=np.array([3.0, 7.0]))
+        reader.poses = SimpleNamespace(data=data, jacobian=lambda small=small: np.diag([1.0, small]))
+        reader._keep_velocities()
+        assert data.qvel == pytest.approx(wanted, abs=1e-6)
+
+
 # --- A file's own model -----------------------------------------------------------------------------------
 def test_runs_of_a_file_have_ever_smaller_steps(tmp_path: Path) -> None:
     found = read(tmp_path, f'<option timestep="0.01"/>{PAIR}')
@@ -468,7 +548,7 @@ def test_stiffer_closures_of_a_file(tmp_path: Path) -> None:
     for family, integrator in ((original.STIFFER, "EULER"), (original.STIFFER_RK4, "RK4")):
         found = simulated(tmp_path, family, more, step=0.002)
         assert found.model.eq_solref[0].tolist() == [0.004, 1.0]
-        assert found.model.eq_solimp[0].tolist() == list(STIFFEST)
+        assert found.model.eq_solimp[0].tolist() == [0.9999, 0.9999, 0.001, 0.5, 2.0]
         assert found.model.opt.integrator == getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
         assert found.settings["step"] == 0.002 and found.settings["solref"] == "0.004 1"
 

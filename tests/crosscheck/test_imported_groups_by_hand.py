@@ -267,6 +267,61 @@ def test_a_step_is_bounded_by_a_fifth_of_the_extent() -> None:
         assert moved[0] == pytest.approx([longest, 0.0]) and len(moved) <= 0.5 / longest + 2
 
 
+@pytest.mark.parametrize(
+    ("gap", "extent", "moves"), [(1.5e-12, 1.0, True), (1.5e-12, 0.1, True), (1.5e-12, 2.0, False)]
+)
+def test_gaps_within_rounding_of_the_extent_are_closed(gap: float, extent: float, moves: bool) -> None:
+    found = Poses(mujoco, model(SLIDES), (), [JointRow("r", (0, -1), gap, 0.0)], extent)
+    found.start("", {})
+    found.close()
+    assert found.data.qpos[0] == pytest.approx(gap if moves else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("apart", "extent", "closes"), [(3e-9, 1.0, False), (3e-9, 0.1, False), (3e-9, 2.0, True)]
+)
+def test_loops_that_nearly_close(apart: float, extent: float, closes: bool) -> None:
+    """Two rows that ask for different places of one slide leave half of their distance, 1.5e-9 m."""
+    rows = [JointRow("r", (0, -1), 0.0, 0.0), JointRow("s", (0, -1), apart, 0.0)]
+    found = Poses(mujoco, model(SLIDES), (), rows, extent)
+    found.start("", {})
+    assert found._newton([]) is closes and found.data.qpos[0] == pytest.approx(apart / 2)
+
+
+def test_redundant_rows_have_small_singular_values() -> None:
+    """Rows are weighted with the roots of the masses, 1 and √3; 1e-9 of the largest counts as zero."""
+    found = poses()
+    for small, wanted in ((1.5e-9, -1 / 1.5e-9), (0.9e-9, 0.0)):
+        step = found._step(np.array([2.0, 1.0]), np.array([[1.0, 0.0], [0.0, small * math.sqrt(3)]]), [])
+        assert step == pytest.approx([-2.0, wanted / math.sqrt(3)], rel=1e-6)
+    light = SLIDES.replace('mass="3"', 'mass="1.5e-9"').replace("type", 'stiffness="1" springref="1" type')
+    for mass, wanted in (("1.5e-9", [1.5e-10, 0.1]), ("0.9e-9", [0.1, 0.0])):
+        falling = Poses(mujoco, model(light.replace("1.5e-9", mass)), (), (), 1.0)
+        falling.start("", {})
+        assert falling._fall() == pytest.approx(wanted, abs=1e-15)
+
+
+def test_attempts_to_close_a_loop() -> None:
+    """From the given pose and after a fall, with and without the given coordinates, 200 steps each."""
+    moved: list[float] = []
+
+    class Still:
+        def __getattr__(self, name: str) -> Any:
+            if name == "mj_integratePos":
+                return lambda model, qpos, step, dt: moved.append(float(np.abs(step).max()))
+            return getattr(mujoco, name)
+
+    text = SLIDES.replace("type", 'stiffness="1" springref="1" type')
+    found = Poses(Still(), model(text), (), [JointRow("r", (0, -1), 0.5, 0.0)], 1.0)
+    found.start("", {"b": 0.0})
+    with pytest.raises(
+        SceneError, match=r"closure 'r': cannot be closed from this pose; the least gap found is 0\.5 m"
+    ):
+        found.close()
+    assert moved.count(0.1) == 2 and moved.count(0.2) == 800 and len(moved) == 802
+    assert moved[200] == 0.1 and moved[601] == 0.1
+
+
 # --- Couplings --------------------------------------------------------------------------------------------
 THREE = "".join(
     f'<body name="{n}"><joint name="{n}" axis="0 0 1"/><site name="{n}"/>{LUMP.format(1)}</body>'

@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
+from crosscheck.engines.mujoco import compiled_run
 from crosscheck.engines.mujoco import model as built
-from crosscheck.engines.mujoco.families import CONVERGED, HARD, MOST_ITERATIONS, STIFFEST
+from crosscheck.engines.mujoco.adapter import ENGINE as MUJOCO
+from crosscheck.engines.mujoco.adapter import MuJoCo
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.engines.mujoco.simulation import TURN_PER_STEP, Simulation
+from crosscheck.engines.mujoco.simulation import Simulation
 from crosscheck.engines.sampling import Failed
 from mbref.scene import (
     Body,
@@ -259,13 +261,13 @@ def test_closures_of_families(family: str, integrator: str) -> None:
     assert flags & BITS.mjDSBL_AUTORESET and flags & BITS.mjDSBL_ISLAND
     is_tuned = family == "tuned"
     assert model.eq_solref[0] == pytest.approx((-9.0, -6.0) if is_tuned else (0.5, 1.0))
-    assert model.eq_solimp[0] == pytest.approx(STIFFEST)
+    assert model.eq_solimp[0] == pytest.approx([0.9999, 0.9999, 0.001, 0.5, 2.0])
     factor = 0.5 if is_tuned else 1.0
     assert model.body_invweight0 == pytest.approx(factor * plain.body_invweight0)
     assert model.dof_invweight0 == pytest.approx(factor * plain.dof_invweight0)
     assert bool(flags & BITS.mjDSBL_REFSAFE) is is_tuned
     if is_tuned:
-        assert (model.opt.tolerance, model.opt.iterations) == (CONVERGED, MOST_ITERATIONS)
+        assert (model.opt.tolerance, model.opt.iterations) == (1e-20, 50)
     assert found.longest == math.inf and found.step == found._fixed
 
 
@@ -280,7 +282,7 @@ def test_defaults_keep_the_library_s_options() -> None:
 def test_a_tuned_model_without_options_is_hard_and_does_not_decay() -> None:
     found, plain = simulation("tuned", scene(joint=WELDED)), compiled(scene(joint=WELDED)).model
     assert np.abs(found.model.eq_solref[0]).max() == 0.0
-    assert found.model.body_invweight0 == pytest.approx(HARD * plain.body_invweight0)
+    assert found.model.body_invweight0 == pytest.approx(1e-7 * plain.body_invweight0)
     with pytest.raises(ValueError, match="mujoco has no family of settings 'quick'"):
         simulation("quick")
 
@@ -288,7 +290,7 @@ def test_a_tuned_model_without_options_is_hard_and_does_not_decay() -> None:
 def test_adaptive_families_have_steps_within_the_turn_of_their_drivers() -> None:
     driven = scene(driver=(Driver(joint="H", polynomial=(0.0, 5.0)),))
     found = simulation("forward", driven, rtol=1e-6, min_step=1e-9)
-    assert found.longest == pytest.approx(TURN_PER_STEP / 5.0) and found.step == found._adaptively
+    assert found.longest == pytest.approx(0.25 / 5.0) and found.step == found._adaptively
     assert simulation("tuned", driven, turn=0.5).longest == pytest.approx(0.1)
     assert simulation("forward", rtol=1e-6, min_step=1e-9).longest == math.inf
 
@@ -297,6 +299,52 @@ def test_compiled_families_leave_unused_features_out() -> None:
     found = simulation("forward, compiled", rtol=1e-6, min_step=1e-9)
     assert found.model.opt.disableflags & BITS.mjDSBL_CONTACT and not hasattr(found, "adaptive")
     assert not simulation("forward", rtol=1e-6, min_step=1e-9).model.opt.disableflags & BITS.mjDSBL_CONTACT
+
+
+# --- The adapter ------------------------------------------------------------------------------------------
+class Seen(MuJoCo):
+    """An adapter that returns what it is asked to run."""
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Any:
+        return scene, times.tolist(), setting
+
+
+def test_the_coarse_run_is_hard_and_decays_by_half_in_a_step() -> None:
+    given, times, setting = Seen()._coarse(scene(), 0.25)  # type: ignore[misc]
+    assert given == scene() and times == pytest.approx(np.linspace(0.0, 2.0, 41).tolist())
+    assert setting == Setting("tuned", {"step": 0.25, "beta": 2.0, "hard": 1e-7})
+
+
+def test_what_the_adapter_serves_and_refuses() -> None:
+    bare = scene(body=(BODY.model_copy(update={"mass": None, "inertia": None}),))
+    assert MUJOCO.refuses(scene()) is None and MUJOCO.refuses(bare) is not None
+    assert (
+        MUJOCO.serves(bare, "tuned")
+        and not MUJOCO.serves(scene(), "quick")
+        and MUJOCO.serves(scene(), "euler")
+    )
+    text = MUJOCO.own_code(scene(), Setting("as in file, finer", {"step": 0.5}))
+    assert text == '<option timestep="0.5"/>'
+    assert MUJOCO.own_code(scene(), Setting("defaults", {"step": 0.5})).startswith(
+        '<option timestep="0.5"><flag'
+    )
+
+
+def test_only_compiled_families_are_prepared(monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    monkeypatch.setattr(compiled_run, "prepare", lambda: made.append(1))
+    MUJOCO.prepare(["tuned", "forward"])
+    assert made == []
+    MUJOCO.prepare(["tuned", "forward, compiled"])
+    assert made == [1]
+
+
+def test_runs_name_their_engine_and_setting() -> None:
+    found = MUJOCO.run(scene(), np.array([0.0, 0.5]), Setting("euler", {"step": 0.25}))
+    assert (found.engine, found.method, found.settings) == ("mujoco", "euler", {"step": 0.25})
+    assert (
+        found.version == mujoco.__version__ and found.cost.steps == 2 and found.outcome is Outcome.COMPLETED
+    )
 
 
 # --- One run ----------------------------------------------------------------------------------------------

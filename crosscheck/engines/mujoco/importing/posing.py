@@ -109,7 +109,7 @@ class Poses:
                 return True
             step = self._step(r, rows, held)
             size = np.abs(step).max()
-            if not size > 1e-15:
+            if not size > 0.0:
                 break
             step *= min(1.0, LONGEST * min(1.0, self.extent) / size)
             self.mujoco.mj_integratePos(self.model, self.data.qpos, step, 1.0)

@@ -23,7 +23,7 @@ from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.holding import compiled
 from crosscheck.engines.mujoco.importing.left_out import Part
-from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
+from crosscheck.engines.mujoco.importing.posing import RANK, JointRow, Poses
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import GROUND, Body, Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
@@ -214,7 +214,7 @@ class _Reader:
         data = self.poses.data
         if np.any(data.qvel):
             rows = self.poses.jacobian()
-            data.qvel[:] -= np.linalg.pinv(rows, rcond=1e-9) @ (rows @ data.qvel) if len(rows) else 0.0
+            data.qvel[:] -= np.linalg.pinv(rows, rcond=RANK) @ (rows @ data.qvel) if len(rows) else 0.0
 
     def _read_joints(self, closures: list[Closure]) -> None:
         data, extent = self.poses.data, self.poses.extent
