@@ -39,8 +39,8 @@ def qr_pivoted(tolerance, scratch):
     for i in range(n):
         for j in range(m):
             norms[0, j] += b[i, j] * b[i, j]
-    copy(norms[0], norms[1])
     largest = norms[0, largest_from(norms[0], 0, m)]
+    copy(norms[0], norms[1])
     for k in range(min(m, n)):
         best = largest_from(norms[0], k, m)
         if best != k:

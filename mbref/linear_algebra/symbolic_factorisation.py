@@ -88,7 +88,7 @@ def _made(*pattern: bytes) -> Symbolic:
 def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
     """Return indices as 32-bit unsigned integers; raises OverflowError if one does not fit."""
     array = np.asarray(indices, dtype=np.int64)
-    if array.max(initial=0) > np.iinfo(np.uint32).max:
+    if (array > np.iinfo(np.uint32).max).any():
         raise OverflowError("the scene is too large for 32-bit indices")
     return array.astype(np.uint32)
 

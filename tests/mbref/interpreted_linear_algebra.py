@@ -5,12 +5,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
 from mbref.kernels.compilation import PLAIN
 
@@ -20,6 +22,7 @@ if not PLAIN:
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.linear_algebra import elimination, minimum_norm, sparse_cholesky, sparse_lu
 from mbref.linear_algebra import orthogonal_factorisations as orthogonal
+from mbref.linear_algebra import symbolic_factorisation as patterns
 
 
 # --- elimination ------------------------------------------------------------------------------------------
@@ -324,11 +327,15 @@ def test_one_step_of_refinement_after_singular_values(monkeypatch):
 
 
 def test_a_pseudo_solution_is_added():
-    """u = (0.6, 0.8), s = 2, v = (0, 1, 0): (1 · 0.6 + 2 · 0.8) / 2 = 1.1, and half of that by rows."""
-    u, vt = np.array([[0.6, 0.8], [0.8, -0.6]]), np.array([[0.0, 1.0, 0.0], [9.0, 9.0, 9.0]])
-    x, dual = np.array([1.0, 2.0, 3.0]), np.array([10.0, 20.0])
-    orthogonal.add_pseudo_solution(u, np.array([2.0, 9.0]), vt, 1, np.array([1.0, 2.0]), x, dual)
-    assert x == pytest.approx([1.0, 3.1, 3.0]) and dual == pytest.approx([10.33, 20.44])
+    """u = (0.6, 0, 0.8), s = 2, v = (0, 1): (1 · 0.6 + 2 · 0.8) / 2 = 1.1, and half of that by rows."""
+    u, vt = np.array([[0.6, 0.8], [0.0, 0.0], [0.8, -0.6]]), np.array([[0.0, 1.0], [9.0, 9.0]])
+    x, dual = np.array([1.0, 2.0]), np.array([10.0, 20.0, 30.0])
+    orthogonal.add_pseudo_solution(u, np.array([2.0, 9.0]), vt, 1, np.array([1.0, 7.0, 2.0]), x, dual)
+    assert x == pytest.approx([1.0, 3.1]) and dual == pytest.approx([10.33, 20.0, 30.44])
+    x, dual = np.zeros(4), np.zeros(1)
+    wide = np.array([[0.0, 0.6, 0.0, -0.8]])
+    orthogonal.add_pseudo_solution(np.ones((1, 1)), np.array([4.0]), wide, 1, np.array([8.0]), x, dual)
+    assert x == pytest.approx([0.0, 1.2, 0.0, -1.6]) and dual == pytest.approx([0.5])
 
 
 # --- sparse factors ---------------------------------------------------------------------------------------
@@ -536,9 +543,102 @@ def test_a_residual_of_rounding_is_left(share, moved):
     assert bool(multipliers[2]) is moved
 
 
+@pytest.mark.parametrize(("size", "moves"), [(1.9e-11, False), (2.1e-11, True)])
+def test_a_row_that_depends_on_others_is_left(monkeypatch, size, moves):
+    """A direction whose change is its length times the row's size, against √α times 1e-11, with α = 4."""
+    made, moved = of_one_row(4.0), []
+    made.d[0], made.l[0], made.change[0] = size, 1.0, 0.0
+    monkeypatch.setattr(
+        minimum_norm, "go_along", lambda *given: moved.append(given[0]) or given[1].residual.fill(0)
+    )
+    assert minimum_norm.go_on_by_conjugate_directions(made, 4.0, np.zeros(2), np.zeros(3)) == OK
+    assert bool(moved) is moves
+    if moves:
+        assert moved[0] == pytest.approx(1 / size**2)
+
+
+def test_the_first_two_conjugate_directions(monkeypatch):
+    """The first is (S + I/α)⁻¹ r; the second adds the first times the ratio of both rᵀ (S + I/α)⁻¹ r."""
+    made, directions, residuals = of_two_rows(), [], []
+    assert sparse_cholesky.factorise(made, 4.0, made.step)
+    made.residual[:], made.change[:], made.total[:], made.direction[:] = (3.0, -1.0), 0.0, 0.0, 99.0
+    go = minimum_norm.go_along
+
+    def noted(length: float, factor: Any, target: Any, multipliers: Any) -> None:
+        directions.append(factor.direction.copy())
+        residuals.append(factor.residual.copy())
+        go(length, factor, target, multipliers)
+
+    monkeypatch.setattr(minimum_norm, "go_along", noted)
+    monkeypatch.setattr(minimum_norm, "ITERATIONS", 2)
+    assert minimum_norm.go_on_by_conjugate_directions(made, 4.0, np.zeros(4), np.zeros(6)) == NOT_CONVERGED
+    solved = [np.linalg.solve(np.array([[21.25, 24.0], [24.0, 65.0]]), r) for r in residuals]
+    ratio = (residuals[1] @ solved[1]) / (residuals[0] @ solved[0])
+    assert directions[0] == pytest.approx(solved[0])
+    assert directions[1] == pytest.approx(solved[1] + ratio * solved[0])
+    length = (residuals[0] @ solved[0]) / (solved[0] @ D @ D.T @ solved[0])
+    assert residuals[1] == pytest.approx(residuals[0] - length * D @ D.T @ solved[0])
+
+
 @pytest.mark.parametrize("force", [8.0, -3.0])
 def test_multipliers_nearest_to_forces(force):
     """Φ_qᵀ λ = force with the row (2,) of unit length 1 in D: x = force / 2 and λ = -x of D."""
     made, multipliers = of_one_row(4.0), np.full(3, 7.0)
     minimum_norm.find_least_multipliers(made, np.array([99.0, force]), multipliers)
     assert multipliers == pytest.approx([7.0, 7.0, force / 2]) and abs(made.change[0]) < 1e-12
+
+
+# --- patterns of factors ----------------------------------------------------------------------------------
+ROWS, COLUMNS, PLACES = np.array([7, 7, 4, 4, 9]), np.array([0, 2, 2, 3, 0]), np.array([70, 72, 42, 43, 90])
+ACTIVE = np.array([True, False, True, True])
+
+
+@pytest.fixture
+def stored(monkeypatch: pytest.MonkeyPatch) -> dict[Any, bytes]:
+    """An empty cache of patterns."""
+    files: dict[Any, bytes] = {}
+    monkeypatch.setattr(patterns.checked_file, "read", files.get)
+    monkeypatch.setattr(patterns.checked_file, "write", files.__setitem__)
+    return files
+
+
+def test_a_pattern_is_found_once_and_stored(monkeypatch, stored):
+    """Rows 4, 7 and 9 of three active columns: 7 and 4 share column 2, 7 and 9 share column 0."""
+    parts = [*(array.tobytes() for array in (ROWS, COLUMNS, PLACES)), ACTIVE.tobytes()]
+    find = patterns._of_pattern.__wrapped__
+    made = find(*parts)
+    digest = hashlib.sha256(b"".join(len(part).to_bytes(8, "little") + part for part in parts)).hexdigest()
+    [path] = stored
+    assert path == patterns.CACHE / "patterns" / digest[:32]
+    monkeypatch.setattr(patterns, "_made", None)
+    again = find(*parts)
+    for name, one, other in zip(made._fields, made, again, strict=True):
+        assert one.dtype == other.dtype == np.uint32 and one.tolist() == other.tolist(), name
+    assert sorted(made.row.tolist()) == [4, 7, 9] and made.column.tolist() == [0, 2, 3]
+    spans = zip(made.row.tolist(), made.d_start.tolist(), made.d_start.tolist()[1:], strict=False)
+    entries = {row: made.d_entry[first:last].tolist() for row, first, last in spans}
+    assert entries == {7: [70, 72], 4: [42, 43], 9: [90]}
+    assert made.column[made.d_column].tolist() == [entry % 10 for entry in made.d_entry.tolist()]
+    assert patterns._of_pattern.cache_info().maxsize == patterns.MOST_PATTERNS == 64
+
+
+def test_patterns_of_nothing():
+    made = patterns.empty_factor()
+    assert made.d.size == made.l.size == made.root.size == made.step.size == 0
+    assert made.symbolic.l_start.tolist() == [0] and made.symbolic.d_start.tolist() == [0]
+
+
+def test_indices_of_32_bits():
+    assert patterns.unsigned([0, 2**32 - 1]).tolist() == [0, 4294967295]
+    assert patterns.unsigned(np.zeros(0)).dtype == np.uint32
+    with pytest.raises(OverflowError, match="too large for 32-bit indices"):
+        patterns.unsigned([2**32])
+
+
+def test_an_order_of_elimination_for_rows_alone_is_refused(monkeypatch):
+    import scipy.sparse.linalg as sparse
+
+    lu = SimpleNamespace(perm_c=np.array([0, 1]), perm_r=np.array([1, 0]))
+    monkeypatch.setattr(sparse, "splu", lambda *given, **options: lu)
+    with pytest.raises(AssertionError, match="not symmetric"):
+        patterns._factor_pattern(csr_array(np.eye(2)))

@@ -46,6 +46,7 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
             "interpreted_crossings",
             "interpreted_decisions",
             "interpreted_drivers",
+            "interpreted_equations",
             "interpreted_formulations",
             "interpreted_integrators",
             "interpreted_linear_algebra",
