@@ -40,7 +40,7 @@ def dtype_of(record: type) -> np.dtype:
 @functools.cache
 def record_type_of(schema: type) -> np.dtype:
     """Return the NumPy type of a record of numbers."""
-    numbers = {name: _number(name) for name in dtype_of(schema).names or ()}
+    numbers = {name: _number(name) for name in typing.get_type_hints(schema)}
     return np.dtype((type(schema.__name__, (Numbers,), {"__slots__": (), **numbers}), dtype_of(schema)))
 
 

@@ -76,7 +76,7 @@ WAYS = pytest.mark.parametrize("way", ["_velocities", "_sparse_velocities"])
 def test_nearest_velocities_and_then_the_least_energy(way, rows, nu, given, v, residual, is_open):
     """Given velocities are missed least in units of the scale; others have the least Σ m v², m = 1, 2 and 5.
 
-    So v₂ + 2 v₃ = 9 gives v ∝ (0, 1/2, 2/5). The second scale is 2, so that v₁ = v₂ = (1 + 1.02/4) / (1 + 1/4)
+    So v₂ + 2 v₃ = 9 gives v ∝ (0, 1/2, 2/5). As the second scale is 2, v₁ = v₂ = (1 + 1.02/4) / (1 + 1/4)
     is nearest to (1, 1.02).
     """
     found, off, still_open = solved(way, rows, nu, given)
