@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Collection
 
 from tests.mutants.operators import Mutant
 
@@ -14,9 +15,18 @@ AT_FIRST_CALL = (
 COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
+EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
+EXCHANGED = "Two rows or columns are exchanged, whichever is named first."
+"""Functions of mbref whose third and fourth arguments may be exchanged, and the reason."""
 UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length."
 ALIKE = "The comparison treats both arrays alike."
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
+PATTERN = "The order of elimination and the fill depend on the pattern of the matrix alone."
+SAMPLE = "(np.random.default_rng(1).uniform(0.5, 1.0, d.nnz), d.indices, d.indptr), shape=d.shape"
+DOMINANT = 's = s + eye_array(size, format="csc") * (10.0 * abs(s).sum(axis=0).max())'
+OPTIONS = (
+    's, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True, "Equil": False}'
+)
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
     (
@@ -82,6 +92,27 @@ REASONS: dict[tuple[str, str, str], str] = {
     ("mbref/equations/primitives.py", "put(blocks, row, 0, NOTHING)", "1"): ZERO_ALREADY,
     ("mbref/equations/primitives.py", "put(blocks, row, 6, NOTHING)", "pass"): ZERO_ALREADY,
     ("mbref/equations/primitives.py", "put(blocks, row, 6, NOTHING)", "7"): ZERO_ALREADY,
+    **{
+        ("mbref/linear_algebra/symbolic_factorisation.py", SAMPLE, new): PATTERN
+        for new in ("2", "1.0", "2.0")
+    },
+    **{
+        ("mbref/linear_algebra/symbolic_factorisation.py", DOMINANT, new): PATTERN
+        for new in (
+            "20.0",
+            "1",
+            "abs(s).sum(axis=0).min",
+            "((10.0) / (abs(s).sum(axis=0).max()))",
+            "((eye_array(size, format='csc')) / (10.0 * abs(s).sum(axis=0).max()))",
+            "((s) - (eye_array(size, format='csc') * (10.0 * abs(s).sum(axis=0).max())))",
+        )
+    },
+    **{("mbref/linear_algebra/symbolic_factorisation.py", OPTIONS, new): PATTERN for new in ("1.0", "True")},
+    (
+        "mbref/linear_algebra/minimum_norm.py",
+        "direction[:], before = 0.0, 1.0",
+        "2.0",
+    ): "The first direction has no direction before it, whose part is zero.",
     ("mbref/stabilisation/partitioning.py", "for k in range(3):", "4"): (
         "The fourth entry is overwritten afterwards."
     ),
@@ -114,8 +145,11 @@ REASONS: dict[tuple[str, str, str], str] = {
 
 def reason(mutant: Mutant, source: str) -> str:
     """Return why a mutant of a source changes nothing; empty where it does."""
-    if mutant.file.startswith("mbref/") and mutant.kind == "argument order" and exchanges_parts(mutant):
-        return COMMUTES
+    if mutant.file.startswith("mbref/") and mutant.kind == "argument order":
+        if exchanges_parts(mutant):
+            return COMMUTES
+        if exchanges_parts(mutant, EXCHANGES, 2):
+            return EXCHANGED
     before = source.encode()[: mutant.start].decode()
     if re.search(r"reshape\([^()]*-$", before) and (mutant.old, mutant.new) == ("1", "2"):
         return UNKNOWN_LENGTH
@@ -123,9 +157,9 @@ def reason(mutant: Mutant, source: str) -> str:
     return REASONS.get((mutant.file, line, mutant.new), "")
 
 
-def exchanges_parts(mutant: Mutant) -> bool:
-    """Return whether a mutant exchanges the first two arguments of a function in COMMUTATIVE."""
+def exchanges_parts(mutant: Mutant, functions: Collection[str] = COMMUTATIVE, first: int = 0) -> bool:
+    """Return whether a mutant exchanges an argument, and the next, of one of these functions."""
     old, new = (ast.parse(text, mode="eval").body for text in (mutant.old, mutant.new))
     assert isinstance(old, ast.Call) and isinstance(new, ast.Call)
-    first, second = (list(map(ast.unparse, call.args[:2])) for call in (old, new))
-    return ast.unparse(old.func) in COMMUTATIVE and first == second[::-1]
+    before, after = (list(map(ast.unparse, call.args[first : first + 2])) for call in (old, new))
+    return ast.unparse(old.func) in functions and before == after[::-1]

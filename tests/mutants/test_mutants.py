@@ -11,7 +11,7 @@ import pytest
 
 from tests.mutants import __main__ as runner
 from tests.mutants import drawing, tree, workers
-from tests.mutants.equivalent import COMMUTES, REASONS, UNKNOWN_LENGTH, reason
+from tests.mutants.equivalent import COMMUTES, EXCHANGED, REASONS, UNKNOWN_LENGTH, reason
 from tests.mutants.operators import KINDS, Mutant, mutants
 from tests.mutants.reach import Reach, around, lines_of
 
@@ -330,6 +330,16 @@ def test_parts_of_sums_and_products_may_be_exchanged():
         ("cross(b, a)", False),
     ]
     assert not reason(orders[1]._replace(file="crosscheck/a.py"), source)
+
+
+def test_rows_that_are_exchanged_may_be_named_in_any_order():
+    source = "exchange_rows(a, n, k, best, rows)\nexchange_entries(r, k, k, best)\nother(a, n, k, best)\n"
+    orders = [m for m in mutants("mbref/a.py", source) if m.kind == "argument order"]
+    found = [m.new for m in orders if reason(m, source) == EXCHANGED]
+    assert (
+        found == ["exchange_rows(a, n, best, k, rows)", "exchange_entries(r, k, best, k)"]
+        and len(orders) == 9
+    )
 
 
 def test_any_negative_length_is_unknown():
