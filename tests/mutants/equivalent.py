@@ -18,6 +18,12 @@ COMMUTES = "A sum or a product is the same for its two parts in any order."
 EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
 EXCHANGED = "Two rows or columns are exchanged, whichever is named first."
 """Functions of mbref whose third and fourth arguments may be exchanged, and the reason."""
+SYMMETRIC = {
+    0: {"suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
+    1: {"np.swapaxes", "difference", "rod"},
+}
+SYMMETRY = "The result is the same for these two arguments in any order."
+"""Functions that treat two successive arguments alike, by the number of the first one, and the reason."""
 UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length."
 ALIKE = "The comparison treats both arrays alike."
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
@@ -150,6 +156,10 @@ def reason(mutant: Mutant, source: str) -> str:
             return COMMUTES
         if exchanges_parts(mutant, EXCHANGES, 2):
             return EXCHANGED
+    if mutant.kind == "argument order" and any(
+        exchanges_parts(mutant, names, first) for first, names in SYMMETRIC.items()
+    ):
+        return SYMMETRY
     before = source.encode()[: mutant.start].decode()
     if re.search(r"reshape\([^()]*-$", before) and (mutant.old, mutant.new) == ("1", "2"):
         return UNKNOWN_LENGTH

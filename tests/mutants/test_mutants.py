@@ -11,7 +11,7 @@ import pytest
 
 from tests.mutants import __main__ as runner
 from tests.mutants import drawing, tree, workers
-from tests.mutants.equivalent import COMMUTES, EXCHANGED, REASONS, UNKNOWN_LENGTH, reason
+from tests.mutants.equivalent import COMMUTES, EXCHANGED, REASONS, SYMMETRY, UNKNOWN_LENGTH, reason
 from tests.mutants.operators import KINDS, Mutant, mutants
 from tests.mutants.reach import Reach, around, lines_of
 
@@ -340,6 +340,19 @@ def test_rows_that_are_exchanged_may_be_named_in_any_order():
         found == ["exchange_rows(a, n, best, k, rows)", "exchange_entries(r, k, best, k)"]
         and len(orders) == 9
     )
+
+
+def test_arguments_that_a_function_treats_alike_may_be_exchanged():
+    source = "x = np.swapaxes(a, 1, 2) + np.moveaxis(a, 1, 2) + difference(s, f(a), b)\n"
+    orders = [m for m in mutants("crosscheck/a.py", source) if m.kind == "argument order"]
+    assert {m.new: reason(m, source) == SYMMETRY for m in orders} == {
+        "np.swapaxes(1, a, 2)": False,
+        "np.swapaxes(a, 2, 1)": True,
+        "np.moveaxis(1, a, 2)": False,
+        "np.moveaxis(a, 2, 1)": False,
+        "difference(f(a), s, b)": False,
+        "difference(s, b, f(a))": True,
+    }
 
 
 def test_any_negative_length_is_unknown():
