@@ -107,7 +107,7 @@ def _equilibrium(options: argparse.Namespace) -> int:
 def _lines(number: int, each: Equilibrium) -> list[str]:
     lines = [_title(number, each)]
     for body in each.scene.body:
-        turned = np.round(to_vector(np.array([body.orientation]))[0], 12) + 0.0
+        turned = to_vector(np.array([body.orientation]))[0]
         lines.append(
             f"  {body.name:12} position {_three(body.position)} m, rotation vector {_three(turned)} rad"
         )

@@ -69,7 +69,7 @@ def system(
             products=products,
             inertia=inertia,
             given=SimpleNamespace(driver=np.zeros(len(of.given), int)),
-            torsions=SimpleNamespace(row=np.zeros(0, int)),
+            torsions=SimpleNamespace(row=np.zeros(0, int), form=np.zeros((0, NZ))),
         ),
         series=SimpleNamespace(
             terms=np.zeros(size),
@@ -468,3 +468,39 @@ def test_rows_below_a_pivot_are_eliminated():
 def test_twice_the_kinetic_energy():
     memory = system([CIRCLE])
     assert uniqueness.kinetic_energy(memory.series.terms, memory) == pytest.approx(RATE @ MASS @ RATE)
+
+
+def test_determinants_at_both_ends_by_pivots_or_by_gradients(monkeypatch):
+    """Without freedom the pivots suffice; with two freedoms the gradient is evaluated."""
+    memory, asked = system([CIRCLE, SADDLE, PLANE]), []
+    memory.partition.rank, memory.step.start_negative, memory.step.start_logarithm = 3, 1, 0.25
+    memory.solver.last[:] = -2.0, 0.5, 3.0
+    memory.kernels.determinant = lambda y, _: asked.append(y) or (True, 7.0)
+    negative, size = determinants.gradient_determinant_at_end(memory)
+    assert not negative and size == pytest.approx(np.log(3.0) + 0.25)
+    assert determinants.log_determinant_at_start(memory) == 0.5 and not asked
+    memory.partition.rank = 1
+    assert determinants.gradient_determinant_at_end(memory) == (True, 7.0)
+    assert determinants.log_determinant_at_start(memory) == 7.0
+    assert asked[0] is memory.series.terms and asked[1] is memory.series.past
+
+
+def test_the_determinant_at_the_start_is_saved_by_the_pivots_of_an_unchanged_partition():
+    memory, asked = system([CIRCLE, SADDLE, PLANE]), []
+    memory.solver.product, memory.solver.past_gradient = np.zeros((3, 3)), np.zeros((3, 3))
+    memory.kernels.gradient = lambda y, m: (
+        asked.append(y) or m.solver.work.__setitem__(slice(None), 2 * np.eye(3))
+    )
+    memory.partition.rank, memory.partition.partition_id, memory.step.start_partition_id = 3, 5, 5
+    memory.solver.past[:] = -2.0, 0.5, 3.0
+    determinants.save_start_determinant(memory)
+    assert (
+        memory.step.start_negative and memory.step.start_logarithm == pytest.approx(np.log(3.0)) and not asked
+    )
+    memory.partition.partition_id = 6
+    determinants.save_start_determinant(memory)
+    assert not memory.step.start_negative and memory.step.start_logarithm == pytest.approx(np.log(8.0))
+    memory.partition.rank = 2
+    determinants.save_start_determinant(memory)
+    assert memory.solver.past_gradient[:, :2].tolist() == [[2.0, 0.0], [0.0, 2.0], [0.0, 0.0]]
+    assert all(y is memory.series.past for y in asked) and len(asked) == 2

@@ -26,6 +26,10 @@ SYMMETRY = "The result is the same for these two arguments in any order."
 """Functions that treat two successive arguments alike, by the number of the first one, and the reason."""
 UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length."
 ALIKE = "The comparison treats both arrays alike."
+ZERO_TIMES = "Zero times any vector is a vector of zeros."
+SKIPS_ZERO = "A row is left as it is when zero times another row is subtracted."
+FOUND_BEFORE = "The largest entry of a row is in one of its free columns, so that the search ends there."
+LARGEST_ENTRY = "while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:"
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 PATTERN = "The order of elimination and the fill depend on the pattern of the matrix alone."
 SAMPLE = "(np.random.default_rng(1).uniform(0.5, 1.0, d.nnz), d.indices, d.indptr), shape=d.shape"
@@ -140,6 +144,15 @@ REASONS: dict[tuple[str, str, str], str] = {
         "write.put(write.minus(entry), self._null_space, f * self._lanes, column)",
         "write.put(write.minus(entry), self._null_space, column, f * self._lanes)",
     ): "The place in memory is the sum of both numbers.",
+    ("mbref/taylor/solver.py", "if i != r and entry != 0.0:", "(i != r)"): SKIPS_ZERO,
+    ("mbref/taylor/solver.py", "if g != f and entry != 0.0:", "(g != f)"): SKIPS_ZERO,
+    (
+        "mbref/taylor/step_start.py",
+        LARGEST_ENTRY,
+        "(abs(tableau[r, pivot_columns[q]]) != row_max[r])",
+    ): FOUND_BEFORE,
+    ("mbref/taylor/step_start.py", LARGEST_ENTRY, "((pivot_columns.shape[0]) + (1))"): FOUND_BEFORE,
+    ("mbref/taylor/step_start.py", LARGEST_ENTRY, "(q <= pivot_columns.shape[0] - 1)"): FOUND_BEFORE,
     (
         "reports/sections/paper_sweep.py",
         "paper = sorted({cell.end for cell in cells if cell.end is not None})",
@@ -163,6 +176,8 @@ def reason(mutant: Mutant, source: str) -> str:
     before = source.encode()[: mutant.start].decode()
     if re.search(r"reshape\([^()]*-$", before) and (mutant.old, mutant.new) == ("1", "2"):
         return UNKNOWN_LENGTH
+    if re.search(r"\b0\.0 \* load\([\w.]+, $", before) and (mutant.old, mutant.new) == ("0", "1"):
+        return ZERO_TIMES
     line = source.splitlines()[mutant.line - 1].strip()
     return REASONS.get((mutant.file, line, mutant.new), "")
 
