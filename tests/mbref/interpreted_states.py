@@ -189,10 +189,14 @@ def test_values_and_rates_of_variables(monkeypatch):
     monkeypatch.setattr(pose_maps, "function_value", lambda k, t, _: (0.1 * k * t, 1.5, 9.0))
     pose_maps.read_variables(4 / 3, made)
     state = made.run.state
-    assert [(one is mine, other is frames) for (one, other), mine in zip(
-        asked, (state.coordinates, state.velocities), strict=True)] == [(True, True)] * 2  # fmt: skip
-    value, rate = ([np.append(x[1], m.ravel()), np.append(x[0], n)] for x, m, n in (
-        (position, a, np.eye(3).ravel()), (velocity, first, np.zeros(9))))  # fmt: skip
+    assert [
+        (one is mine, other is frames)
+        for (one, other), mine in zip(asked, (state.coordinates, state.velocities), strict=True)
+    ] == [(True, True)] * 2
+    value, rate = (
+        [np.append(x[1], m.ravel()), np.append(x[0], n)]
+        for x, m, n in ((position, a, np.eye(3).ravel()), (velocity, first, np.zeros(9)))
+    )
     along, across = made.pose_maps.along, made.pose_maps.across
     c, s = math.cos(0.4), math.sin(0.4)
     expected = [along[0] @ value[0], c * along[1] @ value[0] - s * across[1] @ value[0], along[2] @ value[1]]

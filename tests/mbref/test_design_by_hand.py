@@ -142,10 +142,15 @@ def test_the_motion_that_is_diagnosed(monkeypatch):
     left = [empty, full]
     assert along_motion.along_motion(DOOR)[0] is full  # type: ignore[index]
     usual = asked[0][5]
-    assert asked == [
-        ("door", None, 61, 2.0, 20_000, usual), ("door", None, 61, 2.0, 20_000, usual),
-        ("door", None, 61, 2.0, 20_000, along_motion.NEARLY),
-    ] and usual != along_motion.NEARLY  # fmt: skip
+    assert (
+        asked
+        == [
+            ("door", None, 61, 2.0, 20_000, usual),
+            ("door", None, 61, 2.0, 20_000, usual),
+            ("door", None, 61, 2.0, 20_000, along_motion.NEARLY),
+        ]
+        and usual != along_motion.NEARLY
+    )
     left = [empty, empty]
     with pytest.raises(SceneError, match="scene: the motion could not begin: locked"):
         along_motion.along_motion(DOOR)

@@ -381,8 +381,10 @@ class Shaped:
 
 def loads(**columns: Any) -> Any:
     count = len(columns["kind"])
-    empty = {name: np.zeros((count, 3)) for name in (
-        "point_first", "point_second", "force", "axis", "x_first", "y_first", "x_second")}  # fmt: skip
+    empty = {
+        name: np.zeros((count, 3))
+        for name in ("point_first", "point_second", "force", "axis", "x_first", "y_first", "x_second")
+    }
     empty |= {name: np.zeros(count) for name in ("stiffness", "damping", "natural")}
     empty |= {name: np.zeros(count, int) for name in ("first", "second", "angle")}
     arrays = {name: np.array(column) for name, column in columns.items()}

@@ -448,9 +448,10 @@ def test_numbers_of_new_memory_are_zero_or_one():
 
 
 def allocated(monkeypatch: pytest.MonkeyPatch, sizes: dict[str, int]) -> tuple[Any, Any]:
-    series = SimpleNamespace(**{
-        name: np.zeros((sizes["orders"], sizes["lanes"])) for name in ("scale", "growth")
-    }, variable=np.zeros(sizes["lanes"]))  # fmt: skip
+    series = SimpleNamespace(
+        **{name: np.zeros((sizes["orders"], sizes["lanes"])) for name in ("scale", "growth")},
+        variable=np.zeros(sizes["lanes"]),
+    )
     kept: dict[str, Any] = {}
 
     def allocate(schema: Any, given: Any, **parts: Any) -> Any:
@@ -617,8 +618,12 @@ def test_rows_as_arrays():
     rows = polynomials._rows(of, lane, 8)
     assert rows.constant.tolist() == [0, 0, 0, 4.0, 0, 0, 0, 0]
     assert list(zip(*(c.tolist() for c in rows[:4]), strict=True)) == [
-        *[(1, 0, 0, 0.5)] * 2, (1, 0, 1, -2.0), (1, 1, 0, -2.0), (1, 0, 4, 6.0), (1, 4, 0, 6.0)
-    ]  # fmt: skip
+        *[(1, 0, 0, 0.5)] * 2,
+        (1, 0, 1, -2.0),
+        (1, 1, 0, -2.0),
+        (1, 0, 4, 6.0),
+        (1, 4, 0, 6.0),
+    ]
     assert list(zip(*(c.tolist() for c in rows[4:7]), strict=True)) == [(0, 0, 9.0), (1, 1, 3.0), (1, 4, 7.0)]
     linear, place = polynomials._tableau(rows, 2, 2, 8)
     assert linear.tolist() == [[9, 0, 1, 0, 0, 0, 0, 0], [0, 3, 0, 1, 0, 0, 0, 0], [0] * 8]
