@@ -12,6 +12,9 @@ ERRORS = "position_error_series(scene, trajectory, exact), rotation_error_series
 AT_FIRST_CALL = (
     "Kernels that are not prepared are compiled or loaded at their first call, with equal results."
 )
+WITHOUT_SAMPLES = "for system in (dop853.System(0, 0, places,"
+NO_STEP = "A run without samples takes no step; its numbers only give the types for which code is compiled."
+"""The line that compiles integrators for such runs, and the reason."""
 COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
@@ -179,6 +182,8 @@ def reason(mutant: Mutant, source: str) -> str:
     if re.search(r"\b0\.0 \* load\([\w.]+, $", before) and (mutant.old, mutant.new) == ("0", "1"):
         return ZERO_TIMES
     line = source.splitlines()[mutant.line - 1].strip()
+    if mutant.file == "crosscheck/engines/compiled/run.py" and line.startswith(WITHOUT_SAMPLES):
+        return NO_STEP
     return REASONS.get((mutant.file, line, mutant.new), "")
 
 
