@@ -15,6 +15,9 @@ AT_FIRST_CALL = (
 WITHOUT_SAMPLES = "for system in (dop853.System(0, 0, places,"
 NO_STEP = "A run without samples takes no step; its numbers only give the types for which code is compiled."
 """The line that compiles integrators for such runs, and the reason."""
+STANDING_IN = "GENERAL = ((1.0, 1.1, 1.2),", "UNIT = (1.0, 0.0, 0.0, 0.0)"
+WRITTEN_LATER = "The true masses and axes are written after compilation; a body without inertia has no axes."
+"""Lines of MuJoCo's model with numbers that are replaced later, and the reason."""
 COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
@@ -184,6 +187,8 @@ def reason(mutant: Mutant, source: str) -> str:
     line = source.splitlines()[mutant.line - 1].strip()
     if mutant.file == "crosscheck/engines/compiled/run.py" and line.startswith(WITHOUT_SAMPLES):
         return NO_STEP
+    if mutant.file == "crosscheck/engines/mujoco/model.py" and line.startswith(STANDING_IN):
+        return WRITTEN_LATER
     return REASONS.get((mutant.file, line, mutant.new), "")
 
 
