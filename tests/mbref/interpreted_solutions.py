@@ -111,6 +111,8 @@ def test_the_worst_row_and_the_state_of_a_step():
     memory.control.violation = 0.39
     assert loop.check_state(good, good, memory) == VIOLATED
     assert loop.check_state(bad, good, memory) == loop.check_state(good, bad, memory) == NOT_FINITE
+    memory.equations.rows.phi = np.array([-0.5, 0.1])
+    assert loop.check_state(good, good, memory) == VIOLATED and clock.violated_row == 0
     memory.equations.rows.phi = np.zeros(0)
     assert loop.check_state(good, good, memory) == OK and clock.violated_row == -1
 
