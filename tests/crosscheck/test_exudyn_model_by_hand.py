@@ -512,7 +512,7 @@ def test_steps_of_the_extrapolated_family_are_chosen_by_the_coarse_run(
             return times, setting
 
     times, setting = Seen()._coarse(scene(), 0.25)  # type: ignore[misc]
-    assert times == pytest.approx(np.linspace(0.0, 2.0, len(times))) and len(times) == adapter.SCOUT_SAMPLES
+    assert times == pytest.approx(np.linspace(0.0, 2.0, len(times))) and len(times) == 26
     assert setting == Setting("alpha", {"step": 0.25})
 
 
