@@ -18,7 +18,7 @@ if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
-from mbref.stabilisation import all_coordinates, partitioning, projection
+from mbref.stabilisation import STABILISATIONS, all_coordinates, partitioning, projection
 
 SIZE = projection.INDEPENDENT  # squared pivot
 
@@ -446,3 +446,66 @@ def test_second_rates_of_two_bodies():
     )
     partitioning.second_rates(np.array([1.0, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12]), state)
     assert state.coordinate_second == pytest.approx([1, 2, 3, -3.5, 2, 2.5, 3, 7, 8, 9, -0.75, 5, 5.5, 6])
+
+
+@pytest.mark.parametrize("solved", [OK, NOT_CONVERGED])
+def test_rates_of_a_partition_by_the_formulation(calls, solved):
+    """Coordinates 1 and 0 are independent; their rates stand behind them in y."""
+    state = SimpleNamespace(coordinates="q", velocities="v", coordinate_second=np.array([5.0, 6.0, 7.0]))
+    system = SimpleNamespace(acceleration="a")
+    chart = SimpleNamespace(column_order=np.array([2, 1, 0]), partition=SimpleNamespace(rank=1))
+    memory = SimpleNamespace(state=state, chart=chart, equations=SimpleNamespace(system=system))
+    made = calls(
+        partitioning,
+        solve_dependent_coordinates=solved,
+        solve_dependent_rates=None,
+        assemble_system=None,
+        second_rates=None,
+    )
+    memory.kernels = SimpleNamespace(
+        accelerate=lambda system: made.append(("accelerate", system)) or SINGULAR
+    )
+    y, rate = np.array([1.0, 2.0, 3.0, 4.0]), np.full(5, 9.0)
+    assert partitioning.rates.function(0.5, y, rate, memory) == (SINGULAR if solved == OK else solved)
+    wanted = [
+        ("solve_dependent_coordinates", 0.5, y, memory),
+        ("solve_dependent_rates", y, memory),
+        ("assemble_system", 0.5, "q", "v", memory.equations),
+        ("accelerate", system),
+        ("second_rates", "a", state),
+    ]
+    assert made == (wanted if solved == OK else wanted[:1])
+    assert rate.tolist() == ([3.0, 4.0, 6.0, 5.0, 9.0] if solved == OK else [9.0] * 5)
+
+
+def test_an_accepted_state_of_a_partition_is_saved(calls):
+    partition = SimpleNamespace(pivot=0.5, chosen_pivot=0.5, rank=2)
+    memory = SimpleNamespace(
+        state="state",
+        previous="previous",
+        chart=SimpleNamespace(partition=partition),
+        chart_options=SimpleNamespace(kept=0.6),
+        watch=SimpleNamespace(accepted_time=0.0),
+    )
+    made = calls(partitioning, solve_dependent_coordinates=OK, solve_dependent_rates=None, copy_state=None)
+    assert partitioning.accept.function(0.5, "y", memory) == OK
+    assert made == [
+        ("solve_dependent_coordinates", 0.5, "y", memory),
+        ("solve_dependent_rates", "y", memory),
+        ("copy_state", "state", "previous"),
+    ]
+
+
+def test_facts_of_stabilisations():
+    facts = {
+        name: (each.projects, each.watches_rank, each.largest_turn, dict(each.options), each.memory is None)
+        for name, each in STABILISATIONS.items()
+    }
+    assert facts == {
+        "none": (False, False, 1.0, {}, True),
+        "baumgarte": (False, False, 1.0, {"alpha": 5.0, "beta": 5.0}, True),
+        "partitioning": (False, True, 1.0, {"kept": 0.6}, False),
+        "projection": (True, True, 0.75, {}, False),
+    }
+    assert {name for name, each in STABILISATIONS.items() if each.feedback} == {"baumgarte"}
+    assert STABILISATIONS["projection"].rates_with_outputs is all_coordinates.rates
