@@ -105,7 +105,7 @@ def _torsion_spring(
     along = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     bodies = [scene.body_index(name) for name in joint.bodies]
     sign = np.round(along @ axis)
-    angle, rate = motion.position[:, 0, 0] * 0, motion.position[:, 0, 0] * 0
+    angle = rate = np.zeros(len(motion.position), motion.position.dtype)
     for body, side in zip(bodies, (-1, 1), strict=True):
         if body >= 0:
             angle = angle + side * sign * motion.turn[:, body]

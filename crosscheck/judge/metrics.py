@@ -114,7 +114,7 @@ def position_error_series(scene: Scene, trajectory: Trajectory, exact: Trajector
     """Return the largest distance (k,) of a body's centre from its true position, divided by the scene's
     length."""
     distance = np.linalg.norm(trajectory.position - exact.position, axis=-1)
-    return distance.max(axis=-1) / constraints.scene_length(scene)
+    return distance.max(axis=1) / constraints.scene_length(scene)
 
 
 def rotation_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:

@@ -29,7 +29,7 @@ def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
         return None
     if any(load.over_time for load in scene.load if load.acts_on == "body"):
         return None
-    start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=-1)
+    start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=1)
     state = (trajectory.position, trajectory.orientation, trajectory.velocity, trajectory.angular_velocity)
     linear, angular = _momenta(scene, *state)
     time = trajectory.times[:, None]

@@ -72,7 +72,7 @@ def relative_distance(body: str) -> Measure:
         off = _off(scene, body, motion, exact)
         if off is None or exact is None:
             return None
-        true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=-1)
+        true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=1)
         return float((off / true).max(initial=0.0))
 
     return measure
@@ -108,7 +108,7 @@ def guided(body: str) -> Measure:
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         b = scene.body_index(body)
         place, turn = (a[b] for a in constraints.initial_poses(scene))
-        aside = np.linalg.norm((motion.position[:, b] - place)[:, :2], axis=-1)
+        aside = np.linalg.norm((motion.position[:, b] - place)[:, :2], axis=1)
         tilt = rotations.angle_between(motion.orientation[:, b], np.broadcast_to(turn, (len(aside), 4)))
         return float(max(aside.max(initial=0.0), tilt.max(initial=0.0)))
 
@@ -120,4 +120,4 @@ def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory | None) 
     if exact is None:
         return None
     b, k = scene.body_index(body), len(exact.times)
-    return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=-1))
+    return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=1))
