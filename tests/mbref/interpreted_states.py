@@ -20,7 +20,7 @@ if not PLAIN:
 
 from mbref.kernels.layout import NOT_CONVERGED, OK
 from mbref.taylor import loads, mode, pose_maps, samples, saved_state, step_start, stepping
-from mbref.taylor.crossing import acceptance, short_crossing
+from mbref.taylor.crossing import acceptance, detection, short_crossing
 
 LANES, ORDER = 16, 6
 
@@ -342,3 +342,69 @@ def test_the_pivot_where_a_motion_turns_back(monkeypatch):
     assert times[0] == 0.5 and times[-1] == 1.0 and len(times) == acceptance.BISECTIONS + 1
     made.partition.rank = 1
     assert acceptance.pivot_at_turning_point.function(1.0, made) == pytest.approx(0.3)
+
+
+# --- determinants inside a step -----------------------------------------------------------------------------
+def inside(patch: pytest.MonkeyPatch, at: dict[float, float]) -> tuple[Any, list[Any]]:
+    """A step of 2 s, whose determinants at the ends have the logarithms 3 and 5, and ``at`` other times."""
+    made, calls = memory(), []
+    patch.setattr(detection, "end_logarithms", lambda _: (3.0, 5.0))
+    patch.setattr(detection, "logarithm_at", lambda h, _: at[round(h, 6)])
+    patch.setattr(detection, "time_of_minimum", lambda h, sections, _: h * sections)
+    patch.setattr(detection, "evaluate_series", lambda h, _: calls.append(h))
+    made.step.start_pivot, made.progress = 0.4, SimpleNamespace(largest_pivot=0.5)
+    return made, calls
+
+
+COARSE, FINE = 2.0 * detection.SECTIONS_COARSE, 2.0 * detection.SECTIONS
+
+
+@pytest.mark.parametrize(
+    ("level", "coarse", "fine", "vanishes"),
+    [
+        (False, 0.99, -27.01, True),
+        (False, 0.99, -26.99, False),
+        (False, 1.01, -99.0, False),
+        (True, 0.99, -27.01, False),
+    ],
+)
+def test_a_determinant_that_vanishes_inside_a_step(monkeypatch, level, coarse, fine, vanishes):
+    """Relative to the smaller end, exp(-2) at first and exp(-30) after a finer search."""
+    made, calls = inside(monkeypatch, {COARSE: coarse, FINE: fine})
+    asked: list[Any] = []
+    monkeypatch.setattr(detection, "stays_level", lambda h, largest, _: asked.append((h, largest)) or level)
+    assert detection.vanishes_inside(2.0, made) is vanishes and asked == [(2.0, 5.0)] and calls == [2.0]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "level"), [(4.4, 4.4, True), (4.2, 4.4, False), (4.4, 4.2, False)]
+)
+def test_a_determinant_that_stays_level(monkeypatch, first, second, level):
+    """More than half of the larger end, exp(5), at both golden sections."""
+    made, _ = inside(monkeypatch, {0.763932: first, 1.236068: second})
+    assert detection.stays_level(2.0, 5.0, made) is level
+
+
+@pytest.mark.parametrize(
+    ("dip", "lowest", "accurate", "vanishes"),
+    [
+        (1.38, 0.0, False, True),
+        (1.4, 0.0, False, False),
+        (1.38, -27.01, True, True),
+        (1.38, -26.99, True, False),
+    ],
+)
+def test_a_determinant_that_dips_where_the_pivot_vanishes(monkeypatch, dip, lowest, accurate, vanishes):
+    """0.4 falls to zero at 1.6 s on the way to -0.1; 0.2 of the smaller end is exp(3) / 5."""
+    made, calls = inside(monkeypatch, {1.6: dip, FINE: lowest})
+    made.mode.kind = mode.HIGH_ACCURACY if accurate else mode.REGULAR
+    assert bool(detection.dips_to_zero(2.0, 0.1, made)) is vanishes and calls == [2.0]
+
+
+def test_a_high_accuracy_step_that_starts_near_needs_no_minimum(monkeypatch):
+    """0.6 of the largest pivot is far."""
+    made, _ = inside(monkeypatch, {1.6: 1.38, FINE: 0.0})
+    made.progress.largest_pivot = 0.67
+    assert detection.dips_to_zero(2.0, 0.1, made)
+    made.progress.largest_pivot = 0.66
+    assert not detection.dips_to_zero(2.0, 0.1, made)
