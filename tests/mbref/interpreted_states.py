@@ -408,3 +408,73 @@ def test_a_high_accuracy_step_that_starts_near_needs_no_minimum(monkeypatch):
     assert detection.dips_to_zero(2.0, 0.1, made)
     made.progress.largest_pivot = 0.66
     assert not detection.dips_to_zero(2.0, 0.1, made)
+
+
+def changing(
+    patch: pytest.MonkeyPatch, signs: list[bool], free: int = 2, **answers: Any
+) -> tuple[Any, list[Any]]:
+    """A step of 3 s whose determinants have these signs one after the other."""
+    made, calls, left = memory(), [], list(signs)
+
+    def determinant(y: Any, _: Any) -> tuple[bool, float]:
+        calls.append("state" if y is made.state else "terms" if y is made.series.terms else y)
+        return left.pop(0), 0.0
+
+    made.kernels = SimpleNamespace(determinant=determinant)
+    patch.setattr(detection, "freedoms", lambda _: free)
+    patch.setattr(detection, "has_one_null_vector", lambda _: free == 1)
+    patch.setattr(detection, "save_start_determinant", lambda _: calls.append("start"))
+    patch.setattr(detection, "save_gradient", lambda _: calls.append("gradient"))
+    patch.setattr(detection, "evaluate_series", lambda h, _: calls.append(h))
+    patch.setattr(
+        detection, "gradient_determinant_at_end", lambda _: calls.append("end") or (left.pop(0), 0.0)
+    )
+    for name in ("null_vectors_oppose", "rates_oppose", "is_undriven", "turns_back"):
+        patch.setattr(detection, name, lambda *_, name=name: answers.get(name, False))
+    return made, calls
+
+
+@pytest.mark.parametrize(
+    ("signs", "changes"),
+    [
+        ([False, False, False], False),
+        ([True, False, False], True),
+        ([False, True, True], True),
+        ([False, False, True], True),
+    ],
+)
+def test_a_long_step_is_judged_in_parts(monkeypatch, signs, changes):
+    """Three parts of 1 s: each with the gradient of the one before; the state at the end is put back."""
+    made, calls = changing(monkeypatch, signs)
+    assert detection.determinant_changes_sign(3.0, 3, made) is changes
+    part = ["state", "gradient"]
+    assert calls == ["start", 1.0, *part, 2.0, *part, "terms", 3.0]
+    square, calls = changing(monkeypatch, signs, free=0)
+    assert detection.determinant_changes_sign(3.0, 3, square) is changes
+    assert calls == ["start", 1.0, "state", 2.0, "state", "end", 3.0]
+
+
+def test_a_step_in_one_part(monkeypatch):
+    for sign in (True, False):
+        made, calls = changing(monkeypatch, [sign])
+        assert detection.determinant_changes_sign(3.0, 1, made) is sign and calls == ["start", "terms"]
+        one, calls = changing(monkeypatch, [], free=1, null_vectors_oppose=sign)
+        assert detection.determinant_changes_sign(3.0, 1, one) is sign and not calls
+
+
+@pytest.mark.parametrize(
+    ("parts", "undriven", "turned", "by_rates"),
+    [
+        (2, True, False, True),
+        (4, True, False, True),
+        (5, True, False, False),
+        (2, False, False, False),
+        (2, True, True, False),
+    ],
+)
+def test_a_few_parts_of_one_freedom_are_judged_by_their_rates(monkeypatch, parts, undriven, turned, by_rates):
+    """Up to four parts of a motion without drivers that does not turn back."""
+    made, calls = changing(
+        monkeypatch, [False] * parts, free=1, is_undriven=undriven, turns_back=turned, rates_oppose=True
+    )
+    assert detection.determinant_changes_sign(3.0, parts, made) is by_rates and bool(calls) is not by_rates
