@@ -175,6 +175,26 @@ def test_time_is_scaled_by_the_velocities(v, time):
     assert moving.scale[-1] == pytest.approx(time), "γ at rest depends on time, too"
 
 
+@pytest.mark.parametrize(
+    ("nu", "gamma", "driven"),
+    [((0, 6, 0), (0,) * 3, True), ((0,) * 3, (0, 0, 5), True), ((0,) * 3, (0,) * 3, False)],
+)
+def test_time_counts_where_one_row_depends_on_it(nu, gamma, driven):
+    made = Curved(rows((0, 2.0), (1, 2.0), (9, 3.0)), curved=0.0)
+    made.nu = np.array(nu, dtype=float)
+    terms = made.terms
+
+    def with_time(t: Any, q: np.ndarray, v: np.ndarray | None = None) -> Any:
+        found = terms(t, q, v)
+        return SimpleNamespace(
+            jacobian=found.jacobian, nu=found.nu, gamma=found.gamma + np.array(gamma, float)
+        )
+
+    made.terms = with_time  # type: ignore[method-assign]
+    found = b.second_order(made, 0.25, Q, np.zeros(12))
+    assert found.scale[-1] == (1.0 if driven else 0.0) and found.kernel.shape == (13, 10 if driven else 9)
+
+
 # --- directions and velocities ----------------------------------------------------------------------------
 KERNEL = np.linalg.qr(np.cos(np.arange(9.0).reshape(3, 3) ** 2))[0][:, :2]
 MODEL: Any = SimpleNamespace(mass=np.array([2.0, 5.0]), n=2, m=3)

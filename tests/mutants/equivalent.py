@@ -133,6 +133,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "2",
     ): ANY_RANDOM,
     (
+        "mbref/equations/joint_reactions.py",
+        "components = slice(3, 6) if turns else slice(0, 3)",
+        "7",
+    ): "A wrench has six components, of which a slice takes the last three.",
+    (
         "mbref/linear_algebra/minimum_norm.py",
         "direction[:], before = 0.0, 1.0",
         "2.0",
