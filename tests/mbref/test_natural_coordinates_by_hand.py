@@ -494,3 +494,144 @@ def test_forces_that_functions_multiply():
     assert found.constant.tolist() == [[0.0] * 7 + [-1.5, 0.0], [0, 0, 0, 1.0, 2.0, 3.0, 0, 0, 0]]
     assert found.linear[7, 8] == -1.5 and found.linear[8, 7] == 1.5
     assert np.count_nonzero(found.linear) == 2
+
+
+# --- orientations of a mechanism ----------------------------------------------------------------------------
+def of_bodies(moving: Any, joints: Any = (), group: Any = None) -> Any:
+    """Orientations of bodies whose principal axes are those of the world at first."""
+    found = orientations.Orientations.__new__(orientations.Orientations)
+    count = len(moving)
+    found.nb, found._moving, found._axes = count, np.array(moving, bool), np.tile(np.eye(3), (count, 1, 1))
+    found.group = list(range(count)) if group is None else group
+    names = [f"b{k}" for k in range(count)]
+    found.model = SimpleNamespace(  # type: ignore[assignment]
+        joints=joints,
+        index=lambda name: names.index(name) if name in names else count,
+        to_local=np.tile(np.eye(3), (count + 1, 1, 1)),
+        bodies=[SimpleNamespace(name=name) for name in names],
+    )
+    return found
+
+
+def joint(
+    first: str, second: str, rotations_lost: int, *axes: Any, translations_lost: int = 3, **more: Any
+) -> Any:
+    facts = SimpleNamespace(
+        forbidden_rotations=(0,) * rotations_lost, forbidden_translations=(0,) * translations_lost
+    )
+    pair = more.get("anchors", ((0.0, 0.0, 0.0),) * 2)
+    return SimpleNamespace(facts=facts, bodies=(first, second), directions=axes, anchor_pair=pair)
+
+
+def as_lists(found: Any) -> Any:
+    return {group: [axis.tolist() for axis in axes] for group, axes in found.items() if group >= 0}
+
+
+def test_axes_at_rest_of_bodies_that_turn_about_principal_axes():
+    """One axis of a body that turns about one, none of one that turns about several, two of one at rest."""
+    made = of_bodies([[0, 0, 1], [1, 1, 0], [0, 0, 0], [1, 1, 1]])
+    x, y, z = np.eye(3).tolist()
+    assert as_lists(made._axes_at_rest()) == {0: [z], 2: [x, y]}
+    together = of_bodies([[0, 0, 1], [1, 0, 0]], group=[0, 0])
+    assert as_lists(together._axes_at_rest()) == {0: [z, x]}
+
+
+def test_axes_at_rest_are_passed_on_by_hinges():
+    """From the ground to b0, b1 and b2, against the order of the joints; b3 turns about another axis."""
+    z, y = (0.0, 0.0, 2.0), (0.0, 3.0, 0.0)
+    chain = [
+        joint("b1", "b2", 2, z),
+        joint("b1", "b0", 2, z),
+        joint("ground", "b0", 2, z),
+        joint("b2", "b3", 2, y),
+    ]
+    free = [[1, 1, 1]] * 4
+    assert as_lists(of_bodies(free, chain)._axes_at_rest()) == {k: [[0.0, 0.0, 1.0]] for k in range(3)}
+    shared = list(of_bodies(free, chain).shared_axes())
+    assert [(one[0], other[0]) for one, other in shared] == [(1, 2), (1, 0), (-1, 0), (2, 3)]
+    assert shared[3][1][1].tolist() == [0.0, 1.0, 0.0]
+    assert not list(of_bodies(free, [joint("b0", "b1", 3), joint("b0", "b1", 0, z)]).shared_axes())
+
+
+def test_bodies_that_joints_hold_in_one_orientation():
+    """The ground holds b2, and b1 holds b3 and b0: the smallest number is kept."""
+    made = of_bodies(
+        [[1, 1, 1]] * 4,
+        [
+            joint("b3", "b1", 3),
+            joint("ground", "b2", 3),
+            joint("b0", "b1", 3),
+            joint("b2", "b3", 2, (0, 0, 1)),
+        ],
+    )
+    assert made._groups() == [0, 0, -1, 0]
+    made.group = [0, 0, -1, 0]
+    assert [made.number(body) for body in (0, 2, 3, 4)] == [0, -1, 0, -1]
+    assert [made._group_of(name) for name in ("b1", "b2", "ground")] == [0, -1, -1]
+
+
+def test_kinds_of_orientations():
+    """Two axes at rest fix an orientation, one axis lets it turn, and none leaves it free."""
+    made = of_bodies([[1, 1, 1]] * 3)
+    x, y, z = np.eye(3)
+    made._axes_at_rest = lambda: {-1: [x, y], 0: [x, y], 1: [z]}
+    made._turning = lambda group, axis: ("turning", group, axis.tolist())
+    made._free = lambda group: ("free", group)
+    assert made._orientations() == {-1: FIXED, 0: FIXED, 1: ("turning", 1, [0.0, 0.0, 1.0]), 2: ("free", 2)}
+
+
+def test_the_frame_of_an_orientation_that_turns():
+    """The first direction is that of a slide across the axis, or the unit vector farthest from the axis."""
+    z = np.array([0.0, 0.0, 1.0])
+    plain = of_bodies([[1, 1, 1]])._frame(z)
+    assert plain.tolist() == [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    slide = joint("b0", "ground", 3, (0.0, 3.0, 0.0), translations_lost=2)
+    along = joint("b0", "ground", 3, (0.0, 0.0, 1.0), translations_lost=2)
+    hinge = joint("b0", "ground", 2, (1.0, 1.0, 0.0))
+    found = of_bodies([[1, 1, 1]], [hinge, along, slide])._frame(z)
+    assert found.tolist() == [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    axis = np.array([0.6, 0.0, 0.8])
+    tilted = of_bodies([[1, 1, 1]])._frame(axis)
+    assert tilted @ tilted.T == pytest.approx(np.eye(3)) and tilted[2] is not axis and tilted[2] @ axis == 1.0
+    assert tilted[0].tolist() == [0.0, 1.0, 0.0] and np.linalg.det(tilted) == pytest.approx(1.0)
+
+
+def test_directions_for_the_basis_of_an_orientation():
+    """Axes of joints on the bodies, arms between anchors, and principal axes, in this order."""
+    anchors = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), ((9.0, 0.0, 0.0), (0.0, 4.0, 0.0))
+    joints = [
+        joint("ground", "b0", 2, (0.0, 0.0, 2.0), anchors=anchors[0]),
+        joint("b1", "b0", 1, (3.0, 0.0, 0.0), (0.0, 5.0, 0.0), anchors=anchors[1]),
+        joint("b1", "ground", 2, (1.0, 0.0, 0.0)),
+    ]
+    found = np.array(list(of_bodies([[1, 1, 1]] * 2, joints)._directions(0)))
+    x, y, z = np.eye(3).tolist()
+    assert found.tolist() == [z, y, y, x, y, z]
+
+
+def test_an_orientation_that_turns_has_an_arm_across_its_axis():
+    """The first direction with more than 0.2 across the axis; its variables are along the frame."""
+    made = of_bodies([[1, 1, 1]])
+    near = np.array([0.19, 0.0, math.sqrt(1 - 0.19**2)])
+    far = np.array([0.0, 0.6, 0.8])
+    made._directions = lambda group: iter([near, far])
+    asked: list[Any] = []
+    made._variables = lambda *given: asked.append(given) or (4, 5)
+    found = made._turning(0, np.array([0.0, 0.0, 1.0]))
+    assert found.basis.tolist() == [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    assert found.variables == (4, 5) and found.frame[2].tolist() == [0.0, 0.0, 1.0]
+    [(group, axes, [arm])] = asked
+    assert group == 0 and axes.tolist() == found.frame[:2].tolist() and arm.tolist() == [0.0, 1.0, 0.0]
+
+
+def test_variables_of_directions_belong_to_the_first_body_of_their_orientation():
+    made = of_bodies([[1, 1, 1]] * 3, group=[0, 1, 1])
+    made._axes[1] = TURN
+    made._direction_vectors = DirectionVectors(1.0)
+    axes, w = np.eye(3)[:2], np.array([0.3, -0.8, 0.5])
+    assert made._variables(1, axes, [w, w]) == (0, 1, 2, 3)
+    body, _, along, _ = made._direction_vectors.pose_maps(range(4))
+    assert body.tolist() == [1] * 4
+    turn = rotations.to_matrix(rotations.from_vector(np.array([0.5, 0.1, 0.7])))
+    pose = np.append(np.zeros(3), (turn @ TURN).ravel())
+    assert along @ pose == pytest.approx(np.tile(axes @ turn @ w, 2), abs=1e-14)
