@@ -504,3 +504,72 @@ def test_the_determinant_at_the_start_is_saved_by_the_pivots_of_an_unchanged_par
     determinants.save_start_determinant(memory)
     assert memory.solver.past_gradient[:, :2].tolist() == [[2.0, 0.0], [0.0, 2.0], [0.0, 0.0]]
     assert all(y is memory.series.past for y in asked) and len(asked) == 2
+
+
+# --- which code computes the orders -------------------------------------------------------------------------
+def expanding(patch: pytest.MonkeyPatch, deceleration: float = 0.0, length: float = 0.0, **code: Any) -> Any:
+    """A series of rates up to 4 /s, whose code by power finds that its speed changes at a rate (1/s)."""
+    memory, calls = system([CIRCLE]), []
+    memory.series.terms[1, :NZ], memory.partition.rank = (1.0, -4.0, 2.0), 1
+    memory.run.loop = SimpleNamespace(clock=SimpleNamespace(length=length))
+    memory.code = SimpleNamespace(**{"expand": 0, "expand_by_power": 7, "rank": 1, **code})
+
+    def by_power(
+        address: int, terms: Any, response: Any, left: Any, right: Any, sums: Any, last: int
+    ) -> None:
+        calls.append(("power", address, last))
+        sums[0] = -deceleration
+
+    def by_code(address: int, *given: Any) -> None:
+        calls.append(("code", address, given[-1]))
+
+    patch.setattr(series, "expand_by_power", by_power)
+    patch.setattr(series, "expand_by_code", by_code)
+    patch.setattr(series, "start_sums", lambda _: calls.append("sums"))
+    patch.setattr(series, "expand_without_loads", lambda last, _: calls.append(("loops", last)))
+    memory.kernels.multipliers = lambda _: calls.append("multipliers") or 44
+    memory.kernels.respond = lambda _: calls.append("respond")
+    memory.kernels.loads = lambda _: calls.append("loads") or 55
+    memory.calls = calls
+    return memory
+
+
+@pytest.mark.parametrize(
+    ("deceleration", "length", "by_power"),
+    [(7.9, 0.0, True), (8.1, 0.0, False), (3.9, 0.5, True), (-4.1, 0.5, False), (np.nan, 0.5, False)],
+)
+def test_orders_by_power_unless_the_motion_may_turn_back(monkeypatch, deceleration, length, by_power):
+    """Twice the time of stopping must be longer than the last step, at first the time to move by one."""
+    memory = expanding(monkeypatch, deceleration, length)
+    assert series.expand_series.function(memory) == (OK if by_power else 44)
+    assert memory.calls == [("power", 7, LAST), *["multipliers"] * (not by_power)]
+    assert memory.step.deceleration == pytest.approx(abs(deceleration), nan_ok=True)
+
+
+@pytest.mark.parametrize("code", [{"expand_by_power": 0}, {"rank": 2}, {"rates": 0.0}])
+def test_orders_with_multipliers(monkeypatch, code):
+    """Without code by power, at another rank, and at rest before the first step."""
+    rates = code.pop("rates", 4.0) if "rates" in code else 4.0
+    memory = expanding(monkeypatch, 1.0, **code)
+    memory.series.terms[1] *= rates
+    memory.step.deceleration = 9.0
+    assert series.expand_series.function(memory) == 44 and memory.calls == ["multipliers"]
+    assert memory.step.deceleration == 0.0
+
+
+@pytest.mark.parametrize(
+    ("code", "varies", "status", "calls"),
+    [
+        ({"expand": 5}, False, OK, ["respond", ("code", 5, LAST)]),
+        ({"expand": 5, "rank": 2}, False, OK, ["respond", "sums", ("loops", LAST)]),
+        ({"expand_by_power": 0}, True, 55, ["sums", "loads"]),
+        ({"expand_by_power": 0, "expand": 5}, True, OK, [("code", 5, LAST)]),
+    ],
+)
+def test_multipliers_by_code_or_by_loops(monkeypatch, code, varies, status, calls):
+    """After orders by power the response to all equations is missing."""
+    memory = expanding(monkeypatch, **code)
+    monkeypatch.setattr(series, "has_varying_loads", lambda polynomials: varies)
+    memory.step.deceleration = 9.0
+    assert series.expand_with_multipliers.function(memory) == status and memory.calls == calls
+    assert memory.step.deceleration == 0.0
