@@ -178,9 +178,7 @@ def resultants(scene: Scene, run: Trajectory, samples: np.ndarray | int) -> np.n
 def largest_reaction(scene: Scene, run: Trajectory) -> float:
     """Return the largest reaction of a run, N; at least the force that accelerates the masses by LEAST."""
     units = np.repeat([1.0, scene_length(scene)], 3)
-    sizes = [
-        float(np.linalg.norm(wrench / units, axis=1).max()) for wrench in (run.reactions or {}).values()
-    ]
+    sizes = [float(np.linalg.norm(wrench / units, axis=1).max()) for wrench in (run.reactions or {}).values()]
     return max(*sizes, 0.0, LEAST * sum(body.mass or 1.0 for body in scene.body))
 
 
