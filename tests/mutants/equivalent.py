@@ -35,6 +35,7 @@ ALIKE = "The comparison treats both arrays alike."
 ZERO_TIMES = "Zero times any vector is a vector of zeros."
 SKIPS_ZERO = "A row is left as it is when zero times another row is subtracted."
 FOUND_BEFORE = "The largest entry of a row is in one of its free columns, so that the search ends there."
+PADDED = "Sizes of one and of two are both padded to eight lanes."
 LARGEST_ENTRY = "while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:"
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 ANY_RANDOM = "Any random numbers serve; the seed only makes results repeatable."
@@ -163,6 +164,16 @@ REASONS: dict[tuple[str, str, str], str] = {
         "write.put(write.minus(entry), self._null_space, f * self._lanes, column)",
         "write.put(write.minus(entry), self._null_space, column, f * self._lanes)",
     ): "The place in memory is the sum of both numbers.",
+    (
+        "mbref/taylor/polynomials.py",
+        "self._lanes = padded_size(max(1, len(lane) + len(of.rows)))",
+        "2",
+    ): PADDED,
+    (
+        "mbref/taylor/series_memory.py",
+        '"lanes": padded_size(max(1, nz + nr + ng)), "slots": polynomials.products.left.size,',
+        "2",
+    ): PADDED,
     ("mbref/taylor/solver.py", "if i != r and entry != 0.0:", "(i != r)"): SKIPS_ZERO,
     ("mbref/taylor/solver.py", "if g != f and entry != 0.0:", "(g != f)"): SKIPS_ZERO,
     (
