@@ -85,4 +85,4 @@ def test_second_runs_differ_from_the_first_ones():
     assert reference.SECONDS == 20.0 and reference.SHARE == 0.4
     assert reference.SECOND_RUN_ORDER == 24 != taylor.ORDER == 28
     assert reference.SECOND_RUN_NODES == 1.8 < tree.NODES_PER_DIGIT == 2.1 and reference.SECOND_RUN_SEED == 1
-    assert reference.CONSISTENT == 32 * EXTENDED.eps
+    assert 32 * EXTENDED.eps == reference.CONSISTENT

@@ -10,6 +10,7 @@ import pytest
 
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles
 from crosscheck.judge.reference.natural import NaturalCoordinates, axial, quaternions, skew
+from crosscheck.judge.reference.natural_joints import AngleForm, Gear, GearSeries
 from mbref import rotations
 from mbref.scene import Body, Revolute, Scene
 
@@ -145,3 +146,23 @@ def test_a_cosine_of_rounding_is_a_right_angle():
         made.arithmetic, made.c = SimpleNamespace(digits=digits), np.array([1e-15, 1.1e-15])
         made.take_right_angles()
         assert made.c.tolist() == left
+
+
+def test_multipliers_of_gears_act_along_their_coordinates():
+    """Orders 0 and 1 of a multiplier 2 + 3 t, of weight 5: as a moment 10 + 15 t about the hinge."""
+    free = SCENE.with_(joint=(Revolute(name="A", bodies=("a", "b"), anchor=(0, 0, 0), axis=(0, 0.6, 0.8)),))
+    coordinates = NaturalCoordinates(free, DOUBLE)
+    form = AngleForm(coordinates, free.joint[0])
+    x = np.random.default_rng(7).normal(size=(3, 3, 12))
+    gears = GearSeries(SimpleNamespace(forms=[form]), [Gear(((0, 5.0),))], [0.25], 3, DOUBLE.zeros)
+    alone, moment = form.series(0.25, 3), np.array([10.0, 15.0, 0.0])
+    for k in range(3):
+        gears.grow(k, x)
+        alone.grow(k, x)
+    for k, multiplier in enumerate((2.0, 3.0)):
+        gears.put(np.array([multiplier]), k)
+    wanted = [alone.pull(moment, k) for k in range(2)][1]
+    assert gears.pull(1) == pytest.approx(wanted) and np.abs(wanted).max() > 1.0
+    assert gears.gaps(1) == pytest.approx([5.0 * alone.value[1]])
+    none = GearSeries(SimpleNamespace(forms=[]), [], [], 3, DOUBLE.zeros)
+    assert none.pull(0) == 0 and none.gaps(0).shape == (0,)
