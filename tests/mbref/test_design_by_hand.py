@@ -354,7 +354,7 @@ def test_motions_that_are_not_steady(monkeypatch, rate, freedoms, phi, change, f
 
     def accelerations(model: Any, t: float, q: Any, v: Any) -> np.ndarray:
         asked.append((t, q, v))
-        return np.array([1.0, 0.5]) + (change if t else 0.0)
+        return np.array([1.0, 0.5 + (change if t else 0.0)])
 
     monkeypatch.setattr(linearisation, "accelerations", accelerations)
     frame = SimpleNamespace(
@@ -617,9 +617,12 @@ def test_parts_of_an_offset_are_small(monkeypatch, shift, turn, small):
 
 def test_an_offset_that_no_pose_obeys():
     model: Any = SimpleNamespace(row_joint=["A", "G", "B"])
-    text = offsets._unmet(PAIR, model, np.array([0.0, -0.25, 0.1]), 0.375)
+    couplings = [("G", 1.0), ("H", 0.0), ("K", -0.5)]
+    scene: Any = SimpleNamespace(coupling=[SimpleNamespace(name=n, offset=x) for n, x in couplings])
+    text = offsets._unmet(scene, model, np.array([0.0, -0.25, 0.1]), 0.375)
     assert text == (
-        "coupling: no pose obeys the offsets of G (1); after 38 % of them 0.25 m or rad remain open at 'G'"
+        "coupling: no pose obeys the offsets of G (1), K (-0.5); after 38 % of them 0.25 m or rad "
+        "remain open at 'G'"
     )
 
 

@@ -165,6 +165,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "write.put(write.minus(entry), self._null_space, column, f * self._lanes)",
     ): "The place in memory is the sum of both numbers.",
     (
+        "mbref/design/turning.py",
+        "return Turning(sign * driver.polynomial[1] * axis, np.array(joint.anchor_pair[0]), driver.joint)",
+        "1",
+    ): "Both bodies of a joint that turns have one anchor.",
+    (
         "mbref/taylor/polynomials.py",
         "self._lanes = padded_size(max(1, len(lane) + len(of.rows)))",
         "2",
