@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.cli import comparison, request, scene_request
 from crosscheck.engine import Setting
 from crosscheck.setting import BRANCHES
 from crosscheck.study import pictures, progress, sentences, speed_sentences
@@ -249,3 +250,30 @@ def test_who_integrates(monkeypatch: pytest.MonkeyPatch) -> None:
     assert speed_sentences.is_integrated_here(of)
     assert not speed_sentences.is_integrated_here({**of, "family": "own"})
     assert not speed_sentences.is_integrated_here({**of, "asked": {"engine": "gone"}})
+
+
+# --- A comparison from Python -----------------------------------------------------------------------------
+@pytest.mark.parametrize("is_file", [True, False])
+def test_a_comparison_tells_its_caller_and_names_its_scene(
+    is_file: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A scene made in Python is named as the file that it would be saved in."""
+    told: list[str] = []
+    paths: list[dict[str, str]] = []
+    monkeypatch.setattr(scene_request, "find_scenes", lambda names: [SCENE.with_(name=names[0])])
+
+    def find_engines(names: Any, tell: Any) -> list[str]:
+        tell("left out")
+        return ["e"]
+
+    monkeypatch.setattr(request, "find_engines", find_engines)
+    monkeypatch.setattr(comparison, "collected", lambda *given: "found")
+    monkeypatch.setattr(
+        comparison, "comparisons", lambda found, named, limit: paths.append(named) or ["compared"]
+    )
+    given: Any = "my.toml" if is_file else SCENE
+    assert comparison.compare(given, notice=told.append) == "compared"  # type: ignore[comparison-overlap]
+    assert told == ["left out"]
+    assert paths == [{"my.toml": "my.toml"} if is_file else {"s": "s.toml"}]
+    comparison.compare(given)
+    assert told == ["left out"]
