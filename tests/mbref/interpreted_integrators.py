@@ -267,3 +267,4 @@ def test_facts_of_integrators():
     }
     assert {name for name, each in INTEGRATORS.items() if each.crosses == "by series"} == {"taylor"}
     assert all(each.highest_order({}) == each.order for each in INTEGRATORS.values())
+    assert adams.OrderControl() == (-1, 0, 0, 0.0, 0.0, 0, 0.0, 0.0, 0, 0), "no past, before the start phase"
