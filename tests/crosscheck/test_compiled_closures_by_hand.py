@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba import types
+from numba.extending import register_jitable
 
 from crosscheck.engines.compiled import calls, newton, run
 from crosscheck.engines.mujoco import closures, context, rates
@@ -21,6 +23,24 @@ from crosscheck.engines.sampling import Counts
 from mbref.trajectory import Outcome
 
 SCALE = 2.0  # of the entries of rows; smaller ones than 1e-12 are rounding
+
+
+@register_jitable
+def twice(x: float) -> float:
+    return 2.0 * x
+
+
+def twice_and_one(x: float) -> float:
+    return twice(x) + 1.0
+
+
+def test_functions_for_c_code_are_compiled_without_jit_too(monkeypatch, tmp_path):
+    """The cache is empty, so that the function is compiled."""
+    monkeypatch.setattr(calls.config, "DISABLE_JIT", 1)
+    monkeypatch.setattr(calls.config, "CACHE_DIR", str(tmp_path))
+    found = calls.c_function(types.float64(types.float64))(twice_and_one)
+    assert found.address and found.ctypes(1.5) == 4.0
+    assert calls.config.DISABLE_JIT == 1 and list(tmp_path.rglob("*.nbi"))
 
 
 # --- linear algebra ---------------------------------------------------------------------------------------

@@ -1,22 +1,39 @@
 """Calls of C functions by their address from code that numba compiles.
 
 An address is an argument, so that compiled code contains no address of this process and can be cached.
-Without compilation (NUMBA_DISABLE_JIT) ctypes makes the calls.
+Without compilation (NUMBA_DISABLE_JIT) ctypes makes the calls. Functions for C code are always compiled.
 """
 
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import config, types
+from numba import cfunc, config, types
 from numba.extending import intrinsic
 
 POINTER, REAL = ctypes.c_void_p, ctypes.c_double
 INTEGER = ir.IntType(types.intp.bitwidth)
 RATES = ctypes.CFUNCTYPE(ctypes.c_int32, POINTER, REAL, POINTER, POINTER)
 """int rates(void *context, double t, double *y, double *rates): 0, or why there are none at y"""
+
+
+def c_function(signature: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a function for C code, which calls it by its field ``address``.
+
+    NUMBA_DISABLE_JIT does not hold for it: numba could not compile the functions that it calls.
+    """
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        before, config.DISABLE_JIT = config.DISABLE_JIT, 0
+        try:
+            return cfunc(signature, cache=True)(function)
+        finally:
+            config.DISABLE_JIT = before
+
+    return compiled
 
 
 def _called(context: Any, builder: Any, address: Any, result: Any, arguments: list[Any]) -> Any:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 
-from numba import carray, cfunc
+from numba import carray
 from numba.extending import register_jitable
 
 from crosscheck.engines.compiled.calls import (
+    c_function,
     call_with_three,
     call_with_three_and_real,
     call_with_two,
@@ -260,7 +261,7 @@ def take(c, y, qpos, qvel):
     state[: c[NQ]], state[c[NQ] :] = qpos, qvel
 
 
-@cfunc(SIGNATURE, cache=True)
+@c_function(SIGNATURE)
 def settle(context, t, y, out):
     """Project the state y at time t (s) onto the closures by the least kinetic energy; returns MET or
     NOT_MET."""
@@ -275,7 +276,7 @@ def settle(context, t, y, out):
     return MET
 
 
-@cfunc(SIGNATURE, cache=True)
+@c_function(SIGNATURE)
 def follow(context, t, y, numbers):
     """Move the state y from time TIME to time t by Newton's method on the closures; returns MET or
     NOT_MET."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, cfunc, types
+from numba import carray, types
 from numba.extending import register_jitable
 
-from crosscheck.engines.compiled.calls import RATES, call_with_two, integers, reals
+from crosscheck.engines.compiled.calls import RATES, c_function, call_with_two, integers, reals
 from crosscheck.engines.mujoco.context import (
     AMPLITUDE,
     DATA,
@@ -97,7 +97,7 @@ def put(c, t, y):
     return qpos, qvel
 
 
-@cfunc(SIGNATURE, cache=True)
+@c_function(SIGNATURE)
 def rates(context, t, y, out):
     """Compute the rates (nq + nv,) of a state at time t (s) by mj_forward; returns 0."""
     c = carray(context, (WIDTH,))
