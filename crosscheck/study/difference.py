@@ -149,7 +149,7 @@ def _sentences(old: Record | None, new: Record | None) -> Iterator[str]:
         yield f"outcome {ended(old)} → {ended(new)}"
         return
     little = EARLIER**3 * new["asked"].get("end", 0.0)
-    if not (is_completed(new) or math.isclose(old["t_end"], new["t_end"], rel_tol=EARLIER, abs_tol=little)):
+    if not math.isclose(old["t_end"], new["t_end"], rel_tol=EARLIER, abs_tol=little):
         yield f"end {ended(old)} → {ended(new)}"
     bound = max(map(error_bound, (old, new)))
     if _is_changed(error(old), error(new), ERROR_RATIO, max(NOISE, bound)):

@@ -262,6 +262,11 @@ def test_couplings_locks_and_merged_bodies(tmp_path: Path) -> None:
     assert [(body.name, body.mass) for body in found.scene.body] == [("a", 2.0), ("b", 1.0)]
 
 
+def test_bodies_fixed_to_the_ground_have_no_note(tmp_path: Path) -> None:
+    fixed = PAIR.replace("<worldbody>", f'<worldbody><body name="pillar">{LUMP}</body>')
+    assert read(tmp_path, fixed).imported.notes == ("fixed to 'a' and part of it: 'm'",)
+
+
 def test_velocities_of_a_keyframe_obey_the_closures(tmp_path: Path) -> None:
     """B follows A with the ratio 3: the nearest velocities to (1, 2) are (0.7, 2.1)."""
     text = '<equality><joint name="K" joint1="B" joint2="A" polycoef="0 3 0 0 0"/></equality>'

@@ -217,6 +217,17 @@ def test_the_sense_of_a_steady_rotation_is_of_the_second_body():
     assert np.allclose(turning(scene.with_(joint=[backwards, scene.joint[1]])).spin, [0.0, 0.0, -6.0])
 
 
+@pytest.mark.parametrize(("sine", "is_steady"), [(0.9e-12, True), (1.1e-12, False)])
+def test_an_axis_along_gravity_up_to_rounding(sine, is_steady):
+    """The driver turns about z; gravity is inclined in the plane of x and z."""
+    scene = turning_pendulum().with_(gravity=(sine * 9.81, 0.0, -9.81))
+    if is_steady:
+        assert turning(scene).rate == 6.0
+    else:
+        with pytest.raises(SceneError, match="its axis is not along gravity"):
+            turning(scene)
+
+
 def test_a_rotation_that_the_loads_do_not_follow_is_not_steady():
     load = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [0.0, 0.1, 0.0]}
     assert turning(turning_pendulum()).rate == 6.0 and len(steady_poses(turning_pendulum(), starts=2)) > 0

@@ -180,6 +180,8 @@ def test_a_mechanism_that_falls_as_one_piece():
         thrown[1].model_copy(update={"angular_velocity": (0.0, 0.0, 1.0), "velocity": (1.0, 0.5, 0.0)}),
     ]
     assert not falls_freely(two.with_(body=spun))
+    parted = [body("b", velocity=(1.0, 0.0, 0.0)), body("c", 2.0, velocity=(2.0, 0.0, 0.0))]
+    assert not falls_freely(scene(body=parted, joint=())), "they part along one axis alone"
     assert not falls_freely(two.with_(driver=(Driver(joint="A"),)))
     bare = [b.model_copy(update={"mass": None, "inertia": None}) for b in two.body]
     assert not falls_freely(two.with_(body=bare))

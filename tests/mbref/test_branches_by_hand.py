@@ -233,11 +233,15 @@ def test_velocities_of_a_branch_with_drivers_are_rates():
     assert b._velocity(MODEL, found, np.array([1.0, 2.0, 1e-4]), np.zeros(2)) is None
 
 
-def test_directions_that_agree_with_given_velocities():
+def test_directions_that_agree_with_given_velocities(monkeypatch):
     given, v = np.array([True, False, True]), np.array([2.0, 0.0, 6.0])
     assert b._as_given(np.array([1.0, 7.0, 3.0, 0.5]), v, given) == pytest.approx([2, 14, 6])
     assert b._as_given(np.array([1.0, 7.0, 3.0, 0.4]), v, given) is None
     assert b._as_given(np.array([-1.0, 7.0, -3.0, 0.0]), v, given) == pytest.approx([2, -14, 6])
+    u, all_given = np.array([1.0, 2.0**-30]), np.array([True])
+    monkeypatch.setattr(b, "SAME", 2.0**-30)  # |u| is 1: the rate of time is at the limit
+    assert b._as_given(u, np.array([2.0]), all_given) == pytest.approx([2.0])
+    monkeypatch.undo()
     assert b._as_given(np.array([1.0, 7.0, 3.1, 0.0]), v, given) is None
     free = np.zeros(3, dtype=bool)
     assert b._as_given(np.array([1.0, 7.0, 3.0, 0.0]), v, free) == pytest.approx([1, 7, 3])

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mbref.cli import main
+from mbref.cli import main, output
 from mbref.ensembles.ensemble import ensemble
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import run_all
@@ -152,8 +152,10 @@ def test_command_refuses_what_cannot_vary(text: str, says: str, capsys: pytest.C
     assert says in printed.err, printed.err
 
 
-def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.CaptureFixture):
+def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch):
     """A four-bar whose coupler alone is longer cannot turn over: its driver comes to a dead position."""
+    bar, asked = output.progress_bar, []
+    monkeypatch.setattr("mbref.cli.ensemble.progress_bar", lambda *of: asked.append(of) or bar(*of))
     driver = Driver(joint="A", polynomial=(0.0, 3.0))
     SCENES["four_bar_gravity"]().with_(driver=(driver,), duration=2.0).save(tmp_path / "driven.toml")
     x = SCENES["four_bar_gravity"]().joint_named("C").anchor_pair[0][0]
@@ -173,6 +175,7 @@ def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.Cap
     )
     printed = capsys.readouterr()
     assert status == 1 and "0 of 2 variants completed" in printed.out, printed
+    assert asked == [("simulating", 2)]
     assert printed.err.startswith("UNDECIDED: 2, the first of them variant 0: the drivers come to a dead"), (
         printed
     )

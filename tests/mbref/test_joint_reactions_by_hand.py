@@ -174,6 +174,19 @@ def test_two_hinges_share_all_but_the_moment_about_their_axis():
     assert vanishing[0].T @ vanishing[0] == pytest.approx(np.eye(5), abs=1e-14)
 
 
+def test_shares_at_the_limit_are_rounding(monkeypatch):
+    """Two of three singular values are not larger than the limit."""
+    system = door(0.0, 2.0)
+    limit = joint_reactions.SHARE
+    monkeypatch.setattr(joint_reactions, "_singular_values", lambda _: np.array([[2 * limit, limit, 0.0]]))
+    blocks = system.terms(np.zeros(1), poses(system)).blocks
+    assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {
+        "J0": [1],
+        "J1": [1],
+        "free": [1],
+    }
+
+
 def test_a_single_hinge_leaves_nothing_open():
     system = door(0.0)
     blocks = system.terms(np.zeros(1), poses(system)).blocks

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from mbref.command_line import Parser, commands, output_file, output_folder
+from mbref.equations.model import Model
 from mbref.kernels import memory_pool
 from mbref.kernels.aligned import aligned_zeros, block_of
 from mbref.kernels.dimensions import check_sizes, size_of
@@ -25,6 +26,7 @@ from mbref.kernels.memory_pool import (
 )
 from mbref.kernels.records import dtype_of, is_record, record
 from mbref.lazy import LazyMapping, LazySequence
+from mbref.scene import Body, Revolute, Scene
 
 FLOAT, WHOLE, SMALL = np.dtype("f8"), np.dtype("i8"), np.dtype("u1")
 
@@ -291,3 +293,20 @@ def test_a_command_line_without_a_command_shows_the_help(parser, capsys):
     printed = capsys.readouterr()
     assert caught.value.code == 2 and printed.err == parser.format_help() and printed.out == ""
     assert parser.parse_args(["run", "--steps", "3"]).steps == 3
+
+
+def test_memory_that_is_used_again_has_the_numbers_of_the_new_scene():
+    """Both scenes have one structure; a link of 3 kg follows one of 2 kg, at another place."""
+    masses = []
+    for mass, x in ((2.0, 1.0), (3.0, 4.0)):
+        link = Body(name="link", mass=mass, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, 0.0))
+        hinge = Revolute(name="A", bodies=("ground", "link"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+        model = Model(Scene(name="s", duration=1.0, body=(link,), joint=(hinge,)))
+        values = model.memory.values
+        assert values.system.mass.tolist() == [mass] * 3 + [1.0] * 3
+        assert values.system.inverse_root == pytest.approx([mass**-0.5] * 3 + [1.0] * 3)
+        numbers = [np.array(array).tolist() for array in values.scene.numbers]
+        assert numbers == [np.array(array).tolist() for array in model.data.numbers]
+        masses.append(numbers)
+        model.release()
+    assert masses[0] != masses[1], "the anchors differ"

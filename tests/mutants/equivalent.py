@@ -25,7 +25,7 @@ EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
 EXCHANGED = "Two rows or columns are exchanged, whichever is named first."
 """Functions of mbref whose third and fourth arguments may be exchanged, and the reason."""
 SYMMETRIC = {
-    0: {"suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
+    0: {"_is", "suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
     1: {"np.swapaxes", "difference", "rod"},
 }
 SYMMETRY = "The result is the same for these two arguments in any order."
@@ -47,6 +47,17 @@ OPTIONS = (
 )
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
+    (
+        "crosscheck/conformance/relations.py",
+        "return np.eye(3) if np.linalg.det(self.matrix) > 0 else FLIP",
+        "(np.linalg.det(self.matrix) >= 0)",
+    ): "The matrix is orthogonal, so that its determinant is 1 or -1.",
+    ("mbref/linear_algebra/elimination.py", "first = 0.0", "1.0"): "The first pivot replaces the number.",
+    (
+        "crosscheck/judge/gauss_principle.py",
+        "mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)",
+        "(body.mass)",
+    ): "The function needs the masses of all bodies before; the number is for types.",
     (
         "crosscheck/cli/__init__.py",
         "gc.disable()  # garbage collection would only cost time during the imports",

@@ -110,6 +110,18 @@ def tables(blocks: list, word: str) -> list[Table]:
     return [b for b in blocks if isinstance(b, Table) and word in b.header]
 
 
+def test_each_table_has_a_caption_and_a_header_for_each_cell(blocks):
+    found = [block for block in blocks if isinstance(block, Table)]
+    assert len(found) > 5
+    for table in found:
+        assert isinstance(table.caption, str) and not isinstance(table.header, str), table
+        assert {len(row) for row in table.rows} <= {len(table.header)}, table.caption
+        assert all(isinstance(cell, str) for row in (table.header, *table.rows) for cell in row), (
+            table.caption
+        )
+        assert table.right <= {*range(len(table.header))}, table.caption
+
+
 def test_score_and_the_cells_that_were_changed(records):
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score

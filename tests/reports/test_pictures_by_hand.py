@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from test_figures_by_hand import SCENE, group, moving, plain
 
+from crosscheck.paper.runs import Label
 from mbref.trajectory import Trajectory
 from reports import engine_looks, figures, ladders, mechanisms, places, speed_figure
 from reports.runs import Run, SceneRuns
@@ -154,6 +155,16 @@ def test_growth_of_a_violation_over_time():
         "It grows about as t^1.5; after 2 s: 4.0e-06 at rtol 1e-6, 2.0e-06 at rtol 1e-9."
     )
     assert ". It is of rounding; " in paper_teaching._growth_caption({"1e-6": rounding})
+
+
+def test_runs_of_one_part_by_their_variants():
+    records = {
+        Label("growth", "LM2", "x", "1e-6"): growing(1.0).record,
+        Label("gain", "LM2", "x", "5"): growing(2.0).record,
+        Label("gain", "LM2", "x", "10"): growing(3.0).record,
+    }
+    found = paper_teaching._varied(records, "gain")
+    assert list(found) == ["5", "10"] and found["10"].record["violation"] == growing(3.0).record["violation"]
 
 
 def test_violation_and_error_over_the_gain():

@@ -13,7 +13,7 @@ from crosscheck.paper.cells import Cell
 from crosscheck.paper.runs import HEAVY, UNEQUAL, Label
 from crosscheck.setting import BRANCHES
 from mbref.trajectory import Outcome
-from reports import benchmark_plot, speed_figure
+from reports import benchmark_plot, figures, speed_figure
 from reports.blocks import Table
 from reports.runs import Run, SceneRuns
 from reports.sections import (
@@ -241,6 +241,8 @@ def test_benchmark_plot_shows_the_least_cost_of_each_engine():
     assert names == ["first scene", "second"] and figure.axes[-1].get_xticks().tolist() == [0, 1]
     marks = {line.get_label(): line.get_marker() for line in figure.axes[0].lines}
     assert marks["limit"] == "_" and len(set(marks.values())) == 3
+    colours = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
+    assert colours == {"limit": figures.GREY, "a": figures.colour("a"), "b": figures.colour("b")}
     assert "CPU milliseconds per simulated second" in figure.axes[0].get_title()
     [legend] = figure.legends
     assert [text.get_text() for text in legend.get_texts()] == ["a", "b", "limit"]

@@ -14,6 +14,7 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.model import SUPPORTS as OF_MUJOCO
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.own_steps import STEP, SteppingEngine
@@ -21,8 +22,6 @@ from crosscheck.engines.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
-# impedance parameters; MuJoCo clamps the first two at this value
-STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 FAMILIES = {
     "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4",
     "euler": "default closures, first-order integrator Euler",
