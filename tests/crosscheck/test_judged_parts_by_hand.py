@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from crosscheck.conformance import relations
 from crosscheck.convergence import document
+from crosscheck.engines import terms
+from crosscheck.engines.mujoco.importing import agreement
+from crosscheck.engines.sampling import Failed
 from crosscheck.judge import gauss_principle, reaction_balance
 from crosscheck.judge.truth.reference_truth import trajectory
+from crosscheck.processes import interrupts
 from crosscheck.setting import Setting
 from crosscheck.study import fair_timing, origin
 from mbref.scene import Body, Revolute, Scene
+from mbref.trajectory import Outcome
 
 LINK = Body(name="link", mass=2.0, inertia=(1.0, 3.0, 3.5), position=(1.0, 0.0, 0.0))
 
@@ -89,3 +96,51 @@ def test_the_name_of_the_processor(monkeypatch, tmp_path):
     monkeypatch.setattr(origin.platform, "processor", lambda: "")
     monkeypatch.setattr(origin.platform, "machine", lambda: "riscv")
     assert origin._processor() == "riscv"
+
+
+@pytest.mark.parametrize(("extent", "least"), [(0.25, 0.25), (3.0, 1.0)])
+def test_rows_of_loops_count_from_a_length(extent, least, monkeypatch):
+    """Of a mechanism above 1 m, rows of the size of RANK count; of a smaller one, smaller rows."""
+    seen = []
+    monkeypatch.setattr(agreement, "_unit", lambda rows, least: seen.append(least) or rows)
+    empty = np.zeros((0, 6))
+    poses = SimpleNamespace(extent=extent, jacobian=lambda: empty)
+    compared = SimpleNamespace(_equalities=lambda: empty, poses=poses)
+    pose = np.array([[1.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    agreement.Agreement._loops(compared, scene(LINK).with_(joint=()), (), pose, np.eye(6))
+    assert seen == [agreement.RANK * least] * 2
+
+
+@pytest.mark.parametrize("size", [math.nan, math.inf])
+def test_terms_that_are_not_finite_end_a_run(size):
+    simulation = SimpleNamespace(free=np.array([1]))
+    with pytest.raises(Failed, match=r"the closures are not finite at 0\.5 s$") as caught:
+        terms.Simulation._spread(simulation, 0.5, np.eye(1), np.array([[0.0, size]]))
+    assert (caught.value.outcome, caught.value.t) == (Outcome.NOT_FINITE, 0.5)
+    with pytest.raises(Failed, match=r"the state is not finite at 0\.25 s$") as caught:
+        terms.Simulation._root(simulation, 0.25, SimpleNamespace(mass=np.diag([1.0, size])))
+    assert (caught.value.outcome, caught.value.t) == (Outcome.NOT_FINITE, 0.25)
+    spread = terms.Simulation._spread(simulation, 0.5, 2.0 * np.eye(1), np.array([[9.0, 3.0]]))
+    assert spread.tolist() == [[1.5]], "the column of the free coordinate, over the root"
+
+
+def test_an_isometry_without_a_shift_keeps_the_origin():
+    changed = relations._isometry("nothing", np.eye(3)).change(scene(LINK), None)
+    assert changed.body[0].position == (1.0, 0.0, 0.0) and changed.joint[0].anchor == (0.0, 0.0, 0.0)
+    changed = relations._isometry("a shift", np.eye(3), (1.0, 2.0, 3.0)).change(scene(LINK), None)
+    assert changed.body[0].position == (2.0, 2.0, 3.0) and changed.joint[0].anchor == (1.0, 2.0, 3.0)
+
+
+def test_attempts_to_end_calls_are_a_tenth_of_a_second_apart(monkeypatch):
+    """The second attempt ends the last child."""
+    left, asked = [["call"], ["call"], []], []
+    monkeypatch.setattr(interrupts, "stop_all", lambda: asked.append("stop"))
+
+    def wait(calls: object, timeout: float) -> SimpleNamespace:
+        asked.append(timeout)
+        return SimpleNamespace(not_done=left.pop(0))
+
+    monkeypatch.setattr(interrupts, "wait", wait)
+    with pytest.raises(KeyboardInterrupt), interrupts.calls_ended([]):
+        raise KeyboardInterrupt
+    assert asked == [0.1, "stop", 0.1, "stop", 0.1]

@@ -435,3 +435,11 @@ def test_scores_and_times_of_the_sweep():
     sized = Label("sized", sizes.rows[0][1], HALF_TURN, f"{sizes.rows[0][0]} m, seed 0")
     row = paper_sweep._sizes({sized: next(iter(records_.values()))}).rows[0]
     assert row[2 + paper_sweep.COLUMNS.index(HALF_TURN)].endswith("(1 of 1)")
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"), [(2.0, 0.0), (1.5, 0.0), (1.0, 0.0), (0.1, 1.0), (1e-5, 5.0), (math.nan, 0.0)]
+)
+def test_the_number_of_correct_digits(error, expected):
+    assert stability._digits(error) == pytest.approx(expected)
+    assert stability._digits(0.0) == stability._digits(1e-30) == stability.MOST_DIGITS

@@ -150,7 +150,7 @@ class _Original:
         read = source(path, options)
         self.mujoco, self.model, self.counts = mujoco, read.original, Counts()
         self.groups = read.groups
-        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe or "\0")
+        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe)
         self.motors = [a for a in controlled(mujoco, self.model, key) if is_motor(mujoco, self.model, a)]
         bits = mujoco.mjtDisableBit
         for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "AUTORESET"):
@@ -169,7 +169,7 @@ class _Original:
     def _push(self, options: ImportOptions) -> None:
         """Apply the forces of motors that the scene has, along their joints."""
         mujoco, model = self.mujoco, self.model
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe or "\0")
+        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe)
         for a in [] if "motors" in checked(options.without) else self.motors:
             velocity = model.jnt_dofadr[model.actuator_trnid[a, 0]]
             self.data.qfrc_applied[velocity] += motor_force(model, key, a)

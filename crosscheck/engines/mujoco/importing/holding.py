@@ -58,7 +58,7 @@ def _held(mujoco: Any, spec: Any, hold: Sequence[str], keyframe: str) -> Any:
 
 def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:
     """Return a model whose motion-capture bodies stand where a keyframe has them."""
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe or "\0")
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
     for b in np.flatnonzero(model.body_mocapid >= 0) if key >= 0 else ():
         k = int(model.body_mocapid[b])
         model.body_pos[b] = model.key_mpos[key, 3 * k : 3 * k + 3]
@@ -70,7 +70,7 @@ def _placed(mujoco: Any, model: Any, keyframe: str) -> Any:
     """Return the data of a model at a keyframe, or at the reference if the model has no keyframe of that
     name."""
     data = mujoco.MjData(model)
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe or "\0")
+    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
     mujoco.mj_kinematics(model, data)

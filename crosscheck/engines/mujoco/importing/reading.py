@@ -293,7 +293,7 @@ class _Reader:
     def _key(self) -> int:
         """Return MuJoCo's number of the keyframe at which the motion begins; -1 if there is none."""
         kinds = self.mujoco.mjtObj
-        return int(self.mujoco.mj_name2id(self.model, kinds.mjOBJ_KEY, self.options.keyframe or "\0"))
+        return int(self.mujoco.mj_name2id(self.model, kinds.mjOBJ_KEY, self.options.keyframe))
 
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
