@@ -27,7 +27,7 @@ class Forces:
     def __init__(self, scene: Scene):
         self.scene, self.nb = scene, len(scene.body)
         weighed = scene.has_mass()
-        mass = [(body.mass or 1.0) if weighed else 1.0 for body in scene.body]
+        mass = np.array([body.mass for body in scene.body]) if weighed else np.ones(self.nb)
         self.inertia = inertia_matrices(scene) if weighed else np.array([np.eye(3)] * self.nb)
         self.weight = (
             np.outer(mass, np.array(scene.gravity))[..., None] if weighed else np.zeros((self.nb, 3, 1))

@@ -13,13 +13,15 @@ from crosscheck.convergence import document
 from crosscheck.engines import terms
 from crosscheck.engines.mujoco.importing import agreement
 from crosscheck.engines.sampling import Failed
-from crosscheck.judge import gauss_principle, reaction_balance
+from crosscheck.judge import gauss_principle, metrics, reaction_balance
 from crosscheck.judge.truth.reference_truth import trajectory
+from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
 from crosscheck.processes import interrupts
 from crosscheck.setting import Setting
 from crosscheck.study import fair_timing, origin
-from mbref.scene import Body, Revolute, Scene
-from mbref.trajectory import Outcome
+from mbref.scene import Body, Revolute, Scene, Spherical, Universal
+from mbref.scenes import find_scene
+from mbref.trajectory import Outcome, Trajectory
 
 LINK = Body(name="link", mass=2.0, inertia=(1.0, 3.0, 3.5), position=(1.0, 0.0, 0.0))
 
@@ -144,3 +146,31 @@ def test_attempts_to_end_calls_are_a_tenth_of_a_second_apart(monkeypatch):
     with pytest.raises(KeyboardInterrupt), interrupts.calls_ended([]):
         raise KeyboardInterrupt
     assert asked == [0.1, "stop", 0.1, "stop", 0.1]
+
+
+@pytest.mark.parametrize(("true", "found", "expected"), [(0.5, 0.6, 0.2), (0.5, 0.5, 0.0), (0.0, 0.1, None)])
+def test_errors_of_velocities_count_from_the_largest_true_velocity(true, found, expected):
+    """A link moves along x, slower than 1 m/s; without true motion there is no scale."""
+
+    def motion(speed: float) -> Trajectory:
+        given = samples([0.0, 0.25])
+        fields = {"velocity": np.tile([speed, 0.0, 0.0], (2, 1, 1)), "angular_velocity": np.zeros((2, 1, 3))}
+        return trajectory(scene(LINK), SimpleNamespace(**{**vars(given), **fields}))
+
+    got = metrics._velocity_error(scene(LINK), motion(found), motion(true))
+    assert got is None if expected is None else got == pytest.approx(expected, abs=1e-15)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_no_path_where_an_axis_of_the_universal_joint_is_along_the_rod(which):
+    """The spatial slider-crank of the paper, but one axis of the joint between crank and rod."""
+    given = find_scene("spatial_slider_crank")
+    [pin] = [joint for joint in given.joint if isinstance(joint, Universal)]
+    assert spatial_slider_crank(given) is not None
+    end = next(joint for joint in given.joint if isinstance(joint, Spherical))
+    along = np.array(end.anchor) - np.array(pin.anchor)
+    across = np.cross(along, [0.3, 0.2, 0.9])
+    axes = [tuple(each / np.linalg.norm(each)) for each in (along, across)]
+    turned = pin.model_copy(update={"axes": tuple(axes[:: 1 - 2 * which])})
+    joints = [turned if joint is pin else joint for joint in given.joint]
+    assert spatial_slider_crank(given.model_copy(update={"joint": tuple(joints)})) is None
