@@ -8,7 +8,7 @@ from pathlib import Path
 
 from imports import ROOT, sources, statements
 
-DECORATORS = {"kernel", "inlined", "allocating", "entry", "exchangeable", "intrinsic", "njit", "cfunc"}
+DECORATORS = {"kernel", "inlined", "allocating", "entry", "exchangeable", "intrinsic", "njit", "c_function"}
 
 
 def has_kernels(path: Path) -> bool:
