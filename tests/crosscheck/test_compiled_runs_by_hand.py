@@ -474,6 +474,12 @@ def test_the_coarse_run_of_pinocchio() -> None:
     assert run.outcome is Outcome.COMPLETED and run.times.tolist() == [0.0, 0.5]
 
 
+@pytest.fixture
+def versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Engines that need not be installed: each package has the version 1."""
+    monkeypatch.setattr("crosscheck.engine.metadata.version", lambda package: "1")
+
+
 # --- heyoka -----------------------------------------------------------------------------------------------
 class Integrator:
     """Answers with states of the hinge, and the end of the last step."""
@@ -499,6 +505,7 @@ def test_states_at_the_samples_of_heyoka() -> None:
     assert only[0].tolist() == [[8.0, 9.0]] and only[1:] == ("", 0)
 
 
+@pytest.mark.usefixtures("versions")
 @pytest.mark.parametrize("last", [math.nan, 3.0])
 def test_a_run_of_heyoka(last: float, monkeypatch: pytest.MonkeyPatch) -> None:
     made = Integrator([[0.0, 3.0], [math.pi / 2, 3.0], [math.pi, last]])
@@ -519,6 +526,7 @@ def test_a_run_of_heyoka(last: float, monkeypatch: pytest.MonkeyPatch) -> None:
         heyoka.ENGINE.run(given, np.zeros(1), Setting("x", {}))
 
 
+@pytest.mark.usefixtures("versions")
 def test_a_state_that_is_lost_ends_the_run_of_heyoka(monkeypatch: pytest.MonkeyPatch) -> None:
     made = Integrator([[0.0, 3.0], [math.nan, 3.0], [1.0, 3.0]])
     monkeypatch.setattr(heyoka, "_integrator", lambda scene, rtol: made)
@@ -585,6 +593,7 @@ class Integrate:
         return self.status
 
 
+@pytest.mark.usefixtures("versions")
 @pytest.mark.parametrize(("family", "is_projected"), [("projected, compiled", 1), ("dop853, compiled", 0)])
 def test_a_run_of_casadi(family: str, is_projected: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = Integrate([[0.0, 3.0], [math.pi / 2, 3.0], [0.0, 0.0]], 2, 2)
