@@ -59,7 +59,7 @@ def made(method: str, scene: Scene | None = None, **limits: Any) -> Run:
         ("lm1+projection", 5, 2, 2, 4, 3, 3),
         ("alf-dual+projection", 0, 2, 2, 4, 3, 1),
         ("alf-dual+none", 0, 2, 0, 4, 3, 1),
-        ("mpi-qr+partitioning", 5, 0, 0, 7, 6, 3),
+        ("mpi-svd+partitioning", 5, 0, 0, 7, 6, 3),
     ],
 )
 def test_sizes_of_the_memory_of_a_run(method, dense, pivots, watched, coordinates, velocities, kept):
