@@ -65,7 +65,7 @@ def test_states_and_their_rates():
 
 
 def test_states_of_two_bodies_with_an_angle():
-    """The angle of a load about a joint is the last number, and its rate that of the second body."""
+    """The last number of the state is the angle of the torsion spring, whose rate is 11 - 8 = 3 rad/s."""
     other = SPUN.model_copy(update={"name": "c"})
     hinge = Revolute(name="J", bodies=("b", "c"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
     pair = FREE.with_(body=(SPUN, other), joint=(hinge,), load=(TorsionSpring(joint="J", stiffness=1.0),))

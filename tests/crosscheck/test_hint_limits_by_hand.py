@@ -47,5 +47,5 @@ def test_an_acceleration_at_the_limit_is_right(explained):
 
 
 def test_a_change_at_the_limit_explains(explained):
-    """Of a difference of 2 m/s² half a metre per second squared may remain."""
+    """Accelerations differ by 2 m/s². A change explains this if at most 0.5 m/s² remain."""
     assert explained(4.0, 3.5, 4.5, 3.5 - 2.0**-40, 4.5 + 2.0**-40) == {("loads", 3.5), ("loads", 4.5)}

@@ -335,7 +335,7 @@ TENDONS = """<tendon><fixed name="p"><joint joint="x" coef="2"/></fixed>
 
 
 def equality(text: str, without: frozenset[str] = frozenset()) -> tuple[list[Any], list[int]]:
-    """What is read of the equalities, and which of them are active afterwards."""
+    """Return the closures and rows of the equalities, and whether each equality is still active."""
     found = model(THREE, f"{TENDONS}<equality>{text}</equality>")
     return list(of_equalities(mujoco, found, without)), found.eq_active0.tolist()
 

@@ -102,7 +102,7 @@ def test_the_name_of_the_processor(monkeypatch, tmp_path):
 
 @pytest.mark.parametrize(("extent", "least"), [(0.25, 0.25), (3.0, 1.0)])
 def test_rows_of_loops_count_from_a_length(extent, least, monkeypatch):
-    """Of a mechanism above 1 m, rows of the size of RANK count; of a smaller one, smaller rows."""
+    """The least row that counts is RANK above 1 m, and in proportion to the length below."""
     seen = []
     monkeypatch.setattr(agreement, "_unit", lambda rows, least: seen.append(least) or rows)
     empty = np.zeros((0, 6))

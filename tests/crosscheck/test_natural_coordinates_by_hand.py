@@ -20,7 +20,7 @@ AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (-2 
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("angle", [0.0, 0.3, 2.0, 3.0, math.pi, 4.0])
 def test_quaternions_of_rotation_matrices(axis, angle):
-    """Of either sign, also for half a turn, where w is zero."""
+    """The quaternion may have either sign. At half a turn its first component is zero."""
     q = np.array([math.cos(angle / 2), *(math.sin(angle / 2) * np.array(axis))])
     found = quaternions(rotations.to_matrix(q))
     assert found.shape == (4,) and abs(found @ q) == pytest.approx(1.0, abs=1e-15)
@@ -83,7 +83,7 @@ def test_energy_of_natural_coordinates(of):
 
 
 def test_bodies_of_coordinates_and_their_rates(of):
-    """The body has its place, velocity and spin; its acceleration is that of a body that turns steadily."""
+    """Coordinates and rates are made from known poses, velocities and accelerations, and give them back."""
     x, _ = of.start()
     velocity, spin = np.array(BODY.velocity), np.array(BODY.angular_velocity)
     v = rates(of, x, velocity, spin)

@@ -85,7 +85,7 @@ def test_loads_without_a_function_of_time_have_none():
 
 # --- arrays of orientations -------------------------------------------------------------------------------
 def test_rotation_vectors_and_tilts_of_many_orientations():
-    """Each is that of the orientation alone, for arrays of any shape."""
+    """Each orientation of an array gives the same numbers as it does alone."""
     q = np.random.default_rng(6).normal(size=(2, 3, 4))
     q /= np.linalg.norm(q, axis=2, keepdims=True)
     q[1, 1], q[1, 2] = (1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0)

@@ -38,7 +38,7 @@ POSE = initial_poses(PAIR)
 
 
 def test_a_coupling_acts_along_both_coordinates():
-    """Of x = θ / 2 a unit multiplier pushes b by one along x and turns a by -1/2 about z."""
+    """The unit multiplier of x = θ / 2 is a force of 1 N along x and a moment of -1/2 N m about z."""
     rows, _ = jacobian(PAIR, 0.0, *POSE)
     found = {joint.name: wrench for joint, wrench in joint_reactions.of_multipliers(PAIR, rows, *POSE)}
     assert found["A"].shape == found["T"].shape == (6, 11)

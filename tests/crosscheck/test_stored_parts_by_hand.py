@@ -38,7 +38,7 @@ def record(seconds: float, outcome: str = "COMPLETED", **options: float) -> dict
 
 
 def test_time_of_the_next_finer_run() -> None:
-    """Half the step takes twice as long; a tolerance, as long; a failed run tells nothing."""
+    """A run with half the step takes twice as long, and one with another tolerance the same time."""
     assert ladders._would_take(case(step=0.25), record(3.0, step=0.5)) == 6.0
     assert ladders._would_take(case(rtol=1e-5), record(3.0, rtol=1e-4)) == 3.0
     assert ladders._would_take(case(step=0.25), record(3.0, "TIMED_OUT", step=0.5)) == math.inf

@@ -254,11 +254,11 @@ def test_who_integrates(monkeypatch: pytest.MonkeyPatch) -> None:
 
 # --- A comparison from Python -----------------------------------------------------------------------------
 @pytest.mark.parametrize("is_file", [True, False])
-def test_a_comparison_tells_its_caller_and_names_its_scene(
+def test_a_comparison_reports_to_its_caller_and_names_its_scene(
     is_file: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A scene made in Python is named as the file that it would be saved in."""
-    told: list[str] = []
+    notices: list[str] = []
     paths: list[dict[str, str]] = []
     monkeypatch.setattr(scene_request, "find_scenes", lambda names: [SCENE.with_(name=names[0])])
 
@@ -272,8 +272,8 @@ def test_a_comparison_tells_its_caller_and_names_its_scene(
         comparison, "comparisons", lambda found, named, limit: paths.append(named) or ["compared"]
     )
     given: Any = "my.toml" if is_file else SCENE
-    assert comparison.compare(given, notice=told.append) == "compared"  # type: ignore[comparison-overlap]
-    assert told == ["left out"]
+    assert comparison.compare(given, notice=notices.append) == "compared"  # type: ignore[comparison-overlap]
+    assert notices == ["left out"]
     assert paths == [{"my.toml": "my.toml"} if is_file else {"s": "s.toml"}]
     comparison.compare(given)
-    assert told == ["left out"]
+    assert notices == ["left out"]

@@ -52,7 +52,7 @@ def chosen(rows: list[list[float]], kept: list[int] | None, **parts: Any) -> lis
 
 
 def test_rows_are_selected_by_their_weights_and_stay_while_they_serve():
-    """Rows 0 and 1 are equal but for their size; row 2 is across them."""
+    """Rows 0 and 1 have one direction, and row 2 is perpendicular to them."""
     same = [[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]]
     assert chosen(same, None) == [1, 2] and chosen(same, [0, 2]) == [0, 2]
     assert chosen([[0.49, 0.0], *same[1:]], [0, 2]) == [1, 2], "below half of the best conditioning"

@@ -248,13 +248,13 @@ def test_method_and_tolerance_of_a_second_run(monkeypatch):
 
 
 def test_a_second_run_that_takes_too_long(monkeypatch):
-    told: list[float] = []
-    second_run._Check(1e3, told.append)(0.5)
-    assert told == [0.5]
+    reported: list[float] = []
+    second_run._Check(1e3, reported.append)(0.5)
+    assert reported == [0.5]
     second_run._Check(1e3, None)(0.5)
     with pytest.raises(second_run._TooLong, match="a second run takes longer than -1 s; --estimate yes"):
-        second_run._Check(-1.0, told.append)(0.75)
-    assert told == [0.5]
+        second_run._Check(-1.0, reported.append)(0.75)
+    assert reported == [0.5]
     ended, released = SimpleNamespace(t_end=1.2345, message="stopped"), []
     run = SimpleNamespace(model=SimpleNamespace(length=3.0), release=lambda: released.append(1))
     monkeypatch.setattr(second_run, "checked_run", lambda *given: asked.append(given) or run)
