@@ -6,8 +6,7 @@ import numpy as np
 
 from crosscheck.conformance.random_mechanisms import CONTINUES, random_mechanism, triple
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
-from crosscheck.judge.gauss_principle import goes_on
-from crosscheck.judge.tolerances import RANK
+from crosscheck.judge.gauss_principle import goes_on, rank_of
 from mbref.scene import Coupling, Joint, Scene
 from mbref.scene_joints import Coordinate
 
@@ -52,7 +51,7 @@ def _moving(scene: Scene, rng: np.random.Generator) -> Scene | None:
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     _, sizes, vt = np.linalg.svd(rows * units)
-    free = vt[int(np.sum(sizes > RANK * sizes[0])) :].T
+    free = vt[rank_of(sizes) :].T
     if not free.shape[1]:
         return None
     twists = (units * (free @ rng.normal(size=free.shape[1]))).reshape(-1, 6)

@@ -14,8 +14,7 @@ import numpy as np
 
 from crosscheck.conformance.changes import replaced
 from crosscheck.conformance.features import DRIVERS, JOINTS, LOADS
-from crosscheck.judge.constraints import initial_poses, jacobian
-from crosscheck.judge.tolerances import RANK
+from crosscheck.conformance.random_mechanisms import null_space
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -238,11 +237,8 @@ def rounded_velocities() -> Scene:
 def consistent(scene: Scene, twists: np.ndarray) -> Scene:
     """Return the scene with the velocities that its joints allow and that are nearest to twists (nb, 6) in
     world axes."""
-    still = scene.with_(driver=())
-    rows, _ = jacobian(still, 0.0, *initial_poses(scene))
-    _, s, vt = np.linalg.svd(rows) if len(rows) else (0, np.zeros(0), np.eye(6 * len(scene.body)))
-    free = vt[int(np.sum(s > RANK * s.max(initial=0.0))) :]
-    found = (free.T @ (free @ np.ravel(twists))).reshape(-1, 6)
+    free = null_space(scene.with_(driver=()))
+    found = (free @ (free.T @ np.ravel(twists))).reshape(-1, 6)
     bodies = [
         replaced(body, velocity=x[:3], angular_velocity=x[3:])
         for body, x in zip(scene.body, found, strict=True)

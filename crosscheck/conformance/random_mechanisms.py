@@ -12,7 +12,6 @@ import numpy as np
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.gauss_principle import gauss, goes_on, rank_of, singular_values, stacked
-from crosscheck.judge.tolerances import RANK
 from mbref import rotations
 from mbref.scene import (
     GROUND,
@@ -155,7 +154,7 @@ class _Drawing:
             joint=tuple(self.joints),
             load=self.loads(),
         )
-        free = _null_space(scene)
+        free = null_space(scene)
         twists = (free @ (free.T @ self.rng.normal(size=len(free)))).reshape(-1, 6)
         moving = [
             body.model_copy(
@@ -232,12 +231,12 @@ def triple(v: np.ndarray) -> Triple:
     return x, y, z
 
 
-def _null_space(scene: Scene) -> np.ndarray:
+def null_space(scene: Scene) -> np.ndarray:
     """Return an orthonormal basis (6 nb, degrees of freedom) of the twists that the joints allow at t = 0."""
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     _, s, vt = np.linalg.svd(rows, full_matrices=True)
-    return vt[int(np.sum(s > RANK * s[0])) :].T
+    return vt[rank_of(s) :].T
 
 
 def _freedoms(scene: Scene) -> int:
-    return _null_space(scene).shape[1]
+    return null_space(scene).shape[1]
