@@ -40,11 +40,9 @@ STYLE: Any = {
     "axes.grid": True,
     "grid.color": "#e6e6e6",
     "grid.linewidth": 0.6,
-    "lines.linewidth": 1.5,
     "legend.frameon": False,
     "legend.fontsize": 8.0,
     "svg.fonttype": "none",
-    "path.simplify_threshold": 0.5,
 }
 
 

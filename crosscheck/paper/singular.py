@@ -6,6 +6,7 @@ All numbers follow from the judge's joint equations and the exact motion, in pla
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -79,9 +80,9 @@ def _along(angle: float) -> np.ndarray:
 
 def crossings(theta0: float, last: float) -> list[tuple[float, int]]:
     """Return the times (s) up to ``last`` at which θ₂ = theta0 - 124.8 t is a multiple k of π, and k."""
-    first = math.floor(theta0 / math.pi + 1e-9)
-    out = [((theta0 - k * math.pi) / CRANK_RATE, k) for k in range(first, first - 1000, -1)]
-    return [(t, k) for t, k in out if t <= last]
+    multiples = itertools.count(math.floor(theta0 / math.pi), -1)
+    times = (((theta0 - k * math.pi) / CRANK_RATE, k) for k in multiples)
+    return list(itertools.takewhile(lambda crossing: crossing[0] <= last, times))
 
 
 def crossing_distance(theta0: float, time: float) -> float:

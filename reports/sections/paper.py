@@ -30,6 +30,7 @@ TITLES = {
 }
 NEAR = 0.1  # rad; a run ending this near to a multiple of π counts as ended at that crossing
 DIGITS = 1e-3  # s; resolution of the end times that the paper prints
+AHEAD = 0.06  # s; singular positions are listed up to this time after the end of a run
 
 
 def render(records: Records, illustration: Illustration) -> list[Block]:
@@ -320,10 +321,10 @@ def _where(column: str, run: Run) -> str:
     if run.completed:
         return f"passes every singular position, violation {power(run.metric('violation_position'))}"
     theta0 = LINKAGES[column][1]
-    t, k = min(singular.crossings(theta0, 25.0), key=lambda crossing: abs(crossing[0] - run.t_end))
+    crossings = singular.crossings(theta0, run.t_end + AHEAD)
+    t, k = min(crossings, key=lambda crossing: abs(crossing[0] - run.t_end))
     near, angle = singular.crossing_distance(theta0, run.t_end), singular.turns(k)
     if near > NEAR:
         return f"ends {near:.2g} rad from the singular position θ₂ = {angle}, on a wrong branch"
-    others = [time for time, _ in singular.crossings(theta0, t + 0.06)]
-    place = f"{others.index(t) + 1} of {', '.join(f'{o:.4f}' for o in others)} s"
+    place = f"{crossings.index((t, k)) + 1} of {', '.join(f'{time:.4f}' for time, _ in crossings)} s"
     return f"ends at θ₂ = {angle}, singular position {place}"

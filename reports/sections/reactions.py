@@ -45,7 +45,7 @@ def render(scene_runs: SceneRuns) -> list[Block]:
             sentences += [Text(f"{sentence}.") for sentence in absurd(scene, run, true)]
     if not found:
         return []
-    table = Table(CAPTION, ("Joint", "Open", *found), _rows(scene, found), right=_after(0))
+    table = Table(CAPTION, ("Joint", "Open", *found), _rows(scene, found), right=_numbers(len(found) + 2))
     return [Heading("Joint reactions"), table, *sentences, *_choices(scene, runs)]
 
 
@@ -83,8 +83,9 @@ def _choices(scene: Scene, runs: Mapping[str, Trajectory]) -> list[Block]:
     ]
     if all(set(sizes) == {"0"} for _, *sizes in rows):
         return [Text(UNUSED.format(t=time))]
-    return [Table(SHARES.format(t=time), ("Joint", *runs), rows, right=_after(0))]
+    return [Table(SHARES.format(t=time), ("Joint", *runs), rows, right=_numbers(len(runs) + 1))]
 
 
-def _after(column: int) -> frozenset[int]:
-    return frozenset(range(column + 1, 20))
+def _numbers(columns: int) -> frozenset[int]:
+    """Return the columns after the first one."""
+    return frozenset(range(1, columns))

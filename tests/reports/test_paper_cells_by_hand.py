@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -209,6 +210,26 @@ def test_cells_of_a_crank_that_leaves_the_true_motion(monkeypatch):
     assert ended_at == "2.4 s c"
     assert cells == ["2.0e-02", "3.0e-05", "–", "2", "0", "1.5", "2"], "on the true motion to its end"
     assert paper_cranks._cells(UNEQUAL, run)[4:] == ("–", "4.0e-03", "2.5", "3")
+    at_limit = shown([[0.0, 0.0, 0.0], [0.01, 0.0, 0.0], [0.02, 0.0, 0.0]], times=[0.0, 0.5, 0.987654])
+    assert paper_cranks._cells(UNEQUAL, at_limit)[3] == "0.9877", "10 mm off is not off yet"
+
+
+def test_the_true_motion_of_a_crank(monkeypatch):
+    """The judge's motion of the column's mechanism; positions are counted over 2001 instants."""
+    asked: list[Any] = []
+    truth = SimpleNamespace(poses=lambda times: asked.append(times.tolist()) or steady(HEAVY, (0.0, 1.0)))
+    monkeypatch.setattr(paper_cranks, "truth_for", lambda scene: asked.append(scene) or truth)
+    monkeypatch.setattr(paper_cranks, "dynamic_scene", lambda column: f"scene of {column}")
+    try:
+        assert paper_cranks._true("a column", (0.0, 0.25)).times.tolist() == [0.0, 1.0]
+    finally:
+        paper_cranks._true.cache_clear()
+    assert asked == ["scene of a column", [0.0, 0.25]]
+    instants: list[int] = []
+    monkeypatch.setattr(
+        paper_cranks, "_true", lambda column, times: instants.append(len(times)) or steady(column, times)
+    )
+    assert paper_cranks._passed(HEAVY, 0.79) == 1 and instants == [2001]
 
 
 def test_the_planar_slider_cranks_of_the_paper_alone_are_counted(monkeypatch):

@@ -12,7 +12,7 @@ from test_figures_by_hand import SCENE, moving, plain
 
 from crosscheck.paper.runs import ALPHAS, Label
 from mbref.trajectory import Outcome
-from reports import figures
+from reports import figures, mechanisms
 from reports.blocks import Figure
 from reports.runs import Run
 from reports.sections import paper_figures, paper_methods
@@ -46,13 +46,17 @@ def test_ends_of_runs_in_a_caption():
     assert paper_figures._only({"one": 1, "two": 2, "three": 3}, ("three", "one")) == {"three": 3, "one": 1}
 
 
-def test_poses_of_a_span_of_time():
+def test_poses_of_a_span_of_time(monkeypatch):
     """Samples at 0, 0.5, 1, 1.5 and 2 s; both ends of a span belong to it."""
     run = moving("a", "x", (0.0, 1.0, 0.0, 1.0, 0.0))
     whole = paper_figures.plot_poses(SCENE, {"x": run}, None)
     part = paper_figures.plot_poses(SCENE, {"x": run}, (0.5, 1.5))
     rough = paper_figures.plot_poses(SCENE, {"x": run, "y": run}, (0.6, 1.4))
     assert "to 2 s" in whole and "to 1.5 s" in part and rough.count("to 1 s") == 2
+    monkeypatch.setattr(mechanisms, "poses_side_by_side", lambda scene, shown, number: (scene, shown, number))
+    scene, shown, number = paper_figures.plot_poses(SCENE, {"x": run}, (0.5, 1.5))
+    assert (scene, list(shown), number) == (SCENE, ["x"], 12)
+    assert shown["x"][1].times.tolist() == [0.5, 1.0, 1.5]
     opacities = [len(re.findall(r'opacity="0\.\d+"', text)) for text in (whole, part)]
     assert opacities[0] > opacities[1] > 0, "five poses and three"
 
@@ -212,4 +216,20 @@ def test_the_paper_s_figures_in_its_order():
         "15": records[Label("dynamic", plain[0], paper_figures.SPATIAL_DYNAMIC)],
         "16": records[Label("dynamic", held[0], paper_figures.SPATIAL_DYNAMIC)],
     }
+    drawn = {name: figure.draw for name, figure in made.items()}
+    assert {name: draw.func.__name__ for name, draw in drawn.items()} == {
+        **dict.fromkeys(("4", "8", "12"), "plot_poses"),
+        **dict.fromkeys(("5", "6"), "plot_violations"),
+        **dict.fromkeys(("11", "14", "15", "16"), "plot_rates"),
+        "13": "plot_accelerations",
+    }
+    spans = {
+        name: (draw.args[0].name, draw.args[2]) for name, draw in drawn.items() if name in ("4", "8", "12")
+    }
+    assert spans == {
+        "4": ("four_bar", None),
+        "8": ("five_bar", None),
+        "12": ("planar_slider_crank_heavy", (3.4, 4.8)),
+    }
+    assert {name: list(drawn[name].args[1]) for name in spans} == {name: list(shown[name]) for name in spans}
     assert rates == {n: r["bodies"]["b"]["angular_velocity"][1][2] for n, r in expected.items()}

@@ -288,6 +288,7 @@ def test_counts_of_a_free_block():
         "Redundant rows": "0",
         "Degrees of freedom": "6",
     }
+    assert table.right == {0, 1, 2, 3, 4}
 
 
 def cubic(times: np.ndarray) -> Trajectory:

@@ -376,16 +376,20 @@ def test_end_times_of_the_sweep_in_their_panels():
     label = Label("I", "MPI (SVD)", HALF_TURN, "the settings")
     record = {**plain("mbref", "x", 1e-3, 1.0, "VIOLATION", 0.0378), "settings": {}}
     late = {**record, "t_end": 0.2}
+    last = {**record, "t_end": 0.15}
     other = next(cell for cell in paper_sweep.SWEPT if cell.row == "ALF" and cell.column == HALF_TURN)
     second = Label("I", "ALF", HALF_TURN, label.variant)
-    drawing = paper_sweep.plot({label: record, second: late})
+    third = Label("I", "MPI (GS)", HALF_TURN, label.variant)
+    drawing = paper_sweep.plot({label: record, second: late, third: last})
     assert drawing.get_size_inches().tolist() == [7.4, 7.0] and len(drawing.axes) == len(paper_sweep.COLUMNS)
     axes = drawing.axes[paper_sweep.COLUMNS.index(HALF_TURN)]
-    assert axes.get_title() == f"{HALF_TURN}: 1 runs end here, 1 later or never"
-    [bar] = [patch for patch in axes.patches if patch.get_height()]
+    assert axes.get_title() == f"{HALF_TURN}: 2 runs end here, 1 later or never"
+    assert axes.title.get_fontsize() == 9
+    [bar, _] = [patch for patch in axes.patches if patch.get_height()]
     assert bar.get_x() <= 0.0378 <= bar.get_x() + bar.get_width() and bar.get_width() == pytest.approx(1e-3)
     *crossings_, triangles = axes.lines
     assert triangles.get_marker() == "^" and set(triangles.get_ydata()) == {0.0}
+    assert not triangles.get_clip_on()
     assert other.end is None or other.end in triangles.get_xdata()
     assert [line.get_xdata()[0] for line in crossings_][:2] == pytest.approx(
         [math.pi / 2 / RATE, 3 * math.pi / 2 / RATE]
