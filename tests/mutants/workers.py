@@ -27,7 +27,7 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -84,16 +84,12 @@ class Session:
     def _limited(self, item: pytest.Item) -> Iterator[None]:
         """End a test that takes longer than a file may."""
 
-        def end(signum: int, frame: object) -> None:
+        def end(signum: int, frame: FrameType | None) -> None:
             self.ended.append(item.nodeid)
             raise pytest.skip.Exception("too long")
 
-        signal.signal(signal.SIGPROF, end)
-        signal.setitimer(signal.ITIMER_PROF, self._of_file)
-        try:
+        with cpu_limit(self._of_file, end):
             yield
-        finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """End where the time of the file is up."""
@@ -133,22 +129,31 @@ class Recording:
                 self.seconds[item.nodeid] = _cpu() - begun
                 raise TimeoutError(item.nodeid)
 
-        signal.signal(signal.SIGPROF, end)
         begun = _cpu()
         self._lines.switch_context(item.nodeid)
-        signal.setitimer(signal.ITIMER_PROF, self._of_test)
         try:
-            result = yield
+            with cpu_limit(self._of_test, end):
+                result = yield
             self.seconds[item.nodeid] = _cpu() - begun
             return result
         finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
             self._lines.switch_context("")
 
     def pytest_runtest_logfinish(self, nodeid: str) -> None:
         """End where the time of the file is up."""
         if _cpu() > self._end:
             pytest.exit("long enough", returncode=5)
+
+
+@contextlib.contextmanager
+def cpu_limit(seconds: float, end: Callable[[int, FrameType | None], None]) -> Iterator[None]:
+    """Call ``end`` as a signal's handler after so many seconds of this process' CPU time."""
+    signal.signal(signal.SIGPROF, end)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
 
 
 def _is_counting(frame: FrameType | None) -> bool:
