@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles
+from crosscheck.judge.reference import panels
 from crosscheck.judge.reference.panels import Panel, Panels, _cosines
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 
@@ -64,6 +65,16 @@ def test_points_near_a_singular_position_do_not_count():
     assert panel.settled and panel.states == pytest.approx(exact, abs=1e-9)
     assert panel.crossing == pytest.approx(0.2, abs=1e-9) and panel.time(panel.crossing) == pytest.approx(0.6)
     assert equations.corrected == equations.asked - 2, "after the place is known, from the second one"
+
+
+def test_a_singular_position_in_the_middle_of_a_panel_is_bridged(monkeypatch):
+    """Its place in [-1, 1] is exactly 0, which is a place like any other."""
+    monkeypatch.setattr(panels, "singular_time", lambda places, distance: 0.0)
+    equations = Wave(0.5, noise=1e3)
+    panel = solved(equations)
+    exact = np.stack([np.cos(TIMES), -np.sin(TIMES)], axis=1)
+    assert panel.settled and panel.states == pytest.approx(exact, abs=1e-9)
+    assert panel.crossing == 0.0 and equations.corrected == equations.asked - 2
 
 
 def test_a_singular_position_after_a_panel_is_foreseen():

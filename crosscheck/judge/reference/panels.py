@@ -116,7 +116,8 @@ class Panels:
                 here = y if crossing is None else equations.nearer(t, y)
                 rates, distance = equations.other_rates(t, here)
                 if last < 1:
-                    crossing = singular_time(places, distance) or crossing
+                    found = singular_time(places, distance)
+                    crossing = crossing if found is None else found
                 if crossing is not None:
                     rates = bridged(places, rates, distance)
                 better, size = self._integrated(equations, y, rates, length)
