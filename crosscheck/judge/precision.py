@@ -93,7 +93,7 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
     length = scene_length(scene)
     rate = motion_rate(scene, run)
     first = run.orientation[:1]
-    sides = np.where(np.sum(run.orientation * first, axis=-1, keepdims=True) < 0, -1.0, 1.0)
+    sides = np.where(np.sum(run.orientation * first, axis=2, keepdims=True) < 0, -1.0, 1.0)
     parts = {
         "positions": run.position / length,
         "orientations": run.orientation * sides,
@@ -106,8 +106,8 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
 def motion_rate(scene: Scene, run: Trajectory) -> float:
     """Return the largest rate (1/s) of a motion: angular velocity, or speed over the scene's length; at least
     one over the scene's duration."""
-    moved = np.linalg.norm(run.velocity, axis=-1).max() / scene_length(scene)
-    turned = np.linalg.norm(run.angular_velocity, axis=-1).max()
+    moved = np.linalg.norm(run.velocity, axis=2).max() / scene_length(scene)
+    turned = np.linalg.norm(run.angular_velocity, axis=2).max()
     return max(float(moved), float(turned), 1 / scene.duration)
 
 

@@ -63,6 +63,7 @@ def test_a_body_that_falls_and_turns(moved, name):
     assert found.angular_velocity[:, 0, 2] == pytest.approx([2.0] * 3)
     assert (found.reached, found.reason, found.crossings, found.formulation) == (0.5, "", (), name)
     assert found.steps == len(seen) > 0 and seen[-1] >= 0.5 and found.seconds > 0.0
+    assert found.contradiction == (0.0 if name == "B" else pytest.approx(0.0, abs=1e-14))
 
 
 @pytest.mark.parametrize("moved", [by_a, by_b])
@@ -133,7 +134,7 @@ def test_differences_below_one_unit():
     length = bound.scene_length(FREE)
     found = bound.differences(FREE, one, two)
     assert found == pytest.approx([0.0, 1e-13 / length], rel=1e-9, abs=0.0)
-    turned = np.array([math.cos(1e-9), 0.0, math.sin(1e-9), 0.0])
+    turned = np.array([[[math.cos(1e-9), 0.0, math.sin(1e-9), 0.0]]])
     assert bound._angles(still[:1, :1], turned)[0] == pytest.approx([2e-9], rel=1e-6, abs=0.0)
 
 

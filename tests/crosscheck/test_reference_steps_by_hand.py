@@ -241,7 +241,7 @@ def test_the_difference_of_two_motions(monkeypatch):
     found = bound.differences(SimpleNamespace(), one, two)
     assert found == pytest.approx([2.5e-3, 3e-3], rel=1e-9)
     assert bound.differences(SimpleNamespace(), two, one) == pytest.approx(found)
-    assert bound._angles(one.orientation[0], two.orientation[1]) == pytest.approx([0.203])
+    assert bound._angles(one.orientation[:1], two.orientation[1:]) == pytest.approx(np.array([[0.203]]))
     far = SimpleNamespace(position=np.array([[[3.0, 0.0, 4.0], [1.0, 0.0, 0.0]]]))
     assert bound.rounding(SimpleNamespace(), far) == pytest.approx([2.5 * np.finfo(float).eps])
 

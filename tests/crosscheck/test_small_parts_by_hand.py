@@ -204,9 +204,9 @@ def test_orders_of_differences_and_signs_of_quaternions():
     assert _order((9.0, 2.0, 1.0), (77.0, 3.0)) == pytest.approx(2.0)
     assert _order((4.0, 2.0, 1.0), (1.0, 2.0)) is None and _order((4.0, 2.0, 1.0), (2.0**13, 1.0)) is None
     assert _order((4.0, 2.0, 1.0), (1.0, 0.0)) is None and _order((4.0, 2.0, 1.0), (math.nan, 1.0)) is None
-    last, before = np.array([[0.6, 0.8, 0.0, 0.0]]), np.array([[-1.0, 0.0, 0.0, 0.0]])
+    last, before = np.array([[[0.6, 0.8, 0.0, 0.0]]]), np.array([[[-1.0, 0.0, 0.0, 0.0]]])
     found = _beyond(last, before, 0.5)
-    assert found[0] == pytest.approx(np.array([0.4, 1.2, 0.0, 0.0]) / math.hypot(0.4, 1.2))
+    assert found[0, 0] == pytest.approx(np.array([0.4, 1.2, 0.0, 0.0]) / math.hypot(0.4, 1.2))
 
 
 NODES = np.cos(np.pi * np.arange(40, -1, -1) / 40)

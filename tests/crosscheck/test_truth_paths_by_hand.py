@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.judge.constraints import closure
 from crosscheck.judge.truth import closed_form
 from crosscheck.judge.truth.crankshaft import _part, _without_shaft, crankshaft
 from crosscheck.judge.truth.free_body import free_body
@@ -23,6 +24,7 @@ from crosscheck.judge.truth.one_dof import (
 )
 from crosscheck.judge.truth.parallelogram import _arm, parallelogram, pivots_of, turning_driver, unit
 from crosscheck.judge.truth.slider import slider
+from crosscheck.judge.truth.spatial_slider_crank import is_along, spatial_slider_crank
 from mbref import rotations
 from mbref.scene import (
     Body,
@@ -40,6 +42,7 @@ from mbref.scene import (
     Spherical,
     TorsionSpring,
     Translational,
+    Universal,
 )
 
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
@@ -330,3 +333,69 @@ def test_a_trajectory_without_samples():
     none, turn = np.zeros((0, 1, 3)), np.zeros((0, 1, 3, 3))
     found = trajectory(PENDULUM, "f", np.zeros(0), none, turn, (none, none), (none, none))
     assert found.t_end == 0.0 and found.method == "f" and found.engine == "truth"
+
+
+# --- slider-cranks in space -------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("cosine", "along"),
+    [(1 - 1e-6, False), (1 - 0.9e-6, True), (-1 + 0.9e-6, True), (-1 + 1.1e-6, False), (1 - 1.9e-6, False)],
+)
+def test_unit_vectors_that_span_no_plane(cosine, along):
+    vector = np.array([cosine, math.sqrt(1 - cosine**2), 0.0])
+    assert is_along(vector, np.array(X)) is along is is_along(np.array(X), vector)
+
+
+# crank of 0.4 m along x about y; the rod of 1.2, 0.3 and 0.5 m ends on a line along z or x
+def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, way: float = 1.0) -> Scene:
+    parts = {
+        "c": body("crank", 0.1, 0.05, 0.0, orientation=(0.8, 0.6, 0.0, 0.0)),
+        "r": body("rod", 0.9, 0.2, 0.3, orientation=(0.8, 0.0, 0.6, 0.0)),
+        "s": body("block", 1.5, 0.3, 0.7, orientation=(0.6, 0.0, 0.0, 0.8)),
+    }
+    bodies = ("rod", "crank") if reverse else ("crank", "rod")
+    axes = ((0.0, 1.2, 1.6), (0.3, -0.8 * way, 0.6 * way))
+    joints = (
+        pin("A", "ground", "crank", 0.0, 0.0, 0.0, axis=(0.0, 3.0, 0.0)),
+        Universal(name="B", bodies=bodies, anchor=(0.4, 0.0, 0.0), axes=axes[::-1] if reverse else axes),
+        Spherical(name="C", bodies=("rod", "block"), anchor=(1.6, 0.3, 0.5)),
+        Translational(name="D", bodies=("ground", "block"), anchor=(1.6, 0.3, 0.5), axis=line),
+    )
+    return scene([parts[name] for name in order], joints)
+
+
+@pytest.mark.parametrize("q", [-0.7, 0.0, 0.4])
+@pytest.mark.parametrize(
+    ("line", "order", "reverse", "way"),
+    [
+        ((2.0, 0.0, 0.0), "crs", False, 1.0),
+        ((-2.0, 0.0, 0.0), "src", True, 1.0),
+        ((0.0, 0.0, 1.0), "rcs", False, -1.0),
+        ((0.6, 0.0, 0.8), "scr", True, -1.0),
+    ],
+)
+def test_the_path_of_a_spatial_slider_crank(line, order, reverse, way, q):
+    """Its joints stay closed, and rates and second derivatives are differences of its poses."""
+    given = spatial(line, order, reverse, way)
+    path, h = spatial_slider_crank(given), 1e-4
+    places = q + h * np.arange(-2, 3)
+    pose = path.poses(places.astype(np.longdouble))
+    turns = rotations.from_matrix(pose.rotation.astype(float))
+    gaps = closure(given, np.zeros(5), pose.position.astype(float), turns)
+    assert max(np.abs(gap).max() for gap in gaps.values()) < 1e-13 and path.family == "spatial_slider_crank"
+    if q == 0.0:
+        starts = [[b.position for b in given.body], [b.orientation for b in given.body]]
+        assert pose.position[2].astype(float) == pytest.approx(np.array(starts[0]), abs=1e-15)
+        assert rotations.to_matrix(np.array(starts[1])) == pytest.approx(pose.rotation[2].astype(float))
+    weights = np.array([1, -8, 0, 8, -1]) / (12 * h)
+    slopes = [np.tensordot(weights, getattr(pose, name), 1) for name in ("position", "rotation", "spin")]
+    assert slopes[0].astype(float) == pytest.approx(pose.dposition[2].astype(float), rel=1e-8, abs=1e-8)
+    rate = slopes[1] @ np.swapaxes(pose.rotation[2], 1, 2)
+    spin = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
+    assert spin.astype(float) == pytest.approx(pose.spin[2].astype(float), rel=1e-8, abs=1e-8)
+    assert slopes[2].astype(float) == pytest.approx(pose.dspin[2].astype(float), rel=1e-8, abs=1e-8)
+    second = np.tensordot(weights, pose.dposition, 1)
+    assert second.astype(float) == pytest.approx(pose.ddposition[2].astype(float), rel=1e-8, abs=1e-8)
+    crank, rod, block = (order.index(name) for name in "crs")
+    assert pose.turn[2, [crank, block]].tolist() == [q, 0.0] and math.isnan(pose.turn[2, rod])
+    signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
+    assert signs == [1.0, None]

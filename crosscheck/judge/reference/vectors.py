@@ -67,7 +67,7 @@ def saddle_solve(
     proportional to the least singular value of G near singularity. The distance is infinite without
     coordinates.
     """
-    n = mass.shape[-1]
+    n = rows.shape[2]
     scale, inverse = _scaled_inverse(doubles(mass), doubles(rows))
     matrix = _saddle(mass, rows, rows[:, :, :1] * 0 * np.zeros(rows.shape[1], dtype=int))
     wanted = np.concatenate([force, right], axis=1)
@@ -90,7 +90,7 @@ def _scaled_inverse(mass: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.
 
     The matrix is made quasi-definite, so that it has an inverse at singular positions, too.
     """
-    n, m = mass.shape[-1], rows.shape[-2]
+    m, n = rows.shape[1:]
     diagonal = np.diagonal(mass, axis1=1, axis2=2)
     light = LIGHT * diagonal.max(axis=1, initial=0.0, keepdims=True) + np.finfo(float).tiny
     across = 1 / np.sqrt(np.maximum(diagonal, light))

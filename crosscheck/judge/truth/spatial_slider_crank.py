@@ -17,6 +17,8 @@ from crosscheck.judge.truth.picard import REAL
 from crosscheck.judge.truth.planar_slider_crank import parts_of
 from mbref.scene import Scene, Universal
 
+ALONG = 1 - 1e-6  # cosine of the angle of two unit vectors, above which one of them is along the other
+
 
 def spatial_slider_crank(scene: Scene) -> Path | None:
     """Return the path of a scene that may be a spatial slider-crank, or None."""
@@ -29,7 +31,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     e0, z0 = unit(pin.axes[first]), unit(pin.axes[1 - first])
     centre, b0, c0 = (np.array(joint.anchor, dtype=REAL) for joint in (pivot, pin, end))
     x0 = unit(c0 - b0)
-    if abs(z0 @ x0) > 1 - 1e-6 or abs(e0 @ x0) > 1 - 1e-6:
+    if is_along(z0, x0) or is_along(e0, x0):
         return None
     arm, length, lean = b0 - centre, np.sqrt(np.sum((c0 - b0) ** 2)), z0 @ x0
     side = float(np.sign((c0 - b0) @ line))
@@ -71,6 +73,11 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
 
     with_q = np.array([{crank: 1.0, rod: np.nan, slider: 0.0}[i] for i in range(3)])
     return Path("spatial_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
+
+
+def is_along(first: np.ndarray, second: np.ndarray) -> bool:
+    """Return whether two unit vectors (3,) are so nearly parallel that they span no plane."""
+    return bool(abs(first @ second) > ALONG)
 
 
 def _slide(
