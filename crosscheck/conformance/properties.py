@@ -73,7 +73,7 @@ def sample_times(bench: Bench) -> Finding:
 
 def unit_orientations(bench: Bench) -> Finding:
     """Orientations are unit quaternions."""
-    norms = np.linalg.norm(bench.motion.orientation, axis=-1)
+    norms = np.linalg.norm(bench.motion.orientation, axis=2)
     return Finding(float(np.abs(norms - 1).max()), max(UNIT_NORM, NORMS * bench.rounding))
 
 
@@ -137,8 +137,8 @@ def true_velocities(bench: Bench) -> Finding | Outside:
     exact, length = bench.exact, scene_length(bench.scene)
     if np.isnan(exact.velocity).any():
         return Outside("the closed form of this scene gives poses only")
-    linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=-1) / length
-    angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=-1)
+    linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=2) / length
+    angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=2)
     return Finding(
         float(max(linear.max(), angular.max())) / motion_rate(bench.scene, bench.motion), LIKE_TRUTH
     )

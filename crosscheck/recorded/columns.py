@@ -97,8 +97,8 @@ def scales(scene: Scene, motion: Trajectory) -> dict[str, float]:
     """Return the size of each quantity in the motion, by which errors of different quantities are
     compared."""
     length = scene_length(scene)
-    speed = float(np.linalg.norm(motion.velocity, axis=-1).max(initial=0.0))
-    turning = float(np.linalg.norm(motion.angular_velocity, axis=-1).max(initial=0.0))
+    speed = float(np.linalg.norm(motion.velocity, axis=2).max(initial=0.0))
+    turning = float(np.linalg.norm(motion.angular_velocity, axis=2).max(initial=0.0))
     least = length / scene.duration
     return {
         "position": length,

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance import geared_mechanisms, moving, random_mechanisms, random_scenes
-from crosscheck.conformance.random_mechanisms import CONTINUES, Comparison
+from crosscheck.conformance.random_mechanisms import Comparison
 from mbref.scene import (
     GROUND,
     Body,
@@ -212,7 +212,7 @@ def test_geared_mechanisms_without_a_motion(monkeypatch):
     assert geared_mechanisms._moving(scene(Fixed(name="F", bodies=(GROUND, "b"), anchor=O)), Script()) is None
     asked = []
     monkeypatch.setattr(geared_mechanisms, "goes_on", lambda scene, within: asked.append(within) or False)
-    assert geared_mechanisms._moving(scene(hinge()), Script()) is None and asked == [CONTINUES]
+    assert geared_mechanisms._moving(scene(hinge()), Script()) is None and asked == [1e-9]
 
 
 # --- random mechanisms --------------------------------------------------------------------------------------
@@ -274,9 +274,9 @@ def closed(
 
 
 def test_a_loop_that_leaves_a_motion(monkeypatch):
-    made, answer, tried = closed(monkeypatch, [0, 1], [], [])
-    assert answer is True and tried == [random_mechanisms.CLOSING] * 2
-    assert [joint.name for joint in made.joints] == ["new"]
+    made, answer, tried = closed(monkeypatch, [0, 1], [slide()], [])
+    assert answer is True and tried == [random_mechanisms.CLOSING] * 2, "there is no hinge"
+    assert [joint.name for joint in made.joints] == ["S", "new"]
     assert made.rng.asked == [([GROUND, "b", "c"], 2, {"replace": False})] * 2
 
 
@@ -310,7 +310,7 @@ def test_a_mechanism_without_all_its_loops(monkeypatch):
         answers = iter(closing)
         made = drawing(rng=Script((), [2], ["ground", "b"]), bodies=(block("b"), block("c", 2.0)))
         made.joint = lambda first, second, places, weights: (first, second, weights)
-        made.close = lambda names, places: next(answers)
+        made.close = lambda names, places: next(answers) if places[names[2]][0] == 2.0 else None
         made.moving = lambda name: (name, made.joints)
         return made.scene("n"), made.rng.asked
 
@@ -350,20 +350,26 @@ def test_a_skew_joint_between_two_bodies():
 
 # --- initial accelerations ----------------------------------------------------------------------------------
 def test_the_comparison_of_initial_accelerations(monkeypatch):
-    """The largest acceleration is 5 m/s², and the largest difference 1 m/s²; a hinge given twice has five
-    redundant rows, and the least singular value of its rows is √2."""
+    """The largest acceleration is 5 m/s², the largest difference 1 m/s²; two of five rows are redundant."""
     given = {
         "mbref": np.array([[3.0, 0.0, 4.0], [0.0, 0.0, 0.0]]),
         "e": np.array([[3.0, 0.0, 4.0], [0.6, 0.8, 0.0]]),
         "none": None,
     }
+    asked = []
     monkeypatch.setattr(random_mechanisms, "initial_accelerations", lambda scene, name: given[name])
     monkeypatch.setattr(random_mechanisms, "gauss", lambda scene: given["mbref"] + 0.5 * np.eye(2, 3))
-    base = scene(hinge("A"), hinge("B"))
+    monkeypatch.setattr(
+        random_mechanisms, "singular_values", lambda scene: np.array([4.0, 2.0, 0.5, 0.0, 0.0])
+    )
+    monkeypatch.setattr(
+        random_mechanisms, "jacobian", lambda s, t, p, q: asked.append((s, t)) or (np.zeros((5, 6)), None)
+    )
+    base = scene(hinge("A"))
     found = random_mechanisms.compare(base, ("e", "none"))
     wanted = {"e": pytest.approx(0.2), "none": np.inf, random_mechanisms.PRINCIPLE: pytest.approx(0.1)}
     assert isinstance(found, Comparison) and found.scene is base and found.errors == wanted
-    assert found.redundant == 5 and found.distance == pytest.approx(np.sqrt(2))
+    assert (found.redundant, found.distance) == (2, 0.5) and asked == [(base, 0.0)]
     given["mbref"] = None
     with pytest.raises(RuntimeError, match="s: mbref gives no initial acceleration"):
         random_mechanisms.compare(base, ())
@@ -377,7 +383,7 @@ def test_initial_accelerations_of_an_engine(monkeypatch):
         asked: tuple[Any, ...] = ()
 
         def best_settings(self, scene: Scene) -> list[str]:
-            return ["coarse", "fine"]
+            return ["coarse", "middle", "fine"]
 
         def run(self, scene: Scene, times: np.ndarray, setting: str) -> Any:
             self.asked = scene, times.tolist(), setting
