@@ -184,7 +184,7 @@ def test_the_first_coupling_that_leaves_a_motion(monkeypatch):
         geared_mechanisms, "_coupling", lambda *of: Coupling(name="g", joints=("A", "S"), ratio=2.0)
     )
     answers = iter([None, "moving"])
-    monkeypatch.setattr(geared_mechanisms, "_moving", lambda scene, rng: next(answers))
+    monkeypatch.setattr(geared_mechanisms, "_moving", lambda scene, rng: scene.coupling and next(answers))
     assert geared_mechanisms.geared_mechanism(1) == "moving"
 
 
