@@ -565,3 +565,8 @@ def test_a_mechanism_without_masses(monkeypatch):
     found = random_scenes.without_masses(1)
     assert found.name == "massless_s" and not found.has_mass() and found.load == ()
     assert found.body[0].inertia is None and found.joint == (hinge(),)
+
+
+def test_velocities_of_two_geared_bodies():
+    pair = geared_mechanisms._moving(scene(hinge(), bodies=(block(x=4.0), block("c"))), Script())
+    assert [body.name for body in pair.body] == ["b", "c"] and np.abs(pair.body[1].velocity).max() > 0.1
