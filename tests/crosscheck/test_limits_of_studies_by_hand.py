@@ -274,9 +274,13 @@ def test_steps_that_fit():
     """Kept where the step is the longest; a first setting with the longest step replaces longer ones."""
     steps = [setting(step=h) for h in (0.8, 0.4, 0.2)]
     for longest, wanted in (
-        (1.0, [0.8, 0.4, 0.2]), (0.8, [0.8, 0.4, 0.2]), (0.5, [0.5, 0.4, 0.2]), (0.4, [0.4, 0.2]),
-        (0.2, [0.2]), (0.1, [0.1]),
-    ):  # fmt: skip
+        (1.0, [0.8, 0.4, 0.2]),
+        (0.8, [0.8, 0.4, 0.2]),
+        (0.5, [0.5, 0.4, 0.2]),
+        (0.4, [0.4, 0.2]),
+        (0.2, [0.2]),
+        (0.1, [0.1]),
+    ):
         assert [s.options["step"] for s in within(steps, longest)] == wanted
 
 
@@ -547,10 +551,19 @@ def test_fields_of_a_record(monkeypatch):
     monkeypatch.setattr(grid, "shown_name", lambda name: f"shown {name}")
     monkeypatch.setattr(grid, "mechanism", lambda scene: "m")
     assert grid.record_of(case._replace(reference_time=3.0), made) == {
-        "schema": 1, "key": key(case), "scene": "s", "mechanism": "m", "engine": "shown e", "t_end": 1.0,
-        "family": "f", "asked": grid._asked(case), "time_limit": 5.0, "metrics": {"truth": ("s", 3.0)},
-        "seed": 0, "date": "today",
-    }  # fmt: skip
+        "schema": 1,
+        "key": key(case),
+        "scene": "s",
+        "mechanism": "m",
+        "engine": "shown e",
+        "t_end": 1.0,
+        "family": "f",
+        "asked": grid._asked(case),
+        "time_limit": 5.0,
+        "metrics": {"truth": ("s", 3.0)},
+        "seed": 0,
+        "date": "today",
+    }
 
 
 def test_the_key_of_a_run():
@@ -579,9 +592,12 @@ def test_progress_of_a_study(tmp_path):
             return done
 
     found = grid.study(
-        [first, second, first], Here(), tmp_path / "r.jsonl", lambda *of: seen.append(of[:2]),
+        [first, second, first],
+        Here(),
+        tmp_path / "r.jsonl",
+        lambda *of: seen.append(of[:2]),
         lambda case: {"key": key(case), "h": case.setting.options["step"]},
-    )  # fmt: skip
+    )
     assert [record["h"] for record in found] == [0.1, 0.2, 0.1] and seen == [(1, 2), (2, 2)]
     assert len((tmp_path / "r.jsonl").read_text().splitlines()) == 2
 
@@ -661,9 +677,13 @@ def test_the_record_of_a_truth(monkeypatch):
     times = np.array([0.0, 0.777777, 1.0])
     found = truths.truth_record(SCENE, times, 20.0)
     assert found == {
-        "key": truths.key(SCENE, times), "scene": "s", "mechanism": "m", "given": 20.0, "kind": "k",
+        "key": truths.key(SCENE, times),
+        "scene": "s",
+        "mechanism": "m",
+        "given": 20.0,
+        "kind": "k",
         "seconds": 3.0,
-    }  # fmt: skip
+    }
     assert asked[0][1] == 20.0
     assert asked[0][0] == pytest.approx(sorted([*np.linspace(0.0, 1.0, 601), 0.01234, 0.777777]))
     assert truths.truth_record(SCENE, times, 20.0)["seconds"] == 9.0

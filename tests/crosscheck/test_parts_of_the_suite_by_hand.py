@@ -280,8 +280,11 @@ def test_probes_of_planar_loops(monkeypatch):
     assert {name.partition(":")[0] for name in scenes} == {f"planar {name}" for name in planar.MECHANISMS}
     refusal = Cannot(Owner.ENGINE, "no")
     for spatial, flat, is_planar in (
-        (refusal, None, True), (None, None, False), (refusal, refusal, False), (None, refusal, False),
-    ):  # fmt: skip
+        (refusal, None, True),
+        (None, None, False),
+        (refusal, refusal, False),
+        (None, refusal, False),
+    ):
         answers = {"planar four-bar: gravity": flat}
         simulator = SimpleNamespace(cannot=lambda scene, a=answers, s=spatial: a.get(scene.name, s))
         assert planar.is_planar(simulator) is is_planar
@@ -430,8 +433,11 @@ def test_scenes_of_the_suite():
     assert [s.scene.name for s in quick if s.dead_end] == ["dead end"]
     ends = {s.scene.name: s.scene.duration for s in quick if s.scene.name in trial.SHORT}
     assert ends == {
-        "four_bar": 0.01, "four_bar_gravity": 0.12, "planar_slider_crank": 0.1, "spatial_slider_crank": 0.02,
+        "four_bar": 0.01,
+        "four_bar_gravity": 0.12,
+        "planar_slider_crank": 0.1,
+        "spatial_slider_crank": 0.02,
         "spatial_slider_crank_driven": 0.02,
-    }  # fmt: skip
+    }
     drawn = {s.scene.name: len(s.scene.driver) for s in quick if s.scene.name.startswith("drawn")}
     assert drawn == {"drawn loop": 0, "drawn driven loop": 1}

@@ -168,10 +168,12 @@ def test_couplings_are_tried_forty_times(monkeypatch, joints, tries):
     drawn_from(monkeypatch, geared_mechanisms, scene(*joints), script)
     pairs = []
     monkeypatch.setattr(
-        geared_mechanisms, "_coupling",
-        lambda first, second, rng: pairs.append((first[0].name, second[0].name))
-        or Coupling(name="g", joints=pairs[-1], ratio=2.0),
-    )  # fmt: skip
+        geared_mechanisms,
+        "_coupling",
+        lambda first, second, rng: (
+            pairs.append((first[0].name, second[0].name)) or Coupling(name="g", joints=pairs[-1], ratio=2.0)
+        ),
+    )
     monkeypatch.setattr(geared_mechanisms, "_moving", lambda scene, rng: None)
     assert not geared_mechanisms.geared_mechanism(1).coupling
     assert pairs == [(joints[1].name, joints[0].name)] * tries if tries else pairs == []
@@ -299,9 +301,12 @@ def test_loads_of_a_drawing():
     assert moment == Moment(body="c", moment=(1.0, 2.0, 3.0))
     assert force == Force(body="b", point=(-0.15, -0.15, -0.15), force=(1.0, 2.0, 3.0))
     assert spring == Spring(
-        bodies=("c", "b"), points=((1.85, -0.15, -0.15), (-0.15, -0.15, -0.15)), stiffness=20.0, damping=0.5,
+        bodies=("c", "b"),
+        points=((1.85, -0.15, -0.15), (-0.15, -0.15, -0.15)),
+        stiffness=20.0,
+        damping=0.5,
         natural_length=0.3,
-    )  # fmt: skip
+    )
     assert made.rng.asked == [(2, 2, {"replace": False})]
 
 
@@ -452,9 +457,10 @@ def test_kinds_of_seeds(monkeypatch, seed, kinds):
     monkeypatch.setattr(random_scenes, "_driven", lambda scene, rng: scene.with_(duration=9.0))
     monkeypatch.setattr(random_scenes, "_undamped", lambda scene: scene.with_(duration=8.0))
     monkeypatch.setattr(
-        random_scenes, "with_loads_of_joints",
+        random_scenes,
+        "with_loads_of_joints",
         lambda scene, seed: scene.with_(load=(JointTorque(joint=name.name, torque=float(seed)),)),
-    )  # fmt: skip
+    )
     found = random_scenes.mechanism(seed)
     assert found.name == f"drawn_{seed}" and seeds == [[seed, 1]]
     assert found.duration == (9.0 if "driver" in kinds else 8.0)
