@@ -166,4 +166,4 @@ def _letter(outcome: str) -> str:
 
 def _digits(value: float) -> float:
     """Return the number of correct digits for an error; at least 0."""
-    return 0.0 if not value < 1.0 else min(MOST_DIGITS, -math.log10(max(value, 10**-MOST_DIGITS)))
+    return 0.0 if not value < 1.0 else -math.log10(max(value, 10**-MOST_DIGITS))

@@ -8,15 +8,30 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from test_figures_by_hand import BLOCK, SCENE, group, moving, plain
+from test_paper_figures_by_hand import turning
+from test_pictures_by_hand import violated
 
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import NoSolution
+from crosscheck.paper.runs import ALPHAS
 from crosscheck.setting import BRANCHES
 from crosscheck.study.record_view import UNTIMED
 from mbref.records import append
 from mbref.trajectory import Trajectory
-from reports import benchmark_plot, engine_looks, figures, mechanisms, places, render, runs, sections, stored
+from reports import (
+    benchmark_plot,
+    engine_looks,
+    figures,
+    mechanisms,
+    places,
+    render,
+    runs,
+    sections,
+    stored,
+    time_series,
+)
 from reports.blocks import (
     Card,
     Cell,
@@ -39,6 +54,9 @@ from reports.sections import (
     conformance,
     convergence,
     crossings,
+    paper_figures,
+    paper_methods,
+    paper_teaching,
     records,
     speed,
     verdict,
@@ -253,6 +271,16 @@ def test_the_opening_stands_above_the_matrix(monkeypatch):
     assert last == Heading("Time against error: block", 2) and isinstance(figure, Plot)
 
 
+def test_only_scenes_with_a_motion_are_shown():
+    """The scene needs a worst run and the true motion."""
+    run, motion = Run(plain("a", "x", 0.5, 1.0)), {"times": [0.0]}
+    truths = (None, {"motion": None}, {"motion": motion})
+    groups = [
+        SceneRuns(SCENE, [run], truth=truth, motion=worst) for truth in truths for worst in (None, motion)
+    ]
+    assert [verdict._shown([one]) for one in groups] == [None] * 5 + [groups[5]]
+
+
 def test_an_engine_with_another_mechanism_is_not_judged():
     several = group()
     several.__dict__["differences"] = {"a": "its mass"}
@@ -424,6 +452,7 @@ def test_the_strip_of_failed_runs():
     assert strip.get_gridspec().get_width_ratios() == (5, 1) and strip.get_xlim() == (0, 1)
     assert main.get_subplotspec().num1 == 0 and strip.get_subplotspec().num1 == 1
     assert [(t.xyann, t.get_fontsize(), t.get_ha()) for t in strip.texts] == [((0, 6), 8, "center")] * 2
+    assert to_hex(strip.get_facecolor()) == "#f6f0ee"
     assert strip.title.get_fontsize() == 8 and not strip.spines["left"].get_visible()
     for which in ("major", "minor"):
         found = strip.yaxis.get_tick_params(which=which)
@@ -435,6 +464,34 @@ def test_the_strip_of_failed_runs():
     main, strip = speed.plot(known, speed.failed(known.runs)).axes
     assert strip.lines[0].get_ydata().tolist() == [4.0], "the least time of a completed run"
     assert (main.lines[0].get_markersize(), main.lines[0].get_alpha()) == (5, 0.9)
+    heading, plot, key = speed.render(known)
+    assert heading == Heading("Speed against error") and right(key) == ["Mark", "Runs", "End time (s)"]
+    assert plot.svg.startswith("<svg") and [name for name, *_ in plot.legend] == ["a"]
+    assert plot.figure.draw.func is speed.plot and plot.figure.draw.args[0] is known
+
+
+def test_every_plot_has_a_legend():
+    ended = violated([0.0, 1.0], [1e-9, 1e-6])
+    run = turning((1.0, 2.0))
+    values = {("a", "x"): [np.array([1.0, 2.0])]}
+    plots = {
+        "rtol 1e-6": paper_teaching.plot_growth({"1e-6": ended}),
+        "violation": paper_teaching.plot_gains({"5": ended}),
+        "one": paper_teaching.plot_violations({"one": ended}),
+        "two": paper_figures.plot_violations({"two": violated_motion(ended)}),
+        "three": paper_figures.plot_rates({"three": run}),
+        "four": paper_figures.plot_accelerations({"four": run}),
+        "smallest": paper_methods.plot_values([0.0], [(0.1, 0.2)]),
+        "ALF": paper_methods.plot_digits({"ALF": [1e-3] * len(ALPHAS)}),
+        "a x": time_series.plot(SceneRuns(SCENE, [moving("a", "x", (1.0, 1.0))]), values, ("one",)),
+    }
+    assert {name: figure.legends[0].get_texts()[0].get_text() for name, figure in plots.items()} == {
+        name: name for name in plots
+    }
+
+
+def violated_motion(run: Run) -> Run:
+    return Run({**moving("a", "x", (1.0, 1.0)).record, **run.record})
 
 
 # --- pages ------------------------------------------------------------------------------------------------
