@@ -14,6 +14,7 @@ from crosscheck.judge.arithmetic import DOUBLE
 from crosscheck.judge.reference.taylor import PREFERENCE, Stepper
 from crosscheck.judge.small_motions import equilibria
 from crosscheck.judge.small_motions.equations import NotSteady
+from mbref.scene import SceneError
 
 reference = import_module("crosscheck.judge.reference.reference")
 EPS = np.finfo(float).eps
@@ -159,6 +160,9 @@ def test_starts_along_the_constraints():
     found = list(equilibria._along(rows, y, np.array([9.0, 0.6, 0.8])))
     steps = np.arange(1, 7)[:, None] * 0.4 * np.array([0.0, 0.6 * 2.0, 0.8 * 0.5])
     assert np.array(found) == pytest.approx(y + steps)
+    assert np.array(list(equilibria._along(rows, y, np.array([7.0, 15.0, 20.0])))) == pytest.approx(
+        np.array(found)
+    )
     still = list(equilibria._along(rows, y, np.array([9.0, 0.0, 0.0])))
     assert np.array(still) == pytest.approx(np.tile(y, (6, 1))), "a direction that the rows forbid"
     left = iter([None, None])
@@ -241,8 +245,8 @@ def test_the_limit_of_a_balance_is_relative_to_the_scale():
 
 
 def test_a_search_without_a_better_pose_ends_by_its_damping():
-    """Damping 0, 1e-3, 1e-2 to 1e6: steps k f / (k² + damping k⁴) each, ten times the damping each time."""
-    made = Hill(k=1.0, force=lambda y: np.array([0.1]))
+    """Damping 0, 1e-3, 1e-2 to 1e6: steps f / k / (1 + damping), with ten times the damping each time."""
+    made = Hill(k=2.0, force=lambda y: np.array([0.2]))
     assert equilibria._settled(made, np.array([0.0]), 1.0) is None
     damping = [0.0, *(10.0**k for k in range(-3, 7))]
     assert made.steps == pytest.approx([-0.1 / (1 + d) for d in damping])
@@ -257,9 +261,32 @@ def test_damping_becomes_less_after_a_better_pose():
 
 
 def test_a_vanishing_stiffness_follows_the_force():
-    flat = Hill(k=0.0, force=lambda y: 2.0 * (1.0 - y) if y[0] > 0.35 else np.array([5.0]))
-    equilibria._settled(flat, np.array([0.0]), 1.0)
-    assert flat.steps[0] == pytest.approx(0.4), "the longest step, along the force"
+    for force in (0.5, -5.0):
+        flat = Hill(k=0.0, force=lambda y, force=force: np.array([force]) if y[0] == 0.0 else np.zeros(1))
+        assert equilibria._settled(flat, np.array([0.0]), 1.0) == pytest.approx([math.copysign(0.4, force)])
+        assert flat.steps == pytest.approx([math.copysign(0.4, force)]), "the longest step, along the force"
+
+
+def test_a_step_along_one_of_two_freedoms():
+    """The force and the step have one part that is zero; a step of (0.3, 0.4) is the longest one."""
+
+    class Plane(Hill):
+        def basis(self, at: np.ndarray) -> np.ndarray:
+            return np.eye(2)
+
+        def stiffness(self, y: np.ndarray, basis: np.ndarray, h: float, order: int = 8) -> np.ndarray:
+            return np.diag([-2.0, -4.0])
+
+        def moved(self, y: np.ndarray, step: np.ndarray) -> np.ndarray:
+            self.steps.append(step[0].tolist())
+            return y[None] + step
+
+    made = Plane(force=lambda y: np.array([2.0, 4.0]) * (y - 1.0))
+    assert equilibria._settled(made, np.array([1.2, 1.0]), 1.0) == pytest.approx([1.0, 1.0])
+    assert np.array(made.steps) == pytest.approx(np.array([[-0.2, 0.0]]))
+    made.steps.clear()
+    equilibria._settled(made, np.array([4.0, 5.0]), 1.0)
+    assert made.steps[0] == pytest.approx([-0.24, -0.32])
 
 
 @pytest.mark.parametrize("error", [NotSteady("open"), np.linalg.LinAlgError()])
@@ -287,6 +314,62 @@ def test_sixty_steps_at_most():
     sizes = iter(0.3 * 0.99**k for k in range(200))
     made = Hill(k=1.0, force=lambda y: np.array([next(sizes)]))
     assert equilibria._settled(made, np.array([0.0]), 1.0) is None and len(made.steps) == 60
+
+
+# --- all poses of a scene ---------------------------------------------------------------------------------
+def searched(monkeypatch: Any, poses: list[float], freedoms: int = 1) -> list[Any]:
+    """Stand-ins for a search: a start settles at its whole part, -1 is unsettled, 3 is not steady."""
+    asked: list[Any] = []
+
+    def start() -> np.ndarray:
+        if not poses:
+            raise NotSteady("the loops do not close")
+        return np.array([poses[0]])
+
+    def made(scene: Any, motion: Any) -> Any:
+        asked.append((scene.name, motion))
+        return SimpleNamespace(start=start, at=lambda y: y, basis=lambda at: np.zeros((2, freedoms)))
+
+    def starts(quick: Any, first: np.ndarray, count: int) -> Any:
+        asked.append((quick, first.tolist(), count))
+        return iter([np.array([pose]) for pose in poses])
+
+    monkeypatch.setattr(equilibria, "turning", lambda scene: "motion")
+    monkeypatch.setattr(equilibria, "Balance", made)
+    monkeypatch.setattr(equilibria, "in_doubles", lambda balance: "quick")
+    monkeypatch.setattr(equilibria, "_starts", starts)
+    monkeypatch.setattr(equilibria, "_scale", lambda quick, poses: len(poses) if quick == "quick" else None)
+    monkeypatch.setattr(
+        equilibria,
+        "_settled",
+        lambda quick, pose, scale: None if pose[0] < 0 else asked.append(scale) or int(pose[0]),
+    )
+    monkeypatch.setattr(equilibria, "_is_same", lambda quick, settled, other: settled == other[0])
+    monkeypatch.setattr(
+        equilibria,
+        "_steady",
+        lambda balance, settled, scale: (settled, scale) if settled != 3 and balance != "quick" else None,
+    )
+    return asked
+
+
+def test_each_steady_pose_is_found_once(monkeypatch):
+    """The first start is the scene's own; others are left at a known pose, without an end or unsteady."""
+    asked = searched(monkeypatch, [2.5, 1.25, -1.0, 2.0, 3.5, 4.0, 1.0])
+    scene: Any = SimpleNamespace(name="s")
+    assert equilibria.steady_poses(scene) == [(2, 7), (1, 7), (4, 7)]
+    assert asked[:2] == [("s", "motion"), ("quick", [2.5], 16)] and asked[2:] == [7] * 6
+    equilibria.steady_poses(scene, 3)
+    assert asked[9] == ("quick", [2.5], 3)
+
+
+def test_scenes_without_a_steady_pose(monkeypatch):
+    searched(monkeypatch, [])
+    with pytest.raises(SceneError, match="s: the loops do not close"):
+        equilibria.steady_poses(SimpleNamespace(name="s"))
+    searched(monkeypatch, [1.0], freedoms=0)
+    with pytest.raises(SceneError, match="the mechanism has no degree of freedom, so it rests at any load"):
+        equilibria.steady_poses(SimpleNamespace(name="s"))
 
 
 # --- refined poses ----------------------------------------------------------------------------------------
@@ -333,7 +416,11 @@ def test_poses_that_are_no_steady_poses(monkeypatch):
     assert equilibria._steady(refined(monkeypatch, sure=1e-3), np.zeros(1), 1.0) is not None
     assert equilibria._steady(refined(monkeypatch, sure=0.99e-3), np.zeros(1), 1.0) is None
     for stays in (True, False):
-        monkeypatch.setattr(equilibria, "_stays", lambda *_, stays=stays: stays)
+        monkeypatch.setattr(
+            equilibria,
+            "_stays",
+            lambda made, y, small, stays=stays: stays and len(y) == 1 and len(small.eigenvalues()) == 2,
+        )
         turning = refined(monkeypatch, motion=SimpleNamespace(rate=2.0))
         assert (equilibria._steady(turning, np.zeros(1), 1.0) is not None) is stays
         assert equilibria._steady(refined(monkeypatch), np.zeros(1), 1.0) is not None, "at rest"

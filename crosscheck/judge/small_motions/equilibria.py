@@ -147,7 +147,7 @@ def _settled(balance: Balance, y: np.ndarray, scale: float) -> np.ndarray | None
             return y
         basis = balance.basis(balance.at(y[None]))
         slope = basis.T @ balance.stiffness(y, basis, STEP / 100, order=2)
-        weight = damping * float(np.linalg.norm(slope)) ** 2 + np.finfo(float).tiny
+        weight = damping * float(np.linalg.norm(slope)) ** 2
         step = np.linalg.lstsq(slope.T @ slope + weight * np.eye(len(off)), slope.T @ off, rcond=None)[0]
         if not step.any():  # the stiffness vanishes: follow the force
             step = off * LONGEST / np.linalg.norm(off)
