@@ -49,7 +49,7 @@ class Small(NamedTuple):
 
 def ordered(eigenvalues: np.ndarray) -> np.ndarray:
     """Return eigenvalues by size, conjugate ones with the positive imaginary part first."""
-    size = np.abs(eigenvalues).max(initial=0.0) or 1.0
+    size = max(np.abs(eigenvalues).max(initial=0.0), np.finfo(float).tiny)
     keys = (-eigenvalues.imag.round(12), eigenvalues.real, (np.abs(eigenvalues) / size).round(9))
     return np.asarray(eigenvalues[np.lexsort(keys)])
 

@@ -209,8 +209,8 @@ def _stays(balance: Balance, y: np.ndarray, small: Small) -> bool:
     found = [doubles(basis.T @ part) for part in parts]
     rate, heavy = balance.motion.rate, float(np.abs(small.mass).max())
     scales = heavy, heavy * rate, max(heavy * rate**2, float(np.abs(small.stiffness).max()))
-    pairs = zip(found, (small.mass, small.damping, small.stiffness), scales, strict=True)
-    change = max(np.abs(now - before).max() / scale for now, before, scale in pairs)
+    before = small.mass, small.damping, small.stiffness
+    change = max(np.abs(found[k] - before[k]).max() / scales[k] for k in range(3))
     off = np.abs(doubles(basis.T @ balance.forces(other)[0])).max()
     return bool(max(change, off / (heavy * rate**2)) < UNSTEADY)
 
