@@ -225,7 +225,7 @@ def _changes(
 
 
 def _size(vectors: np.ndarray) -> float:
-    return float(np.linalg.norm(vectors, axis=1).max())
+    return float(np.linalg.norm(vectors, axis=-1).max())
 
 
 def _apart(first: np.ndarray, second: np.ndarray, scale: float) -> float:
