@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import signal
 import subprocess
 import sys
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 from typing import Any
 
@@ -480,3 +481,65 @@ def test_one_child_at_a_time_prepares_an_engine(monkeypatch):
     with pytest.raises(ValueError), pool._alone_at_first("e", "broken"):
         raise ValueError
     assert ("e", "broken") not in pool._prepared and not pool._preparing["e"].locked()
+
+
+@pytest.mark.parametrize(
+    ("question", "child_of", "more"),
+    [
+        (pool.run_isolated, "m:e", {"question": serve.run_once}),
+        (pool.run_in_turn, "m:e", {}),
+        (pool.observe, "m:e f ready", {"in_copy": True}),
+        (pool.observe, "", {}),
+    ],
+)
+def test_runs_of_a_child(monkeypatch, question, child_of, more):
+    """A run alone, in turn with others, in a copy, and in a process of its own where nothing is copied."""
+    calls = Calls()
+    run = SimpleNamespace(value=SimpleNamespace(outcome=Outcome.COMPLETED))
+    monkeypatch.setattr(pool, "_observed", lambda *given, **named: calls("run")(*given, **named) or run)
+    monkeypatch.setattr(pool, "_in_use", lambda name: Pipes(calls, name))
+    monkeypatch.setattr(pool, "Child", lambda: Pipes(calls, ""))
+    monkeypatch.setattr(pool.fork_server, "AVAILABLE", bool(child_of))
+    assert question("m:e", "scene", "times", SimpleNamespace(family="f"), 20.0) in (run, run.value)
+    (name, used, *given), closed = calls.made
+    assert (name, given[:3], given[4:]) == ("run", ["m:e", "scene", "times"], [20.0, *more.items()])
+    assert given[3].family == "f" and isinstance(used, Pipes) and closed == (f"{child_of}.close",)
+
+
+def test_a_question_is_named_while_it_starts(monkeypatch):
+    """An engine's capabilities are asked of its child."""
+    calls, said = Calls(), []
+    waiting = SimpleNamespace(last_printed=lambda: "")
+
+    def call(*given: Any) -> Any:
+        said.extend(pool.starting().values())
+        return calls("call")(*given) or SimpleNamespace(value="capabilities")
+
+    waiting.call = call
+    monkeypatch.setattr(pool, "_in_use", lambda name: nullcontext(waiting))
+    monkeypatch.setattr(pool, "_prepared", set())
+    assert pool.capabilities("m:e", "scene", 3.0) == "capabilities"
+    assert calls.made == [("call", serve.capabilities, ("m:e", "scene"), 3.0)] and said == ["m:e starts"]
+
+
+def test_a_call_without_a_result_printed_nothing(monkeypatch):
+    def call(*given: Any) -> Any:
+        raise ChildFailed(Outcome.CRASHED, "lost")
+
+    monkeypatch.setattr(pool, "_made_ready", lambda *of: (("1", 0.5), "said", ()))
+    monkeypatch.setattr(pool.serve, "failed", lambda *of: of)
+    seen = pool._observed(SimpleNamespace(ready=None, call=call), "m:e", "scene", "times", "setting", 2.0)
+    assert seen == (("m:e", "1", "scene", "setting", Outcome.CRASHED, "lost"), "", ())
+
+
+@pytest.mark.skipif(not fork_server.AVAILABLE, reason="processes are not forked on this system")
+@pytest.mark.parametrize("kept_by_parent", [pool._idle, fork_server._servers])
+def test_children_and_servers_belong_to_the_process_that_started_them(kept_by_parent):
+    before = list(kept_by_parent)
+    kept_by_parent.append(None)
+    try:
+        if not (fork := os.fork()):
+            os._exit(len(kept_by_parent))
+        assert os.waitstatus_to_exitcode(os.waitpid(fork, 0)[1]) == 0 < len(kept_by_parent)
+    finally:
+        kept_by_parent[:] = before
