@@ -19,6 +19,9 @@ from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
 
 
+SETTING = SimpleNamespace(family="f")
+
+
 class Calls:
     """The calls of the system in their order; each named one returns its next answer."""
 
@@ -528,8 +531,8 @@ def test_a_call_without_a_result_printed_nothing(monkeypatch):
 
     monkeypatch.setattr(pool, "_made_ready", lambda *of: (("1", 0.5), "said", ()))
     monkeypatch.setattr(pool.serve, "failed", lambda *of: of)
-    seen = pool._observed(SimpleNamespace(ready=None, call=call), "m:e", "scene", "times", "setting", 2.0)
-    assert seen == (("m:e", "1", "scene", "setting", Outcome.CRASHED, "lost"), "", ())
+    seen = pool._observed(SimpleNamespace(ready=None, call=call), "m:e", "scene", "times", SETTING, 2.0)
+    assert seen == (("m:e", "1", "scene", SETTING, Outcome.CRASHED, "lost"), "", ())
 
 
 @pytest.mark.skipif(not fork_server.AVAILABLE, reason="processes are not forked on this system")
