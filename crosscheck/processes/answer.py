@@ -87,7 +87,7 @@ def _times(answer: Trajectory, times: np.ndarray) -> np.ndarray:
     """Return the reached times (k,): the first of the requested times, or all of them if the run
     completed."""
     reached = _array("times", answer.times, None)
-    if reached.ndim != 1 or reached.size > times.size or not np.array_equal(reached, times[: reached.size]):
+    if not np.array_equal(reached, times[: reached.size]):
         raise MalformedAnswer("times: are not the first of the requested times")
     if answer.outcome is Outcome.COMPLETED and reached.size < times.size:
         raise MalformedAnswer(f"times: completed with {reached.size} of {times.size} samples")

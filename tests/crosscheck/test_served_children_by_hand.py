@@ -14,10 +14,9 @@ from typing import Any
 import pytest
 
 from crosscheck.engine import BUILT_IN, OPTIONAL
-from crosscheck.processes import child, fork_server, pool, serve
+from crosscheck.processes import answer, child, fork_server, pool, serve
 from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
-
 
 SETTING = SimpleNamespace(family="f")
 
@@ -546,3 +545,15 @@ def test_children_and_servers_belong_to_the_process_that_started_them(kept_by_pa
         assert os.waitstatus_to_exitcode(os.waitpid(fork, 0)[1]) == 0 < len(kept_by_parent)
     finally:
         kept_by_parent[:] = before
+
+
+def test_an_engine_runs_the_scene_at_the_times_with_a_setting(monkeypatch):
+    setting = SimpleNamespace(options={"step": 0.5})
+    made = SimpleNamespace(engine="e", version="1", settings={"step": 0.5})
+    simulator = SimpleNamespace(name="e", version=lambda: "1", run=lambda *given: given)
+    monkeypatch.setattr(
+        answer, "well_formed", lambda run, scene, times: seen.append((run, scene, times)) or made
+    )
+    seen: list[Any] = []
+    assert answer.answered(simulator, "scene", "times", setting) is made
+    assert seen == [(("scene", "times", setting), "scene", "times")]
