@@ -60,7 +60,7 @@ class Property(NamedTuple):
     about: str
     check: Check
     of: Callable[[Specimen], bool]
-    version: int = 1
+    version: int
 
 
 def sample_times(bench: Bench) -> Finding:

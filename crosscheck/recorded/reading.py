@@ -168,9 +168,12 @@ def _numbers(rows: Sequence[Sequence[str]], count: int, path: Path) -> np.ndarra
     found = np.empty((len(rows), count))
     for i, row in enumerate(rows):
         try:
-            found[i] = [float(cell) for cell in row]
+            numbers = [float(cell) for cell in row]
         except ValueError:
-            raise SceneError([f"{path}: row {i + 1} of numbers is not {count} numbers"]) from None
+            numbers = []
+        if len(numbers) != count:
+            raise SceneError([f"{path}: row {i + 1} of numbers is not {count} numbers"])
+        found[i] = numbers
     if not np.isfinite(found).all():
         raise SceneError([f"{path}: row {int(np.argwhere(~np.isfinite(found))[0, 0]) + 1} is not finite"])
     return found

@@ -23,6 +23,7 @@ from crosscheck.study import (
     progress,
     record_view,
     scouting,
+    sentences,
     truths,
     tuning,
     wording,
@@ -729,6 +730,23 @@ def test_the_record_of_a_truth(monkeypatch):
 )
 def test_words_at_their_limits(function, arguments, says):
     assert function(*arguments) == says
+
+
+@pytest.mark.parametrize(
+    ("apart", "says"),
+    [
+        ({}, "s: no two engines completed the motion, so nothing can be compared."),
+        ({("a", "b"): 1e-3}, "The finest runs of a and b agree to 1.0e-03."),
+        (
+            {("a", "c"): 5e-3, ("a", "b"): 1e-3, ("b", "c"): 2e-3},
+            "The finest runs of a and b agree to 1.0e-03; the nearest of them from the others: c 2.0e-03.",
+        ),
+    ],
+)
+def test_engines_that_agree_without_a_truth(apart, says):
+    """An engine without a completed motion is not named."""
+    group = SimpleNamespace(scene=SCENE, agreement=lambda: apart, engines=lambda: dict.fromkeys("abcd"))
+    assert sentences._agreement(group) == says
 
 
 # --- progress -----------------------------------------------------------------------------------------------
