@@ -98,10 +98,7 @@ def velocities(bench: Bench) -> Finding:
     h = (run.times[2] - run.times[0]) / 2
     moved = (run.position[2] - run.position[0]) / (2 * h)
     turn = rotations.multiply(run.orientation[2], rotations.conjugate(run.orientation[0]))
-    turn *= np.where(turn[:, :1] < 0, -1.0, 1.0)
-    angle = 2 * np.arctan2(np.linalg.norm(turn[:, 1:], axis=1), turn[:, 0])
-    axis = turn[:, 1:] / np.maximum(np.linalg.norm(turn[:, 1:], axis=1), 1e-300)[:, None]
-    turned = axis * angle[:, None] / (2 * h)
+    turned = rotations.to_vector(turn) / (2 * h)
     length = scene_length(bench.scene)
     speeds = np.concatenate([run.velocity[1], length * run.angular_velocity[1]])
     off = speeds - np.concatenate([moved, length * turned])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from crosscheck.conformance import (
@@ -26,6 +27,7 @@ from crosscheck.conformance.trial import Finding, Outside
 from crosscheck.engine import Cannot, Owner
 from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.tolerances import ROUNDING, SAME_MOTION
+from mbref import rotations
 from mbref.scene import Body, Driver, Moment, Revolute, Scene, Spherical, Translational
 from mbref.trajectory import Trajectory
 
@@ -250,6 +252,20 @@ def test_a_quaternion_that_is_too_short():
     assert properties.unit_orientations(bench(motion=motion(orientation=turns))).measured == 0.25
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_angular_velocities_by_poses_of_any_sign(sign):
+    """One body turns at (3, 4, 12) rad/s, the other rests; the later quaternion may be the negative one."""
+    rate = np.array([3.0, 4.0, 12.0])
+    times = 1e-3 * np.arange(9)
+    turns = np.stack([rotations.from_vector(np.outer(times, rate)), np.tile([1.0, 0, 0, 0], (9, 1))], axis=1)
+    turns[5] *= sign
+    spin, zero = np.zeros((9, 2, 3)), np.zeros((9, 2, 3))
+    spin[:, 0] = rate
+    near = motion(9, orientation=turns, angular_velocity=spin, velocity=zero, position=zero)
+    found = properties.velocities(bench(close=replace(near, times=times)))
+    assert found.measured < 1e-9 and found.allowed == properties.LIKE_TRUTH
+
+
 # --- probes of features -------------------------------------------------------------------------------------
 def test_a_body_whose_motion_is_undetermined():
     scene = features.undetermined()
@@ -441,3 +457,59 @@ def test_scenes_of_the_suite():
     }
     drawn = {s.scene.name: len(s.scene.driver) for s in quick if s.scene.name.startswith("drawn")}
     assert drawn == {"drawn loop": 0, "drawn driven loop": 1}
+
+
+def swung(acceleration: Any, angle: float) -> Any:
+    """Angles at times from the start of a motion from rest, with an acceleration by angle and rate."""
+
+    def angles(times: np.ndarray) -> np.ndarray:
+        found = solve_ivp(
+            lambda t, y: (y[1], acceleration(*y)),
+            (0.0, times[-1]),
+            (angle, 0.0),
+            "DOP853",
+            times,
+            rtol=1e-11,
+            atol=1e-13,
+        )
+        return found.y[0] - angle
+
+    return angles
+
+
+G = 9.81
+ANGLES = {
+    # kg, m, kg m², N m/rad: the moment over the moment of inertia about the axis
+    "free_fall": lambda t: 2.0 * t,
+    "pendulum": swung(lambda a, w: -2.0 * G * 0.4 * np.sin(a) / 0.35, 1.2),
+    "torsion": swung(lambda a, w: (6.0 * (0.9 - a) - 0.2 * w) / 0.35, 0.0),
+    "driven": lambda t: t - 0.5 * t**2 + 0.3 * np.sin(5.0 * t),
+    "turntable": lambda t: 1.5 * t + 2.0 * t**2,
+    "gear pair": lambda t: 25.0 / 2 * t**2 * np.array([[1.0], [-0.5]]),
+    "rack": lambda t: -1.5 * G / 81.5 / 0.05 / 2 * t**2 * np.array([[1.0], [0.0]]),
+    "screw": lambda t: -2.0 * G * 0.01 / 0.0202 / 2 * t**2,
+    "armature pendulum": swung(lambda a, w: -2.0 * G * 0.5 * np.cos(a) / 0.83, 0.0),
+}
+PLACES = {
+    "free_fall": lambda t: np.array([0.1 + t, 0.2 + 3.0 * t - G / 2 * t**2, 0 * t]),
+    "oscillator": lambda t: np.array(
+        [0.8 + swung(lambda x, v: -25.0 * (x - 0.5) - 1.5 * v, 0.8)(t), 0 * t, 0 * t]
+    ),
+    "rack": lambda t: np.array([0.05 + 0 * t, 0.2 - 1.5 * G / 81.5 / 2 * t**2, 0 * t]),
+    "screw": lambda t: np.array([0 * t, 0 * t, -2.0 * G * 1e-4 / 0.0202 / 2 * t**2]),
+}
+FORMULAS = {make()[0].name: make for make in (*closed_forms.CLOSED_FORMS, *geared_forms.GEARED)}
+
+
+@pytest.mark.parametrize("name", FORMULAS)
+def test_formulas_obey_newton_and_euler(name):
+    """Angles about z and places by an integration of the equation of motion, or by its polynomial."""
+    scene, exact = FORMULAS[name]()
+    times = np.linspace(0.0, scene.duration, 6)
+    position, orientation = exact(times)
+    turned = np.unwrap(2 * np.arctan2(orientation[..., 3], orientation[..., 0]), axis=0, period=4 * np.pi)
+    wanted = np.reshape(ANGLES.get(name, np.zeros_like)(times), (-1, len(times))).T
+    assert np.cos(turned - wanted) == pytest.approx(1.0, abs=1e-14), name
+    assert np.sin(turned - wanted) == pytest.approx(0.0, abs=1e-8), name
+    if name in PLACES:
+        assert position[:, -1] == pytest.approx(PLACES[name](times).T, abs=1e-9)
