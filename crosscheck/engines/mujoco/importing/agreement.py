@@ -80,7 +80,7 @@ class Agreement:
         still = np.zeros_like(pose[0])
         mass = _masses(scene, pose[1]) + reflected(scene, *pose, still, still).mass
         ours = twists.T @ mass @ twists
-        if ours.size and np.abs(ours).max() == 0.0:
+        if np.abs(ours).max() == 0.0:
             joint = joint_name(self.model, int(self.model.dof_jntid[0]))
             raise SceneError([f"joint {joint}: its bodies have no inertia about or along its axis"])
         self._same(ours, self.poses.mass(), "mass matrix")
@@ -92,7 +92,7 @@ class Agreement:
         drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
         inertial = _inertial(scene, pose[1], motion, drift) + armatures.mass @ drift - armatures.force
         forces = inertial - _pushes(scene, pose, motion)
-        largest = (np.abs(twists).T @ np.abs(forces)).max(initial=0.0)  # of parts that may cancel
+        largest = (np.abs(twists).T @ np.abs(forces)).max()  # of parts that may cancel
         self._same(twists.T @ forces, data.qfrc_bias - data.qfrc_passive, "bias forces", largest)
 
     def _drift(self) -> np.ndarray:
@@ -100,9 +100,9 @@ class Agreement:
         return np.concatenate([self.groups.drift(self.poses.data, piece) for piece in self.groups.pieces])
 
     def _same(self, ours: np.ndarray, theirs: np.ndarray, what: str, largest: float = 0.0) -> None:
-        scale = max(np.abs(theirs).max(initial=0.0), np.abs(ours).max(initial=0.0), largest)
+        scale = max(np.abs(theirs).max(), np.abs(ours).max(), largest)
         apart = np.abs(ours - theirs).reshape(len(ours), -1).max(axis=1)
-        if (worst := apart.max(initial=0.0)) > AGREE * scale:
+        if (worst := apart.max()) > AGREE * scale:
             joint = joint_name(self.model, int(self.model.dof_jntid[int(apart.argmax())]))
             raise SceneError(
                 [

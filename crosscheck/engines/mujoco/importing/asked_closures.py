@@ -14,7 +14,7 @@ from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
 from crosscheck.engines.mujoco.importing.urdf import along
 from mbref.scene import GROUND, SceneError
 
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+AXES = dict(zip("xyz", np.eye(3), strict=True))
 SHORT = {"3d": "spherical", "6d": "fixed"}  # numbers of equations, as in YAML files of parallel robots
 COINCIDENT = 1e-6  # distance / extent of the model at which frames coincide
 GRAMMAR = "frame_a=frame_b[:type[:axis]] or a .yaml file"
@@ -35,9 +35,9 @@ class Frames:
         site, body = (self.mujoco.mj_name2id(self.model, kind, name) for kind in self._kinds)
         if site >= 0:
             return of_site(self.model, site)
-        if body < 0:
+        if body == -1:
             known = list(self.names())
-            near = difflib.get_close_matches(name, known, 1)
+            near = difflib.get_close_matches(name, known)
             meant = f"; did you mean {near[0]!r}?" if near else f"; known: {', '.join(known)}"
             raise SceneError([f"--close: no link, body or site {name!r}{meant}"])
         return Frame(int(body), np.zeros(3), np.eye(3))
@@ -61,8 +61,8 @@ def asked(options: Sequence[str], frames: Frames) -> Iterator[Closure]:
 def _of_text(text: str, frames: Frames) -> Closure:
     pair, _, rest = text.partition(":")
     kind, _, axis = rest.partition(":")
-    first, equals, second = pair.partition("=")
-    if not equals or not first or not second:
+    first, _, second = pair.partition("=")
+    if not first or not second:
         raise SceneError([f"--close {text}: must be {GRAMMAR}"])
     return _closure(first, second, kind or "spherical", axis or "z", frames)
 
@@ -73,7 +73,7 @@ def _closure(first: str, second: str, kind: str, axis: str, frames: Frames) -> C
         raise SceneError([f"--close {name}: type {kind!r} is none of {', '.join((*TYPES, *SHORT))}"])
     if axis not in AXES:
         raise SceneError([f"--close {name}: axis {axis!r} is none of x, y, z (of both frames)"])
-    turn = along(np.array(AXES[axis]))
+    turn = along(AXES[axis])
     ends = [frames.find(end) for end in (first, second)]
     a, b = (Frame(end.body, end.origin, end.axes @ turn) for end in ends)
     return Closure(name, TYPES[kind], (a, b))
@@ -105,12 +105,10 @@ def _as_many(value: Any, count: int, default: str, path: Path, key: str) -> list
     return list(value)
 
 
-def unclosed(
-    groups: Groups, data: Any, frames: Frames, closed: Sequence[Closure], extent: float
-) -> Iterator[str]:
+def unclosed(groups: Groups, data: Any, closed: Sequence[Closure], extent: float) -> Iterator[str]:
     """Return a sentence for every two frames without mass that coincide on bodies that no joint connects
     there."""
-    places = [(name, int(groups.of[f.body]), f.place(data)) for name, f in _marks(groups, frames)]
+    places = [(name, int(groups.of[f.body]), f.place(data)) for name, f in _marks(groups)]
     taken = [c.frames[0].place(data) for c in closed] + list(data.xanchor)
     for i, (first, a, place) in enumerate(places):
         for second, b, other in places[i + 1 :]:
@@ -123,11 +121,11 @@ def unclosed(
                 )
 
 
-def _marks(groups: Groups, frames: Frames) -> Iterator[tuple[str, Frame]]:
+def _marks(groups: Groups) -> Iterator[tuple[str, Frame]]:
     """Return named sites, and named bodies without mass or children that are fixed to another body."""
     model = groups.model
-    parents = set(model.body_parentid[1:].tolist())
-    for b in range(1, model.nbody):
+    parents = set(model.body_parentid.tolist())
+    for b in range(model.nbody):  # the world carries others
         if model.body_mass[b] == 0 and not model.body_jntnum[b] and b not in parents and model.body(b).name:
             yield model.body(b).name, Frame(b, np.zeros(3), np.eye(3))
     for s in range(model.nsite):

@@ -165,7 +165,7 @@ def _found(mujoco: Any, model: Any, kind: Any, what: str, name: str, count: int)
     number = int(mujoco.mj_name2id(model, kind, name))
     if number < 0:
         known = [str(mujoco.mj_id2name(model, kind, k) or "") for k in range(count)]
-        near = difflib.get_close_matches(name, known, 1)
+        near = difflib.get_close_matches(name, known)
         meant = f"; did you mean {near[0]!r}?" if near else ""
         listed = ", ".join(filter(None, known)) or "none"
         raise SceneError([f"--{what.replace('joint', 'pose')}: no {what} {name!r}; known: {listed}{meant}"])

@@ -138,7 +138,7 @@ class _Reader:
         self.parts += left_out.of_model(model, self.kept)
         if self.text is not None:
             self.parts += urdf.couplings(self.text.root)
-        self.notes += unclosed(self.groups, self.poses.data, self.frames, closures, self.poses.extent)
+        self.notes += unclosed(self.groups, self.poses.data, closures, self.poses.extent)
 
     def scene(self, name: str) -> Scene:
         """Return the scene made of the parts that were read."""
