@@ -322,8 +322,7 @@ def coincide(text: str = MARKS, extent: float = 1.0, closed: Any = ()) -> list[s
     model = mujoco.MjModel.from_xml_string(text)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    frames = asked_closures.Frames(mujoco, model, "")
-    return list(asked_closures.unclosed(Groups(mujoco, model), data, frames, closed, extent))
+    return list(asked_closures.unclosed(Groups(mujoco, model), data, closed, extent))
 
 
 def test_frames_of_two_bodies_at_one_place() -> None:

@@ -101,7 +101,7 @@ class Agreement:
 
     def _same(self, ours: np.ndarray, theirs: np.ndarray, what: str, largest: float = 0.0) -> None:
         scale = max(np.abs(theirs).max(), np.abs(ours).max(), largest)
-        apart = np.abs(ours - theirs).reshape(len(ours), -1).max(axis=1)
+        apart = np.atleast_2d(np.abs(ours - theirs).T).max(axis=0)
         if (worst := apart.max()) > AGREE * scale:
             joint = joint_name(self.model, int(self.model.dof_jntid[int(apart.argmax())]))
             raise SceneError(
@@ -170,10 +170,15 @@ def _masses(scene: Scene, orientation: np.ndarray) -> np.ndarray:
     """Return the mass matrix (6 nb, 6 nb) of the twists of the centres of mass, world."""
     found = np.zeros((6 * len(scene.body),) * 2)
     turns = rotations.to_matrix(orientation)
-    for k, (body, inertia) in enumerate(zip(scene.body, inertia_matrices(scene), strict=True)):
-        found[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = (body.mass or 0.0) * np.eye(3)
+    for k, (mass, inertia) in enumerate(zip(_body_masses(scene), inertia_matrices(scene), strict=True)):
+        found[6 * k : 6 * k + 3, 6 * k : 6 * k + 3] = mass * np.eye(3)
         found[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6] = turns[k] @ inertia @ turns[k].T
     return found
+
+
+def _body_masses(scene: Scene) -> np.ndarray:
+    """Return the masses (nb,), which all bodies of a file have."""
+    return np.array([body.mass for body in scene.body], float)
 
 
 def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.ndarray:
@@ -189,7 +194,7 @@ def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: 
 def _pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarray) -> np.ndarray:
     """Return weight and forces of the scene's springs (6 nb,); actuators are off in the comparison."""
     found = np.zeros((len(scene.body) + 1, 6))  # the last entry is the ground's
-    found[:-1, :3] = np.outer([body.mass or 0.0 for body in scene.body], np.array(scene.gravity))
+    found[:-1, :3] = np.outer(_body_masses(scene), np.array(scene.gravity))
     actions = {"spring": _spring, "torsion_spring": _torsion, "slide_spring": _slide}
     for load in scene.load:
         if action := actions.get(load.type):
