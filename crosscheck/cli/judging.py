@@ -41,8 +41,8 @@ def judge(arguments: argparse.Namespace) -> int:
 
 
 def _assigned(text: str) -> tuple[str, str]:
-    name, equals, place = text.partition("=")
-    if not equals or not place:
+    name, _, place = text.partition("=")
+    if not place:
         raise RequestError(f"--column {text}: must be NAME=PLACE, such as rod.position.x=3")
     return name, place
 

@@ -558,6 +558,18 @@ def test_only_bodies_with_joints_to_the_ground_can_be_held(robot: Path, name: st
         holding.compiled(mujoco, robot, [name], "")
 
 
+@pytest.mark.parametrize("hold", [[], ["base"]])
+def test_meshes_that_are_missing_are_left_out_with_a_note(tmp_path: Path, hold: list[str]) -> None:
+    mesh = '<asset><mesh name="m" file="none.stl"/></asset>'
+    text = ROBOT.replace("<mujoco>", f"<mujoco>{mesh}").replace(
+        '<joint name="j"/>', '<joint name="j"/><geom type="mesh" mesh="m"/>'
+    )
+    (tmp_path / "shown.xml").write_text(text)
+    found, notes = holding.compiled(mujoco, tmp_path / "shown.xml", hold, "")
+    assert notes == ["files that are missing: none.stl; these shapes have no effect"]
+    assert found.ngeom == 0 and found.njnt == 3 - len(hold)
+
+
 def test_a_file_that_mujoco_cannot_read_for_another_reason_stays_unread(tmp_path: Path) -> None:
     (tmp_path / "bad.xml").write_text(ROBOT.replace('mass="1"', 'mass="-1"', 1))
     with pytest.raises(ValueError, match="mass"):

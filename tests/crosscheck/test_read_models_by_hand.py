@@ -313,6 +313,31 @@ def test_a_urdf_with_a_mimic_joint_and_a_loop(tmp_path: Path) -> None:
     ]
 
 
+def test_links_without_mass_have_none_in_the_model(tmp_path: Path) -> None:
+    """MuJoCo needs a mass; it is in neither the scene nor the model."""
+    file = ROBOT.format("", "").replace(f'<link name="a">{INERTIA.format(2)}</link>', '<link name="a"/>')
+    file = file.replace(
+        '"base"/><child link="b"/><origin xyz="1 0 0"/>\n<axis xyz="0 0 1"/>',
+        '"a"/>\n<child link="b"/><axis xyz="0 1 0"/>',
+    )
+    found = read(tmp_path, file, "r.urdf")
+    assert [(body.name, body.mass) for body in found.imported.scene.body] == [("b", 3.0)]
+    assert [joint.type for joint in found.imported.scene.joint] == ["universal"]
+    assert found.model.body("a").mass[0] == 0.0 and not found.model.body("a").inertia.any()
+
+
+def test_the_least_gap_that_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "OPEN", 0.25)
+    for gap, count in ((1.0, 0), (1.000001, 1)):
+        reader: Any = object.__new__(reading._Reader)
+        data = SimpleNamespace(qvel=np.zeros(1))
+        gaps = {"r": gap, "other": 0.5}
+        reader.poses = SimpleNamespace(extent=4.0, gaps=lambda g=gaps: g, close=gaps.clear, data=data)
+        reader.notes = []
+        reader._close()
+        assert len(reader.notes) == count and not gaps
+
+
 def test_the_root_of_a_urdf() -> None:
     import xml.etree.ElementTree as ET
 

@@ -26,7 +26,7 @@ def moved_to_joints(mujoco: Any, model: Any) -> Iterator[Part]:
             ("armature", model.actuator_armature, model.dof_armature),
             ("damping", model.actuator_damping, model.dof_damping),
         ):
-            if numbers[a] and is_plain:
+            if is_plain:
                 of_joint[model.jnt_dofadr[j]] += gear**2 * numbers[a]
             elif numbers[a]:
                 yield Part(kind, f"{kind} of {name!r}, which is no actuator of a hinge or slide")

@@ -205,19 +205,37 @@ def _pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarra
 
 def _spring(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
     bodies = [scene.body_index(name) for name in load.bodies]
-    arms, places, rates = [], [], []
-    for b, point in zip(bodies, load.points, strict=True):
-        arm = np.zeros(3) if b < 0 else _turn(scene, pose, b) @ (np.array(point) - scene.body[b].position)
-        arms.append(arm)
-        places.append(np.array(point) if b < 0 else pose[0][b] + arm)
-        rates.append(np.zeros(3) if b < 0 else motion[b, :3] + np.cross(motion[b, 3:], arm))
+    places, rates = _points(scene, pose, motion, bodies, load.points)
     apart = places[1] - places[0]
     length = np.linalg.norm(apart)
     along = apart / length
     pull = load.stiffness * (length - load.natural_length) + load.damping * along @ (rates[1] - rates[0])
-    forces = (pull * along, -pull * along)
+    return _wrenches(pose, bodies, places, pull * along)
+
+
+def _points(scene: Scene, pose: Any, motion: np.ndarray, bodies: Sequence[int], points: Any) -> Any:
+    """Return positions and velocities, world, of a point of each body, given at the scene's pose."""
+    places, rates = [], []
+    for b, point in zip(bodies, np.array(points), strict=True):
+        if b < 0:
+            places.append(point)
+            rates.append(np.zeros(3))
+            continue
+        arm = _turn(scene, pose, b) @ (point - scene.body[b].position)
+        places.append(pose[0][b] + arm)
+        rates.append(motion[b, :3] + np.cross(motion[b, 3:], arm))
+    return places, rates
+
+
+def _wrenches(
+    pose: Any, bodies: Sequence[int], places: Sequence[np.ndarray], force: np.ndarray
+) -> list[tuple[int, np.ndarray]]:
+    """Return the wrenches about the bodies' centres of a force on the first body and its opposite on the
+    second one."""
+    centres = np.vstack([pose[0], np.zeros(3)])  # the last one is the ground's
     return [
-        (b, np.concatenate([f, np.cross(arm, f)])) for b, f, arm in zip(bodies, forces, arms, strict=True)
+        (b, np.concatenate([sign * force, np.cross(place - centres[b], sign * force)]))
+        for b, place, sign in zip(bodies, places, (1, -1), strict=True)
     ]
 
 
@@ -229,7 +247,6 @@ def _torsion(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
     axis = turns[0] @ start
     q = rotations.from_matrix(turns[0].T @ turns[1])
     angle = 2 * np.arctan2(q[1:] @ start, q[0])
-    angle -= 2 * np.pi * np.round(angle / (2 * np.pi))
     rates = [np.zeros(3) if b < 0 else motion[b, 3:] for b in bodies]
     moment = load.stiffness * (angle - load.natural_angle) + load.damping * axis @ (rates[1] - rates[0])
     return [
@@ -241,21 +258,13 @@ def _torsion(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
 def _slide(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
     joint = scene.joint_named(load.joint)
     bodies = [scene.body_index(name) for name in joint.bodies]
-    turns = [np.eye(3) if b < 0 else _turn(scene, pose, b) for b in bodies]
-    axis = turns[0] @ np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
-    places, rates = [], []
-    for b, turn, point in zip(bodies, turns, joint.anchor_pair, strict=True):
-        arm = np.zeros(3) if b < 0 else turn @ (np.array(point) - scene.body[b].position)
-        places.append(np.array(point) if b < 0 else pose[0][b] + arm)
-        rates.append(np.zeros(3) if b < 0 else motion[b, :3] + np.cross(motion[b, 3:], arm))
+    turn = np.eye(3) if bodies[0] < 0 else _turn(scene, pose, bodies[0])
+    axis = turn @ np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    places, rates = _points(scene, pose, motion, bodies, joint.anchor_pair)
     apart, spin = places[1] - places[0], np.zeros(3) if bodies[0] < 0 else motion[bodies[0], 3:]
     rate = axis @ (rates[1] - rates[0]) + np.cross(spin, axis) @ apart
     push = (load.stiffness * (axis @ apart - load.natural_displacement) + load.damping * rate) * axis
-    arms = [places[1] - (np.zeros(3) if b < 0 else pose[0][b]) for b in bodies]
-    return [
-        (b, np.concatenate([sign * push, np.cross(arm, sign * push)]))
-        for b, arm, sign in zip(bodies, arms, (1, -1), strict=True)
-    ]
+    return _wrenches(pose, bodies, [places[1]] * 2, push)
 
 
 def _turn(scene: Scene, pose: Any, b: int) -> np.ndarray:

@@ -121,7 +121,6 @@ def of_site(model: Any, s: int) -> Frame:
 
 def _rotation_vector(matrix: np.ndarray) -> np.ndarray:
     """Return the rotation vector (3,) of a rotation matrix, at most half a turn long."""
-    q = rotations.from_matrix(matrix)
-    q = q if q[0] >= 0 else -q
+    q = rotations.from_matrix(matrix)  # with w ≥ 0
     sine = float(np.linalg.norm(q[1:]))
     return np.asarray(q[1:] * (2 * np.arctan2(sine, q[0]) / sine if sine > 0 else 2.0))

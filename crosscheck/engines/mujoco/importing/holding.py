@@ -24,8 +24,7 @@ def compiled(mujoco: Any, path: Path, hold: Sequence[str], keyframe: str) -> tup
         model = mujoco.MjModel.from_xml_path(str(path))
     except ValueError:
         spec = mujoco.MjSpec.from_file(str(path))
-        if not (notes := without_missing(mujoco, spec)):
-            raise
+        notes = without_missing(mujoco, spec)
         model = spec.compile()
     else:
         spec = mujoco.MjSpec.from_file(str(path)) if hold else None
@@ -61,8 +60,8 @@ def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:
     key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
     for b in np.flatnonzero(model.body_mocapid >= 0) if key >= 0 else ():
         k = int(model.body_mocapid[b])
-        model.body_pos[b] = model.key_mpos[key, 3 * k : 3 * k + 3]
-        model.body_quat[b] = model.key_mquat[key, 4 * k : 4 * k + 4]
+        model.body_pos[b] = model.key_mpos[key].reshape(-1, 3)[k]
+        model.body_quat[b] = model.key_mquat[key].reshape(-1, 4)[k]
     return model
 
 
