@@ -106,6 +106,33 @@ def test_exact_eigenvalues_of_a_pose():
     assert (
         records._nearest(np.array([1.0, 3.004]), known) is None and records._nearest(np.ones(1), []) is None
     )
+    assert records._nearest(np.array([1.0, 3.003003]), known) is None, "relative to the exact ones"
+    assert records._nearest(np.array([1.0, 1001.0]), [(1.0, 1000.0)]) is not None
+    assert records._nearest(np.array([1.0, 1001.1]), [(1.0, 1000.0)]) is None
+
+
+def test_results_of_engines_in_turn(monkeypatch):
+    said: list[str] = []
+    monkeypatch.setattr(records, "engine", lambda name: f"engine {name}")
+    monkeypatch.setattr(records, "of_engine", lambda *asked: iter([asked, "second"]))
+    found = records._results("scene", "steady", ["a", "b"], said.append)
+    assert found == [("engine a", "scene", "steady"), "second", ("engine b", "scene", "steady"), "second"]
+    assert said == ["a", "b"]
+
+
+def test_records_of_all_mechanisms(monkeypatch):
+    said: list[str] = []
+
+    def measured(scene: Any, engines: Any, known: Any, progress: Any) -> list[Any]:
+        progress("begun")
+        return [(scene, engines, known)] * 2
+
+    made = [SimpleNamespace(name=name, make=lambda n=name: n, known=lambda n=name: [n]) for name in "xy"]
+    monkeypatch.setattr(records, "measured", measured)
+    monkeypatch.setattr(records, "MECHANISMS", made)
+    found = records.of_mechanisms(["e"], said.append)
+    assert found == [("x", ["e"], ["x"])] * 2 + [("y", ["e"], ["y"])] * 2 and said == ["x: begun", "y: begun"]
+    assert records.of_mechanisms([]) == [("x", [], ["x"])] * 2 + [("y", [], ["y"])] * 2
 
 
 def steady(values: Any = (-1.0 + 2j, -1.0 - 2j), rate: float = 0.0) -> Any:
@@ -116,6 +143,7 @@ def steady(values: Any = (-1.0 + 2j, -1.0 - 2j), rate: float = 0.0) -> Any:
         uncertainty=1e-12,
         stability="stable",
         balance=SimpleNamespace(motion=SimpleNamespace(rate=rate)),
+        rate=rate,
     )
 
 
@@ -146,12 +174,16 @@ def test_the_record_of_a_pose(monkeypatch):
             {"engine": "f", "version": "1.2", "way": "", "reason": "no", "error": None},
         ],
     }
+    third = records._record(scene(), steady([1 / 3 + 2j / 3]), None, [], [])
+    assert third["eigenvalues"] == [[0.3333333333333, 0.6666666666667]], "thirteen digits"
+    off = records._record(scene(), steady([1.0, 2.5]), np.array([1.0, 2.0]), [], [])
+    assert off["error"] == pytest.approx(0.25), "relative to the exact one"
     alone = records._record(scene(), steady(), None, [own(0.5, 1.0)], [])
     assert alone["error"] is alone["mbref_distance"] is alone["mbref_error"] is None
     assert records._record(scene(), steady(), None, [], [])["mbref_distance"] is None
 
 
-@pytest.mark.parametrize(("shift", "is_found"), [(1.9e-6, True), (2.1e-6, False)])
+@pytest.mark.parametrize(("shift", "is_found"), [(1.9e-6, True), (2e-6, False), (2.1e-6, False)])
 def test_a_pose_counts_as_found_below_a_millionth_of_the_length(monkeypatch, shift, is_found):
     monkeypatch.setattr(compare, "scene_length", lambda scene: 2.0)
     found = records._record(scene(), steady(), None, [own(shift, 1.0, 1.0)], [])
@@ -163,7 +195,14 @@ def test_poses_that_are_measured(monkeypatch):
     said: list[str] = []
     monkeypatch.setattr(records, "steady_poses", lambda scene, starts: [steady([1.0]), steady([2.0])])
     monkeypatch.setattr(records, "search", lambda scene: "own")
-    monkeypatch.setattr(records, "_results", lambda scene, each, engines, progress: ["r", *engines])
+    monkeypatch.setattr(
+        records,
+        "_results",
+        lambda scene, each, engines, progress: [
+            *("r" if (scene.name, each.rate) == ("s", 0) else ""),
+            *engines,
+        ],
+    )
     monkeypatch.setattr(
         records, "_record", lambda scene, each, of, own, results: (each.eigenvalues[0], of, own, results)
     )
@@ -273,6 +312,16 @@ def test_the_table_has_the_largest_error_of_each_mechanism():
         "| mbref modes | 9e-09 | 5e-09" + rest,
         "| e 1, w | 6e-08 | –" + rest,
     ]
+
+
+def test_the_page_lists_each_pose_with_its_mechanism():
+    names = [MECHANISMS[k].name for k in (1, 0)]
+    lines = document.page([shown(scene=name, uncertainty=k) for k, name in enumerate(names)]).splitlines()
+    poses = [k for k, line in enumerate(lines) if line.startswith("- Equilibrium, stable: s = +2 i, -2 i")]
+    assert len(poses) == 2
+    for k, mechanism in zip(poses, MECHANISMS, strict=False):
+        assert lines[k - 2] == f"**{mechanism.name}**: {mechanism.about}."
+    assert sum(line.startswith("**") for line in lines) == len(MECHANISMS)
 
 
 def test_refusals_are_listed_once():
