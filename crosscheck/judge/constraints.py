@@ -260,7 +260,7 @@ def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the least-squares solution of least norm, and a basis (n, k) of the null space."""
     u, s, vt = np.linalg.svd(matrix, full_matrices=True)
-    rank = int(np.sum(s > RANK * max(s.max(initial=0.0), 1e-300)))
+    rank = int(np.sum(s > RANK * s.max(initial=0.0)))
     return vt[:rank].T @ ((u[:, :rank].T @ rhs) / s[:rank]), vt[rank:].T
 
 

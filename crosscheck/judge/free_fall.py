@@ -23,7 +23,7 @@ def falls_freely(scene: Scene) -> bool:
     velocity, angular_velocity = initial_twists(scene)
     speed = np.abs(velocity).max()
     apart = max(np.ptp(velocity, axis=0).max(), scene_length(scene) * np.abs(angular_velocity).max())
-    if apart > ROUNDING * max(speed, 1e-300):
+    if apart > ROUNDING * speed:
         return False
     linear, angular = np.split(gauss(scene), 2)  # the second part is times the scene's length
     return bool(max(np.abs(linear - scene.gravity).max(), np.abs(angular).max()) <= ROUNDING * gravity)

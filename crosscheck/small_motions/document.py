@@ -142,5 +142,5 @@ def written(real: float, imaginary: float) -> str:
     real, imaginary = (0.0 if abs(x) <= scale else x for x in (real, imaginary))
     if imaginary == 0.0:
         return f"{real:.10g}"
-    sign = "-" if imaginary < 0 else "+"
-    return f"{real:.10g} {sign} {abs(imaginary):.10g} i" if real else f"{sign}{abs(imaginary):.10g} i"
+    text = f"{imaginary:+.10g} i"
+    return f"{real:.10g} {text[0]} {text[1:]}" if real else text

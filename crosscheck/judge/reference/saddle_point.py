@@ -16,7 +16,6 @@ from crosscheck.judge.deadline import ask
 
 ROUNDS = 40  # largest number of refinement steps
 FIRST = 4.0  # initial correction size, so that the first step is never the last
-TINY = 1e-300
 STALLED = 0.5  # ratio of successive corrections above which refinement ends
 
 
@@ -72,5 +71,5 @@ class SaddlePoint:
             change = float(np.abs(step).max() * size / np.abs(found / self._scale).max())
             if change * change / last <= self._eps or not change <= STALLED * last:
                 break
-            last, left = max(change, TINY), self._arithmetic.settled(wanted - self._product(found))
+            last, left = change, self._arithmetic.settled(wanted - self._product(found))
         return found[: self._size].reshape(force.shape), found[self._size :]
