@@ -274,7 +274,7 @@ def _rotation_vector(q: np.ndarray) -> np.ndarray:
     """Return rotation vectors (…, 3), length ≤ π, of unit quaternions."""
     q = np.where(q[..., :1] < 0, -q, q)
     size = np.linalg.norm(q[..., 1:], axis=-1, keepdims=True)
-    return 2 * np.arctan2(size, q[..., :1]) * q[..., 1:] / np.where(size > 0, size, 1)
+    return 2 * np.arctan2(size, q[..., :1]) * q[..., 1:] / np.maximum(size, np.finfo(float).tiny)
 
 
 def _tilt(q: np.ndarray) -> np.ndarray:
@@ -282,7 +282,7 @@ def _tilt(q: np.ndarray) -> np.ndarray:
     other."""
     x, y, z = np.moveaxis(rotations.to_matrix(q)[..., 2], -1, 0)
     sine = np.hypot(x, y)
-    size = np.where(sine > 0, sine, 1)
+    size = np.maximum(sine, np.finfo(float).tiny)
     # any direction if the axes are opposite
     unit = np.stack([np.where(sine > 0, -y / size, 1.0), x / size], axis=-1)
     return unit * np.arctan2(sine, z)[..., None]

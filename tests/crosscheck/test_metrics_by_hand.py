@@ -249,3 +249,23 @@ def test_the_first_panel_of_a_pendulum(asked):
     assert start.astype(float) == pytest.approx([0.0, -3.0 * root, 0.0]) and start.dtype == np.longdouble
     found = rates(np.array([[0.0, 2.0, 9.0], [math.pi / 2, -1.0, 9.0]], dtype=np.longdouble))
     assert found.astype(float) == pytest.approx(np.array([[2.0, 20.0, root], [-1.0, 0.0, root]]), abs=1e-14)
+
+
+def test_accelerations_of_a_free_body_at_its_start():
+    """Newton's and Euler's equations: the force acts at 0.5 m along x, J ω' = M - ω × J ω."""
+    found = FreeBody(FLYING).poses(np.zeros(1))
+    turn = rotations.to_matrix(TURNED)
+    inertia = turn @ np.array(SPUN.inertia) @ turn.T
+    spin = np.array(SPUN.angular_velocity)
+    moment = np.cross([0.5, 0.0, 0.0], [0.0, 6.0, 0.0]) + np.array([0.1, 0.2, -0.3])
+    wanted = np.linalg.solve(inertia, moment - np.cross(spin, inertia @ spin))
+    assert found.angular_acceleration[0, 0] == pytest.approx(wanted)
+    assert found.acceleration[0, 0] == pytest.approx([0.0, 3.0, -10.0])
+    assert found.velocity[0, 0].tolist() == [3.0, 0.0, 4.0] and found.position[0, 0].tolist() == [
+        1.0,
+        2.0,
+        3.0,
+    ]
+    assert found.angular_velocity[0, 0] == pytest.approx(spin) and found.orientation[0, 0] == pytest.approx(
+        TURNED
+    )

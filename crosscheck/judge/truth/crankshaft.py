@@ -41,7 +41,7 @@ def _without_shaft(scene: Scene) -> list[np.ndarray]:
     linked = np.zeros((len(scene.body), len(scene.body)))
     for joint in scene.joint:
         if GROUND not in joint.bodies and not isinstance(joint, Fixed):
-            linked[tuple(scene.body_index(name) for name in joint.bodies)] = 1
+            linked[tuple(scene.body_index(name) for name in joint.bodies)] = True
     _, label = connected_components(linked, directed=False)
     return [np.flatnonzero(label == k) for k in range(label.max() + 1)]
 
