@@ -48,8 +48,6 @@ from mbref.scene_fields import COINCIDENT
 from mbref.scene_joints import ANGLE
 
 Values = tuple[float, ...]
-# parameters of the fixed frame, in the form of ``_of_body``
-AT_ORIGIN = (*ORIGIN, 1.0, *ORIGIN, 1.0, 1.0, 1.0, 1.0)
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
 
@@ -173,7 +171,9 @@ class Packs:
     def _bodies(self) -> Bodies:
         """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""
         found = [_once(_of_body, bodies) for bodies in self.listed]
-        numbers = self._rows((row for rows in found for row in (*(own for own, _ in rows), AT_ORIGIN)), 11)
+        # zeros for the fixed frame, whose quaternion without a vector part is no rotation
+        numbers = np.zeros((len(self.scenes), self.nb + 1, 11))
+        numbers[:, :-1] = self._rows((own for rows in found for own, _ in rows), 11)
         axes = [axes for rows in found for _, axes in rows]
         if self.kinematic:
             numbers[..., 7:] = 1.0
@@ -184,7 +184,7 @@ class Packs:
             frames[:, :-1] = rotations.multiply(frames[:, :-1], self.principal)
         self.to_local = np.ascontiguousarray(rotations.to_matrix(frames).swapaxes(-1, -2))
         self._centres, self.orientation = numbers[..., :3], frames[:, :-1]
-        self.mass = numbers[:, :-1].take(OF_MASS, axis=-1).reshape(len(self.scenes), 6 * self.nb)
+        self.mass = numbers[:, :-1].take(OF_MASS, axis=2).reshape(len(self.scenes), 6 * self.nb)
         self.inverse_root = inverse_root(self.mass)
         return Bodies(numbers[:, :-1, 7], numbers[:, :-1, 8:])
 
@@ -194,7 +194,7 @@ class Packs:
         nb, nj = len(self.scenes[0].body), len(self.scenes[0].joint)
         points = np.concatenate((self._centres[:, :nb], anchors[:, : 2 * nj]), axis=1)
         apart = points[:, :, None] - points[:, None]
-        self.length = np.sqrt((apart * apart).sum(axis=-1).max(axis=(1, 2)))
+        self.length = np.sqrt((apart * apart).sum(axis=3).max(axis=(1, 2)))
         self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
@@ -249,7 +249,7 @@ class Packs:
 
     def start(self) -> np.ndarray:
         """Return coordinates (s, 7 nb) of the scenes' poses, for principal frames."""
-        poses = np.concatenate([self._centres[:, : self.nb], self.orientation], axis=-1)
+        poses = np.concatenate([self._centres[:, : self.nb], self.orientation], axis=2)
         return poses.reshape(len(self.scenes), 7 * self.nb)
 
 

@@ -66,15 +66,17 @@ def choose(memory):
         subtract_pivot_row(k, 0.0, k, memory)
     for k in range(pivot_columns.shape[0]):
         pivot_columns[k] = k
-    while rank < min(pivot_rows.shape[0], pivot_columns.shape[0]):
+    for _ in range(min(pivot_rows.shape[0], pivot_columns.shape[0])):
         p = place_of_largest_row(row_max, pivot_rows, rank)
         if not row_max[pivot_rows[p]] > tolerance:
             break
         parity = parity != (p != rank)
         pivot_rows[rank], pivot_rows[p] = pivot_rows[p], pivot_rows[rank]
         q, r = rank, pivot_rows[rank]
-        while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:
-            q += 1
+        for free in range(rank, pivot_columns.shape[0]):
+            if abs(tableau[r, pivot_columns[free]]) == row_max[r]:
+                q = free
+                break
         parity = parity != (q != rank)
         pivot_columns[rank], pivot_columns[q] = pivot_columns[q], pivot_columns[rank]
         c = pivot_columns[rank]

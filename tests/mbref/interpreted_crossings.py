@@ -24,7 +24,7 @@ from mbref.taylor.crossing import (
     start,
     uniqueness,
 )
-from mbref.taylor.crossing.thresholds import CROSSING_NOISE, DEPARTURE
+from mbref.taylor.crossing.thresholds import CROSSING_NOISE, DEPARTURE, PIVOT_CLEAR
 from mbref.taylor.mode import HIGH_ACCURACY, REGULAR
 from tests.mbref.threshold_checks import KERNELS, memory
 
@@ -68,6 +68,22 @@ def test_minors_oppose_by_the_signs_of_motion_partition_and_pivots(along, parity
     state = memory(pivot=pivot)
     state.partition.parity = parity
     assert determinants.minors_oppose(along, state) == (along * pivot * (1 - 2 * parity) < 0.0)
+
+
+@pytest.mark.parametrize(
+    ("vector", "negative", "size"),
+    [
+        ((0.5, 0.0), False, math.log(0.5)),
+        ((-0.25, 2.0), True, math.log(0.25)),
+        ((0.0, 1.0), False, -math.inf),
+    ],
+)
+def test_the_determinant_by_pivots_and_null_vectors(vector, negative, size):
+    """Pivots of 3 at the start and of 2 at the end; null vectors across each other make it zero."""
+    state = memory(pivot=2.0)
+    state.solver.past, state.solver.null_space = np.array([3.0]), np.array([vector, (9.0, 9.0)])
+    found = determinants.determinant_by_null_vectors(state)
+    assert found == (negative, pytest.approx(math.log(6.0) + size))
 
 
 def as_determinant(monkeypatch, value, end):
@@ -280,6 +296,14 @@ def test_regular_steps_follow_when_the_distance_grows_beyond_a_limit():
         state.progress.clearance = before
         long_crossing.judge_clearance(state)
         assert state.progress.is_clear == clear, (before, pivot)
+    state = memory(pivot=0.2, largest_pivot=4.0)
+    long_crossing.judge_clearance(state)
+    assert state.progress.clearance == pytest.approx(0.2 / (PIVOT_CLEAR * 4.0))
+    state.progress.clearance = 1e-3
+    state.run.loop.clock.attempt_end = state.run.loop.clock.time
+    state.solver.last[:] = 4.0 * PIVOT_CLEAR
+    long_crossing.judge_clearance(state)
+    assert state.progress.clearance == 1.0 and state.progress.is_clear, "the limit and the time belong to it"
     state = memory(pivot=0.2)
     state.run.loop.clock.attempt_end = 0.1
     long_crossing.judge_clearance(state)

@@ -33,6 +33,7 @@ from mbref.kernels import (
     scene_layout,
 )
 from mbref.kernels.compilation import FLOAT, INT, Entry, Exchangeable, Helper
+from mbref.taylor import layout as taylor_layout
 
 
 # --- names and options ------------------------------------------------------------------------------------
@@ -58,6 +59,27 @@ def test_signatures_of_kernels_that_are_passed_on():
     }
     for name, (result, arguments) in wanted.items():
         signature = getattr(layout, name)
+        assert (signature.return_type, signature.args) == (result, arguments), name
+
+
+def test_signatures_of_kernels_of_series():
+    """Kernels that choose rows have no arguments but the memory; others have times, pivots or variables."""
+    matrix, memory = compilation.MATRIX, taylor_layout.SERIES
+    alone = (
+        "BEGIN TAKE_STEP PARTITION RESPOND TERMS CORRECT SAMPLE SAVE_SERIES RETURN_TO_START RECORD_CROSSINGS"
+    )
+    wanted = {
+        **dict.fromkeys(alone.split(), (i8, (memory,))),
+        "JUDGE_START": (i8, (i8, memory)),
+        "TURNING_PIVOT": (f8, (f8, memory)),
+        "DETECT": (i8, (f8, f8, memory)),
+        "EXPAND": (i8, (f8, memory)),
+        "BALANCE": (i8, (f8, memory)),
+        "GRADIENT": (i8, (matrix, memory)),
+        "DETERMINANT": (types.Tuple((types.boolean, f8)), (matrix, memory)),
+    }
+    for name, (result, arguments) in wanted.items():
+        signature = getattr(taylor_layout, name)
         assert (signature.return_type, signature.args) == (result, arguments), name
 
 

@@ -25,6 +25,7 @@ if not PLAIN:
 
 from mbref.kernels.layout import OK
 from mbref.method import Method
+from mbref.scene import Moment
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
@@ -47,6 +48,9 @@ MECHANISMS = {  # functions besides the corrections
 }
 
 
+MOMENTS = {
+    "four_bar_gravity": (3.0, 5.0, 2.0)
+}  # N m, on the first body: forces that are linear in the variables
 STARTS: dict[str, np.ndarray] = {}  # values of the variables at the start, by name
 
 
@@ -63,7 +67,10 @@ def target_machine() -> llvm.TargetMachine:
 def written(name: str) -> tuple[TaylorMemory, Callable[..., None], tuple[str, ...]]:
     """Return the memory of a scene's series, a call of functions of its code, and their names."""
     method = Method.parse(f"taylor[order={ORDER}]")
-    run = start_run(SCENES[name](), method, np.array([0.1]), Limits(code="generic"))
+    scene = SCENES[name]()
+    if name in MOMENTS:
+        scene = scene.with_(load=(Moment(body=scene.body[0].name, moment=MOMENTS[name]),))
+    run = start_run(scene, method, np.array([0.1]), Limits(code="generic"))
     assert run.stepper.expand() == OK
     taylor = run.stepper.taylor
     names = build.names_of_functions(taylor)

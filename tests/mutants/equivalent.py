@@ -34,9 +34,7 @@ UNKNOWN_LENGTH = "NumPy finds the length of any dimension with a negative length
 ALIKE = "The comparison treats both arrays alike."
 ZERO_TIMES = "Zero times any vector is a vector of zeros."
 SKIPS_ZERO = "A row is left as it is when zero times another row is subtracted."
-FOUND_BEFORE = "The largest entry of a row is in one of its free columns, so that the search ends there."
 PADDED = "Sizes of one and of two are both padded to eight lanes."
-LARGEST_ENTRY = "while q < pivot_columns.shape[0] - 1 and abs(tableau[r, pivot_columns[q]]) != row_max[r]:"
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 ANY_RANDOM = "Any random numbers serve; the seed only makes results repeatable."
 PATTERN = "The order of elimination and the fill depend on the pattern of the matrix alone."
@@ -197,13 +195,6 @@ REASONS: dict[tuple[str, str, str], str] = {
     ): PADDED,
     ("mbref/taylor/solver.py", "if i != r and entry != 0.0:", "(i != r)"): SKIPS_ZERO,
     ("mbref/taylor/solver.py", "if g != f and entry != 0.0:", "(g != f)"): SKIPS_ZERO,
-    (
-        "mbref/taylor/step_start.py",
-        LARGEST_ENTRY,
-        "(abs(tableau[r, pivot_columns[q]]) != row_max[r])",
-    ): FOUND_BEFORE,
-    ("mbref/taylor/step_start.py", LARGEST_ENTRY, "((pivot_columns.shape[0]) + (1))"): FOUND_BEFORE,
-    ("mbref/taylor/step_start.py", LARGEST_ENTRY, "(q <= pivot_columns.shape[0] - 1)"): FOUND_BEFORE,
     (
         "reports/sections/paper_sweep.py",
         "paper = sorted({cell.end for cell in cells if cell.end is not None})",
