@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Iterable
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,11 +15,11 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.findings import document, finding
 from crosscheck.findings.finding import Finding
-from crosscheck.paper import cells, runs, settings, singular, store
+from crosscheck.paper import cells, illustration, runs, settings, singular, store
 from crosscheck.paper.cells import Cell, Match
 from crosscheck.paper.runs import FREE, HEAVY, SPATIAL_DYNAMIC, UNEQUAL, Label
 from crosscheck.paper.settings import BASE, Variant
-from mbref.records import append
+from mbref.records import append, stored
 from mbref.scene import Body, Distance, Revolute, Scene
 from mbref.trajectory import Outcome
 
@@ -150,6 +151,11 @@ def named(monkeypatch) -> None:
     monkeypatch.setattr(runs, "digits_scene", lambda: "digits")
 
 
+def every(step: float, count: int) -> Any:
+    """Times from zero on, at equal steps (s)."""
+    return pytest.approx(step * np.arange(count))
+
+
 def places(found: Iterable[Label]) -> list[tuple[str, str, str]]:
     return [(label.row, label.column, label.variant) for label in found]
 
@@ -159,7 +165,7 @@ def test_runs_of_the_tables_and_their_draws(named):
     assert places(tables) == [(c.row, c.column, BASE.name) for c in cells.CELLS]
     assert [label.part for label in tables] == ["I"] * 33 + ["II"] * 11 + ["III"] * 11
     case = tables[Label("II", "MPI (GS)", "five-bar")]
-    assert case.scene == ("five-bar", BASE) and case.times is not None and len(case.times) == 101
+    assert case.scene == ("five-bar", BASE) and case.times == every(0.2, 101)
     assert case.engine == "mbref" and case.setting == Setting("mpi-gs+none/adams", BASE.options())
     counts = {(c.table, c.row): runs.draws(c) for c in cells.CELLS if c.table != "I"}
     assert {row for (table, row), n in counts.items() if table == "II" and n == 1} == {
@@ -212,13 +218,13 @@ def test_runs_of_the_figures(named):
     found = runs.figures()
     assert [label.row for label in found if label.column == "five-bar"] == list(runs.FIGURES["five-bar"])
     assert {label.part for label in found} == {"figures"} and len(found) == 9
-    assert all(case.times is not None and len(case.times) == 61 for case in found.values())
+    assert all(case.times == every(0.002, 61) for case in found.values())
     dynamic = runs.dynamic()
     columns = [label.column for label in dynamic]
     assert [columns.count(c) for c in (HEAVY, UNEQUAL, SPATIAL_DYNAMIC)] == [8 + 2, 6, 9]
-    assert len(dynamic[runs.PEAKS].times) == 2001
+    assert dynamic[runs.PEAKS].times == every(0.01, 2001)
     smooth = dynamic[Label("dynamic", "taylor", HEAVY)]
-    assert smooth.setting == Setting("taylor", {"rtol": 1e-9}) and len(smooth.times) == 201
+    assert smooth.setting == Setting("taylor", {"rtol": 1e-9}) and smooth.times == every(0.1, 201)
     assert smooth.scene == ("dynamic", HEAVY) and smooth.engine == "mbref"
 
 
@@ -235,7 +241,9 @@ def test_runs_over_tolerances_and_penalties(named):
     assert dual.setting.family == "alf-dual[alpha=1e+12,epsilon=1e-14,iterations=100]+none"
     assert digits[Label("digits", "mpi-svd", "")].setting.family == "mpi-svd+none"
     assert {label.column for label in digits} - {""} == {f"{10.0**k:g}" for k in range(2, 13)}
+    assert {len(case.times) for case in kept.values()} == {201}
     gains = [float(label.variant) for label in runs.gains()]
+    assert all(case.times == every(0.02, 101) for case in (*runs.gains().values(), *runs.growth().values()))
     assert gains == [0, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000]
     assert (
         runs.gains()[Label("gain", "LM2 + B", SPATIAL_DYNAMIC, "5")].setting.family
@@ -246,6 +254,7 @@ def test_runs_over_tolerances_and_penalties(named):
 
 def test_timed_runs_and_pairs(named, monkeypatch):
     timed = runs.timed()
+    assert timed[Label("timed", "LM2", cells.SPATIAL)].times == every(0.2, 6)
     ends = {
         column: {case.times[-1] for label, case in timed.items() if label.column == column}
         for column in (cells.SPATIAL, SPATIAL_DYNAMIC)
@@ -355,6 +364,10 @@ def test_cells_and_the_outcomes_that_match_them():
     at_start = Cell("I", "r", "c", 0.0, "c")
     found = [cells.match(at_start, Outcome.VIOLATION, t) for t in (0.002, 0.0021)]
     assert found == [Match.SAME, Match.OTHER_TIME]
+    lasting = Cell("I", "r", "c", None, "")
+    ends = [cells.match(lasting, outcome, 20.0) for outcome in (Outcome.COMPLETED, Outcome.VIOLATION)]
+    assert ends == [Match.SAME, Match.DIFFERENT]
+    assert cells.match(at_start, Outcome.COMPLETED, 0.0) is Match.DIFFERENT
     early = [cells.match(Cell("I", "r", "c", 1.0, "c"), Outcome.VIOLATION, t) for t in (0.9981, 0.9979)]
     assert early == [Match.SAME, Match.OTHER_TIME]
 
@@ -411,6 +424,12 @@ def test_errors_of_the_right_hand_side_near_a_singular_position(monkeypatch):
     assert d.tolist() == [[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
     assert (alpha, epsilon) == (1e4, 1e-11)
     assert np.abs(gamma - [3.0, 0.0, 0.0]) == pytest.approx([0.75, 0.0, 0.0]), "two rows are one"
+
+
+def test_the_committed_explanation_answers_the_present_question():
+    """Settings and constants of the explanation are those of the record, so that nothing is computed."""
+    path = Path(__file__).parents[2] / "reports" / "paper" / "paper-illustration.jsonl"
+    assert illustration._key() in stored(path)
 
 
 def test_residuals_on_the_fold():
