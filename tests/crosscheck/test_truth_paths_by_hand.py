@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from crosscheck.judge.truth.crankshaft import _part, _without_shaft, crankshaft
 from crosscheck.judge.truth.free_body import free_body
 from crosscheck.judge.truth.locked import locked
 from crosscheck.judge.truth.one_dof import (
+    Reduced,
     _torsion_angles_known,
     circle,
     freedoms_at,
@@ -23,6 +25,7 @@ from crosscheck.judge.truth.one_dof import (
     turned,
 )
 from crosscheck.judge.truth.parallelogram import _arm, parallelogram, pivots_of, turning_driver, unit
+from crosscheck.judge.truth.picard import NoSolution
 from crosscheck.judge.truth.slider import slider
 from crosscheck.judge.truth.spatial_slider_crank import is_along, spatial_slider_crank
 from mbref import rotations
@@ -46,6 +49,7 @@ from mbref.scene import (
 )
 
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+EPS = np.finfo(np.longdouble).eps
 
 
 def body(name: str, *place: float, **parts: Any) -> Body:
@@ -399,3 +403,134 @@ def test_the_path_of_a_spatial_slider_crank(line, order, reverse, way, q):
     assert pose.turn[2, [crank, block]].tolist() == [q, 0.0] and math.isnan(pose.turn[2, rod])
     signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
     assert signs == [1.0, None]
+
+
+# --- motions along a path ---------------------------------------------------------------------------------
+def test_a_pendulum_that_turns_freely():
+    """2 m at -3 rad/s without weight: 18 m/s² towards the hinge, at any time."""
+    moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
+    truth = one_dof(moving, parallelogram(moving))
+    found = truth.poses(np.array([0.0, math.pi / 6]))
+    assert found.position[:, 0] == pytest.approx(np.array([[0, -2, 0.5], [-2, 0, 0.5]]), abs=1e-12)
+    assert found.velocity[:, 0] == pytest.approx(np.array([[-6, 0, 0], [0, 6, 0.0]]), abs=1e-11)
+    assert found.acceleration[:, 0] == pytest.approx(np.array([[0, 18, 0], [18, 0, 0.0]]), abs=1e-11)
+    assert found.angular_velocity[:, 0] == pytest.approx(np.tile([0.0, 0.0, -3.0], (2, 1)))
+    assert found.angular_acceleration[:, 0] == pytest.approx(np.zeros((2, 3)), abs=1e-11)
+    assert truth.coordinate(np.array([0.0, 0.5])) == pytest.approx(np.array([[0.0, -3.0], [-1.5, -3.0]]))
+    assert truth.name == "pendulum" and truth.accuracy == 1e-12
+    late = truth.coordinate(np.array([100.0, 0.25, 40.0]))
+    assert late == pytest.approx(np.array([[-300.0, -3.0], [-0.75, -3.0], [-120.0, -3.0]])), "many turns"
+    forwards = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, 3.0)),))
+    late = one_dof(forwards, parallelogram(forwards)).coordinate(np.array([100.0, 0.0]))
+    assert late == pytest.approx(np.array([[300.0, 3.0], [0.0, 3.0]]))
+
+
+def test_a_driven_pendulum():
+    """q = t + t²/2 of a joint whose first body is the bar: it turns by -q; at 1 s 2 rad/s and 1 rad/s²."""
+    hinge = pin("A", "bar", "ground", 0.0, 0.0, 0.5)
+    driven = PENDULUM.with_(joint=(hinge,), driver=(Driver(joint="A", polynomial=(0.0, 1.0, 0.5)),))
+    truth = closed_form(driven)
+    found, (sine, cosine) = truth.poses(np.array([1.0])), (math.sin(1.5), math.cos(1.5))
+    assert found.position[0, 0] == pytest.approx([-2 * sine, -2 * cosine, 0.5])
+    assert found.velocity[0, 0] == pytest.approx([-4 * cosine, 4 * sine, 0.0])
+    wanted = [-2 * cosine + 8 * sine, 2 * sine + 8 * cosine, 0.0]
+    assert found.acceleration[0, 0] == pytest.approx(wanted)
+    assert found.angular_velocity[0, 0].tolist() == [0.0, 0.0, -2.0]
+    assert found.angular_acceleration[0, 0].tolist() == [0.0, 0.0, -1.0] and truth.accuracy == 1e-13
+    assert truth.coordinate(np.array([1.0, 0.0])).tolist() == [[-1.5, -2.0], [0.0, -1.0]]
+
+
+def test_a_pendulum_under_gravity():
+    """10 N/kg along y: I q'' = -40 sin q with I = 8.5; at 90° 6 rad/s need I ω² / 2 - 40 = 113 J."""
+    rate = 6.0
+    falling = PENDULUM.with_(
+        gravity=(0.0, -10.0, 0.0), body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, rate)),)
+    )
+    truth = one_dof(falling, parallelogram(falling))
+    times = np.linspace(0.0, 1.0, 9)
+    q, dq = truth.coordinate(times).T
+    assert 8.5 * dq**2 / 2 - 40 * np.cos(q) == pytest.approx(np.full(9, 8.5 * 18.0 - 40.0))
+    assert truth.poses(times).angular_acceleration[:, 0, 2] == pytest.approx(-40 / 8.5 * np.sin(q))
+    again = truth.coordinate(times[:1] + 20.0)
+    assert 8.5 * again[0, 1] ** 2 / 2 - 40 * np.cos(again[0, 0]) == pytest.approx(8.5 * 18.0 - 40.0)
+
+
+def test_a_motion_that_ends_names_the_time():
+    """The solver knows the end by its own variable; the state there has the time 0.75 s."""
+    made: Any = object.__new__(Reduced)
+
+    def ended(times: np.ndarray) -> Any:
+        raise NoSolution("it is singular", 5.0)
+
+    made._turns = ended
+    made._solution = SimpleNamespace(reach=lambda is_enough: [1.0, 2.0, 0.75] if is_enough(None) else None)
+    with pytest.raises(NoSolution, match=r"^it is singular at t = 0\.75$") as caught:
+        made(np.array([0.5, 1.0]))
+    assert caught.value.reason == "it is singular" and 0.74 < caught.value.until < 0.75
+
+
+@pytest.mark.parametrize(
+    ("damped", "loads", "shift", "turn", "end", "repeats"),
+    [
+        (False, (), 0.0, 0.0, 2.0, True),
+        (True, (), 0.0, 0.0, 2.0, False),
+        (False, (TorsionSpring(joint="A", stiffness=1.0),), 0.0, 0.0, 2.0, False),
+        (False, (Moment(body="bar", moment=Z),), 0.0, 0.0, 2.0, True),
+        (False, (), 1e-16, 0.0, 2.0, False),
+        (False, (), 0.0, 1e-16, 2.0, False),
+        (False, (), 5e-18, 5e-18, 2.0, True),
+        (False, (), 0.0, 0.0, 2.0 * (1 + 63 * EPS), True),
+        (False, (), 0.0, 0.0, 2.0 * (1 + 66 * EPS), False),
+        (False, (), 0.0, 0.0, -2.0, False),
+    ],
+)
+def test_motions_that_repeat_after_a_turn(damped, loads, shift, turn, end, repeats):
+    """Places, orientations and speeds are equal to 64 roundings, and nothing is damped or wound up."""
+    made: Any = object.__new__(Reduced)
+    made._damped, made._scene = damped, SimpleNamespace(load=loads)
+
+    def poses(q: np.ndarray) -> Any:
+        later = q[0] > 1
+        place = np.ones((1, 1, 3), dtype=np.longdouble) * (shift if later else 0)
+        return SimpleNamespace(
+            position=place, rotation=np.ones((1, 1, 3, 3)) * np.longdouble(turn if later else 0)
+        )
+
+    made._path = SimpleNamespace(poses=poses)
+    made._solution = Solving(np.longdouble(2.0), np.longdouble(2) + (np.longdouble(end) - 2))
+    assert made._repeats() is repeats
+
+
+class Solving:
+    """A solution whose speed is known at its start and after a turn."""
+
+    def __init__(self, start: Any, end: Any) -> None:
+        self.start, self.end = start, end
+
+    def __call__(self, times: np.ndarray) -> Any:
+        assert times.tolist() == [0.0]
+        return [(0.0, self.start, 9.0)]
+
+    def where(self, component: int, wanted: np.ndarray) -> Any:
+        assert component == 0 and float(wanted[0]) == pytest.approx(2 * math.pi)
+        return [(7.0, self.end, 9.0)]
+
+
+def test_turns_of_a_motion_that_repeats():
+    """A period of 1.5 s: 3.5 s are two turns and half a second."""
+    made: Any = object.__new__(Reduced)
+    turn = 2 * np.longdouble(4) * np.arctan(np.longdouble(1))
+    made._solution = SimpleNamespace(
+        reach=lambda enough: (
+            np.array([turn, 1.0, 2.0]) if enough((turn, 0, 0)) and enough((0, 0, 3.5)) else None
+        ),
+        where=lambda component, wanted: np.array([[turn, 1.0, 1.5]]),
+    )
+    made._repeats = lambda: True
+    turns, rest = made._turns(np.array([0.0, 1.25, 3.5]))
+    assert turns.tolist() == [0.0, 0.0, 2.0] and rest.tolist() == [0.0, 1.25, 0.5]
+    made._repeats = lambda: False
+    assert [part.tolist() for part in made._turns(np.array([0.5]))] == [[0.0], [0.5]]
+    made._solution.reach = lambda enough: np.array([turn - 1e-9, 1.0, 2.0])
+    made._repeats = lambda: True
+    assert [part.tolist() for part in made._turns(np.array([0.5]))] == [[0.0], [0.5]], "less than a turn"
