@@ -20,8 +20,10 @@ from crosscheck.judge.constraints import (
     _solve,
     scene_length,
 )
+from crosscheck.judge.reference import vectors
 from crosscheck.judge.reference.panels import Panels
 from crosscheck.judge.reference.saddle_point import SaddlePoint
+from crosscheck.judge.reference.start_velocities import given
 from crosscheck.judge.reference.vectors import saddle_solve
 from mbref import rotations
 from mbref.scene import Body, Coupling, Cylindrical, Distance, Revolute, Scene, SceneError, Translational
@@ -166,6 +168,15 @@ def test_velocities_nearest_to_the_given_ones():
             assert constraints.initial_twists(given)[0][0, 0] == pytest.approx(3.0), "a copy"
 
 
+def test_velocities_that_a_scene_gives(monkeypatch):
+    """Components by their numbers; the weight of an angular velocity is the length of 2.5 m."""
+    monkeypatch.setattr(constraints, "scene_length", lambda scene: 2.5)
+    both = scene(body("a", angular_velocity=(1.0, 2.0, 3.0)), body("b", velocity=(4.0, 5.0, 6.0)), body("c"))
+    found = given(both)
+    assert found.components.tolist() == [3, 4, 5, 6, 7, 8] and found.values.tolist() == [1, 2, 3, 4, 5, 6]
+    assert found.weights.tolist() == [2.5, 2.5, 2.5, 1.0, 1.0, 1.0]
+
+
 # --- falls ------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize(
     ("velocities", "falls"),
@@ -206,6 +217,27 @@ def test_slow_rotations_are_no_fall():
             for n, place in (("a", O), ("b", (4.0, 0.0, 0.0)))
         ]
         assert free_fall.falls_freely(scene(*bodies, gravity=(0.0, -10.0, 0.0))) is falls
+
+
+# --- vectors and quaternions ------------------------------------------------------------------------------
+@pytest.mark.parametrize("numbers", [DOUBLE, EXTENDED], ids=["double", "extended"])
+def test_vectors_and_quaternions_of_many_samples(numbers):
+    """Products of arrays (2, 5, ·) as NumPy and mbref's rotations know them."""
+    draws = np.random.default_rng(3)
+    a, b = draws.normal(size=(2, 2, 5, 3))
+    p, q = draws.normal(size=(2, 2, 5, 4))
+    x, y, r, s = map(numbers.array, (a, b, p, q))
+    assert doubles(vectors.cross(x, y)) == pytest.approx(np.cross(a, b))
+    assert doubles(vectors.dot(x, y)) == pytest.approx(np.einsum("kij,kij->ki", a, b))
+    assert doubles(vectors.skew(x) @ y[..., None])[..., 0] == pytest.approx(np.cross(a, b))
+    assert doubles(vectors.product(r, s)) == pytest.approx(rotations.multiply(p, q))
+    unit = vectors.unit(r)
+    assert doubles((unit * unit).sum(axis=2)) == pytest.approx(np.ones((2, 5)))
+    assert doubles(unit / r).std(axis=2) == pytest.approx(np.zeros((2, 5)), abs=1e-15)
+    assert doubles(vectors.matrices(unit)) == pytest.approx(rotations.to_matrix(doubles(unit)))
+    matrix = numbers.array(draws.normal(size=(2, 5, 4, 3)))
+    assert doubles(vectors.apply(matrix, x)) == pytest.approx(np.einsum("kimn,kin->kim", doubles(matrix), a))
+    assert vectors.product(r, s).dtype == vectors.matrices(unit).dtype == numbers.dtype
 
 
 # --- numbers ----------------------------------------------------------------------------------------------

@@ -34,7 +34,12 @@ def motion(count: int, seconds: float, reason: str = "", reached: float = 9.0) -
 def judged(monkeypatch: Any, one: Any, second: Any, other: Any, *apart: list[float], count: int = 4) -> Any:
     """The judgement at some times; the differences to the second run and to the other motion are given."""
     found = iter(apart)
-    monkeypatch.setattr(reference, "differences", lambda scene, a, b: np.array(next(found)))
+
+    def differences(scene: Any, a: Any, b: Any) -> np.ndarray:
+        assert scene is None and a is one and b is not one
+        return np.array(next(found))
+
+    monkeypatch.setattr(reference, "differences", differences)
     monkeypatch.setattr(reference, "rounding", lambda scene, a: np.full(len(a.times), 2e-14))
     return reference.judged(None, 0.5 * np.arange(count), one, second, other)
 

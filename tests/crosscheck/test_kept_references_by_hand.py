@@ -64,12 +64,20 @@ def test_a_reference_has_the_times_that_are_asked_for_in_order(monkeypatch):
     assert ended.part.times.tolist() == [0.0, 0.5] and asked[-1][1] == reference.SECONDS
 
 
+def test_a_motion_without_a_sample_answers_nothing():
+    """The start itself is missing, and it is not after the last known time."""
+    none = _Kept(kept().samples.at(np.zeros(0)), "it locks", 5.0)
+    assert none.until() == 0.0 and not none.answers(np.zeros(1), 1.0) and none.answers(np.array([0.5]), 1.0)
+
+
 def test_a_known_part_is_computed_once_and_stored(monkeypatch, tmp_path: Path):
     """More times are computed together with the stored ones."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     runs: list[Any] = []
     monkeypatch.setattr(reference, "runs", lambda scene, times, seconds: runs.append((times, seconds)) or ())
-    monkeypatch.setattr(reference, "judged", lambda scene, times: (kept().samples, "it locks"))
+    monkeypatch.setattr(
+        reference, "judged", lambda scene, times: (kept().samples, "it locks") if scene is SCENE else None
+    )
     assert _load(SCENE) is None
     first = reference._known(SCENE, TIMES[:2], 3.0)
     again = reference._known(SCENE, TIMES[:1], 9.0)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles
-from crosscheck.judge.reference import panels
+from crosscheck.judge.reference import crossing, panels
 from crosscheck.judge.reference.panels import Panel, Panels, _cosines
 from crosscheck.judge.reference.stiff_panels import StiffPanels
 
@@ -212,3 +212,60 @@ def test_corrections_that_grow_or_do_not_end(changes, count):
 @pytest.mark.parametrize(("change", "count"), [(PANELS.tolerance, 1), (1.001 * PANELS.tolerance, 2)])
 def test_a_change_of_the_tolerance_is_the_last(change, count):
     assert corrected(change, 0.0)[1] == count
+
+
+# --- singular positions in a panel ------------------------------------------------------------------------
+PLACES = np.arange(-32, 33) / 32  # a 32nd apart
+
+
+def test_a_distance_that_is_not_finite_has_no_sign():
+    distance = np.abs(PLACES - 0.2)
+    assert crossing.singular_time(PLACES, distance) == pytest.approx(0.2)
+    distance[-1] = np.inf
+    assert crossing.singular_time(PLACES, distance) is None
+
+
+@pytest.mark.parametrize(("least", "first", "last"), [(30, 18, 42), (5, 0, 17), (60, 48, 64)])
+def test_the_points_to_which_distances_are_fitted(monkeypatch, least, first, last):
+    """Twelve on either side of the least one; the distance is negative before it, or up to it."""
+    seen: list[Any] = []
+    monkeypatch.setattr(crossing, "_inside", lambda near: True)
+    monkeypatch.setattr(crossing, "_fit", lambda x, d: seen.append((x, d)) or (1.0, None))
+    distance = np.abs(PLACES - PLACES[least] - 0.01)
+    assert crossing.singular_time(PLACES, distance) is None
+    place, given = PLACES[first : last + 1], distance[first : last + 1]
+    for (x, d), signs in zip(
+        seen, ((place >= PLACES[least]), (place > PLACES[least]), place < 9), strict=True
+    ):
+        assert x.tolist() == place.tolist() and d.tolist() == np.where(signs, given, -given).tolist()
+
+
+@pytest.mark.parametrize(
+    ("roots", "found"),
+    [
+        ([0.0 + 1e-9j, 0.5], None),
+        ([0.0 + 0.9e-9j, 0.5], 0.0),
+        ([1 / 32, -0.01], -0.01),
+        ([1 / 32], 1 / 32),
+        ([-1 / 32, 1 / 16], -1 / 32),
+        ([1 / 32 + 1e-9, -0.04], None),
+        ([], None),
+    ],
+)
+def test_roots_next_to_the_least_distance(monkeypatch, roots, found):
+    """Real ones up to the largest distance of two points; of these the nearest one."""
+    monkeypatch.setattr(crossing.chebyshev, "chebroots", lambda c: np.array(roots, dtype=complex))
+    assert crossing.singular_time(PLACES, np.abs(PLACES)) == found
+
+
+def test_the_largest_residual_of_a_fit():
+    """Eight powers are met; of the tenth Chebyshev polynomial the whole is left at its own points."""
+    own = np.cos(np.pi * (np.arange(10) + 0.5) / 10)
+    x = np.concatenate([own, [1.0]])
+    smooth = x**8 - 3 * x**5 + 2
+    residual, coefficients = crossing._fit(x[:10], smooth[:10])
+    assert residual < 1e-12 and np.polynomial.chebyshev.chebval(x, coefficients) == pytest.approx(smooth)
+    bumpy = smooth + np.where(np.arange(11) == 10, 0.5, 0.0)
+    residual, coefficients = crossing._fit(x, bumpy)
+    left = np.polynomial.chebyshev.chebval(x, coefficients) - bumpy
+    assert residual == pytest.approx(np.abs(left).max()) and residual > 2 * np.abs(left).min()

@@ -19,7 +19,7 @@ from crosscheck.judge.reference.vectors import saddle_solve
 from crosscheck.small_motions import records
 from crosscheck.small_motions.compare import error
 from crosscheck.small_motions.mechanisms import MECHANISMS
-from mbref.scene import Body, Fixed, Revolute, Scene, Spherical, Translational, Universal
+from mbref.scene import Body, Fixed, Revolute, Scene, Spherical, TorsionSpring, Translational, Universal
 
 X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
 COUNT = 24
@@ -183,6 +183,32 @@ def test_four_hinges_of_a_planar_loop_lose_three_rows():
     assert changed and "removed" not in changed.values() and "A" not in changed, "the last joints first"
 
 
+@pytest.mark.parametrize(("value", "is_removed"), [(0.021, True), (0.02, False)])
+def test_a_joint_is_removed_if_the_rest_is_well_conditioned(monkeypatch, value, is_removed):
+    """Without a joint the least singular value is a part of its value before, at each pose."""
+    one, two = hinge("A", ("ground", "b"), O), hinge("B", ("ground", "b"), (0.0, 0.0, 1.0))
+    asked: list[Any] = []
+
+    def least(scene: Scene, rank: int, pose: Any) -> float:
+        asked.append((len(scene.joint), rank, pose[0]))
+        return 1.0 if scene == door(one, two) else value if pose[0] else 1.0
+
+    monkeypatch.setattr(isostatic, "_singular_value", least)
+    later = (0.5, np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0, 0.0]]))
+    found = isostatic.isostatic(door(one, two), [later])
+    assert (found.joint == (one,)) is is_removed and (found == door(one, two)) is not is_removed
+    assert asked[:2] == [(2, 5, 0.0), (2, 5, 0.5)]
+
+
+def test_joints_whose_coordinates_are_used_stay():
+    """A spring acts about the second hinge, so that the first one is removed; both cannot go."""
+    one, two = hinge("A", ("ground", "b"), O), hinge("B", ("ground", "b"), (0.0, 0.0, 1.0))
+    springs = [TorsionSpring(joint=name, stiffness=1.0) for name in "BA"]
+    assert isostatic.isostatic(door(one, two).with_(load=springs[:1])).joint == (two,)
+    both = door(one, two).with_(load=springs)
+    assert isostatic.isostatic(both) == both
+
+
 def test_replaced_joints_by_name():
     one, two = hinge("A", ("ground", "b"), O), hinge("B", ("ground", "b"), X)
     ball = Spherical(name="B", bodies=("ground", "b"), anchor=X)
@@ -333,6 +359,28 @@ def test_motions_that_end_are_not_certified(runs):
         certify.certified(SCENE, TIMES, 10)
     with pytest.raises(NotCertified, match=r"^door: "):
         certify.certified(SCENE, TIMES, 10, seconds=-1.0)
+
+
+def test_poses_along_a_motion(monkeypatch):
+    """101 poses from the start to the end, in doubles."""
+    asked: list[Any] = []
+
+    def moved(scene: Scene, times: np.ndarray, numbers: Any) -> Any:
+        asked.append((scene, times.tolist(), numbers))
+        place, turn = (
+            np.arange(6, dtype=np.longdouble).reshape(2, 1, 3),
+            np.ones((2, 1, 4), dtype=np.longdouble),
+        )
+        return SimpleNamespace(times=times[:2], position=place, orientation=turn)
+
+    monkeypatch.undo()
+    monkeypatch.setattr(certify, "natural_motion", moved)
+    (first, place, turn), (second, later, _) = certify._poses(SCENE, 4.0)
+    assert asked == [(SCENE, pytest.approx([0.04 * k for k in range(101)]), EXTENDED)]
+    assert (first, second) == (0.0, 0.04) and type(second) is float
+    assert (
+        place.tolist() == [[0, 1, 2]] and later.tolist() == [[3, 4, 5]] and turn.dtype == place.dtype == float
+    )
 
 
 def test_decimals_have_two_digits_more():

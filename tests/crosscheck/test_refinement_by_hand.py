@@ -65,6 +65,14 @@ def test_a_correction_of_half_the_one_before_is_no_stall(monkeypatch, asked):
     assert len(asked) == 3
 
 
+@pytest.mark.parametrize(("bits", "count"), [(10, 2), (11, 3)])
+def test_refinement_ends_where_the_next_correction_is_rounding(monkeypatch, asked, bits, count):
+    """Corrections of 1 and 2^-5: the next one would be 2^-10."""
+    wanted, steps = (1.0, 2.0**-5, 0.0), [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
+    x = solved(monkeypatch, lambda k, right: np.array(steps[k]), wanted, eps=2.0**-bits)
+    assert x.tolist() == list(wanted) and len(asked) == count
+
+
 def test_nothing_is_solved_for_zero(monkeypatch, asked):
     assert solved(monkeypatch, None, (0.0, 0.0, 0.0)).tolist() == [0.0] * 3 and len(asked) == 1
 

@@ -33,7 +33,7 @@ def singular_time(nodes: np.ndarray, distance: np.ndarray) -> float | None:
     least = int(np.argmin(distance))
     window = np.arange(max(0, least - WINDOW), min(len(nodes), least + WINDOW + 1))
     x, d, k = nodes[window], distance[window], np.arange(len(nodes))[window]
-    fits = [_fit(x, np.where(k < least + after, -d, d)) for after in (0, 1)]
+    fits = [_fit(x, d * (1 - 2 * (k < least + after))) for after in (0, 1)]
     misfit, coefficients = min(fits, key=lambda fit: fit[0])
     if misfit > SIGNED * _fit(x, d)[0]:
         return None

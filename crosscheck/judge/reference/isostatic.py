@@ -76,16 +76,15 @@ def _weaker(joint: Joint) -> Iterator[tuple[Joint, ...]]:
     directions normal to the hinge's axis.
     """
     yield ()
-    axis = next(iter(joint.directions), None)
+    axis, anchor = next(iter(joint.directions), None), next(iter(joint.anchor_pair))
     for kind in WEAKER.get(joint.type, ()):
-        places = {"anchor": joint.anchor_pair[0], "axis": axis}
+        places = {"anchor": anchor, "axis": axis}
         yield (JOINT_TYPES[kind].at(joint.name, joint.bodies, **places),)
     if joint.type == "revolute" and axis is not None:
         across = np.cross(np.eye(3)[np.argmin(np.abs(axis))], axis)
         for normal in (across, np.cross(axis, across)):
             x, y, z = normal.tolist()
-            there = joint.anchor_pair[0]
-            yield (Universal(name=joint.name, bodies=joint.bodies, anchor=there, axes=(axis, (x, y, z))),)
+            yield (Universal(name=joint.name, bodies=joint.bodies, anchor=anchor, axes=(axis, (x, y, z))),)
 
 
 def _with(scene: Scene, joint: Joint, others: tuple[Joint, ...]) -> Scene:
