@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
@@ -130,10 +130,10 @@ def _is_corrected(scene: Scene) -> bool:
 
 def _in_halves(scene: Scene, body: Body) -> Scene:
     arm = _arm(body)
-    moved = (body.mass or 0.0) * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    moved = _mass(body) * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     reach = rotations.rotate(np.array(body.orientation), arm)
     swing = np.cross(np.array(body.angular_velocity), reach)
-    common = {"mass": (body.mass or 0.0) / 2, "inertia": (_inertia(body) - moved) / 2}
+    common = {"mass": _mass(body) / 2, "inertia": (_inertia(body) - moved) / 2}
     halves = [
         replaced(
             body,
@@ -176,7 +176,11 @@ def _arm(body: Body) -> np.ndarray:
     """Return the vector from the centre of a body to the centre of its first half, in body axes."""
     moments, axes = np.linalg.eigh(_inertia(body))
     axis = axes[:, 0] * np.sign(axes[np.argmax(np.abs(axes[:, 0])), 0])
-    return np.sqrt(LIMIT * moments[1] / (body.mass or 1.0)) * axis
+    return np.sqrt(LIMIT * moments[1] / _mass(body)) * axis
+
+
+def _mass(body: Body) -> float:
+    return cast(float, body.mass)  # `split` refuses bodies without mass
 
 
 def _inertia(body: Body) -> np.ndarray:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
+from typing import cast
 
 import numpy as np
 from hypothesis import strategies as st
@@ -93,7 +94,7 @@ def paper_mechanisms(draw: st.DrawFn, names: Sequence[str] = PAPER) -> Scene:
             Body(
                 **{
                     **{n: getattr(body, n) for n in Body.model_fields},
-                    "mass": mass * (body.mass or 1.0),
+                    "mass": mass * cast(float, body.mass),
                     "inertia": moments,
                 }
             )

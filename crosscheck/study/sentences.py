@@ -120,7 +120,7 @@ def right(groups: Sequence[Judged]) -> str:
                 error(record) if grade(record) is not Grade.FAILED else math.inf
             )
     worst = {name: max(found) for name, found in errors.items()}
-    sure = max(group.truth["bound"] or 0.0 for group in reported)
+    sure = max(group.truth["bound"] for group in reported)
     good = [name for name, e in worst.items() if math.isfinite(e) and _of(reported, name) is Grade.RIGHT]
     sentences = []
     if good:

@@ -24,7 +24,7 @@ from crosscheck.recorded.explanations import Difference, Explanation, ranked, wi
 from crosscheck.recorded.judgement import ColumnError, _column, _judged
 from crosscheck.recorded.reading import Recording
 from mbref import rotations
-from mbref.scene import Body, Scene, SceneError
+from mbref.scene import Body, Revolute, Scene, SceneError
 from mbref.trajectory import Trajectory
 
 BLOCK = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))
@@ -246,6 +246,17 @@ def test_scenes_are_changed_while_there_is_time(monkeypatch):
     monkeypatch.setattr(changed_scenes, "changes", lambda scene: [Change(None, 1.0, lambda x: f"by {x}")] * 3)
     monkeypatch.setattr(changed_scenes, "_fitted", lambda change, d: (0.5, {"A": 1}))
     assert list(changed_scenes.changed(SCENE, None, 3.0)) == [("by 0.5", 2, {"A": 1})]
+
+
+def test_a_damper_to_begin_with(monkeypatch):
+    """A thousandth of the mass of 2 kg times the square of the length over the duration of 2 s; a link has no
+    mass."""
+    monkeypatch.setattr(changed_scenes, "scene_length", lambda scene: 4.0)
+    hinge = Revolute(name="H", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    link = Body(name="link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
+    damper, mass, *_ = changed_scenes.changes(SCENE.with_(body=(BLOCK, link), joint=(hinge,)))
+    assert damper.small == pytest.approx(1e-3 * 2.0 * 16.0 / 2.0) and mass.small == -0.05
+    assert damper.of(0.25).load[0].damping == 0.25 and damper.of(0.25).load[0].stiffness == 0.0
 
 
 def test_a_mass_that_is_none():

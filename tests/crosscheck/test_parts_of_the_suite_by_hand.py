@@ -266,6 +266,15 @@ def test_angular_velocities_by_poses_of_any_sign(sign):
     assert found.measured < 1e-9 and found.allowed == properties.LIKE_TRUTH
 
 
+@pytest.mark.parametrize("check", [properties.true_velocities, precise.settled])
+def test_exact_velocities_that_are_partly_unknown(check):
+    unknown = motion().velocity.astype(float)
+    unknown[1, 0, 2] = np.nan
+    assert check(bench(exact=motion(velocity=unknown))) == Outside(
+        "the closed form of this scene gives poses only"
+    )
+
+
 # --- probes of features -------------------------------------------------------------------------------------
 def test_a_body_whose_motion_is_undetermined():
     scene = features.undetermined()
