@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -295,7 +295,7 @@ def _related(specimen: Specimen) -> bool:
 
 
 def _property(check: Check, of: Callable[[Specimen], bool] = _every, version: int = 1) -> Property:
-    return Property((check.__doc__ or "").splitlines()[0], check, of, version)
+    return Property(cast(str, check.__doc__).splitlines()[0], check, of, version)
 
 
 PROPERTIES: Mapping[str, Property] = {

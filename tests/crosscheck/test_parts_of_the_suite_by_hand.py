@@ -275,6 +275,61 @@ def test_exact_velocities_that_are_partly_unknown(check):
     )
 
 
+@pytest.mark.parametrize(("pushes", "wanted"), [(0.3, 0.2), (0.45, 0.45)])
+def test_the_finding_nearest_to_its_limit(monkeypatch, pushes, wanted):
+    """0.2 of 0.25 is nearer than 0.3 of 0.5, and 0.45 of 0.5 is nearer still."""
+    changed, asked = SCENE.with_(name="changed"), []
+    relation = SimpleNamespace(expect=lambda scene, run: "expected")
+    monkeypatch.setattr(properties, "RELATIONS", {"r": relation})
+    monkeypatch.setattr(properties, "changed", lambda relation, bench: changed)
+    expected, found = motion(), motion()
+    monkeypatch.setattr(properties, "in_scene_order", lambda scene, run: expected)
+    monkeypatch.setattr(properties, "difference", lambda scene, a, b: asked.append((scene, a, b)) or 0.2)
+    monkeypatch.setattr(properties, "pushes_apart", lambda *of: asked.append(of) or (pushes, "A"))
+    run = lambda scene, times: found if scene is changed and times is expected.times else None  # noqa: E731
+    made = bench(
+        own_accuracy=0.25, own_pushes=0.5, floors="f", rank=1e-9, run=run, refuses=lambda scene: None
+    )
+    assert properties.related("r", made).measured == wanted
+    assert asked == [(changed, expected, found), (changed, expected, found, 1e-9)]
+    rates = [Finding(0.2, 0.25, "v"), Finding(pushes, 0.5, "a")]
+    monkeypatch.setattr(precise, "_rates", lambda bench: iter(rates))
+    assert precise.settled(bench()).measured == wanted
+
+
+@pytest.mark.parametrize(
+    ("printed", "files", "again"), [("", (), 0), ("a", (), 1), ("", ("f",), 1), ("a", ("f",), 1)]
+)
+def test_a_run_that_is_not_silent_is_repeated(printed, files, again):
+    """What is printed or left once on a machine is allowed."""
+    asked: list[Any] = []
+    quiet = SimpleNamespace(printed="", files=())
+    made = bench(
+        finest=SimpleNamespace(printed=printed, files=files),
+        times="times",
+        observed=lambda *of: asked.append(of) or quiet,
+    )
+    assert properties.silence(made) == Finding(0.0, 0.0, "") and asked == [(SCENE, "times", "b")] * again
+
+
+def test_versions_of_checks():
+    """By them stored verdicts are known: relations are in their third version, four checks in their second."""
+    newer = {
+        "truth": 2,
+        "convergence": 2,
+        "energy": 2,
+        "repeated": 2,
+        "resampled": 3,
+        **dict.fromkeys(RELATIONS, 3),
+    }
+    versions = {name: entry.version for name, entry in properties.PROPERTIES.items()}
+    assert versions == {name: newer.get(name, 1) for name in properties.PROPERTIES}
+    assert properties.PROPERTIES["closure"].about == (
+        "Joints and drivers hold at every sample, by the judge's own joint equations."
+    )
+    assert properties.PROPERTIES["turned"].about == "Changed scene: rotated about z, the motion rotates too."
+
+
 # --- probes of features -------------------------------------------------------------------------------------
 def test_a_body_whose_motion_is_undetermined():
     scene = features.undetermined()
