@@ -313,7 +313,7 @@ def test_a_run_that_is_not_silent_is_repeated(printed, files, again):
 
 
 def test_versions_of_checks():
-    """By them stored verdicts are known: relations are in their third version, four checks in their second."""
+    """Stored verdicts name them: relations are in their third version, four checks in their second."""
     newer = {
         "truth": 2,
         "convergence": 2,
