@@ -36,9 +36,16 @@ from mbref.scenes import SCENES
 
 KINDS = ("revolute", "spherical", "universal", "cylindrical", "translational", "distance", "fixed")
 PAPER = ("four_bar", "five_bar", "planar_slider_crank", "spatial_slider_crank")
+
+
+def is_direction(vector: tuple[float, float, float]) -> bool:
+    """Return whether a vector is long enough for a direction."""
+    return bool(np.linalg.norm(vector) > 0.2)
+
+
 grid = st.integers(-8, 8).map(lambda k: k / 8)
 vectors = st.tuples(grid, grid, grid)
-directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.2)
+directions = vectors.filter(is_direction)
 
 
 @st.composite

@@ -55,6 +55,14 @@ def test_grids():
     assert min(lengths) > 0.2 and max(lengths) > 1.0
 
 
+@pytest.mark.parametrize(
+    ("vector", "is_long"),
+    [((0.2, 0.0, 0.0), False), ((0.0, 0.0, -0.21), True), ((0.125, 0.125, 0.125), True)],
+)
+def test_vectors_of_a_fifth_are_no_directions(vector, is_long):
+    assert strategies.is_direction(vector) is is_long
+
+
 def test_bodies_are_near_their_places_in_a_row():
     bodies = drawn(strategies._bodies("b", 2))
     places = np.array([body.position for body in bodies]) - [1.8, 0.0, 0.0]
