@@ -238,6 +238,13 @@ def test_a_motion_that_is_not_known_beside_one_that_is():
     assert "agree with the truth to 6.1e-9 on planar_slider_crank." in right(groups), right(groups)
 
 
+def test_speeds_are_compared_where_one_of_two_motions_is_known():
+    still = [record(name, "tuned", None, times=[0.0], scene=SOUND.name) for name in ("mbref", "exudyn")]
+    unknown = group(still, SOUND, kind="", reason="two ways", bound=None)
+    assert fast([group(), unknown]).startswith("mbref is the fastest to an error of 1e-6 on ")
+    assert fast([unknown, unknown]).startswith("Without a truth no error is known")
+
+
 def test_defaults_that_nothing_judges():
     unjudged = [record(name, "defaults", None, times=[0.0]) for name in ("mujoco", "exudyn")]
     assert breaks([group(unjudged, kind="", reason="two ways", bound=None)]) == (
