@@ -24,6 +24,7 @@ from crosscheck.study import (
     record_view,
     scouting,
     sentences,
+    speed_sentences,
     truths,
     tuning,
     wording,
@@ -747,6 +748,60 @@ def test_engines_that_agree_without_a_truth(apart, says):
     """An engine without a completed motion is not named."""
     group = SimpleNamespace(scene=SCENE, agreement=lambda: apart, engines=lambda: dict.fromkeys("abcd"))
     assert sentences._agreement(group) == says
+
+
+SCENES_AND_SECONDS = {
+    "s": {"b": 3.0, "a": 1.0, "c": 5.0},
+    "t": {"a": 2.0, "c": 30.0, "b": 20.0},
+    "u": {"b": 1.0, "a": 9.0},
+    "v": {"a": 1.0},
+}
+
+
+@pytest.mark.parametrize(
+    ("scenes", "aided", "says"),
+    [
+        (
+            "stuv",
+            {("a", "s"), ("a", "t")},
+            "a is the fastest to an error of 1e-6 on 3 of 4 scenes; the best other engine takes 3.0 to 10 "
+            "times as long. On all other scenes the fastest is b on u.",
+        ),
+        (
+            "stv",
+            {("a", "s"), ("a", "t"), ("a", "v")},
+            "a, integrated by crosscheck, is the fastest to an error of 1e-6 on all 3 scenes; the best other "
+            "engine takes 3.0 to 10 times as long.",
+        ),
+        (
+            "uv",
+            (),
+            "b is the fastest to an error of 1e-6 on 1 of 2 scenes; the best other engine takes 9.0 times "
+            "as long. On all other scenes the fastest is a on v.",
+        ),
+        ("v", (), "a is the fastest to an error of 1e-6 on all 1 scenes."),
+    ],
+)
+def test_the_fastest_on_several_scenes(scenes, aided, says):
+    """Ratios count on the scenes of the engine that is the fastest most often, where another one reaches."""
+    costs = {scene: SCENES_AND_SECONDS[scene] for scene in scenes}
+    assert speed_sentences._fast_on_several(costs, aided) == says
+
+
+@pytest.mark.parametrize(
+    ("costs", "aided", "says"),
+    [
+        ({"a": 0.5}, (), "a reaches an error of 1e-6 in 500 ms of stepping."),
+        (
+            {"b": 1.5, "a": 0.5, "mujoco": 1.0},
+            {"a"},
+            "a, integrated by crosscheck, reaches an error of 1e-6 in 500 ms of stepping; MuJoCo takes 2.0 "
+            "times as long and b takes 3.0 times as long.",
+        ),
+    ],
+)
+def test_the_fastest_on_one_scene(costs, aided, says):
+    assert speed_sentences._fast_on_one(costs, aided) == says
 
 
 # --- progress -----------------------------------------------------------------------------------------------

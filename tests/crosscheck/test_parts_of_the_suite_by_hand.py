@@ -511,6 +511,8 @@ def test_scenes_of_the_suite():
     last = len(geared_forms.GEARED) + 1
     assert all(s.related for s in deep[:-last]) and not any(s.related for s in deep[-last:])
     assert [s.scene.name for s in quick if s.dead_end] == ["dead end"]
+    assert {"loop", "free body", "fixed joint", "heavy top"} < set(names)
+    assert "driven loop" not in names, "a scene with a truth of its own counts once"
     ends = {s.scene.name: s.scene.duration for s in quick if s.scene.name in trial.SHORT}
     assert ends == {
         "four_bar": 0.01,
