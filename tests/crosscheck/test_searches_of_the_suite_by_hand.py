@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.conformance import deep, explained, findings, hint, suite
+from crosscheck.conformance import deep, explained, findings, hint, runners, suite
 from crosscheck.conformance.deep import AGREEMENT, Plan, Tally
 from crosscheck.conformance.suite import FAIL, PASS, REFUSAL, RUN, Conformance, Verdict
 from crosscheck.conformance.trial import Bench, Specimen
@@ -363,3 +363,74 @@ def test_explanations_by_engine_check_and_scene(monkeypatch, tmp_path):
     assert explained.proofs.__wrapped__() == (explained.Proof("x", "s", "a"),)
     (tmp_path / "explained.toml").write_text("")
     assert explained.explanations.__wrapped__() == {}
+
+
+# --- runners ------------------------------------------------------------------------------------------------
+def test_a_runner_in_child_processes(monkeypatch):
+    asked: list[Any] = []
+    for name in ("ask", "observe", "run_isolated"):
+        monkeypatch.setattr(runners, name, lambda *of, name=name: asked.append((name, *of)) or f"{name} done")
+    monkeypatch.setattr(
+        runners, "engine", lambda name: SimpleNamespace(rounding=0.25 if name == "e" else None)
+    )
+    made = runners.Isolated("e", 7.0)
+    assert made.rounding == 0.25
+    assert (
+        made.offers(SCENE, "f") == made.refuses(SCENE, "f") == "ask done" and made.offers(SCENE) == "ask done"
+    )
+    assert made.observe(SCENE, "times", "setting") == "observe done"
+    assert made.in_turn([(SCENE, "one"), (SCENE, "two")], "times") == ["run_isolated done"] * 2
+    assert asked == [
+        ("ask", "e", runners.serve.offered, (SCENE, "f"), 7.0),
+        ("ask", "e", runners.serve.refused, (SCENE, "f"), 7.0),
+        ("ask", "e", runners.serve.offered, (SCENE, ""), 7.0),
+        ("observe", "e", SCENE, "times", "setting", 7.0),
+        ("run_isolated", "e", SCENE, "times", "one", 7.0),
+        ("run_isolated", "e", SCENE, "times", "two", 7.0),
+    ]
+
+
+def test_questions_to_an_engine_in_this_process(monkeypatch):
+    monkeypatch.setattr(
+        runners, "serve", SimpleNamespace(offers_of=lambda *of: ("offers", *of), refusal_of=lambda *of: of)
+    )
+    simulator = SimpleNamespace(name="own", rounding=0.5)
+    made = runners.InProcess(simulator)
+    assert made.offers(SCENE, "f") == ("offers", simulator, SCENE, "f") and made.name == "own"
+    assert made.offers(SCENE) == ("offers", simulator, SCENE, "") and made.rounding == 0.5
+    assert made.refuses(SCENE, "f") == (simulator, SCENE, "f")
+
+
+@pytest.mark.parametrize(
+    ("seconds", "is_main", "is_timed"),
+    [(2.0, True, True), (np.inf, True, False), (2.0, False, False)],
+)
+def test_a_timer_of_cpu_time(monkeypatch, seconds, is_main, is_timed):
+    """It ends with the block, also after a failure, and the handler before it is put back."""
+    calls: list[Any] = []
+    system = SimpleNamespace(
+        SIGPROF="prof",
+        ITIMER_PROF="timer",
+        signal=lambda *of: calls.append(of) or "before",
+        setitimer=lambda *of: calls.append(of),
+    )
+    threads = SimpleNamespace(
+        current_thread=lambda: "main" if is_main else "other", main_thread=lambda: "main"
+    )
+    monkeypatch.setattr(runners, "signal", system)
+    monkeypatch.setattr(runners, "threading", threads)
+    with pytest.raises(ValueError), runners._within(seconds):
+        calls.append("run")
+        raise ValueError
+    if not is_timed:
+        assert calls == ["run"]
+        return
+    (name, end), *others = calls
+    assert others == [("timer", 2.0), "run", ("timer", 0.0), ("prof", "before")] and name == "prof"
+    with pytest.raises(runners._OutOfTime):
+        end("prof", None)
+    del system.setitimer
+    calls.clear()
+    with runners._within(seconds):
+        pass
+    assert calls == [], "a system without timers"

@@ -7,6 +7,7 @@ import pickle
 import signal
 import subprocess
 import sys
+import tempfile
 from contextlib import nullcontext, suppress
 from types import SimpleNamespace
 from typing import Any
@@ -372,11 +373,15 @@ def owned(calls: Calls, **parts: Any) -> Child:
     return made
 
 
-def test_a_job_of_a_child():
+def test_a_job_of_a_child(monkeypatch):
     """Ten times its limit and ten seconds more until the child ends itself."""
-    calls = Calls(**{"recv_bytes": [pickle.dumps((True, 5))] * 2})
+    calls, folders = Calls(**{"recv_bytes": [pickle.dumps((True, 5))] * 2}), []
+    real = tempfile.TemporaryDirectory
+    named = lambda **options: folders.append(options) or real(prefix=options["prefix"])  # noqa: E731
+    monkeypatch.setattr(child, "tempfile", SimpleNamespace(TemporaryDirectory=named))
     made = owned(calls)
     seen = made._called((divmod, (7, 2), True), 3.0)
+    assert folders == [{"prefix": "crosscheck-", "ignore_cleanup_errors": True}]
     assert seen == (5, "printed", ()) and made._copies is True
     [(_, (folder, last_resort, *asked))] = [call for call in calls.made if call[0] == "send"]
     assert last_resort == 40.0 and asked == [divmod, (7, 2), True] and "crosscheck-" in folder
