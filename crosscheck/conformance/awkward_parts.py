@@ -110,4 +110,4 @@ def slider_crank(angle: float, crank: float, length: float) -> Scene:
         Spherical(name="C", bodies=("rod", "slider"), anchor=triple(c)),
         Translational(name="D", bodies=("slider", "ground"), anchor=triple(c), axis=(1.0, 0.0, 0.0)),
     )
-    return Scene(name="slider_crank", gravity=(0.0, -9.81, 0.0), duration=0.3, body=bodies, joint=joints)
+    return Scene(name="slider_crank", gravity=(0.0, -9.81, 0.0), body=bodies, joint=joints)

@@ -642,6 +642,16 @@ def test_short_runs_that_compare_mechanisms(monkeypatch):
     assert all(c.times is TIMES and c.scene is SCENE for c in cases)
 
 
+def test_the_truth_that_mechanisms_are_compared_with(monkeypatch):
+    """With the time that a reference may take; without records nothing is compared."""
+    asked: list[Any] = []
+    monkeypatch.setattr(fair_timing, "truth_for", lambda *of: asked.append(of))
+    assert fair_timing.model_differences(SCENE, [], 7.0) == {}
+    assert fair_timing.model_difference(SCENE, [], 8.0) is None
+    assert fair_timing.model_differences(SCENE, []) == {} == fair_timing.model_differences(SCENE, [], 7.0, [])
+    assert asked == [(SCENE, 7.0), (SCENE, 8.0), (SCENE, fair_timing.SECONDS), (SCENE, 7.0)]
+
+
 # --- origins, truths, words ---------------------------------------------------------------------------------
 def test_origin_of_a_record(monkeypatch):
     monkeypatch.setattr(origin, "commit", lambda: "c")

@@ -25,7 +25,7 @@ EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
 EXCHANGED = "Two rows or columns are exchanged, whichever is named first."
 """Functions of mbref whose third and fourth arguments may be exchanged, and the reason."""
 SYMMETRIC = {
-    0: {"_is", "suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
+    0: {"np.add", "_is", "suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
     1: {"np.swapaxes", "difference", "rod"},
 }
 SYMMETRY = "The result is the same for these two arguments in any order."
@@ -55,6 +55,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "return np.eye(3) if np.linalg.det(self.matrix) > 0 else FLIP",
         "(np.linalg.det(self.matrix) >= 0)",
     ): "The matrix is orthogonal, so that its determinant is 1 or -1.",
+    (
+        "crosscheck/conformance/awkward_parts.py",
+        "way = np.subtract(stop, start)",
+        "np.subtract(start, stop)",
+    ): "A rod has the same length and inertia in both directions.",
     ("mbref/linear_algebra/elimination.py", "first = 0.0", "1.0"): "The first pivot replaces the number.",
     (
         "crosscheck/judge/gauss_principle.py",
