@@ -134,7 +134,7 @@ def wound_spring() -> Scene:
     weight."""
     hinge = JOINTS["revolute"]
     axis = np.array(hinge.directions[0]) / np.linalg.norm(hinge.directions[0])
-    swing = np.cross(40.0 * axis, np.array(BODY.position) - np.array(hinge.anchor_pair[0]))
+    swing = np.cross(40.0 * axis, BODY.position)  # the hinge goes through the origin
     body = replaced(BODY, angular_velocity=40.0 * axis, velocity=swing)
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)
     return Scene(name="wound spring", gravity=GRAVITY, duration=0.45, body=(body,), joint=(hinge,),

@@ -139,6 +139,7 @@ def test_the_crank_of_the_dead_end():
     assert np.linalg.norm(second - first) == pytest.approx(0.3)
     assert np.linalg.norm(third - second) == pytest.approx(0.25)
     assert rod.position == pytest.approx((second + third) / 2)
+    assert np.arctan2(*(second - first)[1::-1]) == pytest.approx(0.2)
     reached = np.arctan2(*(second - first)[1::-1]) + 4.0 * found.duration
     assert reached > np.arcsin(0.25 / 0.3) > np.arctan2(*(second - first)[1::-1])
 
