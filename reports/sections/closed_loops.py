@@ -59,8 +59,8 @@ def _shown(cell: Cell, record: Record | None) -> Shown:
         return Shown(shown(None), "")
     if is_refusal(record):
         return Shown(shown(record), "", href=_place(cell))
-    digits = -math.log10(max(error(record), 1e-16)) if grade(record) is not Grade.FAILED else 0.0
-    depth = min(1.0, max(0.0, digits / MOST_DIGITS))
+    digits = -math.log10(max(error(record), 10.0**-MOST_DIGITS)) if grade(record) is not Grade.FAILED else 0.0
+    depth = max(0.0, digits / MOST_DIGITS)
     return Shown(shown(record), KINDS.get(grade(record), ""), depth, _place(cell))
 
 

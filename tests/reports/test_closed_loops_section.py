@@ -112,6 +112,9 @@ def test_mechanisms_are_listed_with_their_ends(section):
 
 
 def test_captions_and_headers_of_the_tables(section):
+    headings = [(block.text, block.level) for block in section if isinstance(block, Heading)]
+    names = ("Engines on closed loops", "The mechanisms", "mbref", "mujoco", "pinocchio", "exudyn")
+    assert {name for name, _ in headings} == {*names} and {level for _, level in headings} == {2}
     assert [(b.header, b.caption) for b in section if isinstance(b, Table)][:2] == [
         (("Sign", "Meaning"), "How to read a cell."),
         (("Column", "Scene", "Until (s)", "Mechanism"), "Scenes that the columns run."),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from types import SimpleNamespace
 from typing import Any
@@ -59,6 +60,7 @@ from reports.sections import (
     paper_teaching,
     records,
     speed,
+    summary,
     verdict,
 )
 
@@ -262,13 +264,37 @@ def test_the_opening_stands_above_the_matrix(monkeypatch):
     assert [type(block) for block in verdict.render([bare])] == [Heading, Matrix] and not seen
     opening, heading, matrix = verdict.render([bare, known])
     assert opening == Opening("a headline", {"Who": "nobody"}, "<svg/>", "a caption")
-    assert [found.scene.name for found in seen[0]] == ["known"] and seen[0][0].truth is truth
+    [shown] = seen[0]
+    assert shown.scene.name == "known" and shown.truth is truth
+    assert [record["engine"] for record in shown.records] == ["b"] and shown.differences == {}
     assert heading == Heading("Every scene in every engine", 2)
     assert [name for name, _ in matrix.scenes] == ["block", "known"] == list(matrix.cells)
     assert matrix.engines[1] == ("b", verdict.title("b"), 6, engine_looks.MARKS[6])
     monkeypatch.setattr(verdict, "_shown", lambda groups: bare)
     *_, last, figure = verdict.render([bare, known])
     assert last == Heading("Time against error: block", 2) and isinstance(figure, Plot)
+
+
+def test_ends_of_motions_and_runs_of_one_family(monkeypatch):
+    """0.999 of the duration is the whole motion; without a completed run no error is the largest."""
+    exact = SimpleNamespace(times=np.array([0.0, 999.0]))
+    monkeypatch.setattr(verdict, "motion_of", lambda scene, record: exact)
+    monkeypatch.setattr(verdict, "over_truth", lambda scene, exact, run, engine: "<svg/>")
+    long = SceneRuns(SCENE.with_(duration=1000.0), [], truth={"motion": {"times": []}})
+    assert verdict.motion(long) == ("<svg/>", "block, 999 s of its true motion as thick lines.")
+    assert verdict._largest(long) == 0.0
+    alone = group((plain("a", "defaults", 0.5, 1.0),))
+    assert [found.family for found in verdict._row(alone)["a"]] == ["defaults"]
+
+
+def test_costs_that_rank_families():
+    """The middle one of the levels counts; families without it are not the fastest."""
+    run = Run(plain("a", "x", 0.25, 1.0))
+    assert summary._rank(run, [1.0, 2.0, 3.0, 4.0, 5.0]) == (False, 3.0, 0.25)
+    costs = {("a", "x"): [math.nan, math.nan], ("b", "y"): [2.0, math.nan], ("c", "z"): [3.0, math.nan]}
+    assert summary._least(costs, 0) == 2.0 and math.isnan(summary._least(costs, 1))
+    _, _, _, table = summary.render([group((plain("a", "x", 1e-4, 1.0),))])
+    assert right(table) == [table.header[k] for k in (2, 3, 5, 6, 7, 8)]
 
 
 def test_only_scenes_with_a_motion_are_shown():
@@ -413,6 +439,8 @@ def test_names_of_a_part_of_a_motion():
     }
     shown = mechanisms.motion_of(SCENE, record)
     assert (shown.scene, shown.engine, shown.method, shown.bodies) == ("block", "", "", ("b",))
+    assert shown.position.tolist() == [[[1.0, 2.0, 3.0]]] and shown.orientation.tolist() == [[[1.0, 0, 0, 0]]]
+    assert shown.times.tolist() == [0.0] and not shown.velocity.any() and not shown.angular_velocity.any()
 
 
 # --- figures ----------------------------------------------------------------------------------------------

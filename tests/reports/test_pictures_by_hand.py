@@ -7,6 +7,7 @@ import math
 import re
 import struct
 import xml.etree.ElementTree as ET
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -109,6 +110,22 @@ def test_zones_and_ticks_of_the_speed_figure():
     grid = [(line.get("y1"), line.get("x2")) for line in inner.findall("line")]
     assert grid == [(f"{y:.1f}", "100%") for y in (380, 285, 190, 95, 0)] + [("380", "100%")]
     assert [list(speed_figure._ticks(0, n)) for n in (1, 7, 8)] == [[0, 1], [*range(8)], [0, 2, 4, 6, 8]]
+
+
+def test_zones_that_reach_the_end_of_the_axis_and_narrow_ones():
+    """The axis ends at 1e-7: half of it is right, half inaccurate, and none wrong. A zone has its name if it
+    is wider than 18 %."""
+    inner = element((plain("a", "x", 1e-9, 1.0, step=0.1), plain("a", "x", 1e-7, 2.0, step=0.2))).find("svg")
+    zones = [(z.get("class"), z.get("x"), z.get("width")) for z in inner.findall("rect")]
+    assert zones == [("zone right", "0.00%", "50.00%"), ("zone inaccurate", "50.00%", "50.00%")]
+    places_ = {1e-9: 0.0, 1e-8: 18.0, 1e-2: 36.5}
+    axes = SimpleNamespace(x0=-9, x=places_.__getitem__)
+    shown = [
+        re.sub("<text.*>(.*)</text>", r"\1", line) for line in speed_figure._zones(axes) if "<text" in line
+    ]
+    assert shown == ["inaccurate", "wrong"]
+    axes.x = {1e-9: 0.0, 1e-8: 0.0, 1e-2: 100.0}.__getitem__
+    assert [line.count("inaccurate") for line in speed_figure._zones(axes)] == [1, 1]
 
 
 def test_one_value_spans_a_decade():
@@ -227,6 +244,9 @@ def test_looks_of_curves_and_the_legend():
         ("b", "y"): ("-", "o"),
     }
     assert {v["color"] for v in looks.values()} == {figures.COLOURS[-1]}, "engines of other packages"
+    dash_dot_dot, dots = figures.DASHES[4:]
+    assert dash_dot_dot == (0, (6, 1.5, 1, 1.5, 1, 1.5)), "a dash of 6 and two dots of 1, at distances of 1.5"
+    assert dots == (0, (1, 3)), "dots of 1 at distances of 3"
     figure, (axes,) = figures.canvas()
     figures.legend_below(figure, axes)
     assert not figure.legends, "nothing to explain"

@@ -239,6 +239,8 @@ def test_benchmark_plot_shows_the_least_cost_of_each_engine():
     assert {axes.get_yscale() for axes in figure.axes} == {"log"}
     names = [label.get_text() for label in figure.axes[-1].get_xticklabels()]
     assert names == ["first scene", "second"] and figure.axes[-1].get_xticks().tolist() == [0, 1]
+    angles = {(label.get_rotation(), label.get_ha()) for label in figure.axes[-1].get_xticklabels()}
+    assert angles == {(30.0, "right")}, "names below the last panel"
     marks = {line.get_label(): line.get_marker() for line in figure.axes[0].lines}
     assert marks["limit"] == "_" and len(set(marks.values())) == 3
     colours = {line.get_label(): line.get_color() for line in figure.axes[0].lines}
