@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.engines.mujoco.importing import holding, massless
+from crosscheck.engines.mujoco.importing import groups, holding, massless, reading
 from crosscheck.engines.mujoco.importing.actuators import moved_to_joints
 from crosscheck.engines.mujoco.importing.chains import Chain
 from crosscheck.engines.mujoco.importing.closures import Closure, Frame
@@ -113,6 +113,19 @@ def test_inertia_is_in_the_axes_of_the_body(arm: Any) -> None:
     assert np.array(body.inertia) == pytest.approx(np.array(wanted))
 
 
+@pytest.mark.parametrize(("product", "is_plain"), [(1.0, True), (-1.0, True), (1.000001, False)])
+def test_products_of_inertia_that_are_rounding(
+    arm: Any, monkeypatch: pytest.MonkeyPatch, product: float, is_plain: bool
+) -> None:
+    """A quarter of the largest moment, 4."""
+    monkeypatch.setattr(groups, "PLAIN", 0.25)
+    found, data = Groups(mujoco, arm), placed(arm)
+    inertia = np.array([[3.0, 0.0, product], [0.0, 4.0, 0.0], [product, 0.0, 2.0]])
+    monkeypatch.setattr(found, "_inertia", lambda data, group, centre: inertia)
+    body = found.body(data, Piece(1), None)
+    assert body.inertia == ((3.0, 4.0, 2.0) if is_plain else tuple(map(tuple, inertia.tolist())))
+
+
 def test_a_link_turns_with_the_joints_before_it(arm: Any) -> None:
     found, data = Groups(mujoco, arm), placed(arm, 0.0, math.pi / 2, 0.3)
     link, whole = found.placed(data, Piece(3, 1)), found.placed(data, Piece(3))
@@ -130,9 +143,10 @@ def test_a_link_turns_with_the_joints_before_it(arm: Any) -> None:
 def test_a_link_before_a_ball_joint_or_a_slide_does_not_turn_with_it() -> None:
     joints = '<joint name="a" axis="0 0 1"/><joint name="b" type="ball"/>'
     turned = model(f'<body name="x">{joints}{LUMP.format(1)}</body>')
-    c, s = math.cos(0.2), math.sin(0.2)
-    data = placed(turned, math.pi / 2, c, s, 0.0, 0.0)
-    assert Groups(mujoco, turned).placed(data, Piece(1, 0)).orientation == pytest.approx([HALF, 0, 0, HALF])
+    for ball in ((0.5, 0.5, -0.5, 0.5), (0.7, 0.1, 0.5, -0.5)):
+        data = placed(turned, math.pi / 2, *ball)
+        link = Groups(mujoco, turned).placed(data, Piece(1, 0))
+        assert link.orientation == pytest.approx([HALF, 0, 0, HALF])
     sliding = model(f'<body name="x">{joints.replace("ball", "slide")}{LUMP.format(1)}</body>')
     found = Groups(mujoco, sliding).placed(placed(sliding, math.pi / 2, 2.0), Piece(1, 0))
     assert found.orientation == pytest.approx([HALF, 0.0, 0.0, HALF])
@@ -151,6 +165,36 @@ def test_accelerations_at_constant_rates_are_centripetal_and_gyroscopic(arm: Any
     assert data.qvel[:3].tolist() == [2.0, 3.0, 5.0]
     assert found.drift(data, Piece(3)) == pytest.approx([-12, -20, 25, -10, 6, 15])
     assert found.drift(data, Piece(1)) == pytest.approx([-6, -3, 0, 0, 0, 0])
+
+
+def test_a_link_does_not_accelerate_by_a_slide_behind_it() -> None:
+    """A hinge turns the link with 2 rad/s, 1 m from its axis; the slide behind it has 3 m/s."""
+    joints = '<joint axis="0 0 1"/><joint type="slide" axis="1 0 0" pos="1 0 0"/>'
+    moved = model(f'<body name="x">{joints}{LUMP.format(1)}</body>')
+    data = placed(moved)
+    data.qvel[:] = 2.0, 3.0
+    mujoco.mj_comVel(moved, data)
+    found = Groups(mujoco, moved)
+    assert found.drift(data, Piece(1, 0)) == pytest.approx([-4, 0, 0, 0, 0, 0], abs=1e-12)
+    assert found.drift(data, Piece(1)) == pytest.approx([0, 12, 0, 0, 0, 0], abs=1e-12)
+
+
+def test_bodies_fixed_to_the_ground_have_no_note_on_bodies_that_are_one() -> None:
+    reader: Any = object.__new__(reading._Reader)
+    pillars = "".join(f'<body name="{n}">{LUMP.format(1)}</body>' for n in "pq")
+    arm = f'<body name="a"><joint/>{LUMP.format(1)}<body name="empty"/><body name="b">{LUMP.format(2)}</body>'
+    reader.model = model(f"{pillars}{arm}</body>")
+    reader.groups, reader.notes = Groups(mujoco, reader.model), []
+    reader._read_merged()
+    assert reader.notes == ["fixed to 'a' and part of it: 'b'"]
+
+
+def test_a_ball_has_no_armature_in_a_scene() -> None:
+    reader: Any = object.__new__(reading._Reader)
+    reader.without, reader.kept = frozenset(), []
+    reader.model = model(f'<body><joint type="ball" armature="2"/>{LUMP.format(1)}</body>')
+    ball = Spherical(name="j", bodies=("ground", "b"), anchor=(0, 0, 0))
+    assert reader._with_armature(row("ball", [(0, 0, 1)]), [ball]) == [ball] and not reader.kept
 
 
 # --- Poses ------------------------------------------------------------------------------------------------
@@ -390,6 +434,34 @@ def test_equalities_that_are_no_rows_are_parts_and_inactive(text: str, sentence:
     assert equality(f"<{text}/>") == ([Part("couplings", f"equality 'e' {sentence}")], [0])
 
 
+def test_a_row_of_a_tendon_whose_second_joint_is_the_first_of_the_file() -> None:
+    """2 y + 4 x = 0.8: y follows x with the ratio -2."""
+    turned = TENDONS.replace(
+        '<joint joint="x" coef="4"/><joint joint="y" coef="2"/>',
+        '<joint joint="y" coef="2"/><joint joint="x" coef="4"/>',
+    )
+    text = '<equality><tendon name="e" tendon1="both" polycoef="0.8 0 0 0 0"/></equality>'
+    [found] = of_equalities(mujoco, model(THREE, turned + text), frozenset())
+    assert found == JointRow("e", (1, 0), 0.4, -2.0)
+
+
+def test_equalities_of_other_types_are_parts() -> None:
+    """A weld is a closure; a type that holds a body that deforms is none."""
+    kinds = mujoco.mjtEq
+    found = model(THREE, '<equality><joint name="e" joint1="x" joint2="z"/></equality>')
+    found.eq_data[0, 5] = 7.0  # behind the five coefficients
+    [row] = of_equalities(mujoco, found, frozenset())
+    assert row == JointRow("e", (0, 2), 0.0, 1.0)
+    found.eq_data[0, 4] = 7.0
+    [part] = of_equalities(mujoco, found, frozenset())
+    assert part == Part("couplings", "equality 'e' of type joint, whose polynomial is not linear")
+    found.eq_type[0], found.eq_active0[0] = kinds.mjEQ_FLEX, 1
+    [part] = of_equalities(mujoco, found, frozenset())
+    assert part == Part("couplings", "equality 'e' of type flex") and not found.eq_active0[0]
+    found.eq_active0[0] = 1
+    assert list(of_equalities(mujoco, found, frozenset({"couplings"}))) == [part]
+
+
 def test_couplings_that_are_left_out_are_inactive_and_locks_stay() -> None:
     text = '<joint name="e" joint1="x" joint2="z"/><joint name="f" joint1="y"/>'
     lock = JointRow("f", (1, -1), 0.0, 0.0)
@@ -507,14 +579,14 @@ def test_a_row_of_joints_is_one_joint_unless_something_acts_along_a_part() -> No
 
 
 def test_dependent_motions_in_a_row_need_an_armature() -> None:
-    groups = Groups(mujoco, model(f'<body name="b"><joint/>{LUMP.format(1)}</body>'))
+    bodies = Groups(mujoco, model(f'<body name="b"><joint/>{LUMP.format(1)}</body>'))
     twice = row("hinge slide hinge", [(0, 0, 1), (1, 0, 0), (0, 0, 1)])
     with pytest.raises(SceneError, match="body 'b': joints hinge, slide, hinge in a row have dependent"):
-        massless._check(twice, groups, {}, 1.0)
+        massless._check(twice, bodies, {}, 1.0)
     with pytest.raises(SceneError, match="body 'b': joints hinge, hinge in a row have dependent"):
-        massless._check(twice, groups, {1: {ARMATURE}}, 1.0)
-    massless._check(twice, groups, {2: {ARMATURE}}, 1.0)
-    massless._check(twice, groups, {k: {ARMATURE} for k in range(3)}, 1.0)
+        massless._check(twice, bodies, {1: {ARMATURE}}, 1.0)
+    massless._check(twice, bodies, {2: {ARMATURE}}, 1.0)
+    massless._check(twice, bodies, {k: {ARMATURE} for k in range(3)}, 1.0)
 
 
 # --- Bodies that are held ---------------------------------------------------------------------------------

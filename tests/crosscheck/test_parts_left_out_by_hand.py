@@ -94,6 +94,27 @@ def test_parts_that_change_the_motion(full):
     assert "fluid" not in [part.kind for part in of_model(full, ())]
 
 
+def test_tendons_and_bodies_without_names_have_numbers():
+    tendon = '<tendon><fixed frictionloss="1"><joint joint="j" coef="1"/></fixed></tendon>'
+    found = model(f'<body><joint name="j"/>{GEOM}<body><joint frictionloss="1"/>{GEOM}</body></body>', tendon)
+    assert [part.sentence for part in of_model(found, ())] == [
+        "dry friction of joint 1 (of body 'body 2')",
+        "friction of tendons tendon 0",
+    ]
+    light = model(body("a", '<joint name="j"/>', '<body gravcomp="1"/>'), "")
+    assert [part.sentence for part in of_model(light, ())] == ["compensation of the weight of "]
+
+
+def test_geoms_touch_others_by_their_type_or_their_affinity():
+    """Two of three geoms."""
+    shapes = GEOM + GEOM.replace('contype="0"', 'contype="1"')
+    shapes += GEOM.replace('conaffinity="0"', 'conaffinity="1"')
+    found = model(f'<body name="a"><joint name="j"/>{shapes}</body>')
+    assert list(notes(mujoco, found, "")) == ["2 geoms that could touch others"]
+    found.geom_contype[:] = 1
+    assert list(notes(mujoco, found, "")) == ["3 geoms that could touch others"]
+
+
 def test_stripped_models_have_no_such_part(full):
     stripped(full, [2])
     assert list(of_model(full, [2])) == [] and full.dof_armature.tolist() == [0.0, 0.0, 2.0, 0.0, 0.0, 0.0]

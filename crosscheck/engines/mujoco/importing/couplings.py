@@ -50,7 +50,7 @@ def _row(mujoco: Any, model: Any, e: int, name: str) -> JointRow | Part:
         return Part("couplings", f"{label}, whose polynomial is not linear")
     first = int(model.eq_obj1id[e])
     if kind == kinds.mjEQ_JOINT:
-        pair = (first, second) if second >= 0 and ratio else (first, -1)
+        pair = first, second if ratio else -1
         return JointRow(name, pair, offset, ratio if pair[1] >= 0 else 0.0)
     return _tendon_row(mujoco, model, name, label, [(first, 1.0), (second, -ratio)], offset)
 

@@ -101,7 +101,7 @@ def notes(mujoco: Any, model: Any, keyframe: str) -> Iterator[str]:
     """Return sentences about parts that a scene cannot describe and that do not change the motion, which
     begins at a keyframe if one is named."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
-    servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1))) if model.nu else 0
+    servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1)))
     counts = (
         (model.npair, "contact pair", "contact pairs"),
         (model.nplugin, "plugin", "plugins"),
