@@ -19,7 +19,7 @@ from crosscheck.engines.mujoco.importing.groups import Groups, Piece
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.massless import ARMATURE, COUPLING, LOAD, LOCK
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
-from mbref.scene import Cylindrical, SceneError, Spherical, Universal
+from mbref.scene import Cylindrical, Revolute, SceneError, Spherical, Universal
 
 HALF = math.sqrt(0.5)
 LUMP = '<inertial pos="0 0 0" mass="{}" diaginertia="1 1.5 2"/>'
@@ -544,7 +544,7 @@ def test_groups_at_the_ends_of_closures_and_springs_are_held() -> None:
     tendons = """<tendon><spatial stiffness="1"><site site="x"/><site site="ground"/></spatial>
     <spatial><site site="y"/><site site="ground"/></spatial>
     <spatial damping="1"><site site="z"/><geom geom="g"/><site site="x"/></spatial></tendon>"""
-    more = '<site name="ground"/><body name="w"><joint/><geom name="g" size="0.1"/></body>'
+    more = '<site name="ground"/><geom size="1"/><body name="w"><joint/><geom name="g" size="0.1"/></body>'
     found = model(THREE + more, tendons)
     assert massless.held(found, Groups(mujoco, found), ()) == {0, 1, 3}
     at = Frame(2, np.zeros(3), np.eye(3)), Frame(4, np.zeros(3), np.eye(3))
@@ -587,6 +587,45 @@ def test_dependent_motions_in_a_row_need_an_armature() -> None:
         massless._check(twice, bodies, {1: {ARMATURE}}, 1.0)
     massless._check(twice, bodies, {2: {ARMATURE}}, 1.0)
     massless._check(twice, bodies, {k: {ARMATURE} for k in range(3)}, 1.0)
+
+
+def test_rows_of_joints_are_read_as_joints_and_links() -> None:
+    """A slide with a rotor moves a link; a sleeve without one is a joint; a free body has none."""
+    text = f"""<body name="a"><joint name="s" type="slide" axis="0 0 1" armature="1"/>
+    <joint name="h" axis="0 0 1"/>{LUMP.format(1)}</body>
+    <body name="b" pos="2 0 0"><joint name="t" type="slide" axis="0 0 1"/>
+    <joint name="i" axis="0 0 1"/>{LUMP.format(1)}</body><body name="c"><freejoint/>{LUMP.format(1)}</body>"""
+    found = model(text)
+    bodies, data = Groups(mujoco, found), placed(found)
+    read = massless.read(mujoco, bodies, data, {0: {ARMATURE}}, 1.0)
+    assert [(chain.joints, [joint.type for joint in joints]) for chain, joints in read] == [
+        ((0,), ["translational"]),
+        ((1,), ["revolute"]),
+        ((2, 3), ["cylindrical"]),
+        ((4,), []),
+    ]
+    assert [joint.bodies for _, joints in read for joint in joints] == [
+        ("ground", "a link s"),
+        ("a link s", "a"),
+        ("ground", "b"),
+    ]
+    assert bodies.pieces == [Piece(1, 0), Piece(1), Piece(2), Piece(3)]
+    twice = model(f'<body name="a"><joint axis="0 0 1"/><joint axis="0 0 1"/>{LUMP.format(1)}</body>')
+    with pytest.raises(SceneError, match="body 'a': joints hinge, hinge in a row have dependent motions"):
+        massless.read(mujoco, Groups(mujoco, twice), placed(twice), {}, 1.0)
+
+
+def test_a_closure_is_a_joint_at_its_second_frame_along_the_axis_of_the_first(arm: Any) -> None:
+    data, bodies = placed(arm), Groups(mujoco, arm)
+    turned = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    ends = Frame(1, np.array([1.0, 2.0, 3.0]), turned), Frame(3, np.array([0.0, 0.5, 0.0]), np.eye(3))
+    made = Closure("c", Revolute, ends).joint(data, bodies)
+    assert (made.name, made.type, made.bodies) == ("c", "revolute", ("arm", "wrist"))
+    assert made.anchor == pytest.approx(data.xpos[3] + [0.0, 0.5, 0.0])
+    assert made.axis == pytest.approx((1.0, 0.0, 0.0))
+    with pytest.raises(SceneError) as caught:
+        Closure("c", Revolute, (ends[0], Frame(2, np.zeros(3), np.eye(3)))).joint(data, bodies)
+    assert list(caught.value.faults) == ["closure 'c': both sides are on 'arm', or fixed to it"]
 
 
 # --- Bodies that are held ---------------------------------------------------------------------------------

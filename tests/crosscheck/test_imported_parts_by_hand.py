@@ -323,6 +323,60 @@ def test_springs_that_a_file_disables():
     assert (spring.stiffness, spring.damping) == (3.0, 0.0)
 
 
+def test_plastic_springs_are_parts_without_stiffness():
+    model, data = read(
+        turn='stiffness="3"',
+        slip='stiffness="2"',
+        tendon='<spatial name="r" stiffness="9"><site site="o"/><site site="s"/></spatial>',
+    )
+    model.jnt_springyield[1], model.tendon_springyield[0] = 1.0, 1.0
+    first, second, spring = loads.of_joints(mujoco, model, data, {0: HINGE, 1: SLIDE})
+    assert (first, second) == (
+        Part("springs", "plastic spring of joint 'slip'"),
+        Part("springs", "plastic spring of tendon 'r'"),
+    )
+    assert (spring.joint, spring.stiffness) == ("A", 3.0)
+    assert model.jnt_stiffness.tolist() == [3.0, 0.0] and model.tendon_stiffness.tolist() == [0.0]
+
+
+def test_springs_and_dampers_that_are_not_constant():
+    """Each joint and tendon is named once, in the order of joints' and tendons' springs and dampers."""
+    tendons = "".join(
+        f'<spatial name="{name}"><site site="o"/><site site="s"/></spatial>' for name in ("p", "q")
+    )
+    model, data = read(tendon=tendons)
+    numbers = (
+        model.jnt_stiffnesspoly,
+        model.dof_dampingpoly,
+        model.tendon_stiffnesspoly,
+        model.tendon_dampingpoly,
+    )
+    for rows, row in zip(numbers, (1, 0, 1, 0), strict=True):
+        rows[row, 0] = 2.0
+    assert list(loads.of_joints(mujoco, model, data, {0: HINGE, 1: SLIDE})) == [
+        Part("springs", "polynomial springs of joint 'slip'"),
+        Part("damping", "polynomial damping of joint 'turn'"),
+        Part("springs", "polynomial springs of tendon 'q'"),
+        Part("damping", "polynomial damping of tendon 'p'"),
+    ]
+    assert not any(rows.any() for rows in numbers)
+
+
+def test_a_ball_with_damping_is_one_part():
+    """Its three coordinates have no load in a scene; a ball's polynomial is named once."""
+    text = """<mujoco><worldbody><body><joint name="h"/><geom size=".1"/>
+    <body><joint name="b" type="ball" damping="2"/><geom size=".1"/></body></body></worldbody></mujoco>"""
+    model = mujoco.MjModel.from_xml_string(text)
+    model.dof_damping[0], model.dof_dampingpoly[1:] = 5.0, 1.0
+    found = list(loads.of_joints(mujoco, model, mujoco.MjData(model), {0: HINGE, 1: HINGE}))
+    assert [getattr(part, "sentence", "") for part in found] == [
+        "",
+        "damping of joint 'b'",
+        "polynomial damping of joint 'b'",
+    ]
+    assert model.dof_damping.tolist() == [5.0, 0.0, 0.0, 0.0]
+
+
 def test_springs_of_joints_that_the_scene_does_not_have():
     model, data = read(turn='stiffness="3" damping="0.5"', slip='damping="2"')
     found = list(loads.of_joints(mujoco, model, data, {0: SLIDE}))
@@ -355,7 +409,11 @@ def test_motors_with_a_control_value():
     assert of_motors("0 0 1") == [
         Part("motors", "control value of 'servo' in the keyframe, no motor of a joint")
     ]
-    assert all(isinstance(part, Part) for part in of_motors("1 1 0", {}))
+    assert [part.sentence for part in of_motors("1 1 0", {})] == [
+        "control value of 'm' in the keyframe, no motor of a joint",
+        "control value of 'actuator 1' in the keyframe, no motor of a joint",
+    ]
+    assert all(isinstance(part, Part) for part in of_motors("1 1 0", {0: SLIDE, 1: HINGE}))
     assert of_motors("1 1 1", option='><flag actuation="disable"/></option><option ') == []
     model, _ = read(actuator=MOTORS, ctrl="1 1 1")
     assert loads.controlled(mujoco, model, -1) == [] and loads.controlled(mujoco, model, 0) == [0, 1, 2]
@@ -396,6 +454,11 @@ def test_a_tendon_between_two_sites_is_a_spring():
         (
             '<fixed name="f" damping="2"><joint joint="turn" coef="1"/></fixed>',
             Part("damping", "tendon 'f', which is not a spring between two sites"),
+        ),
+        (
+            '<fixed name="f" stiffness="2"><joint joint="turn" coef="1"/>'
+            '<joint joint="slip" coef="1"/></fixed>',
+            Part("springs", "tendon 'f', which is not a spring between two sites"),
         ),
     ],
 )

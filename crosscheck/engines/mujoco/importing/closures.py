@@ -111,7 +111,7 @@ def _ends(mujoco: Any, model: Any, e: int) -> tuple[Frame, Frame]:
     relative = rotations.to_matrix(data[6:10] / np.linalg.norm(data[6:10]))
     # pose of the second body's frame in the first body's frame, at the second body's anchor
     anchor = data[0:3].copy()
-    return Frame(first, data[3:6] + 0.0, relative), Frame(second, anchor, np.eye(3))
+    return Frame(first, data[3:6].copy(), relative), Frame(second, anchor, np.eye(3))
 
 
 def of_site(model: Any, s: int) -> Frame:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from crosscheck.engines.mujoco.importing import chains
 from crosscheck.engines.mujoco.importing.chains import Chain, joints_of
@@ -69,9 +69,9 @@ def read(
             found.append((chain, joints))
             continue
         _check(chain, groups, wanted, extent)
-        found += [(part, joints_of(part, groups, extent) or []) for part in chain.parts(groups)]
+        found += [(part, cast(list[Joint], joints_of(part, groups, extent))) for part in chain.parts(groups)]
     ends = [chain.ends[1] for chain, _ in found]
-    groups.keep({e.group for e in ends if e.last < 0}, {e.last for e in ends})
+    groups.keep({e.group for e in ends}, {e.last for e in ends})
     return found
 
 
