@@ -93,8 +93,8 @@ def stated_rate(scene: Scene) -> float:
         rates += [abs(driver.sine.frequency)] if driver.sine else []
     for body in scene.body:
         rates += [math.hypot(*body.angular_velocity)] if body.angular_velocity else []
-    mass = min((body.mass for body in scene.body if body.mass), default=1.0)
-    inertia = min((_middle_moment(body.inertia) for body in scene.body if body.inertia), default=1.0)
+    mass = min((body.mass for body in scene.body if body.mass), default=math.inf)
+    inertia = min((_middle_moment(body.inertia) for body in scene.body if body.inertia), default=math.inf)
     for load in scene.load:
         if isinstance(load, Spring):
             rates += [math.sqrt(load.stiffness / mass), load.damping / mass]

@@ -430,6 +430,54 @@ def test_the_fastest_rate_that_is_stated(parts, rate):
     assert driver_motion.stated_rate(turning) == pytest.approx(10.0)
 
 
+def test_scenes_without_masses_have_a_rate_too():
+    """A driver alone turns the four-bar, with 2 pi times one over its duration at least."""
+    from mbref.scenes import SCENES
+
+    given = SCENES["four_bar"]()
+    assert driver_motion.stated_rate(given) >= 1 / given.duration
+
+
+@pytest.mark.parametrize(
+    ("speeds", "outcomes", "rate", "count"),
+    [
+        ([9.0], [Outcome.COMPLETED], 9.0, 1),
+        ([0.25], [Outcome.COMPLETED], 0.5, 1),
+        ([499.0], [Outcome.COMPLETED], 499.0, 1),
+        ([500.0, 600.0], [Outcome.COMPLETED] * 2, 600.0, 2),
+        ([9.0, 8.0], [Outcome.STEP_FAILED, Outcome.COMPLETED], 8.0, 2),
+        ([9.0, 8.0], [Outcome.STEP_FAILED] * 2, 8.0, 2),
+        ([1e6, 1e6], [Outcome.COMPLETED] * 2, 4000.0, 2),
+        ([None], [Outcome.COMPLETED], 0.5, 1),
+    ],
+)
+def test_the_fastest_rate_of_coarse_runs(speeds, outcomes, rate, count):
+    """2000 steps in 2 s, then 16000, where a body turns by half a rad or more in a step; 1 / 2 s at least."""
+    asked = []
+
+    def coarse(step):
+        k = len(asked)
+        asked.append(step)
+        turning = np.zeros((0, 2, 3)) if speeds[k] is None else np.zeros((3, 2, 3))
+        if speeds[k] is not None:
+            turning[1, 1] = 0.6 * speeds[k], 0.0, -0.8 * speeds[k]
+        return SimpleNamespace(angular_velocity=turning, outcome=outcomes[k])
+
+    assert driver_motion.fastest_rate(scene(duration=2.0), coarse) == pytest.approx(rate)
+    assert asked == [2 / 2000, 2 / 16000][:count]
+
+
+def test_pieces_of_switched_tables_at_their_ends():
+    """The cubic through 0, 1, 8, 27 starts at 1 s where it is switched on, and is zero before."""
+    rows = tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0))
+    factor = Factor(table=rows, start=1.0, stop=2.5)
+    assert driver_motion.motion(factor, 0.999) == (0.0, 0.0, 0.0)
+    assert driver_motion.motion(factor, 1.0) == pytest.approx((1.0, 3.0, 6.0))
+    assert driver_motion.motion(factor, 2.5) == (0.0, 0.0, 0.0)
+    assert driver_motion.motion(factor, 2.5, since=2.0) == pytest.approx((15.625, 18.75, 15.0))
+    assert driver_motion.motion(factor, 1.0, since=0.5) == (0.0, 0.0, 0.0)
+
+
 # --- refusals ---------------------------------------------------------------------------------------------
 EVERYTHING = Supports(
     joints=("revolute", "cylindrical"),

@@ -352,7 +352,7 @@ def test_attempts_to_close_a_loop() -> None:
     class Still:
         def __getattr__(self, name: str) -> Any:
             if name == "mj_integratePos":
-                return lambda model, qpos, step, dt: moved.append(float(np.abs(step).max()))
+                return lambda model, qpos, step, dt: moved.append(float(np.abs(step * dt).max()))
             return getattr(mujoco, name)
 
     text = SLIDES.replace("type", 'stiffness="1" springref="1" type')
@@ -364,6 +364,30 @@ def test_attempts_to_close_a_loop() -> None:
         found.close()
     assert moved.count(0.1) == 2 and moved.count(0.2) == 800 and len(moved) == 802
     assert moved[200] == 0.1 and moved[601] == 0.1
+    found.held = [0]
+    assert found._fall() == pytest.approx([0.0, 0.1]), "coordinates that are given do not fall"
+
+
+def test_one_open_loop_of_two_is_open() -> None:
+    """The second slide closes; the first one cannot be at two places."""
+    rows = [
+        JointRow("r", (0, -1), 0.0, 0.0),
+        JointRow("s", (0, -1), 1.0, 0.0),
+        JointRow("t", (1, -1), 0.5, 0.0),
+    ]
+    found = Poses(mujoco, model(SLIDES), (), rows, 1.0)
+    found.start("", {})
+    assert found._newton([]) is False and found.data.qpos == pytest.approx([0.5, 0.5])
+
+
+def test_a_coordinate_without_mass_has_a_billionth_of_the_mean_mass() -> None:
+    """1 kg beside 3 kg: 1 m is shared as 3 to 1. Without the first mass its share is 3 to 1.5e-9."""
+    found = poses()
+    one = found._step(np.array([1.0]), np.array([[1.0, 1.0]]), [])
+    assert one == pytest.approx([-0.75, -0.25])
+    found.mass = lambda: np.diag([0.0, 3.0])  # type: ignore[method-assign]
+    bare = found._step(np.array([1.0]), np.array([[1.0, 1.0]]), [])
+    assert bare[1] / bare[0] == pytest.approx(1.5e-9 / 3, rel=1e-6)
 
 
 # --- Couplings --------------------------------------------------------------------------------------------
@@ -610,6 +634,24 @@ def test_rows_of_joints_are_read_as_joints_and_links() -> None:
         ("ground", "b"),
     ]
     assert bodies.pieces == [Piece(1, 0), Piece(1), Piece(2), Piece(3)]
+    thin = model(
+        f'<body name="a"><joint axis="0 0 1"/>{LUMP.format(1)}<body name="b"><joint axis="0 1 0"/>'
+        f'<joint axis="1 0 0"/>{LUMP.format(1)}</body></body>'
+    )
+    thin.body_mass[1] = 0.0
+    bodies = Groups(mujoco, thin)
+    read = massless.read(mujoco, bodies, placed(thin), {0: {LOAD}}, 1.0)
+    assert [chain.ends for chain, _ in read] == [
+        (Piece(0), Piece(1)),
+        (Piece(1), Piece(2, 1)),
+        (Piece(2, 1), Piece(2)),
+    ]
+    assert [[joint.name for joint in joints] for _, joints in read] == [
+        ["a joint"],
+        ["b link 1 joint"],
+        ["b joint"],
+    ]
+    assert bodies.pieces == [Piece(1), Piece(2, 1), Piece(2)]
     twice = model(f'<body name="a"><joint axis="0 0 1"/><joint axis="0 0 1"/>{LUMP.format(1)}</body>')
     with pytest.raises(SceneError, match="body 'a': joints hinge, hinge in a row have dependent motions"):
         massless.read(mujoco, Groups(mujoco, twice), placed(twice), {}, 1.0)

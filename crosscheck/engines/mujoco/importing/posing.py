@@ -99,7 +99,7 @@ class Poses:
         force, mass = fallen.qfrc_passive - fallen.qfrc_bias, self.mass()
         found = np.linalg.lstsq(mass, force, rcond=RANK)[0]
         found[self.held] = 0.0
-        size = np.abs(found).max(initial=0.0)
+        size = np.abs(found).max()
         return found * (FALL * min(1.0, self.extent) / size if size > 0 else 0.0)
 
     def _newton(self, held: list[int]) -> bool:
