@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.engines.mujoco.importing import loads, urdf_faults
+from crosscheck.engines.mujoco.importing import chains, loads, urdf_faults
 from crosscheck.engines.mujoco.importing.chains import Chain, _recognised, freedoms, joints_of, rank
 from crosscheck.engines.mujoco.importing.groups import Piece
 from crosscheck.engines.mujoco.importing.left_out import Part
@@ -100,6 +100,15 @@ def made(*parts: tuple[str, Any, Any]) -> Any:
             [("Distance", {"anchors": ([0, 0, 0], [1, 0, 0])})],
         ),
         ([("hinge", O, X), ("ball", (1, 0, 0), Z)], None),
+        ([("hinge", O, X), ("hinge", (0, 0, 0.1), Y), ("ball", (1, 0, 2), Z)], None),
+        ([("ball", O, Z), ("hinge", O, X), ("hinge", (0, 0, 0.1), Y)], None),
+        (
+            [("hinge", O, Z), ("hinge", (1.0, 0.0, 0.5), (0, 0, -1))],
+            [
+                ("Planar", {"anchor": [1, 0, 0.5], "axis": [0, 0, 1]}),
+                ("Distance", {"anchors": ([0, 0, 0], [1, 0, 0])}),
+            ],
+        ),
     ],
 )
 def test_joints_with_the_motions_of_a_chain(parts, wanted):
@@ -121,6 +130,31 @@ def test_how_nearly_axes_are_parallel_or_lines_meet(off, is_one):
     assert (made(("hinge", O, X), ("hinge", O, (off, 1.0, 0.0))) is not None) is is_one
     assert (made(("hinge", O, X), ("hinge", (0.0, 0.0, 4 * off), Y)) is not None) is is_one
     assert (made(("slide", O, X), ("slide", O, (0.0, 1.0, off)), ("hinge", X, Z)) is not None) is is_one
+
+
+def test_the_limits_of_axes_and_points(monkeypatch):
+    """A quarter of unit vectors, and of the extent of 2 m, exactly; and a little more."""
+    monkeypatch.setattr(chains, "ALIGNED", 0.25)
+    for more, is_within in ((0.0, True), (1e-6, False)):
+        off = 0.25 + more
+        assert chains._parallel(np.array([Z, (off, 0.0, 1.0)])) is is_within
+        tilted = chain(("slide", O, (1.0, 0.0, off)), ("slide", O, Y), ("hinge", X, Z))
+        assert (chains._planar(tilted, EXTENT) is not None) is is_within
+        crossed = chain(("hinge", O, X), ("hinge", O, (off, 1.0, 0.0)))
+        assert (chains._universal(crossed, EXTENT) is not None) is is_within
+        apart = chain(("hinge", O, Z), ("hinge", (2 * off, 0.0, 7.0), Z))
+        assert (chains._two_hinges(apart, EXTENT) is None) is is_within
+        missing = chain(("hinge", O, X), ("hinge", (0.0, 0.0, 4 * off), Y))
+        found = chains._meeting(missing, slice(0, 2), EXTENT)
+        assert found == ([0.0, 0.0, 0.5] if is_within else None)
+    square = chain(("hinge", (3.0, 0.0, 0.0), X), ("hinge", (0.0, 2.0, 0.0), Y))
+    for least, point in ((1.0, None), (0.999, [0.0, 0.0, 0.0])):
+        monkeypatch.setattr(chains, "ALIGNED", least)
+        assert chains._meeting(square, slice(0, 2), EXTENT) == point
+    assert chains._meeting(square, slice(0, 1), EXTENT) is None
+    monkeypatch.setattr(chains, "RANK", 0.25)
+    for size, count in ((0.25, 1), (0.250001, 2)):
+        assert rank(chain(("slide", O, X), ("slide", O, (0.0, size, 0.0))), EXTENT) == count
 
 
 def test_freedoms_and_independent_motions():

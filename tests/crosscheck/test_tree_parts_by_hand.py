@@ -402,6 +402,30 @@ def test_files_are_made_once_and_again_if_damaged(cache):
     assert sorted(p.suffix for p in cache.iterdir()) == [".so", ".so"], "no part of a file is left"
 
 
+def test_files_that_cannot_be_made_leave_nothing(cache, monkeypatch):
+    closed: list[int] = []
+    opened = kept.tempfile.mkstemp
+
+    def mkstemp(**given: Any) -> Any:
+        handle, place = opened(**given)
+        closed.append(-handle)
+        return handle, place
+
+    def close(handle: int) -> None:
+        closed.append(handle)
+        real_close(handle)
+
+    def fail(path: Path) -> None:
+        raise ValueError("no file")
+
+    real_close = kept.os.close
+    monkeypatch.setattr(kept.tempfile, "mkstemp", mkstemp)
+    monkeypatch.setattr(kept.os, "close", close)
+    with pytest.raises(ValueError, match="no file"):
+        kept.keep("code", "origin", ".so", fail)
+    assert list(cache.iterdir()) == [] and -closed[0] in closed[1:]
+
+
 def test_files_are_kept_elsewhere_if_the_cache_cannot_be_written(cache):
     cache.parent.mkdir(parents=True)
     cache.write_text("a file in place of the folder")

@@ -49,6 +49,8 @@ def inertia(ixx: float, iyy: float, izz: float, ixy: float = 0.0, more: str = "<
         (inertia(0.1, 0.2, 0.3), (0.0, 0.0)),
         ("", (1.0, 1.0)),
         ("<inertial/>", (1.0, 1.0)),
+        ("<inertial><mass/><inertia/></inertial>", (1.0, 1.0)),
+        ("<inertial><mass value=''/><inertia ixx='2' iyy='2' izz='3'/></inertial>", (1.0, 0.0)),
         (inertia(0.1, 0.2, 0.3, more="<mass value='1e-12'/>"), (0.0, 0.0)),
         (inertia(0.1, 0.2, 0.3, more="<mass value='0.9e-12'/>"), (1.0, 0.0)),
         (inertia(0.0, 0.2, 0.3), (0.0, 0.3)),
@@ -74,6 +76,34 @@ def test_inertia_that_mujoco_needs(inside, added):
         wanted = number(given, "inertia", key) + added[1]
         assert number(link, "inertia", key) == pytest.approx(wanted, rel=1e-12), key
     assert number(link, "inertia", "ixy") == number(given, "inertia", "ixy")
+
+
+def test_the_least_moment_that_is_no_rounding(monkeypatch):
+    monkeypatch.setattr(urdf, "LEAST", 0.25)
+    fake = SimpleNamespace(mjtObj=SimpleNamespace(mjOBJ_BODY=1), mj_name2id=lambda *given: 1)
+    model = SimpleNamespace(
+        nbody=2,
+        body_mass=np.array([0.0, 3.0]),
+        body_inertia=np.array([[0.0] * 3, [2.5, 2.500001, 4.0]]),
+        body_subtreemass=np.zeros(2),
+        body_parentid=np.array([0, 0]),
+    )
+    urdf.Text("", {"a": (1.0, 2.0)}, ET.Element("robot")).take_back(fake, model)
+    assert model.body_inertia[1].tolist() == pytest.approx([0.0, 0.500001, 2.0])
+
+
+def test_a_frame_is_made_with_the_axis_that_is_least_along_it():
+    """x is along that axis times z."""
+    from crosscheck.engines.geometry import joint_frame
+
+    for axis, x, y in (
+        ((0.0, 0.0, 2.0), (0, -1, 0), (1, 0, 0)),
+        ((0.0, 3.0, 0.0), (0, 0, 1), (1, 0, 0)),
+        ((1.0, 0.0, 0.0), (0, 0, -1), (0, 1, 0)),
+    ):
+        z = np.array(axis) / np.linalg.norm(axis)
+        for made in (urdf.along(np.array(axis)), joint_frame(axis)):
+            assert made == pytest.approx(np.column_stack([x, y, z]))
 
 
 def test_added_inertia_is_taken_back():

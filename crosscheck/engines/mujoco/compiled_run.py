@@ -92,7 +92,7 @@ class CompiledRun:
         rtol = self.options["rtol"]
         correction = settle.address if self.family == PROJECTED_COMPILED else 0
         return System(
-            int(rates.address or 0),
+            rates.address,
             self.context.address,
             self.context.quaternions,
             rtol,
@@ -100,7 +100,7 @@ class CompiledRun:
             self.options["min_step"],
             self.longest,
             MOST_STEPS,
-            int(correction or 0),
+            correction,
         )
 
     def _newton(self) -> Any:
@@ -108,7 +108,7 @@ class CompiledRun:
         from crosscheck.engines.mujoco.closures import follow
 
         tolerance = self.options["tolerance"]
-        return System(int(follow.address or 0), self.context.address, tolerance, self.longest)
+        return System(follow.address, self.context.address, tolerance, self.longest)
 
 
 def compiled_run(

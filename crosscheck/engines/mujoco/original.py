@@ -18,7 +18,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.left_out import checked
-from crosscheck.engines.mujoco.importing.loads import controlled, is_motor, motor_force
+from crosscheck.engines.mujoco.importing.loads import controlled, motor_force
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
@@ -151,7 +151,7 @@ class _Original:
         self.mujoco, self.model, self.counts = mujoco, read.original, Counts()
         self.groups = read.groups
         key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe)
-        self.motors = [a for a in controlled(mujoco, self.model, key) if is_motor(mujoco, self.model, a)]
+        motors = [] if "motors" in checked(options.without) else controlled(mujoco, self.model, key)
         bits = mujoco.mjtDisableBit
         for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "AUTORESET"):
             self.model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
@@ -164,15 +164,9 @@ class _Original:
         self.settings = own_settings(self.model) | dict(setting.options)
         self.data, self.between = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.data.qpos[:], self.data.qvel[:] = read.qpos, read.qvel
-        self._push(options)
-
-    def _push(self, options: ImportOptions) -> None:
-        """Apply the forces of motors that the scene has, along their joints."""
-        mujoco, model = self.mujoco, self.model
-        key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe)
-        for a in [] if "motors" in checked(options.without) else self.motors:
-            velocity = model.jnt_dofadr[model.actuator_trnid[a, 0]]
-            self.data.qfrc_applied[velocity] += motor_force(model, key, a)
+        for a in motors:  # the scene has their forces, along their joints
+            velocity = self.model.jnt_dofadr[self.model.actuator_trnid[a, 0]]
+            self.data.qfrc_applied[velocity] += motor_force(self.model, key, a)
 
     def advance(self, t0: float, t1: float) -> None:
         """Step to the last step before t1, and from a copy of it to t1; raises Failed."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import weakref
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -107,7 +107,7 @@ class CompiledRun:
         rtol, settle = options["rtol"], self._function("settle") if is_projected else 0
         system = System(
             self._function("rates"),
-            int(self._address.value or 0),
+            cast(int, self._address.value),
             self.quaternions,
             rtol,
             rtol,
@@ -120,7 +120,7 @@ class CompiledRun:
         return trajectory(self.mechanism.scene, times, system, start, load, sample, built, labels)
 
     def _function(self, name: str) -> int:
-        return int(ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value or 0)
+        return cast(int, ctypes.cast(getattr(self._library, name), ctypes.c_void_p).value)
 
 
 def _pointer(array: np.ndarray) -> ctypes.c_void_p:

@@ -215,7 +215,7 @@ def _halves(chain: Chain, turns: int) -> list[slice]:
     divided."""
     sizes = [{"hinge": 1, "ball": 3}.get(kind, 9) for kind in chain.kinds]
     ends = np.cumsum(sizes)
-    if not len(ends) or ends[-1] != 5 or turns not in ends:
+    if ends[-1] != 5 or turns not in ends:
         return []
     k = int(np.flatnonzero(ends == turns)[0]) + 1
     return [slice(0, k), slice(k, len(sizes))]
@@ -227,7 +227,8 @@ def _centre(chain: Chain, part: slice, extent: float) -> list[float] | None:
 
 
 def _parallel(axes: np.ndarray) -> bool:
-    return bool(np.linalg.norm(np.cross(axes, axes[0]), axis=1).max() <= ALIGNED)
+    across = axes - np.outer(axes @ axes[0], axes[0])
+    return bool(np.linalg.norm(across, axis=1).max() <= ALIGNED)
 
 
 def _meeting(chain: Chain, part: slice, extent: float) -> list[float] | None:

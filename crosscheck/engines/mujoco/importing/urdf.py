@@ -96,10 +96,10 @@ def _enough(link: ET.Element) -> tuple[float, float]:
     inertia = _part(inertial, "inertia", dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), "0"))
     x, y, z = "ixx", "iyy", "izz"
     matrix = np.array(
-        [[float(inertia.get("".join(("i", *sorted(a + b)))) or 0.0) for b in "xyz"] for a in "xyz"]
+        [[float(inertia.get("".join(("i", *sorted(a + b)))) or "0") for b in "xyz"] for a in "xyz"]
     )
     moments = np.linalg.eigvalsh(matrix)
-    heavy = float(mass.get("value") or 0.0)
+    heavy = float(mass.get("value") or "0")
     more = 1.0 if heavy < LEAST else 0.0
     moment = (float(moments[-1]) or 1.0) if moments[0] < max(LEAST, 1e-9 * moments[-1]) else 0.0
     mass.set("value", repr(heavy + more))

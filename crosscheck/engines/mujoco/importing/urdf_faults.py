@@ -59,7 +59,7 @@ def _values(root: ET.Element) -> Iterator[str]:
     """Return a fault for each negative mass, and for each floating joint on a link that is not the base."""
     for link in root.findall("link"):
         mass = link.find("inertial/mass")
-        if mass is not None and float(mass.get("value") or 0.0) < 0.0:
+        if mass is not None and float(mass.get("value") or "0") < 0.0:
             yield f"link {link.get('name')!r}: its mass must not be negative, got {mass.get('value')}"
     for joint in root.findall("joint"):
         parent = _end(joint, "parent")
