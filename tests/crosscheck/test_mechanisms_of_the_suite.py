@@ -21,13 +21,15 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.conformance import random_scenes
 from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
 from crosscheck.conformance.closed_forms import CLOSED_FORMS
-from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
+from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.geared_mechanisms import geared_mechanism
 from crosscheck.conformance.hard_mechanisms import HARD
-from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.moving import dead_end, moving_probes
 from crosscheck.conformance.planar import planar_loops
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.small_motions.mechanisms import MECHANISMS
+from crosscheck.study import stability
 from mbref.scene import Scene
 
 STORED = Path(__file__).parent / "models" / "mechanisms_of_the_suite.json"
@@ -35,6 +37,11 @@ MAKERS: dict[str, Callable[[], Any]] = {
     **{f"awkward {name}": partial(awkward, name, 1) for name in AWKWARD},
     **{f"hard {name}": make for name, make in HARD.items()},
     **{f"closed form {make.__name__}": lambda make=make: make()[0] for make in CLOSED_FORMS},
+    **{f"geared form {make.__name__}": lambda make=make: make()[0] for make in GEARED},
+    "dead end": dead_end,
+    "massless link": massless_link,
+    "undetermined": undetermined,
+    "first rungs of ladders": lambda: {ladder.name: ladder.rungs[0][1] for ladder in stability.ladders()},
     **{f"drawn {seed}": partial(random_scenes.mechanism, seed) for seed in range(1, 6)},
     "floating 1": partial(random_scenes.floating, 1),
     "rotor 1": partial(random_scenes.rotor, 1),
