@@ -8,7 +8,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.special import ellipj, ellipk
+from scipy.special import ellipj
 
 from mbref import rotations
 from mbref.scene import (
@@ -53,8 +53,8 @@ def pendulum() -> tuple[Scene, Exact]:
     k = math.sin(released / 2)
 
     def exact(t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        sn = ellipj(ellipk(k**2) - rate * t, k**2)[0]
-        return _swung(2 * np.arcsin(k * sn) - released, place)
+        _, cn, dn, _ = ellipj(rate * t, k**2)
+        return _swung(2 * np.arcsin(k * cn / dn) - released, place)
 
     return scene, exact
 
