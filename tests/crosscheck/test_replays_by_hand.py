@@ -269,6 +269,13 @@ def test_a_moment_about_an_axis_of_any_length(size):
     assert [body.angular_velocity for body in found.body] == [(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)]
 
 
+def test_a_replayed_motion_has_the_velocities_of_its_first_sample():
+    spin = np.arange(12.0).reshape(2, 2, 3)
+    run = motion(angular_velocity=spin, reactions={"crank": np.ones((2, 6))})
+    found = replays.replayed(scene(joint=(SHAFT, CRANK), driver=(DRIVER,)), run)
+    assert [body.angular_velocity for body in found.body] == [(0.0, 1.0, 2.0), (3.0, 4.0, 5.0)]
+
+
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_a_moment_that_varies(size):
     assert "varies" in replayed(size, size * (1 + 1.1e-6)).reason
