@@ -131,7 +131,7 @@ def test_the_largest_share_of_a_limit(measured, allowed, worst):
 def test_agreement_at_its_limit(monkeypatch, apart, status):
     """The sum of the resolutions, 0.25 and 0.5."""
     other = SimpleNamespace(cannot=None, motion="m", resolution=0.5)
-    monkeypatch.setattr(deep, "engine", lambda name: name)
+    monkeypatch.setattr(deep, "engine", lambda name: f"engine {name}")
     monkeypatch.setattr(deep, "InProcess", lambda engine, name: (engine, name))
     monkeypatch.setattr(
         deep, "set_up", lambda runner, specimen, family: asked.append((runner, family)) or other
@@ -141,7 +141,19 @@ def test_agreement_at_its_limit(monkeypatch, apart, status):
     bench = SimpleNamespace(scene=SCENE, specimen=None, motion="n", resolution=0.25)
     found = deep.agreement(bench, "x=g")
     assert (found.status, found.measured, found.allowed) == (status, apart, 0.75)
-    assert asked == [(("x", "x"), "g")] and found.scene == "s"
+    assert asked == [(("engine x", "x"), "g")] and (found.property, found.scene) == (AGREEMENT, "s")
+    other.cannot = "no loop"
+    found = deep.agreement(bench, "x=g")
+    assert (found.property, found.scene, found.status) == (AGREEMENT, "s", "cannot")
+    assert found.reason == "x=g: no loop"
+
+    def broken(*of: Any) -> float:
+        raise deep.Broken("no end")
+
+    other.cannot = None
+    monkeypatch.setattr(deep, "difference", broken)
+    found = deep.agreement(bench, "x=g")
+    assert (found.property, found.scene, found.status, found.reason) == (AGREEMENT, "s", FAIL, "x=g: no end")
 
 
 def test_verdicts_of_one_seed(monkeypatch):
@@ -151,7 +163,7 @@ def test_verdicts_of_one_seed(monkeypatch):
     monkeypatch.setattr(
         deep, "KINDS", tuple(zip(draws, ((RUN, "closure"), ("closure", "energy"), ("energy",)), strict=True))
     )
-    monkeypatch.setattr(deep, "engine", lambda name: name)
+    monkeypatch.setattr(deep, "engine", lambda name: f"engine {name}")
     monkeypatch.setattr(deep, "InProcess", lambda engine, name: (engine, name))
 
     def set_up(runner: Any, specimen: Specimen, family: str) -> Any:
@@ -177,7 +189,7 @@ def test_verdicts_of_one_seed(monkeypatch):
     ]
     assert found["version"] == "of free 7" and len(asked) == 2, "the third kind has nothing to decide"
     runner, specimen, family = asked[0]
-    assert runner == ("e", "e") and family == "f"
+    assert runner == ("engine e", "e") and family == "f"
     assert specimen == Specimen(SCENE.with_(name="loop 7"), None, True, reference_time=0.0)
     only = deep._record(Plan("e", 1), 7, ["energy"])
     assert [v["scene"] for v in only["verdicts"]] == ["free 7"]
