@@ -446,3 +446,52 @@ def test_a_timer_of_cpu_time(monkeypatch, seconds, is_main, is_timed):
     with runners._within(seconds):
         pass
     assert calls == [], "a system without timers"
+
+
+# --- names in verdicts --------------------------------------------------------------------------------------
+OUTCOMES = {
+    PASS: suite.Finding(0.5, 1.0, "r"),
+    FAIL: suite.Broken("no end"),
+    "outside": suite.Outside("no joint"),
+    "cannot": "no loop",
+}
+
+
+@pytest.mark.parametrize("status", [*OUTCOMES, "unknown"])
+def test_a_verdict_names_its_check_and_its_scene(monkeypatch, status):
+    def check(bench: Any) -> Any:
+        found = OUTCOMES.get(status, suite.NoExact("too slow"))
+        if isinstance(found, Exception):
+            raise found
+        return found
+
+    monkeypatch.setattr(suite, "PROPERTIES", {"closure": SimpleNamespace(check=check, version=1, about="")})
+    found = suite.judged("closure", SimpleNamespace(scene=SCENE))
+    assert (found.property, found.scene) == ("closure", "s")
+    assert found.status == ("outside" if status == "unknown" else status)
+
+
+@pytest.mark.parametrize(
+    ("cannot", "settings", "impossible", "status"),
+    [
+        ("no loop", ["a"], False, "cannot"),
+        ("no loop", ["a"], True, PASS),
+        (None, ["a"], True, FAIL),
+        (None, [], False, FAIL),
+        (None, ["a"], False, PASS),
+    ],
+)
+def test_a_refusal_names_its_check_and_its_scene(monkeypatch, cannot, settings, impossible, status):
+    monkeypatch.setattr(suite, "is_undetermined", lambda scene: impossible)
+    found = suite.refusal(SimpleNamespace(scene=SCENE, cannot=cannot, settings=settings))
+    assert (found.property, found.scene, found.status) == (REFUSAL, "s", status)
+
+
+def test_a_sentence_on_a_verdict():
+    assert suite._sentence(Verdict("closure", "s", FAIL, 0.25, 0.125, "r")).plain == (
+        "fail: s, closure: 0.25, allowed 0.125 (r)"
+    )
+    assert suite._sentence(Verdict("closure", "s", FAIL, 0.25, 0.125)).plain == (
+        "fail: s, closure: 0.25, allowed 0.125"
+    )
+    assert suite._sentence(Verdict("closure", "s", "cannot", reason="r")).plain == "cannot: s, closure: r"
