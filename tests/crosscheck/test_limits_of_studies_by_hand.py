@@ -846,3 +846,13 @@ def test_columns_of_a_bar():
     names = ["TextColumn", "BarColumn", "MofNCompleteColumn", "TimeElapsedColumn", "TextColumn"]
     assert [type(column).__name__ for column in columns] == [*names, "TimeRemainingColumn", "_Working"]
     assert (columns[0].text_format, columns[4].text_format) == ("{task.description}", "left")
+
+
+def test_the_watch_ends_with_the_progress():
+    calls: list[str] = []
+    lines = progress._Lines("runs", 4, None, progress.UnderWay())
+    lines._over = SimpleNamespace(set=lambda: calls.append("over"))
+    lines._watch = SimpleNamespace(start=lambda: calls.append("start"), join=lambda: calls.append("join"))
+    with lines as entered:
+        calls.append("work")
+    assert entered is lines and calls == ["start", "work", "over", "join"]
