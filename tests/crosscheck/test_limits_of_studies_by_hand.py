@@ -17,9 +17,11 @@ from crosscheck.study import (
     difference,
     fair_timing,
     grid,
+    hurried,
     ladder,
     least_errors,
     origin,
+    pictures,
     progress,
     record_view,
     scouting,
@@ -856,3 +858,38 @@ def test_the_watch_ends_with_the_progress():
     with lines as entered:
         calls.append("work")
     assert entered is lines and calls == ["start", "work", "over", "join"]
+
+
+# --- runs of cases ------------------------------------------------------------------------------------------
+def test_runs_of_a_case(monkeypatch):
+    """Engine, scene, times, setting and limit in this order; a record is made of the case and its run."""
+    [case] = family(0.1)
+    given = ("e", SCENE, TIMES, case.setting)
+    asked: list[Any] = []
+
+    bodies = {"b": {"position": [[1.0, 0.0, 0.0]], "orientation": [[1.0, 0.0, 0.0, 0.0]]}}
+
+    def run_by(name: str) -> Any:
+        return lambda *of: asked.append((name, *of)) or SimpleNamespace(outcome=None)
+
+    for module in (pictures, hurried, grid):
+        monkeypatch.setattr(module, "run_estimated", run_by("estimated"))
+        monkeypatch.setattr(module, "record_of", lambda *of: {"bodies": bodies, "of": of})
+    monkeypatch.setattr(grid, "run_once", run_by("once"))
+    pictures._run(case)
+    assert hurried.Hurried()(case)["of"][0] is case
+    assert grid.run_case(case)["of"][0] is case and grid.run_here(case)["of"][0] is case
+    assert asked == [("estimated", *given, 5.0)] * 3 + [("once", *given)]
+    assert pictures._pictured(case, "run")["of"] == (case, "run")
+
+
+def test_a_run_out_of_time_is_not_followed(monkeypatch):
+    """The record of a finer setting names engine, scene and setting."""
+    coarse, fine = family(0.2, 0.1)
+    late = SimpleNamespace(outcome=hurried.Outcome.TIMED_OUT)
+    monkeypatch.setattr(hurried, "run_estimated", lambda *of: late)
+    monkeypatch.setattr(hurried, "failed", lambda *of: of)
+    made = hurried.Hurried()
+    assert made.trajectory(coarse) is late
+    wanted = ("e", "", SCENE, fine.setting, hurried.Outcome.TIMED_OUT, hurried.NOT_STARTED)
+    assert made.trajectory(fine) == wanted
