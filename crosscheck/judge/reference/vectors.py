@@ -19,7 +19,7 @@ REFINEMENTS = 40
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return vector products (…, 3)."""
     a, b = (np.concatenate([v, v[..., :2]], axis=-1) for v in (a, b))
-    return a[..., 1:4] * b[..., 2:5] - a[..., 2:5] * b[..., 1:4]
+    return a[..., 1:4] * b[..., 2:] - a[..., 2:] * b[..., 1:4]
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
