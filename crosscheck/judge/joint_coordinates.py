@@ -76,7 +76,7 @@ def coordinates(
     turned = twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
     w = [angular_velocity[..., b, :] for b in joint.bodies]
     rate = resolve(frames[0], w[1] - w[0])[..., 2]
-    return np.stack([counted(times, turned, rate), resolve(frames[0], offset)[..., 2]], axis=-1)
+    return np.stack([counted(times, turned, rate), resolve(frames[0], offset)[:, 2]], axis=1)
 
 
 def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -140,7 +140,7 @@ def reflected(
     names = tuple(joint.name for joint in geared)
     frames = {joint.name: joint for joint in joint_frames(scene)}
     motion = *with_ground(position, orientation), grounded(velocity), grounded(angular_velocity)
-    still = np.zeros((len(scene.body) + 1, 3))
+    still = grounded(np.zeros((len(scene.body), 3)))
     jacobian, drift = np.zeros((len(geared), 6 * len(scene.body))), np.zeros(len(geared))
     for k, joint in enumerate(geared):
         column = COORDINATES.index(joint.facts.driven)

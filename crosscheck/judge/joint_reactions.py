@@ -186,7 +186,8 @@ def _at_sample(
     scene: Scene, first: Trajectory, second: Trajectory, k: int, scale: float
 ) -> dict[str, tuple[int, float, float]]:
     """Return (shared, unique, chosen) by joint, at one sample."""
-    assert first.reactions is not None and second.reactions is not None
+    assert first.reactions is not None
+    assert second.reactions is not None
     units = np.repeat([1.0, scene_length(scene)], 3)
     shared = shared_wrenches(scene, first.times[k], first.position[k], first.orientation[k])
     joints = {}

@@ -58,8 +58,7 @@ def distance(body: str) -> Measure:
     """Return the largest distance of a body's centre from its true position, m."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
-        off = _off(scene, body, motion, exact)
-        return None if off is None else float(off.max(initial=0.0))
+        return None if exact is None else float(_off(scene, body, motion, exact).max(initial=0.0))
 
     return measure
 
@@ -69,11 +68,10 @@ def relative_distance(body: str) -> Measure:
     position from the origin."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
-        off = _off(scene, body, motion, exact)
-        if off is None or exact is None:
+        if exact is None:
             return None
         true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=1)
-        return float((off / true).max(initial=0.0))
+        return float((_off(scene, body, motion, exact) / true).max(initial=0.0))
 
     return measure
 
@@ -82,8 +80,9 @@ def mean_square_distance(body: str) -> Measure:
     """Return the root mean square distance of a body's centre from its true position, m."""
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
-        off = _off(scene, body, motion, exact)
-        return None if off is None or not off.size else float(np.sqrt(np.mean(off**2)))
+        if exact is None or not len(exact.times):
+            return None
+        return float(np.sqrt(np.mean(_off(scene, body, motion, exact) ** 2)))
 
     return measure
 
@@ -115,9 +114,7 @@ def guided(body: str) -> Measure:
     return measure
 
 
-def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory | None) -> np.ndarray | None:
+def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory) -> np.ndarray:
     """Return the distances (k,) of a body's centre from its true position, m."""
-    if exact is None:
-        return None
     b, k = scene.body_index(body), len(exact.times)
     return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=1))

@@ -51,7 +51,8 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
 def _of_armatures(scene: Scene, exact: Trajectory, k: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows (c, 6 nb) of coordinates q with an armature I at a sample, and their forces -I q''
     (c,)."""
-    assert exact.acceleration is not None and exact.angular_acceleration is not None
+    assert exact.acceleration is not None
+    assert exact.angular_acceleration is not None
     state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
     found = reflected(scene, *state)
     twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
