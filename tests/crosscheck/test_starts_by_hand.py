@@ -270,8 +270,8 @@ def test_reactions_of_a_hinge_with_an_armature():
         turn,
         rest,
         rest,
-        acceleration=rest + [0.0, second, 0.0],
-        angular_acceleration=rest + [0.0, 0.0, second],
+        acceleration=rest + np.array([0.0, second, 0.0]),
+        angular_acceleration=rest + np.array([0.0, 0.0, second]),
     )
     found = reaction_balance.with_exact_reactions(scene, exact)
     wanted = [0.0, 20.0 + 2 * second, 0.0, 0.0, 0.0, -0.5 * second]
