@@ -161,10 +161,10 @@ def side_by_side(scene: Scene, runs: Mapping[str, Trajectory], sample: int) -> d
 def resultants(scene: Scene, run: Trajectory, samples: np.ndarray | int) -> np.ndarray:
     """Return force and moment about the centre of mass (…, nb, 6), world, of all joints on every body, at
     samples (…)."""
-    assert run.reactions is not None
     position, orientation = run.position[samples], run.orientation[samples]
     total = np.zeros((*position.shape[:-1], 6))
     for joint in scene.joint:
+        assert run.reactions is not None
         wrench = run.reactions[joint.name][samples]
         anchor = _anchor(scene, joint, position, orientation)
         for sign, name in zip((-1.0, 1.0), joint.bodies, strict=True):

@@ -129,13 +129,13 @@ def idle(scene: Scene, run: Trajectory, exact: Trajectory) -> float:
 def _idle_at(scene: Scene, run: Trajectory, k: int, units: np.ndarray) -> float:
     position, orientation = run.position[k], run.orientation[k]
     rows, _ = jacobian(scene, run.times[k], position, orientation)
-    assert run.reactions is not None
     left = [np.zeros(6)]
     for joint, wrenches in of_multipliers(scene, rows, position, orientation):
         held = wrenches / units[:, None]
         if joint.reflected_inertia and joint.facts.driven:
             along = along_coordinate(scene, joint, joint.facts.driven, position, orientation)
             held = np.column_stack([held, along])  # a force or a moment alone
+        assert run.reactions is not None
         wrench = run.reactions[joint.name][k] / units
         left.append(wrench - held @ np.linalg.lstsq(held, wrench, rcond=RANK)[0])
     return float(np.abs(left).max())
