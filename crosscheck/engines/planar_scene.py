@@ -67,9 +67,8 @@ def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
     along = [bool(abs(axis @ normal) < PARALLEL) for axis in axes]
 
     def hinge() -> Joint:
-        return Revolute(
-            name=joint.name, bodies=joint.bodies, anchor=joint.anchor_pair[0], axis=tuple(normal.tolist())
-        )
+        anchor, _ = joint.anchor_pair
+        return Revolute(name=joint.name, bodies=joint.bodies, anchor=anchor, axis=tuple(normal.tolist()))
 
     if isinstance(joint, Fixed) or (isinstance(joint, Revolute) and across[0]):
         return joint
@@ -87,7 +86,7 @@ def _closed_by_points(scene: Scene) -> Scene:
     acting |= {joint.name for joint in scene.joint if joint.reflected_inertia}
     cut = {closure.joint for closure in spanning_tree(scene).closures if closure.kind == "weld"}
     joints = [
-        Spherical(name=joint.name, bodies=joint.bodies, anchor=joint.anchor_pair[0])
+        Spherical(name=joint.name, bodies=joint.bodies, anchor=joint.anchor)
         if j in cut and isinstance(joint, Revolute) and joint.name not in acting
         else joint
         for j, joint in enumerate(scene.joint)

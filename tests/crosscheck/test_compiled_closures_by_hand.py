@@ -292,7 +292,7 @@ def test_a_prescribed_coordinate():
 
 def test_rates_of_a_quaternion():
     """q (0, ω) / 2 of a unit quaternion in the direction of q."""
-    q, omega, out = np.array([1.0, -2.0, 3.0, 0.5]), np.array([0.7, -1.1, 0.4]), np.zeros(4)
+    q, omega, out = np.array([1.5, -2.0, 3.0, 0.5]), np.array([0.7, -1.1, 0.4]), np.zeros(4)
     rates.turn_rates(q, omega, out)
     w, v = q[0], q[1:]
     product = np.array([-v @ omega, *(w * omega + np.cross(v, omega))])

@@ -375,6 +375,12 @@ def test_pieces_of_a_chain():
     assert first.origin.tolist() == [1.0, 1.0, 0.0] and first.anchor.tolist() == [1.0, 0.0, 0.0]
     assert first.mass == 2.0 and first.offset.tolist() == list(Z) and first.inertia[2, 2] == 3.0
     assert ball.origin.tolist() == [3.0, 1.0, 0.0]
+    three = SimpleNamespace(links=(link(SLIDE, SLIDE, TURN),), starts=(4,))
+    assert [(p.velocity, p.parent, p.link) for p in pieces(three, 1e-3)] == [
+        (4, -1, -1),
+        (5, 0, -1),
+        (6, 1, 0),
+    ]
 
 
 # --- drivers ----------------------------------------------------------------------------------------------

@@ -257,6 +257,30 @@ def test_joints_in_the_plane_whose_normal_is_z(joint, kind):
         assert found is (None if kind is None else joint)
 
 
+@pytest.mark.parametrize(("off", "is_parallel"), [(0.25, False), (0.2499, True)])
+def test_the_limits_of_axes_in_the_plane(off, is_parallel, monkeypatch):
+    """A quarter, as a sine of the angle or as a part along the normal."""
+    monkeypatch.setattr(planar_scene, "PARALLEL", 0.25)
+    monkeypatch.setattr(planar_scene, "unit", lambda axis: axis)
+    for joint in (
+        hinge("J", *ENDS, *X, axis=(off, 0.0, 1.0)),
+        Translational(name="J", bodies=ENDS, anchor=X, axis=(1.0, 0.0, off)),
+        Translational(name="J", bodies=ENDS, anchor=X, axis=(1.0, 0.0, -off)),
+    ):
+        assert (planar_scene._hinged(joint, np.array(Z)) is joint) is is_parallel
+
+
+@pytest.mark.parametrize(
+    ("velocity", "spin"), [((0.0, 0.0, 1.0), (0.0, 0.0, 4.0)), ((4.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+)
+def test_the_limit_of_velocities_within_the_plane(velocity, spin, monkeypatch):
+    """A quarter of the largest velocity, 4 m/s or rad/s."""
+    free = Scene(name="s", body=(body("a", *O, velocity=velocity, angular_velocity=spin),))
+    for limit, is_within in ((0.25, True), (0.2499, False)):
+        monkeypatch.setattr(planar_scene, "AT_REST", limit)
+        assert planar_scene._starts_within(free, np.array(Z)) is is_within
+
+
 @pytest.mark.parametrize(
     ("velocity", "spin", "is_within"),
     [

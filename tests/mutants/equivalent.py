@@ -46,11 +46,6 @@ OPTIONS = (
 COLLECTOR = "The garbage collector only takes time during imports; nothing is collected otherwise."
 REASONS: dict[tuple[str, str, str], str] = {
     (
-        "crosscheck/engines/pinocchio/adapter.py",
-        'return family == "tuned" or super().serves(scene, family)',
-        "(super().serves(scene, family))",
-    ): "The settings of every scene have this family; the condition saves their computation.",
-    (
         "crosscheck/conformance/relations.py",
         "return np.eye(3) if np.linalg.det(self.matrix) > 0 else FLIP",
         "(np.linalg.det(self.matrix) >= 0)",

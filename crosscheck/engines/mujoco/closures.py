@@ -111,7 +111,7 @@ def least(rows, wanted, change, count, n):
     for k in range(min(count, n)):
         best, square = largest(rows, k, count, n)
         enough = REDUNDANT * REDUNDANT * square if k == 0 else enough
-        if best < 0 or square <= enough:
+        if square <= enough:
             break
         for j in range(n):
             rows[k, j], rows[best, j] = rows[best, j], rows[k, j]

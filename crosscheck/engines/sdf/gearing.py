@@ -36,7 +36,7 @@ def _hinge(
         if joint.type != "revolute" or set(joint.bodies) != {reference, link}:
             continue
         own = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
-        if np.linalg.norm(np.cross(own, axis)) <= PARALLEL:
+        if np.linalg.norm(own - (own @ axis) * axis) <= PARALLEL:
             sense = 1 if own @ axis > 0 else -1
             return joint, sense if joint.bodies[0] == reference else -sense
     raise SceneError(
