@@ -468,6 +468,9 @@ def test_what_is_tried_in_turn(monkeypatch, simple_left, changed_left, noise, tr
         def asked(*of: Any) -> list[Any]:
             seen.append(name)
             assert name == "simple" or of[-1] == 20.0, "s of CPU time"
+            assert {"simple": of[0] is given, "changed": of[:2] == (SCENE, given), "pairs": of[0] is given}[
+                name
+            ]
             return [cause(left, 1, name)]
 
         return asked
@@ -502,3 +505,19 @@ def test_a_motion_without_a_reference(monkeypatch):
     )
     with pytest.raises(SceneError, match="s: has no reference: no time"):
         judgement.judge_motion(SCENE, {"time": [0.0, 1.0], "a.position.x": [1.0, 1.0]})
+
+
+def test_a_recording_by_its_file_or_its_columns(monkeypatch, tmp_path):
+    """The exact motion is asked for the scene, at the times of the recording and between them."""
+    asked: list[Any] = []
+    recording = Recording(np.array([0.0, 1.0]), {"a.position.x": np.ones(2)})
+    monkeypatch.setattr(judgement, "read", lambda *of: asked.append(of) or recording)
+    known = Exact(SimpleNamespace(times=np.array([0.0, 1.0])), np.zeros(2), "")
+    monkeypatch.setattr(judgement, "exact", lambda *of: asked.append(of) or known)
+    monkeypatch.setattr(judgement, "_judged", lambda *of: of)
+    scene, judged_recording, found, tolerance = judgement.judge_motion(
+        SCENE, str(tmp_path / "t.csv"), 7.0, 0.5
+    )
+    assert asked[0] == (tmp_path / "t.csv", SCENE, {}) and asked[1][::2] == (SCENE, 7.0)
+    assert len(asked[1][1]) == 401 and scene == SCENE and found is known and tolerance == 0.5
+    assert judged_recording.columns["a.position.x"].tolist() == [1.0, 1.0]

@@ -549,7 +549,11 @@ def test_default_cases_of_a_scene(monkeypatch):
 def test_fields_of_a_record(monkeypatch):
     [case] = family(0.1)
     made = SimpleNamespace(to_record=lambda: {"engine": "long name", "t_end": 1.0})
-    monkeypatch.setattr(grid.metrics, "measure", lambda scene, run, truth: {"truth": truth})
+    monkeypatch.setattr(
+        grid.metrics,
+        "measure",
+        lambda scene, run, truth: {"truth": truth} if scene is SCENE and run is made else {},
+    )
     monkeypatch.setattr(grid, "_truth", lambda scene, seconds: (scene.name, seconds))
     monkeypatch.setattr(grid, "made_by", lambda: {"date": "today"})
     monkeypatch.setattr(grid, "shown_name", lambda name: f"shown {name}")
@@ -893,3 +897,10 @@ def test_a_run_out_of_time_is_not_followed(monkeypatch):
     assert made.trajectory(coarse) is late
     wanted = ("e", "", SCENE, fine.setting, hurried.Outcome.TIMED_OUT, hurried.NOT_STARTED)
     assert made.trajectory(fine) == wanted
+
+
+def test_the_truth_of_a_scene_is_found_once(monkeypatch):
+    asked: list[Any] = []
+    monkeypatch.setattr(grid, "truth_for", lambda *of: asked.append(of) or "truth")
+    other = SCENE.with_(name="a scene of this test")
+    assert grid._truth(other, 3.5) == grid._truth(other, 3.5) == "truth" and asked == [(other, 3.5)]

@@ -471,7 +471,9 @@ def test_differences_that_are_allowed(monkeypatch, swept, perturbed, accuracy, r
 )
 def test_rank_tolerance_of_a_run(monkeypatch, rounding, left, wanted):
     """16 roundings of the engine, or 16 residuals of the run."""
-    monkeypatch.setattr(trial, "violation_series", lambda scene, run: np.array([0.0, left]))
+    monkeypatch.setattr(
+        trial, "violation_series", lambda scene, run: np.array([0.0, left * len(run.bodies) / 2])
+    )
     made = trial.Bench(SimpleNamespace(rounding=rounding), trial.Specimen(SCENE), "", None, [])
     made.__dict__["motion"] = motion()
     assert made.rank == wanted
@@ -480,7 +482,7 @@ def test_rank_tolerance_of_a_run(monkeypatch, rounding, left, wanted):
 @pytest.mark.parametrize(("rate", "step"), [(2.0, 5e-5), (50.0, 2e-5)])
 def test_neighbouring_samples(monkeypatch, rate, step):
     """A ten-thousandth of 0.5 s, or the time in which the bodies turn by a thousandth of a radian."""
-    monkeypatch.setattr(trial, "motion_rate", lambda scene, run: rate)
+    monkeypatch.setattr(trial, "motion_rate", lambda scene, run: rate * scene.duration / run.times[-1])
     made = trial.Bench(None, trial.Specimen(SCENE), "", None, [])
     made.__dict__["motion"] = motion()
     monkeypatch.setattr(trial.Bench, "run", lambda self, scene, times: times)
@@ -579,3 +581,28 @@ def test_formulas_obey_newton_and_euler(name):
     assert np.sin(turned - wanted) == pytest.approx(0.0, abs=1e-8), name
     if name in PLACES:
         assert position[:, -1] == pytest.approx(PLACES[name](times).T, abs=1e-9)
+
+
+def test_motions_that_a_bench_compares(monkeypatch):
+    """Pushes of the run with those of the perturbed run, and with those of the next coarser setting."""
+    asked: list[Any] = []
+    made = trial.Bench(SimpleNamespace(rounding=0.25), trial.Specimen(SCENE), "", None, [])
+    monkeypatch.setattr(trial, "pushes_apart", lambda *of: asked.append(of) or (0.0, "of"))
+    made.__dict__.update(motion="run", perturbed="perturbed", sweep=["run", "coarser"], rank=1e-9)
+    assert made.own_pushes == trial.SAME_PUSHES
+    made.__dict__.pop("own_pushes")
+    made.__dict__["sweep"] = ["run"]
+    assert made.own_pushes == trial.SAME_PUSHES
+    wanted = [(SCENE, "run", other, 1e-9) for other in ("perturbed", "coarser", "perturbed", "run")]
+    assert asked == wanted
+
+
+def test_the_perturbed_run_and_the_exact_motion_of_a_bench(monkeypatch):
+    made = trial.Bench(SimpleNamespace(rounding=0.25), trial.Specimen(SCENE), "", None, [])
+    monkeypatch.setattr(trial, "nudged", lambda *of: ("nudged", *of))
+    monkeypatch.setattr(trial.Bench, "run", lambda self, *of: of)
+    monkeypatch.setattr(trial, "exact_motion", lambda *of: ("exact", *of))
+    monkeypatch.setattr(trial, "exact_bound", lambda *of: ("bound", *of))
+    assert made.perturbed == (("nudged", SCENE, 0.25), made.times)
+    assert made.exact == ("exact", made.specimen, made.times)
+    assert made.exact_bound == ("bound", made.specimen, made.exact)

@@ -305,6 +305,22 @@ def test_velocities_of_neighbouring_samples(monkeypatch):
     )
 
 
+def test_terms_at_the_middle_sample(monkeypatch):
+    """The engine's own motion, at the sample between its neighbours."""
+    asked: list[Any] = []
+    bench = SimpleNamespace(scene=SCENE, close="close")
+    monkeypatch.setattr(hint, "_differences", lambda *of: asked.append(of) or np.array([1.0]))
+    monkeypatch.setattr(hint, "terms_at", lambda *of: asked.append(of) or np.array([3.0]))
+    monkeypatch.setattr(
+        hint, "variants", lambda *of: asked.append(of) or [("loads", "none", np.array([1.0]))]
+    )
+    monkeypatch.setattr(hint, "accelerations", lambda scene, terms: terms if scene is SCENE else None)
+    monkeypatch.setattr(hint, "_least", lambda scene: 0.0)
+    monkeypatch.setattr(hint, "_rounded", lambda bench: 0.0)
+    assert hint.explanations(bench) == {("loads", "none")}
+    assert asked == [(SCENE, bench), (SCENE, "close", 4), (SCENE, "close", 4)]
+
+
 # --- smaller scenes -----------------------------------------------------------------------------------------
 def test_a_check_that_fails_on_a_scene(monkeypatch):
     asked: list[Any] = []
