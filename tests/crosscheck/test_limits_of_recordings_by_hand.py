@@ -244,8 +244,8 @@ def test_scenes_are_changed_while_there_is_time(monkeypatch):
     clock = iter([0.0, 3.0, 3.1])
     monkeypatch.setattr(changed_scenes, "time", SimpleNamespace(thread_time=lambda: next(clock)))
     monkeypatch.setattr(changed_scenes, "changes", lambda scene: [Change(None, 1.0, lambda x: f"by {x}")] * 3)
-    monkeypatch.setattr(changed_scenes, "_fitted", lambda change, d: (0.5, {"A": 1}))
-    assert list(changed_scenes.changed(SCENE, None, 3.0)) == [("by 0.5", 2, {"A": 1})]
+    monkeypatch.setattr(changed_scenes, "_fitted", lambda change, d: (0.5 * change.small, {"A": d}))
+    assert list(changed_scenes.changed(SCENE, 1, 3.0)) == [("by 0.5", 2, {"A": 1})]
 
 
 def test_a_damper_to_begin_with(monkeypatch):

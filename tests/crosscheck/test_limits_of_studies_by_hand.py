@@ -904,3 +904,62 @@ def test_the_truth_of_a_scene_is_found_once(monkeypatch):
     monkeypatch.setattr(grid, "truth_for", lambda *of: asked.append(of) or "truth")
     other = SCENE.with_(name="a scene of this test")
     assert grid._truth(other, 3.5) == grid._truth(other, 3.5) == "truth" and asked == [(other, 3.5)]
+
+
+# --- questions and their arguments --------------------------------------------------------------------------
+def test_settings_that_are_asked_in_a_child(monkeypatch):
+    """The answer, a refusal, or a failure, which counts as one."""
+    refusal, asked = Cannot(Owner.ENGINE, "no loop"), []
+    answers: dict[str, Any] = {"able": (None, ["a", "b"]), "unable": (refusal, [])}
+
+    def capabilities(name: str, scene: Scene, seconds: float) -> Any:
+        asked.append((name, scene, seconds))
+        if name not in answers:
+            raise scouting.ChildFailed(grid.Outcome.CRASHED, "lost")
+        return ("1", *answers[name])
+
+    monkeypatch.setattr(scouting, "capabilities", capabilities)
+    assert scouting._asked(("able", SCENE)) == ("a", "b") and scouting._asked(("unable", SCENE)) == refusal
+    assert scouting._asked(("gone", SCENE)) == Cannot(Owner.ADAPTER, "its settings are unknown: lost")
+    assert asked == [(name, SCENE, scouting.READY_SECONDS) for name in ("able", "unable", "gone")]
+
+
+def test_settings_that_are_asked_here(monkeypatch):
+    refusal = Cannot(Owner.ENGINE, "no loop")
+    answers = {"able": None, "unable": refusal}
+    monkeypatch.setattr(
+        scouting,
+        "engine",
+        lambda name: SimpleNamespace(cannot=lambda scene: answers[name], settings=lambda scene: [scene.name]),
+    )
+    assert scouting._offered("able", SCENE) == ("s",) and scouting._offered("unable", SCENE) == refusal
+    assert scouting.shown_name("m") == "m" and scouting.shown_name("m:gone") == "m:gone"
+
+
+def test_the_finest_settings_are_asked_for_the_scene(monkeypatch):
+    asked: list[Any] = []
+    monkeypatch.setattr(
+        least_errors, "default_cases", lambda *of, **more: asked.append((of, more)) or (family(0.1), [])
+    )
+    assert least_errors.candidates(SCENE, ["e"]) == family(0.1)
+    assert asked == [((SCENE, ["e"]), {"time_limit": 240.0})]
+
+
+def test_a_reference_is_asked_for_the_scene_at_the_times(monkeypatch):
+    asked: list[Any] = []
+
+    def reference(*of: Any) -> Any:
+        asked.append(of)
+        return truths.NoReference("none", 0.0, SimpleNamespace(times=np.zeros(0)))
+
+    monkeypatch.setattr(truths, "reference", reference)
+    assert truths._of_reference(SCENE, TIMES, 7.0)["reason"] == "none"
+    assert asked == [(SCENE, [0.0, 1.0], 7.0)]
+
+
+def test_a_record_as_a_trajectory_of_its_scene():
+    place = np.zeros((2, 1, 3))
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (2, 1, 1))
+    made = Trajectory("s", "e", "1", "m", {}, TIMES, ("b",), place, turn, place, place)
+    found = fair_timing._motion(SCENE, made.to_record())
+    assert found.scene == "s" and found.times.tolist() == [0.0, 1.0]
