@@ -35,7 +35,7 @@ def shrunk(scene: Scene, fails: Callable[[Scene], bool], tries: int = TRIES) -> 
     reduction still fails, the scene itself is returned.
     """
     left, found = tries, True
-    while found and left > 0:
+    while found:
         found = False
         for smaller in _smaller(scene):
             left -= 1

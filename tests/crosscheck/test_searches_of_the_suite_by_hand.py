@@ -511,3 +511,25 @@ def test_a_sentence_on_a_verdict():
         "fail: s, closure: 0.25, allowed 0.125"
     )
     assert suite._sentence(Verdict("closure", "s", "cannot", reason="r")).plain == "cannot: s, closure: r"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "conforms"),
+    [
+        ([Verdict(REFUSAL, "s", PASS)], False),
+        ([Verdict(REFUSAL, "s", PASS), Verdict("truth", "s", "outside")], False),
+        ([Verdict(REFUSAL, "s", PASS), Verdict("closure", "s", PASS)], True),
+        ([Verdict("closure", "s", PASS), Verdict("truth", "s", FAIL)], False),
+        ([Verdict("closure", "s", PASS), Verdict("truth", "s", "cannot")], True),
+    ],
+)
+def test_an_engine_conforms_by_a_passed_check_of_a_run(verdicts, conforms):
+    assert Conformance("e", "1", verdicts).conforms is conforms
+
+
+@pytest.mark.parametrize(("status", "count"), [(PASS, 1), (FAIL, 1), ("cannot", 0), ("outside", 0)])
+def test_scenes_that_were_run(status, count):
+    said = suite._summary(
+        Conformance("e", "1", [Verdict(RUN, "s", status), Verdict("closure", "t", PASS)])
+    ).plain
+    assert f"; {count} of 2 scenes run" in said and ("is not shown" in said) is (count == 0)
