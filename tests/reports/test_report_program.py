@@ -142,16 +142,22 @@ def test_faults_and_an_interrupt_set_the_exit_status(calls, tmp_path, capsys, mo
     raising(program.RequestError("no engine", "no scene"))
     assert program.main(["--quick", "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err == "no engine\nno scene\n" and "write" not in calls
+    raising(OSError(28, "No space left on device", "a file"))
+    assert program.main(["--quick", "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "a file: No space left on device\n" and "write" not in calls
+    raising(OSError("no file is named"))
+    with pytest.raises(OSError, match="no file is named"):
+        program.main(["--quick", "--out", str(tmp_path)])
     assert program.main([str(tmp_path / "none.toml"), "--out", str(tmp_path)]) == 2
     assert "none.toml" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])
-def test_sections_with_scenes_of_their_own_take_no_others(tmp_path, capsys, asked, given):
+def test_sections_with_scenes_of_their_own_take_no_others(calls, tmp_path, capsys, asked, given):
     folder = tmp_path / "report"
     assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
     assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err
-    assert not folder.exists(), "something was run"
+    assert not folder.exists() and not calls, "something was run"
 
 
 @pytest.mark.parametrize(("depth", "is_whole"), [("quick", False), ("whole", True)])
@@ -172,13 +178,15 @@ def test_section_of_the_paper_prints_its_score(tmp_path, capsys, monkeypatch, de
 
 
 def test_animated_picture_of_the_readme(tmp_path, capsys, monkeypatch):
-    made = SimpleNamespace(scene=still("s"), exact=None, records=[{"scene": "s"}], singular=[0.25])
+    made = SimpleNamespace(scene=still("s"), exact="exact", records=[{"scene": "s"}], singular=[0.25])
     monkeypatch.setattr(program, "moving_picture", lambda: made)
     monkeypatch.setattr(
-        mechanisms, "compared", lambda scene, exact, runs, singular: f"{scene.name}{singular}"
+        mechanisms,
+        "compared",
+        lambda scene, exact, runs, singular: f"{scene.name} {exact} {runs[0].scene} {singular}",
     )
     assert program.main(["--picture", str(tmp_path / "a.svg")]) == 0
-    assert (tmp_path / "a.svg").read_text() == "s[0.25]"
+    assert (tmp_path / "a.svg").read_text() == "s exact s [0.25]"
     assert capsys.readouterr().err == f"written: {tmp_path / 'a.svg'}\n"
 
 
