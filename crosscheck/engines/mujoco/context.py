@@ -11,7 +11,7 @@ import ctypes
 import functools
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 import psutil
@@ -86,7 +86,7 @@ def function(name: str) -> int:
     import mujoco
 
     path = library(Path(mujoco.__file__).parent)
-    return int(ctypes.cast(getattr(ctypes.CDLL(str(path)), name), ctypes.c_void_p).value or 0)
+    return cast(int, ctypes.cast(getattr(ctypes.CDLL(str(path)), name), ctypes.c_void_p).value)
 
 
 def library(package: Path) -> Path:
