@@ -1,7 +1,8 @@
-"""mbref run, draw and animate with stand-ins for their runs / files, lines and exit status by hand."""
+"""Commands of mbref with stand-ins for their runs / files, lines and exit status by hand."""
 
 from __future__ import annotations
 
+import json
 import math
 from contextlib import contextmanager
 from dataclasses import replace
@@ -11,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from mbref.cli import pictures, run
+from mbref.cli import diagnose, pictures, plotting, run, scene_files, statics
 from mbref.cli.commands import parser
 from mbref.input_error import InputError
 from mbref.method import MethodError
-from mbref.scene import Body, Scene
+from mbref.scene import Body, Scene, SceneError
 from mbref.simulation import simulate as simulation
 from mbref.stepping.limits import Limits
 from mbref.trajectory import Cost, Outcome
@@ -254,3 +255,159 @@ def test_lines_of_a_run(capsys):
 
 def replace_times(made: Any) -> Any:
     return SimpleNamespace(**{**vars(made), "times": np.zeros(0), "message": "", "known_estimate": None})
+
+
+# --- diagnosis, plots, vibrations and scene files -----------------------------------------------------------
+@pytest.mark.parametrize(
+    ("words", "at_start", "along", "swaps"),
+    [
+        ([], 0, SimpleNamespace(redundant=0), []),
+        ([], 1, SimpleNamespace(redundant=0), [{"A": "spherical"}]),
+        ([], 0, SimpleNamespace(redundant=1), [{"A": "spherical"}]),
+        ([], 0, "it is locked", []),
+        (["--start"], 0, None, []),
+    ],
+)
+def test_exchanges_are_searched_where_rows_are_redundant(monkeypatch, capsys, words, at_start, along, swaps):
+    found = SimpleNamespace(counts=SimpleNamespace(redundant=at_start))
+    warned: list[Any] = []
+    monkeypatch.setattr(diagnose, "find_scene", lambda name: SCENE)
+    monkeypatch.setattr(diagnose, "warn", warned.append)
+    monkeypatch.setattr(diagnose, "_along", lambda scene: along)
+    monkeypatch.setattr("mbref.equations.diagnosis.diagnose", lambda scene: found)
+    monkeypatch.setattr("mbref.design.exchange.exchanges", lambda scene: [{"A": "spherical"}])
+    monkeypatch.setattr(
+        diagnose, "_record", lambda *given: {"given": [given[1] is found, given[2] is along, given[3]]}
+    )
+    assert diagnose._diagnose(parser().parse_args(["diagnose", "s", "--json", *words])) == 0
+    assert json.loads(capsys.readouterr().out) == {"given": [True, True, swaps]} and warned == [SCENE]
+    parts = ("scene", "unit", "start", "motion", "swap", "driver")
+    for name in parts:
+        monkeypatch.setattr(diagnose, f"_{name}_lines", lambda *given, name=name: [f"{name} {len(given)}"])
+    assert diagnose._diagnose(parser().parse_args(["diagnose", "s", *words])) == 0
+    assert capsys.readouterr().out.split("\n")[:-1] == [f"{name} {1 + (name == 'swap')}" for name in parts]
+
+
+def test_a_motion_that_cannot_be_diagnosed(monkeypatch):
+    def locked(scene: Scene) -> None:
+        raise SceneError(["it is locked", "more"])
+
+    monkeypatch.setattr("mbref.design.along_motion.along_motion", locked)
+    assert diagnose._along(SCENE) == "it is locked"
+    monkeypatch.setattr("mbref.design.along_motion.along_motion", lambda scene: scene)
+    assert diagnose._along(SCENE) is SCENE
+
+
+@pytest.mark.parametrize("columns", [[], ["energy", "b.position"]])
+def test_a_plot_of_columns(monkeypatch, capsys, columns):
+    calls: list[Any] = []
+    figure = SimpleNamespace(savefig=lambda path, dpi: calls.append((str(path), dpi)))
+    ended = motion(plot=lambda *names: calls.append(names) or figure)
+    ended.columns = lambda *names: calls.append(("looked up", *names))
+
+    def moved(check: Any) -> Any:
+        if check:
+            check(ended)
+        return ended
+
+    monkeypatch.setattr(plotting, "request_of", lambda options: SimpleNamespace(motion=moved))
+    assert plotting._plot(parser().parse_args(["plot", "s", *columns])) == 0
+    looked_up = [("looked up", *columns)] if columns else []
+    assert calls == [*looked_up, tuple(columns), ("s-plot.svg", 150)]
+    assert capsys.readouterr().out == "s-plot.svg\n"
+
+    def missing(*names: str) -> None:
+        raise ImportError
+
+    ended.plot = missing
+    with pytest.raises(InputError, match="a plot needs matplotlib"):
+        plotting._plot(parser().parse_args(["plot", "s", *columns]))
+
+
+@pytest.mark.parametrize(
+    ("stabilities", "words", "number"),
+    [
+        (["unstable", "stable", "stable"], [], 2),
+        (["unstable", "unstable"], [], 1),
+        (["unstable", "stable", "unstable"], ["--number", "3"], 3),
+    ],
+)
+def test_vibrations_about_the_first_stable_equilibrium(monkeypatch, capsys, stabilities, words, number):
+    found = [SimpleNamespace(stability=s, scene=f"scene {k}") for k, s in enumerate(stabilities, 1)]
+    films: list[Any] = []
+    monkeypatch.setattr(statics, "_found", lambda options: found)
+    monkeypatch.setattr(statics, "_record", lambda each: {"scene": each.scene})
+    monkeypatch.setattr(statics, "_mode_lines", lambda k, each: [f"{k}: {each.scene}"])
+    monkeypatch.setattr(statics, "write_film", lambda *given: films.append(given))
+    monkeypatch.setattr("mbref.design.equilibrium.motion_of_mode", lambda each, mode: (each.scene, mode))
+    assert statics._modes(parser().parse_args(["modes", "s", "--json", *words])) == 0
+    assert json.loads(capsys.readouterr().out) == {"number": number, "scene": f"scene {number}"} and not films
+    assert statics._modes(parser().parse_args(["modes", "s", "--mode", "4", "--out", "x.svg", *words])) == 0
+    [(path, scene, shown, view)] = films
+    assert (str(path), scene, shown, view) == ("x.svg", f"scene {number}", (f"scene {number}", 4), None)
+    assert capsys.readouterr().out == f"{number}: scene {number}\nx.svg\n"
+
+
+def test_lines_of_an_assembled_scene(monkeypatch, capsys, tmp_path):
+    """Moves up to the limit are rounding; a body that turns has its angle."""
+    limit = scene_files.UNMOVED
+    saved: list[Any] = []
+    found = SimpleNamespace(
+        lengths={"A-B": (1.0, 1.25)},
+        joints={"A": limit, "B": 0.25},
+        bodies={"b": (0.5, limit), "c": (limit, limit), "d": (0.0, 0.75)},
+        scene=SimpleNamespace(save=saved.append),
+    )
+    asked: list[Any] = []
+    hinges = [SimpleNamespace(name=name) for name in ("A", "B")]
+    scene: Any = SimpleNamespace(joint=hinges)
+    monkeypatch.setattr(scene_files, "find_scene", lambda name: scene)
+    monkeypatch.setattr("mbref.design.assemble.assemble", lambda *given: asked.append(given) or found)
+    words = ["assemble", "s", "--length", "A-B=1.25", "--out", "x.toml"]
+    assert scene_files._assemble(parser().parse_args(words)) == 0
+    assert asked == [(scene, {("A", "B"): 1.25})] and saved == ["x.toml"]
+    assert capsys.readouterr().out.splitlines() == [
+        "length A-B: 1 m, now 1.25 m",
+        "joint B: moved by 0.25 m",
+        "body b: moved by 0.5 m",
+        "body d: moved by 0 m, turned by 0.75 rad",
+        "x.toml",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("A-B=0.5", ("A", "B")),
+        ("A-B-C=0.5", ("A-B", "C")),
+        ("C-A-B=0.5", ("C", "A-B")),
+        ("x-y=0.5", ("x", "y")),
+        ("x-y-z=0.5", ("x", "y-z")),
+        ("A-B=0", None),
+        ("A-B=inf", None),
+        ("A-B=x", None),
+        ("A-B", None),
+        ("A=0.5", None),
+    ],
+)
+def test_lengths_between_joints(text, found):
+    scene: Any = SimpleNamespace(joint=[SimpleNamespace(name=name) for name in ("A", "B", "C", "A-B")])
+    if found:
+        assert scene_files._length(scene, text) == (found, 0.5)
+        return
+    with pytest.raises(InputError, match="--length: must be A-B=LENGTH with a positive length in m"):
+        scene_files._length(scene, text)
+
+
+def test_new_scene_files(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(scene_files, "find_scene", lambda name: SCENE.with_(name=name))
+    assert scene_files._new(parser().parse_args(["new", "a.toml"])) == 0
+    assert (tmp_path / "a.toml").read_text() == scene_files.template()
+    assert scene_files._new(parser().parse_args(["new", "b.toml", "--like", "c"])) == 0
+    assert Scene.from_file(tmp_path / "b.toml").name == "c"
+    assert capsys.readouterr().out == "a.toml: next, mbref draw a.toml\nb.toml: next, mbref draw b.toml\n"
+    with pytest.raises(InputError, match=r"a\.toml: exists already and was not changed"):
+        scene_files._new(parser().parse_args(["new", "a.toml"]))
+    with pytest.raises(InputError, match=r"FILE: must end in \.toml, got 'a\.txt'"):
+        scene_files._new(parser().parse_args(["new", "a.txt"]))
