@@ -105,15 +105,16 @@ def _torsion_spring(
     along = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
     bodies = [scene.body_index(name) for name in joint.bodies]
     sign = np.round(along @ axis)
+    turn, about = sign * motion.turn, sign * axis
     angle = rate = np.zeros(len(motion.position), motion.position.dtype)
     for body, side in zip(bodies, (-1, 1), strict=True):
         if body >= 0:
-            angle = angle + side * sign * motion.turn[:, body]
-            rate = rate + side * sign * (motion.angular_velocity[:, body] @ axis)
+            angle = angle + side * turn[:, body]
+            rate = rate + side * (motion.angular_velocity[:, body] @ about)
     resistance = load.stiffness * (angle - load.natural_angle) + load.damping * rate
     for body, side in zip(bodies, (-1, 1), strict=True):
         if body >= 0:
-            moment[:, body] -= side * sign * resistance[:, None] * axis
+            moment[:, body] -= side * (resistance[:, None] * about)
 
 
 ACTIONS: dict[type, Callable[..., None]] = {

@@ -80,8 +80,9 @@ def measure(scene: Scene, trajectory: Trajectory, truth: Truth | None = None) ->
     exact = exact_motion(trajectory, truth)
     with np.errstate(all="ignore"):  # metrics report states that are not finite, without warnings
         found = {name: metric.function(scene, trajectory, exact) for name, metric in METRICS.items()}
-    if truth is None or exact is None or not trajectory.times.size:
+    if exact is None or not trajectory.times.size:
         return found | {"error_bound": None, "error_until": None}
+    assert truth is not None
     bound = exact.settings.get("bound", truth.accuracy)
     return found | {"error_bound": bound, "error_until": float(exact.times[-1])}
 
@@ -90,11 +91,13 @@ def exact_motion(trajectory: Trajectory, truth: Truth | None) -> Trajectory | No
     """Return the truth at a trajectory's times; if the truth ends early, at the first of these times. None
     without a truth, or if the truth is known at the start only.
     """
+    if truth is None:
+        return None
     try:
-        return None if truth is None else truth.poses(trajectory.times)
+        return truth.poses(trajectory.times)
     except NoSolution as end:
         known = trajectory.times[trajectory.times <= end.until]
-        return truth.poses(known) if truth is not None and known.max(initial=0.0) > 0 else None
+        return truth.poses(known) if known.max(initial=0.0) > 0 else None
 
 
 def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
@@ -161,7 +164,7 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np
     length = constraints.scene_length(scene)
     are_lengths = constraints.length_rows(scene)
     scaled = [np.abs(r) / np.where(are_lengths[name], length, 1.0) for name, r in residuals.items()]
-    return np.concatenate([np.zeros((len(trajectory.times), 1)), *scaled], axis=1).max(axis=1)
+    return np.concatenate([np.zeros_like(trajectory.times)[:, None], *scaled], axis=1).max(axis=1)
 
 
 def _against_exact(series: Callable[..., np.ndarray]) -> Callable[..., float | None]:
@@ -213,8 +216,9 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
     """Return the largest difference of the unique part of the reactions from the reactions of the exact
     motion, relative to the largest reaction, at some samples; None without reactions, masses or a truth, and
     for more than MANY bodies."""
-    given = exact is not None and trajectory.reactions is not None and len(trajectory.times)
-    if not given or exact is None or not (scene.joint and scene.has_mass()) or len(scene.body) > MANY:
+    if exact is None or trajectory.reactions is None or not len(trajectory.times):
+        return None
+    if not scene.joint or not scene.has_mass() or len(scene.body) > MANY:
         return None
     chosen = np.unique(np.linspace(0, len(exact.times) - 1, SAMPLES).round().astype(int))
     true = _exact_reactions(scene, _at(exact, chosen))

@@ -62,7 +62,7 @@ def _of_joints(scene: Scene, run: Trajectory) -> Iterator[Series]:
     force = sum(body.mass or 0.0 for body in scene.body) * _acceleration(scene, run)
     unit = np.maximum(force, LEAST) * np.repeat([1.0, scene_length(scene)], 3)
     found = run.reactions or {}
-    largest = max([1.0, *(float(np.abs(wrench / unit).max(initial=0.0)) for wrench in found.values())])
+    largest = max((float(np.abs(wrench / unit).max(initial=1.0)) for wrench in found.values()), default=1.0)
     yield from ((f"reaction in {joint}", wrench, largest * unit) for joint, wrench in found.items())
 
 
@@ -93,10 +93,10 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
     length = scene_length(scene)
     rate = motion_rate(scene, run)
     first = run.orientation[:1]
-    sides = np.where(np.sum(run.orientation * first, axis=2, keepdims=True) < 0, -1.0, 1.0)
+    is_turned = np.sum(run.orientation * first, axis=2, keepdims=True) < 0
     parts = {
         "positions": run.position / length,
-        "orientations": run.orientation * sides,
+        "orientations": np.where(is_turned, -run.orientation, run.orientation),
         "velocities": run.velocity / (length * rate),
         "angular velocities": run.angular_velocity / rate,
     }

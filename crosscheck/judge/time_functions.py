@@ -122,8 +122,7 @@ def _spline(table: tuple[tuple[float, float], ...], arithmetic: Arithmetic) -> n
         right[i] = right[i] - factor * right[i - 1]
     second = arithmetic.zeros(last + 1)
     for i in range(last - 2, -1, -1):
-        ahead = upper[i] * second[i + 2] if i < last - 2 else 0
-        second[i + 1] = (right[i] - ahead) / diagonal[i]
+        second[i + 1] = (right[i] - upper[i] * second[i + 2]) / diagonal[i]
     second[0] = second[1] - first * (second[2] - second[1])
     second[last] = second[last - 1] + final * (second[last - 1] - second[last - 2])
     linear = slope - h * (2 * second[:-1] + second[1:]) / 6

@@ -148,7 +148,7 @@ def test_limits_of_positions_and_orientations_together():
     """Errors h² of a position (m) and an angle; the run with 0.1 s is last, at any place of the list."""
     runs = []
     for h in (0.2, 0.1, 0.4):
-        place = run().position + shifted((0, 1, (0.0, h**2, 0.0)), (1, 2, (h**2, 0.0, 0.0)))
+        place = run().position + shifted((0, 1, (0.0, h**2, 0.0)), (1, 2, (h**2 / 2, 0.0, 0.0)))
         turn = rotations.from_vector(shifted((0, 0, (0.0, 0.0, h**2 / 8))))
         runs.append(run(position=place, orientation=rotations.multiply(turn, run().orientation)))
     found = limit(SCENE, (0.2, 0.1, 0.4), runs)

@@ -55,6 +55,21 @@ REASONS: dict[tuple[str, str, str], str] = {
         "way = np.subtract(stop, start)",
         "np.subtract(start, stop)",
     ): "A rod has the same length and inertia in both directions.",
+    (
+        "crosscheck/judge/precision.py",
+        '"orientations": np.where(is_turned, -run.orientation, run.orientation),',
+        "np.where(is_turned, run.orientation, -run.orientation)",
+    ): "A series and its negative have the same noise.",
+    (
+        "crosscheck/judge/richardson.py",
+        "return float(brentq(off, LEAST_ORDER, HIGHEST_ORDER))",
+        "brentq(off, HIGHEST_ORDER, LEAST_ORDER)",
+    ): "The bracket of a root has no direction.",
+    (
+        "crosscheck/judge/reference/certify.py",
+        "bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))",
+        "differences(scene, b, a)",
+    ): "The difference of two motions is the same in both directions.",
     ("mbref/linear_algebra/elimination.py", "first = 0.0", "1.0"): "The first pivot replaces the number.",
     (
         "crosscheck/judge/gauss_principle.py",
