@@ -290,7 +290,7 @@ def test_scales_of_the_precision_of_reactions():
     force = 2.0 * 0.02
     scales = [scale for _, _, scale in precision._of_joints(slow, moving)]
     assert scales[0] == pytest.approx(np.repeat([0.4, 0.8], 3)) and force < 0.4
-    moving.reactions = {"A": small}
+    moving.reactions = {"A": np.array([[0.01, 0.0, 0.0, 0.0, 0.0, 0.0]])}
     [(_, _, scale)] = precision._of_joints(slow, moving)
     assert scale == pytest.approx(np.repeat([force, 2 * force], 3))
     moving.reactions = None
