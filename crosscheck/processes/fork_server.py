@@ -25,7 +25,7 @@ from collections.abc import Mapping
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from threading import Lock
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 from crosscheck.engine import BUILT_IN, OPTIONAL, engine
 from crosscheck.processes import serve
@@ -63,7 +63,7 @@ class Forked:
         with self._reading:
             if self._status is None:
                 if not self._news.poll(timeout):
-                    raise subprocess.TimeoutExpired("crosscheck.processes.serve", timeout or 0.0)
+                    raise subprocess.TimeoutExpired("crosscheck.processes.serve", cast(float, timeout))
                 self._status = self._received()
             return self._status
 

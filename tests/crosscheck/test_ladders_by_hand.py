@@ -191,3 +191,29 @@ def test_the_finest_settings_of_each_family_are_candidates(monkeypatch):
     assert [(c.setting.family, c.setting.options["k"]) for c in found] == [
         (f, k) for f in ("f", "g") for k in (2, 3, 4)
     ]
+
+
+def test_rungs_of_every_ladder():
+    """Powers of ten to one digit, from easy to hard."""
+    found = {name: [difficulty for difficulty, _ in ladder.rungs] for name, ladder in LADDERS.items()}
+    assert found["duration"] == [0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0]
+    assert found["tilt"] == [1e-1, 1e-3, 1e-5, 1e-6, 1e-10, 1e-11, 1e-13, 1e-15]
+    assert found["length_ratio"] == [1.5, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6]
+    assert found["turning_back"] == [10.0**-k for k in range(1, 10)]
+    assert found["mass_ratio"] == [1.0, 30.0, 1e3, 3e4, 1e6, 3e7, 1e9, 3e10, 1e12]
+    assert all(scene.duration == d for d, scene in LADDERS["duration"].rungs)
+
+
+def test_runs_of_every_rung(monkeypatch):
+    monkeypatch.setattr(stability, "_settings", lambda scene, engines: [(engines[0], Setting("f"))])
+    cases = stability.cases(["e"])
+    assert [case.scene.name for case in cases] == [scene.name for scene in stability.scenes()]
+    assert {(case.engine, case.time_limit, len(case.times)) for case in cases} == {("e", 20.0, 21)}
+    assert all(case.times[0] == 0.0 and case.times[-1] == case.scene.duration for case in cases)
+
+
+@pytest.mark.parametrize(("name", "count"), [("gap[0.1]", 1), ("rank_tolerance[0.1]", 0)])
+def test_engines_have_no_rank_tolerance(monkeypatch, name, count):
+    monkeypatch.setattr(stability, "settings", lambda engine, scene: [Setting("tuned", {"step": 0.1})])
+    found = list(stability._settings(SCENES["four_bar"]().with_(name=name), ["exudyn"]))
+    assert [engine for engine, _ in found] == ["mbref"] * len(stability.METHODS) + ["exudyn"] * count

@@ -562,3 +562,19 @@ def test_an_engine_runs_the_scene_at_the_times_with_a_setting(monkeypatch):
     seen: list[Any] = []
     assert answer.answered(simulator, "scene", "times", setting) is made
     assert seen == [(("scene", "times", setting), "scene", "times")]
+
+
+def test_a_new_child_is_known_until_it_is_closed(monkeypatch):
+    monkeypatch.setattr(child, "_alive", set())
+    started: list[Any] = []
+    process = SimpleNamespace(poll=lambda: 0, wait=lambda: 0)
+    monkeypatch.setattr(
+        child, "_started", lambda channel, printed: started.append((channel, printed)) or process
+    )
+    made = Child()
+    assert child._alive == {made} and made.ready is None and not made.is_alive and len(started) == 1
+    assert started[0][1] == made._printed.fileno() != started[0][0]
+    made._printed.write(b"a")
+    assert made.last_printed() == "a"
+    made.close()
+    assert child._alive == set()
