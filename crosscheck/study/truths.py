@@ -61,7 +61,7 @@ def shown(exact: Trajectory) -> np.ndarray:
     speed = np.linalg.norm(exact.angular_velocity, axis=2).max(axis=1, initial=0.0)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(exact.times) * (speed[1:] + speed[:-1]) / 2)])
     last = int(np.searchsorted(turned, FRAMES * TURN, side="right")) - 1
-    return np.unique(np.linspace(0, last, min(FRAMES, last) + 1).round().astype(int))
+    return np.linspace(0, last, min(FRAMES, last) + 1).round().astype(int)
 
 
 def _of_family(scene: Scene, family: Truth, times: np.ndarray) -> dict[str, Any]:

@@ -963,3 +963,22 @@ def test_a_record_as_a_trajectory_of_its_scene():
     made = Trajectory("s", "e", "1", "m", {}, TIMES, ("b",), place, turn, place, place)
     found = fair_timing._motion(SCENE, made.to_record())
     assert found.scene == "s" and found.times.tolist() == [0.0, 1.0]
+
+
+def test_keys_do_not_depend_on_the_order_of_fields():
+    def ordered(*names: str) -> Any:
+        return SimpleNamespace(to_dict=lambda: {name: len(name) for name in names})
+
+    one, other = ordered("aa", "b"), ordered("b", "aa")
+    assert truths.key(one, TIMES) == truths.key(other, TIMES) != truths.key(ordered("aa", "c"), TIMES)
+    cases = [Case(scene, TIMES, "e", Setting("f", {"k": 1})) for scene in (one, other)]
+    assert key(cases[0]) == key(cases[1])
+
+
+@pytest.mark.parametrize("count", [1, 2, 90, 91, 92, 135, 136, 500, 601])
+def test_frames_are_other_samples(count):
+    """At most 91, in their order, with the first and the last one, where nothing turns."""
+    exact = SimpleNamespace(times=np.linspace(0.0, 1.0, count), angular_velocity=np.zeros((count, 1, 3)))
+    chosen = truths.shown(exact)
+    assert len(chosen) == min(91, count) and chosen[0] == 0 and chosen[-1] == count - 1
+    assert np.diff(chosen).min(initial=1) >= 1
