@@ -982,3 +982,8 @@ def test_frames_are_other_samples(count):
     chosen = truths.shown(exact)
     assert len(chosen) == min(91, count) and chosen[0] == 0 and chosen[-1] == count - 1
     assert np.diff(chosen).min(initial=1) >= 1
+
+
+def test_ends_of_runs_without_an_asked_end():
+    runs = [run(t_end=t, asked={}, outcome="STEP_FAILED") for t in (0.0, 5e-4)]
+    assert [text.partition(" ")[0] for text in difference._sentences(*runs)] == ["end"]
