@@ -987,3 +987,14 @@ def test_frames_are_other_samples(count):
 def test_ends_of_runs_without_an_asked_end():
     runs = [run(t_end=t, asked={}, outcome="STEP_FAILED") for t in (0.0, 5e-4)]
     assert [text.partition(" ")[0] for text in difference._sentences(*runs)] == ["end"]
+
+
+def test_the_name_of_an_outsiders_engine(monkeypatch):
+    monkeypatch.setattr(scouting, "engine", lambda name: SimpleNamespace(name=f"own name of {name}"))
+    assert scouting.shown_name("m:E") == "own name of m:E" and scouting.shown_name("m") == "m"
+
+
+def test_one_thread_measures_beside_the_runs(monkeypatch):
+    monkeypatch.setattr(chains.os, "cpu_count", lambda: 3)
+    with chains.Chains(lambda case, run: {}) as threads:
+        assert (threads._max_workers, threads._measuring._max_workers) == (3, 1)
