@@ -265,6 +265,7 @@ def test_the_setting_half_way(first, second, wanted):
         (setting(step=0.2, rtol=0.25), setting(step=0.1, rtol=0.0625), setting(step=0.283, rtol=0.5)),
         (setting(step=0.2, beta=1.0), setting(step=0.1, beta=2.0), setting(step=0.4, beta=0.5)),
         (setting(step=0.1), setting(step=0.1), None),
+        (setting(step=0.4), setting(step=0.0), None),
         (setting(beta=1.0), setting(beta=2.0), None),
         (setting(step=0.2, law="a"), setting(step=0.1, law="b"), None),
     ],
