@@ -504,14 +504,27 @@ def test_runs_that_share_a_process(monkeypatch):
     assert asked == [(SCENE, "c"), (SCENE, "f"), (changes.weighed(SCENE), "f"), (SCENE, "f")]
 
 
-def test_scenes_of_the_suite():
-    """Relations are applied to some scenes, or to all but those with couplings and the dead end."""
-    quick, deep = trial.specimens(False), trial.specimens(True)
-    names = [specimen.scene.name for specimen in quick]
-    assert names == [specimen.scene.name for specimen in deep] and len(set(names)) == len(names)
-    assert {s.scene.name for s in quick if s.related} == set(trial.RELATED)
+@pytest.mark.parametrize("deep", [False, True])
+def test_scenes_to_which_relations_are_applied(monkeypatch, deep):
+    """Some scenes, or all but those with couplings and the dead end; a scene of the paper counts once."""
+    monkeypatch.setattr(trial, "feature_scenes", lambda: {"loop": SCENE, "own": SCENE.with_(name="four_bar")})
+    monkeypatch.setattr(trial, "moving_probes", lambda: {"spinning loop": SCENE.with_(name="spinning loop")})
+    monkeypatch.setattr(trial, "mechanism", lambda seed: SCENE.with_(duration=1.0 + seed))
+    found = {s.scene.name: s for s in trial.specimens.__wrapped__(deep)}
     last = len(geared_forms.GEARED) + 1
-    assert all(s.related for s in deep[:-last]) and not any(s.related for s in deep[-last:])
+    assert list(found)[-last:] == [*(make()[0].name for make in geared_forms.GEARED), "dead end"]
+    assert not any(s.related for s in list(found.values())[-last:]) and "own" not in found
+    named = {name for name in found if name in trial.RELATED}
+    assert {"loop", "spinning loop", "drawn loop", "pendulum"} <= set(found) and "loop" not in named
+    assert {name for name, s in found.items() if s.related} == (set(list(found)[:-last]) if deep else named)
+    assert [found[name].scene.duration for name in ("drawn loop", "drawn driven loop")] == [1.0, 2.0]
+
+
+def test_scenes_of_the_suite():
+    quick = trial.specimens()
+    names = [specimen.scene.name for specimen in quick]
+    assert len(set(names)) == len(names)
+    assert {s.scene.name for s in quick if s.related} == set(trial.RELATED)
     assert [s.scene.name for s in quick if s.dead_end] == ["dead end"]
     assert {"loop", "free body", "fixed joint", "heavy top"} < set(names)
     assert "driven loop" not in names, "a scene with a truth of its own counts once"

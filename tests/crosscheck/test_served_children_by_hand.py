@@ -540,6 +540,7 @@ def test_a_call_without_a_result_printed_nothing(monkeypatch):
 
 
 @pytest.mark.skipif(not fork_server.AVAILABLE, reason="processes are not forked on this system")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")  # of a process with threads
 @pytest.mark.parametrize("kept_by_parent", [pool._idle, fork_server._servers])
 def test_children_and_servers_belong_to_the_process_that_started_them(kept_by_parent):
     before = list(kept_by_parent)
