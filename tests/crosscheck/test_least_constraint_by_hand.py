@@ -12,7 +12,7 @@ import pytest
 from crosscheck.judge import constraints, gauss_principle, metrics, precision, time_functions
 from crosscheck.judge.energy import energy_drift
 from crosscheck.judge.joint_reactions import compare
-from crosscheck.judge.loads import Motion, at_time, world_inertia, wrenches
+from crosscheck.judge.loads import Motion, at_time, cross, world_inertia, wrenches
 from crosscheck.judge.metrics import METRICS, exact_motion, measure, violation_series
 from crosscheck.judge.richardson import _order
 from crosscheck.judge.truth import NoSolution
@@ -27,7 +27,9 @@ from mbref.scene import (
     Revolute,
     Scene,
     Spherical,
+    Spring,
     TorsionSpring,
+    Translational,
 )
 from mbref.trajectory import Trajectory
 
@@ -156,6 +158,11 @@ def test_inertias_along_world_axes():
         assert world_inertia(two, turns[k]) == pytest.approx(found[k])
         for b, own in enumerate(((1.0, 3.0, 3.5), (2.0, 2.5, 3.0))):
             assert found[k, b] == pytest.approx(turns[k, b] @ np.diag(own) @ turns[k, b].T)
+
+
+def test_vector_products_of_samples():
+    a, b = np.random.default_rng(5).normal(size=(2, 2, 4, 3))
+    assert cross(a, b) == pytest.approx(np.cross(a, b))
 
 
 def test_the_next_end_of_a_piece_is_later():
@@ -295,3 +302,77 @@ def test_scales_of_the_precision_of_reactions():
     assert scale == pytest.approx(np.repeat([force, 2 * force], 3))
     moving.reactions = None
     assert [*precision._of_joints(slow, moving)] == []
+
+
+# --- parts of the equations at the start ------------------------------------------------------------------
+def test_rows_at_the_start(monkeypatch):
+    """Rows are of t = 0; lengths count over the scene's length of 2 m, and rows have the length one."""
+    asked: list[float] = []
+    own = gauss_principle.jacobian
+    monkeypatch.setattr(
+        gauss_principle, "jacobian", lambda of, t, *pose: asked.append(t) or own(of, t, *pose)
+    )
+    gauss_principle.gauss(scene())
+    found = gauss_principle.singular_values(scene())
+    assert asked == [0.0, 0.0]
+    rows = own(scene(), 0.0, *constraints.initial_poses(scene()))[0] * [2.0, 2.0, 2.0, 1.0, 1.0, 1.0]
+    gram = rows @ rows.T / np.outer(np.linalg.norm(rows, axis=1), np.linalg.norm(rows, axis=1))
+    assert np.sort(found**2) == pytest.approx(np.sort(np.linalg.eigvalsh(gram)))
+
+
+def test_mass_matrix_of_bodies_and_massless_links():
+    """3 kg, then a link without mass; inertias stand in the last three rows of each body."""
+    heavy = LINK.model_copy(update={"name": "c", "mass": 3.0, "inertia": (4.0, 5.0, 6.0)})
+    link = LINK.model_copy(update={"name": "d", "mass": 0.0, "inertia": O})
+    mass, _ = gauss_principle._unbound(scene(body=(LINK, heavy, link), joint=()))
+    assert mass == pytest.approx(np.diag([2, 2, 2, 1, 3, 3.5, 3, 3, 3, 4, 5, 6, *[0.0] * 6]))
+
+
+def test_forces_of_joints_at_the_start():
+    """A torque of 2 N m times 1 + 3 t, and an armature of a rail that turns at 3 rad/s."""
+    torque = JointTorque(joint="A", torque=2.0, factor=Factor(polynomial=(1.0, 3.0)))
+    assert gauss_principle._unbound(scene(load=(torque,)))[1] == pytest.approx([0.0] * 5 + [2.0])
+    spun = LINK.model_copy(update={"velocity": (0.0, 6.0, 0.0), "angular_velocity": (0.0, 0.0, 3.0)})
+    arm = Body(name="a", mass=1.0, inertia=(1.0, 1.0, 1.0), position=O, angular_velocity=(0.0, 0.0, 3.0))
+    rail = Translational(name="R", bodies=("a", "b"), anchor=(2.0, 0.0, 0.0), axis=X, armature=0.5)
+    pivot = Revolute(name="P", bodies=("ground", "a"), anchor=O, axis=Z)
+    turning = scene(body=(arm, spun), joint=(pivot, rail))
+    _, force = gauss_principle._unbound(turning)
+    row = np.zeros(12)
+    row[[0, 6]] = -1.0, 1.0
+    assert force == pytest.approx(-0.5 * 18.0 * row), (
+        "(r · e)'' = 2 · 6 · 3 - 9 · 2 m/s² without accelerations"
+    )
+
+
+def test_a_damper_between_turning_bodies():
+    """Points at 1 m across a body that turns at 3 rad/s part with 3 m/s along x: 2 N s/m give 6 N."""
+    spring = Spring(
+        bodies=("ground", "b"),
+        points=((9.0, 1.0, 0.0), (2.0, 1.0, 0.0)),
+        stiffness=4.0,
+        damping=2.0,
+        natural_length=7.0,
+    )
+    spun = LINK.model_copy(update={"angular_velocity": (0.0, 0.0, 3.0), "velocity": O})
+    given = scene(body=(spun,), joint=(), load=(spring,))
+    _, force = gauss_principle._unbound(given)
+    assert force == pytest.approx([6.0, 0.0, 0.0, 0.0, 0.0, -6.0])
+    place, eye = np.array([[[2.0, 0.0, 0.0]]] * 2), np.tile(np.eye(3), (2, 1, 1, 1))
+    place[1, 0, 0] = 1.0
+    spin = np.array([[[0.0, 0.0, 3.0]], [O]])
+    motion = Motion(place, eye, 0 * place, spin, np.zeros((2, 1)))
+    pull, moment = wrenches(given, motion, np.zeros(3))
+    assert pull[:, 0] == pytest.approx(np.array([[6.0, 0.0, 0.0], [4.0, 0.0, 0.0]]))
+    assert moment[:, 0] == pytest.approx(np.array([[0.0, 0.0, -6.0], [0.0, 0.0, -4.0]]))
+
+
+def test_loads_of_joints_without_a_common_axis():
+    """They are added elsewhere; a torque along a joint is always."""
+    rest, eye = np.zeros((1, 1, 3)), np.eye(3)[None, None]
+    motion = Motion(rest, eye, rest, rest, np.full((1, 1), np.nan))
+    loads = TorsionSpring(joint="A", stiffness=3.0, natural_angle=0.5), JointTorque(joint="A", torque=2.0)
+    assert not wrenches(scene(load=loads), motion, np.zeros(3))[1].any()
+    assert not wrenches(scene(load=loads[1:]), motion, np.array(Z))[1].any()
+    turned = Motion(rest, eye, rest, rest, np.full((1, 1), 0.75))
+    assert wrenches(scene(load=loads), turned, np.array(Z))[1][0, 0] == pytest.approx([0.0, 0.0, -0.75])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,8 @@ X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
         (1.0, 1.0 - 0.9e-13, 0.0, True, True),
         (1.0, 1.0 - 1.1e-13, 0.0, False, False),
         (2.0, 2.0, -1.9e-13, True, True),
+        (2.0, 2.0, 2e-13, True, True),
+        (2.0 + 1.9e-13, 2.0, 0.0, True, True),
         (2.0, 2.0, 2.1e-13, False, False),
         (0.5, 1.0, 0.25, False, True),
         (0.5, 1.0, -0.5, False, False),
@@ -37,6 +40,11 @@ def test_cranks_that_turn_fully(a, b, h, equal, fully):
     """Crank and offset are shorter than the rod, or crank and rod are equal to 1e-13."""
     found = Lengths(a, b, h, 0.3, 0.4)
     assert (found.equal(), found.turns_fully()) == (equal, fully)
+
+
+def test_lengths_that_are_equal_to_the_last_digit(monkeypatch):
+    monkeypatch.setattr(import_module(Lengths.__module__), "SAME_LENGTH", 0.0)
+    assert Lengths(0.7, 0.7, 0.0, 0.3, 0.4).equal() and not Lengths(0.7, 0.7, 1e-300, 0.3, 0.4).equal()
 
 
 @pytest.mark.parametrize(("phi0", "side"), [(0.2, 1.0), (math.pi - 0.2, -1.0), (-3.0, -1.0)])

@@ -60,6 +60,14 @@ REASONS: dict[tuple[str, str, str], str] = {
         '"orientations": np.where(is_turned, -run.orientation, run.orientation),',
         "np.where(is_turned, run.orientation, -run.orientation)",
     ): "A series and its negative have the same noise.",
+    **{
+        (
+            "crosscheck/judge/start.py",
+            "return float(np.abs(gap + second[:, None] - coupling.ratio * first).min())",
+            new,
+        ): "Turns of either sign are tried."
+        for new in ("((gap) - (second[:, None]))", "((gap + second[:, None]) + (coupling.ratio * first))")
+    },
     (
         "crosscheck/judge/richardson.py",
         "return float(brentq(off, LEAST_ORDER, HIGHEST_ORDER))",
