@@ -140,6 +140,9 @@ def test_parts_of_a_slider_crank():
         assert parts_of(changed(given, 3, joint), Revolute) is None, joint
     more = pin("E", "ground", "rod", 0.0, 0.0, 0.0)
     assert parts_of(changed(given, 2, more), Revolute) is None, "two pivots"
+    stay = Distance(name="E", bodies=("rod", "block"), anchors=(O, X))
+    assert parts_of(given.with_(joint=(*given.joint, stay)), Revolute) is None, "five joints"
+    assert parts_of(given.with_(body=(*given.body, body("more", 9.0, 0.0, 0.0))), Revolute) is None
     distance = Distance(name="C", bodies=("rod", "block"), anchors=(O, X))
     assert parts_of(changed(given, 2, distance), Revolute) is None
     other = Spherical(name="C", bodies=("crank", "block"), anchor=O)
@@ -178,6 +181,15 @@ def test_the_path_of_a_planar_slider_crank(order, line, axis, q):
         assert pose.turn[2].astype(float) == pytest.approx([0.0] * 3, abs=1e-15)
     signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "ABD"]
     assert signs == [-1.0, None, None], "the second body of the pivot is the ground"
+
+
+def test_a_crank_that_points_backwards():
+    """The rod points forwards; after a turn of 0.5 rad the joints are closed."""
+    given = changed(linkage(), 0, pin("A", "crank", "ground", 1.6, 0.0, 0.0))
+    pose = planar_slider_crank(given).poses(np.array([0.0, 0.5]))
+    turns = rotations.from_matrix(pose.rotation.astype(float))
+    gaps = closure(given, np.zeros(2), pose.position.astype(float), turns)
+    assert max(np.abs(gap).max() for gap in gaps.values()) < 1e-13
 
 
 def test_linkages_that_have_no_path():

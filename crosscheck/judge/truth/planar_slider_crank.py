@@ -76,11 +76,11 @@ def planar_slider_crank(scene: Scene) -> Path | None:
     def poses(q: np.ndarray) -> Pose:
         phi, slope, bend = lengths.rod(theta0 + q)
         turn = phi - start
-        zero, one = 0 * q, 1 + 0 * q
+        zero, one = np.zeros_like(q), np.ones_like(q)
         turns = {crank: (q, one, zero), rod: (turn, slope, bend), slider: (zero, zero, zero)}
         pin_path = circle(axis, q, arm)
         rod_path = _chained(circle(axis, turn, reach), slope, bend)
-        slider_path = [line * ((p + r) @ line)[:, None] for p, r in zip(pin_path, rod_path, strict=True)]
+        slider_path = [line * ((pin_path[n] + rod_path[n]) @ line)[:, None] for n in range(3)]
         slider_path[0] = slider_path[0] - line * ((arm + reach) @ line) + position0[slider]
         centre_path = _chained(circle(axis, turn, position0[rod] - b0), slope, bend)
         crank_path = circle(axis, q, position0[crank] - centre)
@@ -96,7 +96,7 @@ def planar_slider_crank(scene: Scene) -> Path | None:
         spins = (rate[..., None] * axis for rate in (spin, dspin))
         return Pose(position, rotation, angle, dposition, ddposition, *spins)
 
-    with_q = np.array([{crank: 1.0, rod: np.nan, slider: 0.0}[i] for i in range(3)])
+    with_q = np.where(np.arange(3) == crank, 1.0, np.nan)
     return Path("planar_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
 
 

@@ -71,7 +71,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
         rotation, turn = (np.stack([of[i] for i in range(3)], axis=1) for of in (rotations, turns))
         return Pose(position, rotation, turn, dposition, ddposition, spin, dspin)
 
-    with_q = np.array([{crank: 1.0, rod: np.nan, slider: 0.0}[i] for i in range(3)])
+    with_q = np.where(np.arange(3) == crank, 1.0, np.nan)
     return Path("spatial_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
 
 
