@@ -92,8 +92,11 @@ def test_a_motion_whose_steps_end_has_reached_a_time(monkeypatch):
     assert found.times.tolist() == [0.25, 0.5] and found.position[:, 0, 0] == pytest.approx([3.25, 3.5])
 
 
-@pytest.mark.parametrize(("left", "counts"), [(9.0, [1, 2]), (0.5, [0, 2])])
-def test_a_sample_at_the_end_of_a_step_belongs_to_it(monkeypatch, left, counts):
+@pytest.mark.parametrize(
+    ("left", "counts", "steps"),
+    [(9.0, [1, 2], [(1.5, 9.0), (0.5, 8.5)]), (0.5, [0, 2], [(0.5, 0.5), (0.5, 98.5)])],
+)
+def test_a_sample_at_the_end_of_a_step_belongs_to_it(monkeypatch, left, counts, steps):
     """Steps of 0.5 s; at the end of a piece of a function of time the sample belongs to the next piece."""
     made = object.__new__(Stepper)
     number = SimpleNamespace(number=float, settled=lambda x: x)
@@ -103,7 +106,8 @@ def test_a_sample_at_the_end_of_a_step_belongs_to_it(monkeypatch, left, counts):
     made._sharp = lambda x, t: 1.0
     made._refuse_undetermined = made._start = lambda: None
     made._refuse_singular_start = lambda series, d: None
-    made._step = lambda most, left: (SimpleNamespace(x=np.ones((9, 1))), 0.5)
+    asked: list[Any] = []
+    made._step = lambda *most: asked.append(most) or (SimpleNamespace(x=np.ones((9, 1))), 0.5)
 
     def advance(expansion_: Any, series: np.ndarray, h: float) -> None:
         made.t, made.steps = made.t + h, made.steps + 1
@@ -113,7 +117,7 @@ def test_a_sample_at_the_end_of_a_step_belongs_to_it(monkeypatch, left, counts):
     monkeypatch.setattr(taylor, "next_end", lambda scene, t: left if t < left else 99.0)
     for _ in made.samples([0.5, 0.75], lambda t: seen.append(len(yielded))):
         yielded.append(made.t)
-    assert seen == counts
+    assert seen == counts and asked == steps, "twice the time to the last sample, and the time in the piece"
 
 
 # --- bounds -----------------------------------------------------------------------------------------------

@@ -253,3 +253,48 @@ def test_gaps_of_rows_and_couplings(of_angle):
     place, rate = made._gaps(held)
     assert place.tolist() == [3 * 5.0 - 2.0, *([7.0] if of_angle else [])]
     assert rate.tolist() == [6 * 2.5 - 5.0, *([8.0] if of_angle else [])]
+
+
+# --- settings of a motion ---------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("asked", "wanted"),
+    [
+        ({}, (28, EPS, (0, 0.0))),
+        ({"order": 9, "tolerance": 1e-7, "seed": 3, "displaced": 0.5}, (9, 1e-7, (3, 0.5))),
+    ],
+)
+def test_settings_of_a_motion_and_their_defaults(monkeypatch, asked, wanted):
+    """The first run has the order 28, the tolerance of rounding and no displaced joints."""
+    seen: list[Any] = []
+
+    class Begun(Exception):
+        """A stepper is asked for."""
+
+    def begin(scene: Any, numbers: Any, *settings: Any) -> None:
+        seen.append((scene, numbers, settings))
+        raise Begun
+
+    monkeypatch.setattr(taylor, "Stepper", begin)
+    with pytest.raises(Begun):
+        taylor.natural_motion("scene", [0.0], DOUBLE, **asked)
+    assert seen == [("scene", DOUBLE, wanted)]
+
+
+def test_a_loss_of_a_hundred_tolerances_is_enough():
+    for loss, is_enough in ((1e-12, True), (1.1e-12, False)):
+        made = stepper(_lost=np.inf, _tolerance=1e-14, _conditioning=[1.0])
+        assert made._may_step_across(loss) is is_enough
+
+
+@pytest.mark.parametrize(("reach", "last"), [(0.25, 0.5), (2.0, 2.0)])
+def test_lengths_at_which_a_singular_position_is_searched(reach, last):
+    """Twenty-four lengths from a quarter of the step, to its end or as far as the series reaches."""
+    lengths: list[float] = []
+    made = stepper(
+        _tolerance=1e-14,
+        _conditioning=[1.0],
+        _ahead=lambda x, series, h: lengths.append(h) or 1.0 / h,
+    )
+    series = SimpleNamespace(reach=lambda tolerance: reach if tolerance == 1e-7 else None)
+    assert made._crossing(None, series, 0.5) == 0.0
+    assert lengths == pytest.approx((0.125 * (last / 0.125) ** (np.arange(24) / 23)).tolist())
