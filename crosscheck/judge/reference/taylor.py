@@ -110,8 +110,7 @@ class Stepper:
         self._turned = self.of.joints.start()
         self._weights = self._varied(*way)
         self._every, self._lost = HeldRows(self.of, range(self.of.count)), np.inf
-        self._held = self._every
-        self._conditioning: list[float] = []
+        self._held, self._conditioning = self._every, list[float]()
 
     def _varied(self, seed: int, displaced: float) -> np.ndarray:
         """Return row weights (m,) near one that depend on the seed, so that other rows are selected; also
