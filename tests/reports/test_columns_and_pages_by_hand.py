@@ -477,6 +477,7 @@ def test_the_strip_of_failed_runs():
     main, strip = speed.plot(failed, speed.failed(failed.runs)).axes
     assert [line.get_ydata().tolist() for line in strip.lines] == [[UNTIMED], [2.0]]
     assert {line.get_markersize() for line in strip.lines} == {6}
+    assert strip.get_gridspec().get_geometry() == (1, 2)
     assert strip.get_gridspec().get_width_ratios() == (5, 1) and strip.get_xlim() == (0, 1)
     assert main.get_subplotspec().num1 == 0 and strip.get_subplotspec().num1 == 1
     assert [(t.xyann, t.get_fontsize(), t.get_ha()) for t in strip.texts] == [((0, 6), 8, "center")] * 2
@@ -496,6 +497,13 @@ def test_the_strip_of_failed_runs():
     assert heading == Heading("Speed against error") and right(key) == ["Mark", "Runs", "End time (s)"]
     assert plot.svg.startswith("<svg") and [name for name, *_ in plot.legend] == ["a"]
     assert plot.figure.draw.func is speed.plot and plot.figure.draw.args[0] is known
+
+
+def test_one_error_below_the_bound_of_the_truth_is_told():
+    below, above = (plain("a", f, 1e-9, 1.0, bound=b, step=0.1) for f, b in (("x", 1e-7), ("y", 1e-14)))
+    sentence = " An error below the bound on the truth's own error is drawn at that bound."
+    for records_, is_told in (((below, above), True), ((above,), False)):
+        assert (sentence in speed.render(group(records_))[1].caption) is is_told
 
 
 def test_every_plot_has_a_legend():

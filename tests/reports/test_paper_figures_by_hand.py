@@ -65,11 +65,15 @@ def test_violations_with_the_times_of_singular_positions():
     """The crank turns at 124.8 rad/s from π/2: θ₂ = 0 after 12.6 ms, −π after 37.8 ms."""
     runs = {
         "one": violated([0.0, 0.01, 0.04], [1e-9, 0.0, 1e-3]),
-        "two": violated([0.0, 0.02], [1e-9, 1e-2], "STEP_FAILED"),
+        "two": violated([0.0, 0.01, 0.02], [1e-9, 1e-5, 1e-2], "STEP_FAILED"),
     }
     drawing = paper_figures.plot_violations(runs)
     one, two, end, first, second = points(drawing)
-    assert one == [[0.0, 1e-9], [0.01, 1e-17], [0.04, 1e-3]] and two == [[0.0, 1e-9], [0.02, 1e-2]]
+    assert one == [[0.0, 1e-9], [0.01, 1e-17], [0.04, 1e-3]] and two == [
+        [0.0, 1e-9],
+        [0.01, 1e-5],
+        [0.02, 1e-2],
+    ]
     assert end == [[0.02, 1e-2]], "the end of a run that fails"
     crossings = [math.pi / 2 / 124.8, 3 * math.pi / 2 / 124.8]
     assert [first[0][0], second[0][0]] == pytest.approx(crossings)
@@ -77,6 +81,8 @@ def test_violations_with_the_times_of_singular_positions():
     looks = [(line.get_color(), line.get_linestyle(), line.get_marker()) for line in axes.lines[:3]]
     assert looks[0][:2] == (figures.COLOURS[0], "-") and looks[1][:2] == (figures.COLOURS[1], "--")
     assert looks[2][0] == figures.COLOURS[1] and looks[2][2] == figures.FAILED
+    assert axes.lines[2].get_markersize() == 8
+    assert {(line.get_linewidth(), line.get_zorder()) for line in axes.lines[3:]} == {(0.8, 0)}
     assert [line.get_label() for line in axes.lines[:2]] == ["one", "two"]
     assert axes.get_yscale() == "log" and drawing.get_size_inches().tolist() == [7.2, 3.4]
     late = paper_figures.plot_violations({"one": violated([0.0, 0.0121], [1e-9, 1e-9])})
