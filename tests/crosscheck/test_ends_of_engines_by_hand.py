@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.engines import constraint_equations, generalised_forces, terms
+from crosscheck.engines import compiler, constraint_equations, generalised_forces, terms
 from crosscheck.engines import mbref as of_mbref
 from crosscheck.engines.compiled import dop853, newton
 from crosscheck.engines.compiled import run as compiled
@@ -274,6 +274,28 @@ def test_exudyn_prints_nothing_and_reads_no_settings_of_the_user(monkeypatch: py
     monkeypatch.setenv("EXUDYN_NO_USER_SETTINGS", "0")
     assert exudyn._exudyn() is library and said == [True] and library.config.printToConsole is False
     assert exudyn.os.environ["EXUDYN_NO_USER_SETTINGS"] == "1"
+
+
+def test_a_static_analysis_begins_at_rest_at_time_zero(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And Exudyn is imported before the clock of a run."""
+    given: list[Any] = []
+    monkeypatch.setattr(static, "build", lambda exu, scene, forces: given.append((exu, scene, forces)) or "s")
+    found = static.Drive("exu", SCENE)
+    assert given == [("exu", SCENE, False)] and found.system == "s"  # type: ignore[comparison-overlap]
+    assert (found.now, found.steps, found.newton, found.factorisations) == (0.0, 0, 0, 0)
+    assert found.state.shape == (2, 7) and not found.state.any()
+    monkeypatch.setattr(exudyn, "_exudyn", lambda: given.append("imported"))
+    exudyn.ENGINE.prepare(())
+    assert given[1:] == ["imported"]
+
+
+def test_compilers_and_their_variables() -> None:
+    for made, language, variable, first in (
+        (compiler.C, "C", "CC", ("cc", "gcc", "clang")),
+        (compiler.CXX, "C++", "CXX", ("c++", "g++", "clang++")),
+    ):
+        assert (made.language, made.variable, made.commands) == (language, variable, first)
+    assert compiler.TIME_LIMIT == 500.0
 
 
 # --- Pinocchio --------------------------------------------------------------------------------------------

@@ -181,6 +181,10 @@ def test_the_copy_of_the_standard_output_is_closed(monkeypatch: pytest.MonkeyPat
     assert calls == ["flush", ("dup", 1), ("dup2", 2, 1), "within", "flush", ("dup2", 9, 1), ("close", 9)]
 
 
+def test_runs_have_a_hundred_intervals_between_their_samples() -> None:
+    assert running.SAMPLES == 101 and (running.COMPLETED, running.OTHERWISE) == (0, 1)
+
+
 @pytest.mark.parametrize("is_terminal", [True, False])
 def test_the_width_of_a_console(is_terminal: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     """A terminal has its own width; elsewhere lines are long, so that no cell is folded."""
