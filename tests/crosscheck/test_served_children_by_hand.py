@@ -579,3 +579,31 @@ def test_a_new_child_is_known_until_it_is_closed(monkeypatch):
     assert made.last_printed() == "a"
     made.close()
     assert child._alive == set()
+
+
+@pytest.mark.parametrize("question", [pool.run_isolated, pool.run_estimated, pool.run_in_turn, pool.observe])
+def test_runs_of_unknown_engines(monkeypatch, question):
+    monkeypatch.setattr(pool, "_in_use", None)
+    with pytest.raises(LookupError, match="unknown engine 'nosuch'; known: mbref"):
+        question("nosuch", "scene", "times", SETTING, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("question", "outcome", "ends"),
+    [
+        (pool.run_isolated, Outcome.COMPLETED, False),
+        (pool.run_isolated, Outcome.NOT_FINITE, True),
+        (pool.observe, Outcome.COMPLETED, False),
+        (pool.observe, Outcome.NOT_FINITE, True),
+        (pool.run_in_turn, Outcome.NOT_FINITE, False),
+    ],
+)
+def test_a_run_that_does_not_complete_ends_its_child(monkeypatch, question, outcome, ends):
+    """Unless further runs take turns in it."""
+    calls = Calls()
+    monkeypatch.setattr(pool.fork_server, "AVAILABLE", True)
+    monkeypatch.setattr(pool, "_in_use", lambda name: nullcontext(SimpleNamespace(kill=calls("kill"))))
+    run = SimpleNamespace(value=SimpleNamespace(outcome=outcome))
+    monkeypatch.setattr(pool, "_observed", lambda *of, **more: run)
+    question("m:e", "scene", "times", SETTING, 2.0)
+    assert calls.made == [("kill",)] * ends
