@@ -163,6 +163,11 @@ def test_mechanisms_are_a_tree_with_loops_and_consistent_velocities():
     assert all(len(scene.joint) == len(scene.body) + 1 <= 3 for scene in doubled), "no loop"
 
 
+def test_a_single_body_closes_no_loop():
+    alone = drawn(strategies.mechanisms(most_bodies=1, kinds=("spherical", "distance")), 6)
+    assert all(len(scene.body) == len(scene.joint) == 1 for scene in alone)
+
+
 def test_masses_of_paper_mechanisms():
     names = ("planar_slider_crank", "spatial_slider_crank")
     factors: dict[str, set[float]] = {"mass": set(), "inertia": set()}
