@@ -124,6 +124,8 @@ def test_zones_that_reach_the_end_of_the_axis_and_narrow_ones():
         re.sub("<text.*>(.*)</text>", r"\1", line) for line in speed_figure._zones(axes) if "<text" in line
     ]
     assert shown == ["inaccurate", "wrong"]
+    axes.x = {1e-9: 0.0, 1e-8: 0.5, 1e-2: 100.0}.__getitem__
+    assert sum('width="0.50%"' in line for line in speed_figure._zones(axes)) == 1, "however narrow"
     axes.x = {1e-9: 0.0, 1e-8: 0.0, 1e-2: 100.0}.__getitem__
     assert [line.count("inaccurate") for line in speed_figure._zones(axes)] == [1, 1]
 
