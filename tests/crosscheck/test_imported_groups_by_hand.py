@@ -610,6 +610,9 @@ def test_dependent_motions_in_a_row_need_an_armature() -> None:
     with pytest.raises(SceneError, match="body 'b': joints hinge, hinge in a row have dependent"):
         massless._check(twice, bodies, {1: {ARMATURE}}, 1.0)
     massless._check(twice, bodies, {2: {ARMATURE}}, 1.0)
+    places = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    apart = Chain((Piece(0), Piece(1)), (0, 1), ("hinge", "hinge"), places, np.array([[0.0, 0.0, 1.0]] * 2))
+    massless._check(apart, bodies, {}, 1.0)  # parallel hinges at two places move independently
     massless._check(twice, bodies, {k: {ARMATURE} for k in range(3)}, 1.0)
 
 

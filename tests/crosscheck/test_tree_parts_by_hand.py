@@ -426,6 +426,13 @@ def test_files_are_made_once_and_again_if_damaged(cache):
     assert sorted(p.suffix for p in cache.iterdir()) == [".so", ".so"], "no part of a file is left"
 
 
+def test_the_folder_of_a_new_file_is_kept_small(cache, monkeypatch):
+    asked: list[Any] = []
+    monkeypatch.setattr(kept, "remove_oldest", lambda *given: asked.append(given))
+    kept.keep("code", "origin", ".so", writes("one", []))
+    assert asked == [(cache, ".so")]
+
+
 def test_files_that_cannot_be_made_leave_nothing(cache, monkeypatch):
     closed: list[int] = []
     opened = kept.tempfile.mkstemp
