@@ -521,3 +521,10 @@ def test_a_recording_by_its_file_or_its_columns(monkeypatch, tmp_path):
     assert asked[0] == (tmp_path / "t.csv", SCENE, {}) and asked[1][::2] == (SCENE, 7.0)
     assert len(asked[1][1]) == 401 and scene == SCENE and found is known and tolerance == 0.5
     assert judged_recording.columns["a.position.x"].tolist() == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(("sample", "count"), [(1.9991, 401), (2.0009, 401), (1.9989, 402), (2.0011, 402)])
+def test_further_times_before_and_after_a_sample(sample, count):
+    """Hundredths of a second that are a thousandth from a sample, on either side, are left out."""
+    found = judgement._with_dense(np.array([0.0, sample, 4.0]))
+    assert len(found) == count and sample in found
