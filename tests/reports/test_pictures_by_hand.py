@@ -362,3 +362,13 @@ def test_ladders_are_kept_in_a_folder_that_does_not_exist_yet(tmp_path):
         ladders.keep(source, tmp_path / "new" / "place")
     kept = list(ladders.looked_at(tmp_path / "new" / "place" / ladders.FILE).values())
     assert [r["key"] for r in kept] == ["ax", "ay", "bx"] and "bodies" not in kept[0]
+
+
+def test_dense_curves_are_drawn_to_half_a_point():
+    """A wave of 230 points of height takes some 45 lines at a tolerance of 0.5 points, and some 90 at 1/9."""
+    figure, [axes] = figures.canvas()
+    axes.set_ylim(0.0, 1.0)
+    x = np.linspace(0.0, 1.0, 2000)
+    axes.plot(x, 0.5 + 0.4 * np.sin(2 * np.pi * x))
+    curves = re.findall(r'<g id="line2d_\d+">\s*<path d="([^"]*)" clip-path', figures.svg(figure, "wave"))
+    assert 30 < curves[-1].count("L") < 60
