@@ -67,7 +67,7 @@ def fast(groups: Sequence[Judged]) -> str:
     text = (
         _fast_on_one(single, {n for n, place in aided if place == scene})
         if len(groups) == 1
-        else _fast_on_several(costs, aided)
+        else _fast_on_several(costs, aided, len(groups))
     )
     return text + end + _integrated(groups) + CLOCK + (WITHOUT_PYTHON if _has_compiled(groups) else ADAPTERS)
 
@@ -131,7 +131,11 @@ def _whose(name: str, aided: Collection[str]) -> str:
     return f"{title(name)}, integrated by crosscheck," if name in aided else title(name)
 
 
-def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection[tuple[str, str]]) -> str:
+def _fast_on_several(
+    costs: Mapping[str, Mapping[str, float]], aided: Collection[tuple[str, str]], scenes: int
+) -> str:
+    """Return sentences on the engine that is the fastest most often; on some of the scenes no engine may
+    reach LEVEL."""
     winners = {scene: min(cost, key=lambda n: cost[n]) for scene, cost in costs.items()}
     count = {name: list(winners.values()).count(name) for name in dict.fromkeys(winners.values())}
     first = max(count, key=lambda n: count[n])
@@ -140,11 +144,23 @@ def _fast_on_several(costs: Mapping[str, Mapping[str, float]], aided: Collection
         for scene, cost in costs.items()
         if winners[scene] == first and len(cost) > 1
     ]
-    share = f"{count[first]} of {len(costs)}" if count[first] < len(costs) else f"all {len(costs)}"
     wins = [scene for scene, name in winners.items() if name == first]
     by_us = {first} if all((first, scene) in aided for scene in wins) else ()
-    text = f"{_whose(first, by_us)} is the fastest to an error of {SAID} on {share} scenes"
+    text = (
+        f"{_whose(first, by_us)} is the fastest to an error of {SAID} on {_share(wins, len(costs), scenes)}"
+    )
     if ratios:
         text += f"; the best other engine takes {span(min(ratios), max(ratios))} as long"
     others = [f"{title(n)} on {listed(s for s, w in winners.items() if w == n)}" for n in count if n != first]
     return text + (f". On all other scenes the fastest is {listed(others)}." if others else ".")
+
+
+def _share(wins: Sequence[str], reached: int, scenes: int) -> str:
+    """Return the words for the scenes of the fastest engine among those on which an engine reaches LEVEL."""
+    if reached == 1:
+        return f"{wins[0]}, the only scene on which an engine reaches it"
+    every = "both" if reached == 2 else f"all {reached}"
+    if reached == scenes:
+        return f"{every if len(wins) == reached else f'{len(wins)} of {reached}'} scenes"
+    share = every if len(wins) == reached else f"{len(wins)} of the {reached}"
+    return f"{share} scenes on which an engine reaches it"

@@ -776,33 +776,55 @@ SCENES_AND_SECONDS = {
 
 
 @pytest.mark.parametrize(
-    ("scenes", "aided", "says"),
+    ("scenes", "count", "aided", "says"),
     [
         (
             "stuv",
+            4,
             {("a", "s"), ("a", "t")},
             "a is the fastest to an error of 1e-6 on 3 of 4 scenes; the best other engine takes 3.0 to 10 "
             "times as long. On all other scenes the fastest is b on u.",
         ),
         (
             "stv",
+            3,
             {("a", "s"), ("a", "t"), ("a", "v")},
             "a, integrated by crosscheck, is the fastest to an error of 1e-6 on all 3 scenes; the best other "
             "engine takes 3.0 to 10 times as long.",
         ),
         (
             "uv",
+            2,
             (),
             "b is the fastest to an error of 1e-6 on 1 of 2 scenes; the best other engine takes 9.0 times "
             "as long. On all other scenes the fastest is a on v.",
         ),
-        ("v", (), "a is the fastest to an error of 1e-6 on all 1 scenes."),
+        (
+            "v",
+            2,
+            (),
+            "a is the fastest to an error of 1e-6 on v, the only scene on which an engine reaches it.",
+        ),
+        (
+            "tv",
+            3,
+            (),
+            "a is the fastest to an error of 1e-6 on both scenes on which an engine reaches it; the best "
+            "other engine takes 10 times as long.",
+        ),
+        (
+            "uv",
+            3,
+            (),
+            "b is the fastest to an error of 1e-6 on 1 of the 2 scenes on which an engine reaches it; the "
+            "best other engine takes 9.0 times as long. On all other scenes the fastest is a on v.",
+        ),
     ],
 )
-def test_the_fastest_on_several_scenes(scenes, aided, says):
+def test_the_fastest_on_several_scenes(scenes, count, aided, says):
     """Ratios count on the scenes of the engine that is the fastest most often, where another one reaches."""
     costs = {scene: SCENES_AND_SECONDS[scene] for scene in scenes}
-    assert speed_sentences._fast_on_several(costs, aided) == says
+    assert speed_sentences._fast_on_several(costs, aided, count) == says
 
 
 @pytest.mark.parametrize(
