@@ -49,8 +49,10 @@ def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> 
     start = np.concatenate([np.ravel(part) for part in parts])
     rank = rank_at_start(scene)
     if times[-1] == 0:
-        return _trajectory(scene, np.array(times), np.repeat(start[None], len(times), axis=0), rank)
-    return _trajectory(scene, np.array(times), _samples(scene, np.array(times), start, rtol, rank), rank)
+        samples = np.repeat(start[None], len(times), axis=0)
+    else:
+        samples = _samples(scene, np.array(times), start, rtol, rank)
+    return _trajectory(scene, np.array(times), samples, rtol, rank)
 
 
 def _samples(scene: Scene, times: np.ndarray, y: np.ndarray, rtol: float, rank: int) -> np.ndarray:
@@ -222,7 +224,7 @@ def _rates(t: float, y: np.ndarray, scene: Scene, rank: int, since: float) -> np
     return np.concatenate([np.ravel(part) for part in parts])
 
 
-def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray, rank: int) -> Trajectory:
+def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray, rtol: float, rank: int) -> Trajectory:
     states = [_state(scene, y) for y in samples]
     second = np.array([accelerations(scene, t, state, rank) for t, state in zip(times, states, strict=True)])
     position, orientation, velocity, spin = (np.array([state[k] for state in states]) for k in range(4))
@@ -232,7 +234,7 @@ def _trajectory(scene: Scene, times: np.ndarray, samples: np.ndarray, rank: int)
         NAME,
         "",
         "",
-        {"rtol": RTOL},
+        {"rtol": rtol},
         times,
         names,
         position,

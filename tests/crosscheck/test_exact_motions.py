@@ -105,6 +105,7 @@ def test_heavy_top_and_its_reduced_equation():
     times = np.linspace(0.0, scene.duration, 5)
     solved = solve_ivp(rates, (0.0, times[-1]), [0.6, 0.5], "DOP853", times, rtol=1e-12, atol=1e-12)
     run = gauss_motion(scene, tuple(times.tolist()))
+    assert run.settings == {"rtol": 1e-10} and gauss_motion(scene, (0.0,), 1e-9).settings == {"rtol": 1e-9}
     axis = rotations.rotate(run.orientation[:, 0], np.array([0.0, 0.0, 1.0]))
     assert np.abs(np.arccos(axis[:, 2]) - solved.y[0]).max() < 1e-8
 
