@@ -25,7 +25,16 @@ EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
 EXCHANGED = "Two rows or columns are exchanged, whichever is named first."
 """Functions of mbref whose third and fourth arguments may be exchanged, and the reason."""
 SYMMETRIC = {
-    0: {"np.add", "_is", "suppress", "contextlib.suppress", "convolved", "_dot", "rotations.angle_between"},
+    0: {
+        "np.add",
+        "np.union1d",
+        "_is",
+        "suppress",
+        "contextlib.suppress",
+        "convolved",
+        "_dot",
+        "rotations.angle_between",
+    },
     1: {"np.swapaxes", "difference", "rod"},
 }
 SYMMETRY = "The result is the same for these two arguments in any order."
