@@ -89,6 +89,16 @@ REASONS: dict[tuple[str, str, str], str] = {
     ): "The difference of two motions is the same in both directions.",
     ("mbref/linear_algebra/elimination.py", "first = 0.0", "1.0"): "The first pivot replaces the number.",
     (
+        "crosscheck/engines/sdf/reading.py",
+        "return np.array([[entry(i, j) for j in range(3)] for i in range(3)])",
+        "entry(j, i)",
+    ): "The function puts its two numbers in order.",
+    (
+        "mbref/scenes/planar_slider_crank.py",
+        "along, across, _ = rod_inertia(DENSITY * length, length)",
+        "rod_inertia(length, DENSITY * length)",
+    ): "A metre of rod has 1 kg, so that the mass of a rod is its length.",
+    (
         "crosscheck/judge/gauss_principle.py",
         "mass[6 * b : 6 * b + 3, 6 * b : 6 * b + 3] = (body.mass or 0.0) * np.eye(3)",
         "(body.mass)",

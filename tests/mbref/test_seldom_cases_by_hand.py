@@ -1,0 +1,117 @@
+"""Cases that few scenes have / velocities about one axis, hints on columns, unequal masses, waiting calls."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.cli import run
+from mbref.crossing import Crossing
+from mbref.drawing import film
+from mbref.ensembles import processes
+from mbref.equations.initial_state import given_velocities
+from mbref.input_error import InputError
+from mbref.outputs import chosen
+from mbref.scene import Body
+from mbref.simulation import singular_position
+
+
+@pytest.mark.parametrize(
+    ("spin", "local"),
+    [
+        ((2.0, 0.0, 0.0), (0.0, -2.0, 0.0)),
+        ((0.0, 2.0, 0.0), (2.0, 0.0, 0.0)),
+        ((0.0, 0.0, 2.0), (0.0, 0.0, 2.0)),
+    ],
+)
+def test_an_angular_velocity_about_one_axis_is_turned_into_the_body_s_axes(spin, local):
+    """A quarter turn about z: the body's y axis is the world's -x, and its x axis is the world's y."""
+    half = math.sqrt(0.5)
+    body = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0), angular_velocity=spin)
+    velocity, given = given_velocities([[body]], np.array([[0.0, 0.0, 0.0, half, 0.0, 0.0, half]]))
+    assert velocity == pytest.approx(np.array([[0.0, 0.0, 0.0, *local]]), abs=1e-15)
+    assert given.tolist() == [[False] * 3 + [True] * 3]
+
+
+@pytest.mark.parametrize(
+    ("name", "says"),
+    [
+        ("rod.acceleration", "in this motion; it needs accelerations, which the engine does not give"),
+        ("kinetic_energy", "in this motion; it needs the mass and inertia of every body"),
+        ("A.displacement_rate", "in this motion; it needs a joint that slides along one axis"),
+        ("C.displacement", "; did you mean 'A.displacement'"),
+        ("C.moment", "in this motion; it needs the mass and inertia of every body"),
+    ],
+)
+def test_a_column_of_a_known_owner_needs_data_and_another_owner_is_no_owner(name, says):
+    columns = ["time", "rod.position.x", "A.displacement", "energy"]
+    with pytest.raises(InputError) as error:
+        chosen(columns, [name])
+    assert str(error.value).startswith(f"no column {name!r}") and says in str(error.value)
+
+
+@pytest.mark.parametrize(("wanted", "limit"), [("auto", 5.0), ("yes", math.inf)])
+def test_the_time_that_an_estimate_may_take(wanted, limit):
+    motion: Any = SimpleNamespace(t_end=1.0, with_error_estimate=lambda seconds, progress: seconds)
+    assert run._estimated(motion, wanted) == limit and run._estimated(motion, "no") is motion
+
+
+def test_singular_values_belong_to_columns_that_the_masses_scale():
+    """Rows (3, 4) and (1, 3) with the second column times 2 become (3, 8) and (1, 6), and then unit rows."""
+    terms = SimpleNamespace(jacobian=np.array([[3.0, 4.0], [1.0, 3.0]]))
+    model = SimpleNamespace(
+        m=2, terms=lambda t, q: terms, data=SimpleNamespace(metric_root=np.array([1.0, 2.0]))
+    )
+    asked: Any = SimpleNamespace(model=model)
+    values, left = singular_position._singular_values(asked, 0.0, np.zeros(7))
+    cosine = (3 * 1 + 8 * 6) / (math.hypot(3, 8) * math.hypot(1, 6))
+    assert values == pytest.approx([math.sqrt(1 + cosine), math.sqrt(1 - cosine), 0.0, 0.0])
+    assert np.abs(left) == pytest.approx(np.full((2, 2), math.sqrt(0.5)))
+
+
+def test_calls_that_wait_are_made_before_the_end(monkeypatch):
+    monkeypatch.setattr(processes, "_process", lambda: ThreadPoolExecutor(1))
+    pool = processes.Processes(1)
+    futures = [pool.submit(pow, 2, k) for k in range(20)]
+    pool.shutdown()
+    assert [future.result() for future in futures] == [2**k for k in range(20)]
+
+
+@pytest.mark.parametrize(
+    ("missing", "write", "says"),
+    [
+        ("PIL.Image", film._write_gif, "GIF needs Pillow: pip install 'mbref[video]'"),
+        (
+            "imageio_ffmpeg",
+            film._write_mp4,
+            "MP4 needs imageio-ffmpeg and Pillow: pip install 'mbref[video]'",
+        ),
+    ],
+)
+def test_films_without_their_libraries(monkeypatch, tmp_path, missing, write, says):
+    monkeypatch.setitem(sys.modules, missing, None)
+    nothing: Any = None
+    with pytest.raises(InputError, match=f"^{re.escape(says)}; SVG needs nothing more$"):
+        write(tmp_path / "film", nothing, nothing, None)
+
+
+@pytest.mark.parametrize(
+    ("spins", "times"),
+    [
+        ([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0]], (0.0, 10.0)),
+        ([[0.0, 0.6 * math.pi, 0.8 * math.pi], [0.0, 0.0, 0.5 * math.pi]], (3.5, 4.9)),
+        ([[0.25 * math.pi, 0.0, 0.0], [0.25 * math.pi, 0.0, 0.0]], (2.0, 7.6)),
+        ([[0.01 * math.pi, 0.0, 0.0], [0.0, 0.0, 0.0]], (0.0, 10.0)),
+    ],
+)
+def test_the_times_around_a_crossing_depend_on_the_fastest_body(spins, times):
+    """From a quarter of its turn before 4 s to 0.45 turns after, within the run: turns of 2, 8 and 200 s."""
+    asked: Any = SimpleNamespace(time=4.0, angular_velocity=np.array([spins]))
+    assert Crossing.instants(asked, 10.0, 3) == pytest.approx(np.linspace(*times, 3))
