@@ -271,11 +271,14 @@ def test_calls_pass_arrays_in_order_and_then_integers(name):
     builder = SimpleNamespace(
         inttoptr=lambda address, kind: (address, str(kind)), call=lambda *call: called.append(call)
     )
-    context = SimpleNamespace(
-        make_array=lambda kind: lambda context, builder, value: SimpleNamespace(data=f"data of {value}"),
-        get_dummy_value=lambda: "nothing",
-    )
+    read: list[Any] = []
+
+    def array_of(kind: types.Array) -> Any:
+        return lambda *given: read.append((kind, *given)) or SimpleNamespace(data=f"data of {given[-1]}")
+
+    context = SimpleNamespace(make_array=array_of, get_dummy_value=lambda: "nothing")
     assert emit(context, builder, made, ["address", *names, *last]) == "nothing"
+    assert read == [(kinds[array], context, builder, array) for array in names]
     kind = ", ".join(["double*"] * (len(names) - len(whole)) + ["i64*"] * len(whole) + ["i64"] * len(last))
     assert called == [(("address", f"void ({kind})*"), [*(f"data of {array}" for array in names), *last])]
 

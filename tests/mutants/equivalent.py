@@ -87,6 +87,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "bound = SAFETY * float(differences(scene, a, b).max(initial=0.0))",
         "differences(scene, b, a)",
     ): "The difference of two motions is the same in both directions.",
+    (
+        "mbref/taylor/orientations.py",
+        "across = [rotations.cross(self.basis[k - 2], self.basis[k - 1]) for k in range(3)]",
+        "rotations.cross(self.basis[k - 1], self.basis[k - 2])",
+    ): "The products and the determinant by which they are divided change their signs together.",
     ("mbref/linear_algebra/elimination.py", "first = 0.0", "1.0"): "The first pivot replaces the number.",
     (
         "crosscheck/engines/sdf/reading.py",
