@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from mbref import scene_slips
+from mbref.design.turning import Turning
 from mbref.drawing import film
 from mbref.error_estimate import ErrorEstimate
 from mbref.input_error import InputError
@@ -378,3 +379,25 @@ def test_warnings_begin_above_a_thousand_tolerances(error, tighter, says):
     )
     assert found.warning == says
     assert (found.exceeds_from(1e-6), found.exceeds_rtol_from) == (2.0 if error > 1e-6 else None, 1.0)
+
+
+# --- frames that turn -------------------------------------------------------------------------------------
+def test_motions_in_a_frame_that_turns_at_2_rad_per_s():
+    """About z through (1, 0, 0): the body at (4, 0, 5) has 6 m/s along y, and its own axes are turned by 90°
+    about x, so that z of the world is its y axis. A second body is the ground."""
+    frame = Turning(np.array([0.0, 0.0, 2.0]), np.array([1.0, 0.0, 0.0]), "A")
+    half = math.sqrt(0.5)
+    q = np.array([4.0, 0.0, 5.0, half, half, 0.0, 0.0, *np.arange(7.0)])
+    model: Any = SimpleNamespace(nb=2, scene=SimpleNamespace(body=[ROD]))
+    ground = [0.0] * 6
+    assert frame.rate == 2.0
+    assert frame.velocities(model, q) == pytest.approx([0, 6, 0, 0, 2, 0, *ground])
+    rate = np.array([1.0, 0.0, 7.0, 3.0, 0.0, 0.0, *[8.0] * 6])
+    found = frame.relative(model, q, rate, np.ones(12))
+    assert found == pytest.approx([1 + 12, 1 - 4, 1, 1, 1, 1 + 6, *[1.0] * 6])
+    turned = frame.turned(model, q, math.pi / 2)
+    assert turned == pytest.approx([1, 3, 5, 0.5, 0.5, 0.5, 0.5, *np.arange(7.0)])
+    rates = frame.turned_rates(model, rate, math.pi / 2)
+    assert rates == pytest.approx([0, 1, 7, 3, 0, 0, *[8.0] * 6])
+    [body] = frame.bodies(SCENE.with_(body=(ROD.model_copy(update={"position": (4.0, 0.0, 5.0)}),)))
+    assert body.velocity == (0.0, 6.0, 0.0) and body.angular_velocity == (0.0, 0.0, 2.0)
