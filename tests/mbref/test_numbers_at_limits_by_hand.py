@@ -11,6 +11,7 @@ import pytest
 
 from mbref.equations import diagnosis, joint_reactions
 from mbref.equations.initial_state import Start
+from mbref.stepping import ranks, singular_start
 from mbref.taylor import orientations
 
 X, Y, Z = np.eye(3)
@@ -51,3 +52,23 @@ def test_rows_and_reactions_at_their_limits(monkeypatch):
     scene: Any = SimpleNamespace(has_mass=lambda: True, joint=())
     found = [len(joint_reactions.lazy_reactions(scene, NONE, NONE, np.zeros((1, m)))) for m in (120, 121)]
     assert found == [2, 1]
+
+
+def test_ranks_and_starts_at_their_limits(monkeypatch):
+    """A value at the tolerance is no rank; a force across the velocities gives no acceleration."""
+    values = np.array([0.5, 0.25, 0.125])
+    assert ranks._ranks(values, 0.25) == (1, 0.5, 0.25)
+    assert ranks._ranks(values, math.nextafter(0.25, 0.0)) == (2, 0.25, 0.125)
+    assert ranks._ranks(values, 0.5) == (0, 1.0, 0.5) and ranks._ranks(values, 0.0) == (3, 0.125, 0.0)
+    monkeypatch.setattr(singular_start, "NEAR_SINGULAR", 0.25)
+    monkeypatch.setattr(singular_start, "MET", 0.5)
+    monkeypatch.setattr(singular_start, "rate_violation", lambda model, q, v: q)
+
+    def near(least: float, violation: float, speed: float = 1.0) -> bool:
+        start = SimpleNamespace(q=violation, v=np.array([0.0, speed]))
+        run: Any = SimpleNamespace(ranks=SimpleNamespace(least=least), start=start, model=None)
+        return singular_start.begins_near_singular(run)
+
+    below = math.nextafter(0.25, 0.0)
+    found = [near(0.25, 0.0), near(below, 0.5), near(below, beyond(0.5)), near(0.0, 0.0, 0.0)]
+    assert found == [False, True, False, False]
