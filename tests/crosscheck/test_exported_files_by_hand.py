@@ -506,6 +506,21 @@ def simulated(tmp_path: Path, family: str, more: str = "", **options: Any) -> or
     return original._Original(mujoco, Setting(family, given))
 
 
+def test_a_motor_pushes_its_own_joint(tmp_path: Path) -> None:
+    """A ball joint has three velocities after it."""
+    text = """<option timestep="0.01" gravity="0 0 0"/><worldbody><body name="a">
+    <joint name="A" type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+    <body name="b"><joint type="ball"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></body>
+    </worldbody><actuator><motor name="m" joint="A" gear="3"/></actuator>
+    <keyframe><key name="k" ctrl="4"/></keyframe>"""
+    read(tmp_path, text, keyframe="k")
+    from crosscheck.engine import Setting
+
+    given = {"file": str(tmp_path / "m.xml"), "import": "--keyframe k"}
+    found = original._Original(mujoco, Setting(original.AS_IN_FILE, given))
+    assert found.data.qfrc_applied.tolist() == [12.0, 0.0, 0.0, 0.0]
+
+
 def test_motors_of_a_file_push_along_their_joints(tmp_path: Path) -> None:
     """12 N accelerate 2 kg by 6 m/s² from 0.5 m and 1 m/s."""
     found = simulated(tmp_path, original.AS_IN_FILE)

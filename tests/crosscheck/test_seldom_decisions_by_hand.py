@@ -1,0 +1,90 @@
+"""Decisions that few runs come to / numbers exactly at a limit, short steps, motors of the second joint."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.reference import certify, taylor
+from crosscheck.judge.truth.one_dof import _fits
+from mbref.scene import Body, Scene
+from mbref.simulation import rounded_numbers
+
+BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+SCENE = Scene(name="s", body=(BLOCK,), duration=1.0)
+
+
+@pytest.mark.parametrize("spare", [6, 12])
+def test_formulations_that_agree_exactly_to_the_digits(monkeypatch, spare):
+    """The second attempt has 12 spare digits; rates agree to SAFETY times their largest difference."""
+    moving = SimpleNamespace(velocity=np.array([1.0]), angular_velocity=np.array([2.0]))
+    other = SimpleNamespace(velocity=np.array([1.5]), angular_velocity=np.array([2.25]))
+    apart = {6: 1e-3 if spare == 6 else 2e-3, 12: 1e-3}
+    asked: list[int] = []
+
+    def motions(scene: Scene, times: Any, digits: int, more: int, shown: Any) -> Any:
+        asked.append(more)
+        return "moved", moving, other
+
+    monkeypatch.setattr(certify, "_motions", motions)
+    monkeypatch.setattr(certify, "SAFETY", 1.0)
+    monkeypatch.setattr(certify, "differences", lambda *_: np.array([0.0, apart[asked[-1]]]))
+    monkeypatch.setattr(certify, "_apart", lambda a, b: float(np.abs(a - b).max()))
+    monkeypatch.setattr(certify, "_table", lambda scene, *parts: {"parts": parts})
+    nothing: Any = None
+    found = certify._agreed(SCENE, np.zeros(1), 3, nothing)["parts"]
+    assert found == ("moved", moving, 3, (1e-3, 0.5)) and asked == ([6] if spare == 6 else [6, 12])
+    apart.update({6: 2e-3, 12: 2e-3})
+    with pytest.raises(certify.NotCertified, match=r"^s: the formulations agree to 2e-03 only$"):
+        certify._agreed(SCENE, np.zeros(1), 3, nothing)
+
+
+@pytest.mark.parametrize("part", ["position", "rotation"])
+def test_a_path_that_is_not_finite_is_no_path(part):
+    def poses(turned: Any) -> Any:
+        place, turn = np.zeros((len(turned), 1, 3)), np.tile(np.eye(3), (len(turned), 1, 1, 1))
+        {"position": place, "rotation": turn}[part][-1] = np.nan
+        return SimpleNamespace(position=place, rotation=turn)
+
+    asked: Any = SimpleNamespace(poses=poses)
+    assert _fits(SCENE, asked) is False
+
+
+@pytest.mark.parametrize(
+    ("time", "start", "count", "ends"),
+    [(0.0, 1e-7, 30, False), (0.0, 1.2e-12, 2, True), (2.0, 2.4e-9, 2, True), (2.0, 2.4e-9, 1, False)],
+)
+def test_a_step_before_a_singular_position_is_shortened(time, start, count, ends):
+    """By 0.8 each time, to 1e-9 of the time that has passed, which counts as at least 1 ms."""
+    ahead = iter([*[0.1] * (count - 1), 0.9])
+    asked: Any = SimpleNamespace(
+        t=time, _x=None, _conditioning=[1.0], _sharp=lambda x, t: 1.0, _ahead=lambda x, series, h: next(ahead)
+    )
+    series: Any = None
+    if ends:
+        with pytest.raises(taylor.Ended):
+            taylor.Stepper._shortened(asked, np.zeros(1), series, start, 0.1)
+    else:
+        found = taylor.Stepper._shortened(asked, np.zeros(1), series, start, 0.1)
+        assert found == pytest.approx(start * 0.8**count, rel=1e-12)
+
+
+def test_newton_s_method_beside_a_closed_pose_has_twelve_iterations(monkeypatch):
+    """Two equal rows of one coordinate have the rank 1; the residual is asked once more at the end."""
+    asked: list[float] = []
+
+    def terms(t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        asked.append(float(q[0]))
+        return SimpleNamespace(jacobian=np.array([[1.0, 0.0], [1.0, 0.0]]), phi=np.full(2, q[0] / 2))
+
+    monkeypatch.setattr(rounded_numbers, "scaled_jacobian", lambda *_: np.array([[1.0, 0.0], [1.0, 0.0]]))
+    monkeypatch.setattr(rounded_numbers, "null_space", lambda *_: np.array([[1.0], [0.5]]))
+    monkeypatch.setattr(rounded_numbers, "displaced", lambda q, change: q + change)
+    run: Any = SimpleNamespace(
+        model=SimpleNamespace(m=2, n=2, terms=terms), start=SimpleNamespace(q=np.zeros(2))
+    )
+    gap = rounded_numbers.gap_of(run)
+    assert asked == pytest.approx([0.1 / 2**k for k in range(13)]) and gap == pytest.approx(0.05 / 2**12)
