@@ -507,7 +507,7 @@ def simulated(tmp_path: Path, family: str, more: str = "", **options: Any) -> or
 
 
 def test_a_motor_pushes_its_own_joint(tmp_path: Path) -> None:
-    """A ball joint has three velocities after it."""
+    """A ball follows on a ball joint. The bias forces of the balls are rounding without weight."""
     text = """<option timestep="0.01" gravity="0 0 0"/><worldbody><body name="a">
     <joint name="A" type="slide" axis="1 0 0"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
     <body name="b"><joint type="ball"/><inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/></body></body>

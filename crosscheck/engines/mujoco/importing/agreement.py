@@ -92,7 +92,8 @@ class Agreement:
         drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
         inertial = _inertial(scene, pose[1], motion, drift) + armatures.mass @ drift - armatures.force
         forces = inertial - _pushes(scene, pose, motion)
-        largest = (np.abs(twists).T @ np.abs(forces)).max()  # of parts that may cancel
+        parts = np.abs(forces) + _gyroscopic(scene, pose[1], motion)
+        largest = (np.abs(twists).T @ parts).max()  # of parts that may cancel
         self._same(twists.T @ forces, data.qfrc_bias - data.qfrc_passive, "bias forces", largest)
 
     def _drift(self) -> np.ndarray:
@@ -179,6 +180,15 @@ def _masses(scene: Scene, orientation: np.ndarray) -> np.ndarray:
 def _body_masses(scene: Scene) -> np.ndarray:
     """Return the masses (nb,), which all bodies of a file have."""
     return np.array([body.mass for body in scene.body], float)
+
+
+def _gyroscopic(scene: Scene, orientation: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Return |ω| |J ω| for each moment (6 nb,): of a ball, ω × J ω is rounding of this size."""
+    found = np.zeros_like(motion)
+    spin = np.concatenate([found[:, :3], motion[:, 3:]], axis=1)
+    momentum = (_masses(scene, orientation) @ spin.ravel()).reshape(-1, 6)
+    found[:, 3:] = (np.linalg.norm(spin, axis=1) * np.linalg.norm(momentum, axis=1))[:, None]
+    return found.ravel()
 
 
 def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.ndarray:
