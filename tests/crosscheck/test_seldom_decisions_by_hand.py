@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.judge.reference import certify, taylor
+from crosscheck.judge.arithmetic import DOUBLE
+from crosscheck.judge.reference import certify, start_velocities, taylor
 from crosscheck.judge.truth.one_dof import _fits
+from crosscheck.small_motions import records
 from mbref.scene import Body, Scene
 from mbref.simulation import rounded_numbers
 
@@ -88,3 +90,17 @@ def test_newton_s_method_beside_a_closed_pose_has_twelve_iterations(monkeypatch)
     )
     gap = rounded_numbers.gap_of(run)
     assert asked == pytest.approx([0.1 / 2**k for k in range(13)]) and gap == pytest.approx(0.05 / 2**12)
+
+
+def test_every_motion_is_free_without_rows():
+    found = start_velocities.null_space(DOUBLE, np.zeros((2, 3)))
+    assert found.shape == (3, 3) and np.abs(found.T @ found) == pytest.approx(np.eye(3))
+
+
+def test_a_search_has_the_given_number_of_starts(monkeypatch):
+    asked: list[Any] = []
+    monkeypatch.setattr(records, "steady_poses", lambda *given: asked.append(given) or [])
+    monkeypatch.setattr(records, "search", asked.append)
+    said: list[str] = []
+    assert records.measured(SCENE, (), (), 7, said.append) == [] and asked == [(SCENE, 7), SCENE]
+    assert said == ["the judge's search", "mbref's search"]

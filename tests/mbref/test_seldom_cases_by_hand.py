@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import importlib
 import math
 import re
 import sys
@@ -12,6 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+import mbref.cli
+from mbref import scene_validation
 from mbref.cli import run
 from mbref.crossing import Crossing
 from mbref.drawing import film
@@ -115,3 +119,35 @@ def test_the_times_around_a_crossing_depend_on_the_fastest_body(spins, times):
     """From a quarter of its turn before 4 s to 0.45 turns after, within the run: turns of 2, 8 and 200 s."""
     asked: Any = SimpleNamespace(time=4.0, angular_velocity=np.array([spins]))
     assert Crossing.instants(asked, 10.0, 3) == pytest.approx(np.linspace(*times, 3))
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_the_collector_of_garbage_is_as_it_was_after_the_imports(collects):
+    before = gc.isenabled()
+    try:
+        (gc.enable if collects else gc.disable)()
+        importlib.reload(mbref.cli)
+        assert gc.isenabled() == collects
+    finally:
+        (gc.enable if before else gc.disable)()
+        gc.unfreeze()
+
+
+@pytest.mark.parametrize(
+    ("name", "place", "found"),
+    [
+        ("rod", 1, "rod"),
+        ("r" * 79, 1, "r" * 79),
+        ("r" * 80, 1, ""),
+        ("other", 1, ""),
+        ("7", 1, ""),
+        ("a[1", 1, ""),
+        ("a]", 1, ""),
+        ("", 1, ""),
+        ("rod", 2, ""),
+    ],
+)
+def test_the_name_of_an_entry_that_a_path_may_contain(name, place, found):
+    """The first entry has the name ``other``, so that a second one is no name."""
+    data = {"body": [{"name": "other"}, {"name": name}]}
+    assert scene_validation._own_name(data, "body", place) == found

@@ -99,6 +99,26 @@ REASONS: dict[tuple[str, str, str], str] = {
         "entry(j, i)",
     ): "The function puts its two numbers in order.",
     (
+        "mbref/joint_motion.py",
+        'rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)',
+        "np.einsum('ki,ki->k', turning, apart)",
+    ): SYMMETRY,
+    (
+        "mbref/joint_motion.py",
+        'rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)',
+        "np.einsum('ki,ki->k', axis, speeds[1] - speeds[0])",
+    ): SYMMETRY,
+    (
+        "mbref/equations/parts.py",
+        "tuple((body.name, body.inertia and isinstance(body.inertia[0], tuple)) for body in scene.body),",
+        "1",
+    ): "All entries of an inertia are numbers, or all are rows of a matrix.",
+    (
+        "crosscheck/engines/spanning_tree.py",
+        "DRIVEN_WEIGHT = 10  # exceeds the number of rows of any joint, so that driven joints are cut last",
+        "11",
+    ): "A joint has at most six rows; every larger weight gives the same tree.",
+    (
         "mbref/scenes/planar_slider_crank.py",
         "along, across, _ = rod_inertia(DENSITY * length, length)",
         "rod_inertia(length, DENSITY * length)",

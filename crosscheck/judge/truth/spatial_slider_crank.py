@@ -64,7 +64,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
             rod: rod_rotation,
             slider: rotation0[slider] + 0 * rod_rotation,
         }
-        turns = {crank: q, rod: q * np.nan, slider: 0 * q}
+        turns = {crank: q, rod: np.full_like(q, np.nan), slider: 0 * q}
         position, dposition, ddposition, spin, dspin = (
             np.stack([paths[i][n] for i in range(3)], axis=1) for n in range(5)
         )
