@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from crosscheck.engines.compiled import dop853
+from crosscheck.judge import gauss_motion
 from crosscheck.judge.arithmetic import DOUBLE
 from crosscheck.judge.reference import certify, start_velocities, taylor
 from crosscheck.judge.truth.one_dof import _fits
@@ -104,3 +106,23 @@ def test_a_search_has_the_given_number_of_starts(monkeypatch):
     said: list[str] = []
     assert records.measured(SCENE, (), (), 7, said.append) == [] and asked == [(SCENE, 7), SCENE]
     assert said == ["the judge's search", "mbref's search"]
+
+
+def test_an_integration_that_ends_early_is_an_error(monkeypatch):
+    ended = SimpleNamespace(success=False, message="the step is too small", y=np.zeros((13, 1)))
+    monkeypatch.setattr(gauss_motion, "solve_ivp", lambda *_, **__: ended)
+    with pytest.raises(RuntimeError, match=r"^s: the step is too small$"):
+        gauss_motion._samples(SCENE, np.array([0.5]), np.zeros(13), 1e-10, 0)
+
+
+@pytest.mark.parametrize("ratio", [-1.0, 0.5])
+def test_the_best_step_is_made_again_where_one_succeeds(monkeypatch, ratio):
+    asked: list[float] = []
+    monkeypatch.setattr(dop853, "attempt", lambda system, h, memory: asked.append(h) or ratio)
+    memory: Any = SimpleNamespace(counts=np.zeros(8))
+    best = dop853.jump(SimpleNamespace(shortest=1e-3), 1.0, memory)
+    assert memory.counts[dop853.REJECTED] == dop853.JUMPS
+    if ratio < 0:
+        assert best == 0.0 and len(asked) == dop853.JUMPS
+    else:
+        assert best == 1e-3 and len(asked) == dop853.JUMPS + 1 and asked[-1] == best

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import importlib
+import io
 import math
 import re
 import sys
@@ -13,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import mbref.cli
 from mbref import scene_validation
@@ -20,10 +22,12 @@ from mbref.cli import run
 from mbref.crossing import Crossing
 from mbref.drawing import film
 from mbref.ensembles import processes
+from mbref.equations import diagnosis
 from mbref.equations.initial_state import given_velocities
 from mbref.input_error import InputError
+from mbref.linear_algebra.least_norm import null_space
 from mbref.outputs import chosen
-from mbref.scene import Body
+from mbref.scene import Body, Revolute, Scene
 from mbref.simulation import singular_position
 
 
@@ -151,3 +155,39 @@ def test_the_name_of_an_entry_that_a_path_may_contain(name, place, found):
     """The first entry has the name ``other``, so that a second one is no name."""
     data = {"body": [{"name": "other"}, {"name": name}]}
     assert scene_validation._own_name(data, "body", place) == found
+
+
+@pytest.mark.parametrize(("rows", "is_decomposed"), [(5, True), (4, False)])
+def test_reactions_are_decomposed_up_to_a_number_of_rows(monkeypatch, rows, is_decomposed):
+    """A revolute joint has five rows."""
+    monkeypatch.setattr(diagnosis, "MOST_DIAGNOSED_ROWS", rows)
+    bar = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))
+    joint = Revolute(name="A", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    found = mbref.diagnose(Scene(name="s", body=(bar,), joint=(joint,), duration=1.0))
+    assert (found.determined_reactions is not None) == is_decomposed and found.counts.rows == 5
+
+
+def test_joints_of_lost_rows_take_part_by_a_part_of_the_largest(monkeypatch):
+    """The second column of left singular vectors belongs to a value that exists at other poses only."""
+    left = np.array([[0.6, 0.8, 0.0], [0.8, 0.6, 0.0], [0.0, 1e-12, 1.0]])
+    values = np.array([1.0, 1e-12, 1e-12, 0.0, 0.0])
+    monkeypatch.setattr(singular_position, "_singular_values", lambda *_: (values, left))
+    asked: Any = SimpleNamespace(model=SimpleNamespace(row_joint=("A", "B", "C")))
+    assert singular_position._joints(asked, 0.0, np.zeros(7), 2) == ("A", "B")
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e9])
+def test_ranks_do_not_depend_on_the_unit(size):
+    assert null_space(size * np.array([[1.0, 0.0], [0.0, 1e-7]]), 1e-6).shape == (2, 1)
+    assert null_space(size * np.array([[1.0, 0.0], [0.0, 1e-5]]), 1e-6).shape == (2, 0)
+
+
+def test_pictures_of_a_film_have_their_own_size(monkeypatch):
+    asked: list[Any] = []
+    image = io.BytesIO()
+    Image.new("RGBA", (3, 2), (255, 0, 0, 255)).save(image, "PNG")
+    monkeypatch.setattr(film, "frames", lambda scene, motion, view: [(scene, motion, view)])
+    monkeypatch.setattr(film, "png", lambda *given: asked.append(given) or image.getvalue())
+    given: Any = ("scene", "motion", "view")
+    [found] = film._images(*given)
+    assert asked == [(given, 1)] and found.size == (3, 2) and found.getpixel((0, 0)) == (255, 0, 0)

@@ -109,6 +109,16 @@ REASONS: dict[tuple[str, str, str], str] = {
         "np.einsum('ki,ki->k', axis, speeds[1] - speeds[0])",
     ): SYMMETRY,
     (
+        "mbref/taylor/generated/power_orders.py",
+        "return self._write.total(list(map(self._write.product, factors, vectors)))",
+        "map(self._write.product, vectors, factors)",
+    ): COMMUTES,
+    (
+        "crosscheck/study/ladder.py",
+        "return [] if setting is None else [family[0]._replace(setting=setting)]",
+        "1",
+    ): "The cases of a family differ in their settings alone.",
+    (
         "mbref/equations/parts.py",
         "tuple((body.name, body.inertia and isinstance(body.inertia[0], tuple)) for body in scene.body),",
         "1",
