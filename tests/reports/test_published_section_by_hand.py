@@ -22,6 +22,7 @@ def problem(error: float | None, needs_truth: bool = False) -> Any:
     """A problem that accepts an error of 1e-3, in which a run has this error."""
 
     def measure(scene: Any, motion: Any, exact: Any) -> float | None:
+        assert scene.name == "block" and len(motion.times) == 3
         return None if needs_truth and exact is None else error
 
     return SimpleNamespace(
