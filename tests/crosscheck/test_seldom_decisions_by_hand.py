@@ -126,3 +126,15 @@ def test_the_best_step_is_made_again_where_one_succeeds(monkeypatch, ratio):
         assert best == 0.0 and len(asked) == dop853.JUMPS
     else:
         assert best == 1e-3 and len(asked) == dop853.JUMPS + 1 and asked[-1] == best
+
+
+@pytest.mark.parametrize(("place", "least", "found"), [(0.8, 0.0, 0.8), (0.8, 0.2, 0.0), (5.0, 0.0, 0.0)])
+def test_the_place_of_a_singular_position_after_equal_values(place, least, found):
+    """The conditioning is 0.5 at first, and then the distance from the place, if that is within the step."""
+    asked: Any = SimpleNamespace(
+        _tolerance=1e-16,
+        _conditioning=[1.0],
+        _ahead=lambda x, series, h: max(least, min(0.5, abs(h - place))),
+    )
+    series: Any = SimpleNamespace(reach=lambda tolerance: 1.2)
+    assert taylor.Stepper._crossing(asked, np.zeros(1), series, 1.0) == pytest.approx(found, abs=1e-3)
