@@ -19,13 +19,14 @@ from mbref.kernels.compilation import PLAIN
 if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
+from mbref import rotations
 from mbref.integrators import one_step
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.linear_algebra import elimination
 from mbref.stabilisation import projection
 from mbref.stepping import loop, singular_crossing
 from mbref.stepping.loop import STEP_TOO_SMALL, UNDECIDED
-from mbref.taylor import correction, driven, solver, stepping
+from mbref.taylor import correction, driven, samples, solver, stepping
 from mbref.taylor.crossing import acceptance, detection, start, uniqueness
 from tests.mbref.threshold_checks import memory
 
@@ -499,3 +500,18 @@ def test_limits_of_first_lengths(monkeypatch):
     changes(
         monkeypatch, lambda patch, x: lengths(patch, 16.0, x), 8.0, (8.0, 4.0), pytest.approx((15.0, 15.0))
     )
+
+
+@pytest.mark.parametrize("largest", range(4))
+@pytest.mark.parametrize("place", range(4))
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_quaternion_has_the_side_of_the_previous_one(largest, place, side):
+    """The previous one has one component only, so that the new component there has its sign."""
+    quaternion = np.array([0.1, -0.2, 0.3, -0.15])
+    quaternion[largest] = 0.9
+    quaternion /= np.linalg.norm(quaternion)
+    found = np.zeros(4)
+    found[place] = side
+    samples.put_quaternion(rotations.to_matrix(quaternion).ravel(), found)
+    assert found[place] * side > 0.0
+    assert found == pytest.approx(math.copysign(1.0, found[0] * quaternion[0]) * quaternion)
