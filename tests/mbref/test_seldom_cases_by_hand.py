@@ -29,6 +29,7 @@ from mbref.linear_algebra.least_norm import null_space
 from mbref.outputs import chosen
 from mbref.scene import Body, Revolute, Scene
 from mbref.simulation import singular_position
+from mbref.taylor.crossing import departure
 
 
 @pytest.mark.parametrize(
@@ -191,3 +192,29 @@ def test_pictures_of_a_film_have_their_own_size(monkeypatch):
     given: Any = ("scene", "motion", "view")
     [found] = film._images(*given)
     assert asked == [(given, 1)] and found.size == (3, 2) and found.getpixel((0, 0)) == (255, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("moved", "changed", "there", "misses"),
+    [
+        (0.0, 1.0, 0.0, False),
+        (0.0, 1.01, 0.0, True),
+        (0.0, 2.0, 4.0, False),
+        (0.25, 0.0, 0.0, False),
+        (0.26, 0.0, 0.0, True),
+    ],
+)
+def test_a_series_misses_its_start_by_a_part_of_the_larger_speed(monkeypatch, moved, changed, there, misses):
+    """Half of a speed of 2 m/s before, or of another one at the series' beginning; 0.25 m of the way."""
+    monkeypatch.setattr(departure, "START_ERROR", 0.5)
+    q, v = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.array([0.0, 2.0, 0.0, 0.0, 0.0, 0.0])
+    states = {
+        -0.5: (
+            q + np.array([0.0, 0.0, moved, 0.0, 0.0, 0.0, 0.0]),
+            v + np.array([0.0, 0.0, changed, 0, 0, 0]),
+        ),
+        0.0: (q, np.array([there, 0.0, 0.0, 0.0, 0.0, 0.0])),
+    }
+    options = SimpleNamespace(start_distance=0.25)
+    asked: Any = SimpleNamespace(_state_at=states.__getitem__, _taylor=SimpleNamespace(options=options))
+    assert departure.Departure._misses(asked, q, v, 0.5) is misses
