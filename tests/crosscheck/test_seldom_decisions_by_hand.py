@@ -15,7 +15,6 @@ from crosscheck.judge.reference import certify, start_velocities, taylor
 from crosscheck.judge.truth.one_dof import _fits
 from crosscheck.small_motions import records
 from mbref.scene import Body, Scene
-from mbref.simulation import rounded_numbers
 
 BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
 SCENE = Scene(name="s", body=(BLOCK,), duration=1.0)
@@ -74,24 +73,6 @@ def test_a_step_before_a_singular_position_is_shortened(time, start, count, ends
     else:
         found = taylor.Stepper._shortened(asked, np.zeros(1), series, start, 0.1)
         assert found == pytest.approx(start * 0.8**count, rel=1e-12)
-
-
-def test_newton_s_method_beside_a_closed_pose_has_twelve_iterations(monkeypatch):
-    """Two equal rows of one coordinate have the rank 1; the residual is asked once more at the end."""
-    asked: list[float] = []
-
-    def terms(t: float, q: np.ndarray, v: np.ndarray) -> Any:
-        asked.append(float(q[0]))
-        return SimpleNamespace(jacobian=np.array([[1.0, 0.0], [1.0, 0.0]]), phi=np.full(2, q[0] / 2))
-
-    monkeypatch.setattr(rounded_numbers, "scaled_jacobian", lambda *_: np.array([[1.0, 0.0], [1.0, 0.0]]))
-    monkeypatch.setattr(rounded_numbers, "null_space", lambda *_: np.array([[1.0], [0.5]]))
-    monkeypatch.setattr(rounded_numbers, "displaced", lambda q, change: q + change)
-    run: Any = SimpleNamespace(
-        model=SimpleNamespace(m=2, n=2, terms=terms), start=SimpleNamespace(q=np.zeros(2))
-    )
-    gap = rounded_numbers.gap_of(run)
-    assert asked == pytest.approx([0.1 / 2**k for k in range(13)]) and gap == pytest.approx(0.05 / 2**12)
 
 
 def test_every_motion_is_free_without_rows():

@@ -28,7 +28,7 @@ from mbref.input_error import InputError
 from mbref.linear_algebra.least_norm import null_space
 from mbref.outputs import chosen
 from mbref.scene import Body, Revolute, Scene
-from mbref.simulation import singular_position
+from mbref.simulation import rounded_numbers, singular_position
 from mbref.taylor.crossing import departure
 
 
@@ -218,3 +218,21 @@ def test_a_series_misses_its_start_by_a_part_of_the_larger_speed(monkeypatch, mo
     options = SimpleNamespace(start_distance=0.25)
     asked: Any = SimpleNamespace(_state_at=states.__getitem__, _taylor=SimpleNamespace(options=options))
     assert departure.Departure._misses(asked, q, v, 0.5) is misses
+
+
+def test_newton_s_method_beside_a_closed_pose_has_twelve_iterations(monkeypatch):
+    """Two equal rows of one coordinate have the rank 1; the residual is asked once more at the end."""
+    asked: list[float] = []
+
+    def terms(t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        asked.append(float(q[0]))
+        return SimpleNamespace(jacobian=np.array([[1.0, 0.0], [1.0, 0.0]]), phi=np.full(2, q[0] / 2))
+
+    monkeypatch.setattr(rounded_numbers, "scaled_jacobian", lambda *_: np.array([[1.0, 0.0], [1.0, 0.0]]))
+    monkeypatch.setattr(rounded_numbers, "null_space", lambda *_: np.array([[1.0], [0.5]]))
+    monkeypatch.setattr(rounded_numbers, "displaced", lambda q, change: q + change)
+    run: Any = SimpleNamespace(
+        model=SimpleNamespace(m=2, n=2, terms=terms), start=SimpleNamespace(q=np.zeros(2))
+    )
+    gap = rounded_numbers.gap_of(run)
+    assert asked == pytest.approx([0.1 / 2**k for k in range(13)]) and gap == pytest.approx(0.05 / 2**12)
