@@ -93,7 +93,7 @@ def test_the_mass_matrix_in_world_axes():
 
 def test_inertial_forces_have_gyroscopic_moments():
     drift = np.arange(12.0)
-    found = agreement._inertial(scene(), POSE[1], MOTION, drift).reshape(2, 6)
+    found = agreement._inertial(agreement._masses(scene(), POSE[1]), MOTION, drift).reshape(2, 6)
     for k, (mass, moments) in enumerate(((2.0, [3, 2, 4]), (3.0, [2, 4, 3]))):
         spin = MOTION[k, 3:]
         assert found[k, :3] == pytest.approx(mass * drift[6 * k : 6 * k + 3])

@@ -90,9 +90,10 @@ class Agreement:
         data = self.poses.data
         motion = (twists @ data.qvel).reshape(-1, 6)
         drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
-        inertial = _inertial(scene, pose[1], motion, drift) + armatures.mass @ drift - armatures.force
+        mass = _masses(scene, pose[1])
+        inertial = _inertial(mass, motion, drift) + armatures.mass @ drift - armatures.force
         forces = inertial - _pushes(scene, pose, motion)
-        parts = np.abs(forces) + _gyroscopic(scene, pose[1], motion)
+        parts = np.abs(forces) + _gyroscopic(mass, motion)
         largest = (np.abs(twists).T @ parts).max()  # of parts that may cancel
         self._same(twists.T @ forces, data.qfrc_bias - data.qfrc_passive, "bias forces", largest)
 
@@ -182,18 +183,17 @@ def _body_masses(scene: Scene) -> np.ndarray:
     return np.array([body.mass for body in scene.body], float)
 
 
-def _gyroscopic(scene: Scene, orientation: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """Return |ω| |J ω| for each moment (6 nb,): of a ball, ω × J ω is rounding of this size."""
+def _gyroscopic(mass: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """Return |ω| |J ω| for each moment (6 nb,); the moment ω × J ω of a ball is rounding of this size."""
     found = np.zeros_like(motion)
     spin = np.concatenate([found[:, :3], motion[:, 3:]], axis=1)
-    momentum = (_masses(scene, orientation) @ spin.ravel()).reshape(-1, 6)
+    momentum = (mass @ spin.ravel()).reshape(-1, 6)
     found[:, 3:] = (np.linalg.norm(spin, axis=1) * np.linalg.norm(momentum, axis=1))[:, None]
     return found.ravel()
 
 
-def _inertial(scene: Scene, orientation: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.ndarray:
+def _inertial(mass: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.ndarray:
     """Return M Ḃ q̇ and the gyroscopic moments (6 nb,)."""
-    mass = _masses(scene, orientation)
     found = (mass @ drift).reshape(-1, 6)
     for k, twist in enumerate(motion):
         inertia = mass[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6]
