@@ -17,7 +17,7 @@ from crosscheck.study.grid import Unable
 
 
 class Case(NamedTuple):
-    """What the records ask of a case of a study."""
+    """A case of a study, with the fields that the records read."""
 
     scene: Any
     engine: str
@@ -76,7 +76,7 @@ def test_the_finest_case_of_each_family(monkeypatch, tmp_path: Path):
 
 def test_cases_run_once_and_are_stored(monkeypatch, tmp_path: Path):
     """A refusal is stored, too; a case whose key is in the file does not run."""
-    path, ran, told = tmp_path / "r.jsonl", [], []
+    path, ran, seen = tmp_path / "r.jsonl", [], []
     records.write([record(key="known", scene="other")], path)
     whole = {name: name for name in records.KEPT} | {"engine": "e", "scene": "s", "bodies": 1}
     numbers = {"error": 1.0, "error_bound": 2.0, "violation_position": 3.0}
@@ -92,8 +92,8 @@ def test_cases_run_once_and_are_stored(monkeypatch, tmp_path: Path):
     monkeypatch.setattr(records, "engine", lambda name: SimpleNamespace(version=lambda: f"{name} 2"))
     monkeypatch.setattr(records, "made_by", lambda: {"commit": "c", "date": "d", "python": "3"})
     refusal = Unable(SCENE, "h", Cannot(Owner.MODEL, "no hinge"))
-    records.measure(["known", "new"], [refusal], path, lambda *seen: told.append(seen))
-    assert ran == ["new"] and [(done, total) for done, total, _ in told] == [(1, 2)]
+    records.measure(["known", "new"], [refusal], path, lambda *progress: seen.append(progress))
+    assert ran == ["new"] and [(done, total) for done, total, _ in seen] == [(1, 2)]
     assert records.read(path)[1:] == [
         {
             "key": "h refuses s",

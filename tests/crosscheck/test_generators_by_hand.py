@@ -85,7 +85,7 @@ def test_an_integrator_of_heyoka_is_kept_by_everything_that_makes_it(monkeypatch
 
 # --- CasADi -----------------------------------------------------------------------------------------------
 def test_refusals_of_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Those of the equations come first, then a missing compiler."""
+    """The refusals of the equations come first, and then a missing compiler."""
     monkeypatch.setattr(casadi.Generator, "refuses", lambda self, scene: None)
     monkeypatch.setattr(casadi, "why_not", lambda: "")
     assert casadi.ENGINE.refuses(SCENE) is None

@@ -257,8 +257,8 @@ def test_a_comparison_is_planned_by_its_arguments(
     assert wanted.times == [[0.0, 7]] and wanted.reference_time == 11.0 and wanted.out == tmp_path
     assert wanted.is_quick is (depth == "quick") and wanted.is_named is True
     assert plan() == ["the plan"]
-    planned, names, chosen, times, longest, told = asked.calls["plan"]
-    assert planned == [lasting] and names == engines and times == wanted.times and told is notice
+    planned, names, chosen, times, longest, given = asked.calls["plan"]
+    assert planned == [lasting] and names == engines and times == wanted.times and given is notice
     assert longest == limit and chosen.is_quick is (depth == "quick") and chosen.families == ["f", "g"]
     assert asked.calls["comparisons"] == ("the records", {scene.name: f"{scene.name}.toml"}, 11.0)
 

@@ -132,7 +132,7 @@ def test_roots_of_mass_matrices():
 
 @pytest.mark.parametrize(("size", "is_refused"), [(0.1, False), (0.1 + 1e-9, True)])
 def test_contradictions_name_the_joint_with_the_largest_residual(size, is_refused):
-    """A part of 5 % of 2 m/s is allowed; a coupling has one row after those of the joints."""
+    """A residual of 5 % of 2 m/s is allowed; the row of a coupling follows the rows of the joints."""
     sleeve = Cylindrical(name="C", bodies=("ground", "b"), anchor=O, axis=Z)
     gear = Coupling(name="G", joints=("A", "C"), ratio=2.0)
     both = scene(joint=(hinge("A", "ground", "b"), sleeve), coupling=(gear,))

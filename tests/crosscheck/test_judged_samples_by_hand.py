@@ -98,7 +98,7 @@ def test_the_reason_for_which_a_reference_ends(monkeypatch, counts, says):
 # --- rows of the second run -------------------------------------------------------------------------------
 @pytest.mark.parametrize(("seed", "displaced"), [(1, 1e-3), (5, 0.5)])
 def test_second_runs_displace_joints_and_prefer_other_rows(seed, displaced):
-    """Of two bodies, rows from the thirteenth on, up to a part of the largest coordinate, 4."""
+    """Rows from the thirteenth on are preferred; the largest coordinate, 4, scales the displacement."""
     asked: list[str] = []
     c = np.arange(17.0)
     made: Any = object.__new__(Stepper)

@@ -149,7 +149,7 @@ def test_loads_of_a_piece_of_their_function():
 
 
 def test_inertias_along_world_axes():
-    """Of one pose and of several poses of two bodies."""
+    """Two bodies in one pose and in several poses."""
     other = LINK.model_copy(update={"name": "c", "inertia": (2.0, 2.5, 3.0)})
     two = scene(body=(LINK, other), joint=())
     turns = rotations.to_matrix(np.array([[TURN, (0.6, 0.0, 0.0, 0.8)], [(0.0, 0.6, 0.8, 0.0), TURN]]))

@@ -56,7 +56,7 @@ def test_a_motion_that_begins_late_is_interpolated():
 
 
 def test_the_last_sample_ends_the_last_interval():
-    """Of twelve samples every second leaves the last one, which is a node, too."""
+    """Every second one of twelve samples is a node, and so is the last one."""
     given = difference(TIMES[:12], **{"A.angle": TIMES[:12]})
     found = {s: c["A.angle"] for s, _, c in explanations._interpolations(given)}
     lines, steps = (found[name] for name in list(found)[:2])
@@ -177,7 +177,7 @@ def test_a_frame_that_is_turned_by_a_right_angle_about_z():
 
 
 def test_another_point_with_orientations_at_the_samples():
-    """The orientation is not recorded: it is that of the exact motion."""
+    """The orientation is not recorded; the orientation of the exact motion is used."""
     turns = rotations.from_vector(np.outer(TIMES, [0.0, 0.0, 0.5]))
     arm = rotations.rotate(turns, np.array([0.25, 0.5, 0.0]))
     exact = vectors("position", CURVE) | vectors("velocity", CURVE)

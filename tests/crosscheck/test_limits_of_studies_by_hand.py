@@ -682,7 +682,7 @@ def test_the_name_of_a_processor(monkeypatch, tmp_path):
 
 
 def test_the_record_of_a_truth(monkeypatch):
-    """At the samples, the gates and 601 times; the seconds are those of the reference, or counted here."""
+    """The times are the samples, the gates and 601 more; the seconds are given, or counted."""
     asked, clock = [], iter([1.0, 4.0, 1.0, 4.0])
 
     def known_at(scene: Scene, times: np.ndarray, seconds: float) -> dict[str, Any]:

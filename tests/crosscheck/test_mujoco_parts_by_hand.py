@@ -146,7 +146,7 @@ class Found:
 
 
 def test_compiled_families_run_the_scene_in_its_plane(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It has other joints, whose reactions are not those of the scene."""
+    """The planar scene has other joints; their reactions are not reactions of the scene."""
     plane = SCENE.with_(name="plane")
 
     class Run:
