@@ -348,6 +348,61 @@ def test_the_length_of_the_next_attempt(monkeypatch, crossed, pivot, h, used, ex
     assert asked == ([pytest.approx(scale)] if order == 11 else [])
 
 
+@pytest.mark.parametrize(
+    ("accurate", "far", "size", "loose"),
+    [(False, True, 1.0, 1.0), (False, False, 1.0, 1.0), (True, True, 1e24, 1e4), (True, False, 1e24, None)],
+)
+@pytest.mark.parametrize(("last", "orders"), [(6, (5, 6, 7)), (9, (8, 9))])
+@pytest.mark.parametrize("speed", [3.0, 0.5])
+def test_the_longest_step_by_its_terms_and_their_rates(
+    monkeypatch, accurate, far, size, loose, last, orders, speed
+):
+    """Orders up to 9, of which one beyond the last is evaluated; the last one counts most.
+
+    High-accuracy steps near a singular position have no limit of rates.
+    """
+    sizes = {k: size * 0.5**k for k in range(2, 10)} | {1: speed}
+    memory = SimpleNamespace(
+        step=SimpleNamespace(
+            start_pivot=(1.0 if far else 0.99) * stepping.CROSSING_START * 2.0, last_order=last
+        ),
+        mode=SimpleNamespace(order=9),
+        progress=SimpleNamespace(largest_pivot=2.0),
+        run=SimpleNamespace(
+            control=SimpleNamespace(largest_step=99.0, first_step=0.0),
+            equations=SimpleNamespace(system=SimpleNamespace(counts=SimpleNamespace(steps=0))),
+        ),
+    )
+    monkeypatch.setattr(stepping, "largest_used", lambda k, memory: sizes[k])
+    Patched(monkeypatch, stepping, is_accurate=accurate, time_to_no_length=math.inf)
+    of_terms = min((1e-8 / sizes[k]) ** (1 / k) for k in orders)
+    rates = 1e-8 * max(1.0, speed)
+    of_rates = min((rates * (loose or 1.0) / (k * sizes[k])) ** (1 / (k - 1)) for k in orders)
+    expected = of_rates if loose else of_terms
+    assert of_rates < 0.97 * of_terms and expected < 99.0
+    assert stepping.longest_step(1e-8, memory) == pytest.approx(expected, rel=1e-12)
+
+
+def test_the_longest_step_is_limited(monkeypatch):
+    """By the options of a run, and where a spring has no length; terms that vanish allow any step."""
+    counts, control = SimpleNamespace(steps=0), SimpleNamespace(largest_step=0.5, first_step=0.125)
+    memory = SimpleNamespace(
+        step=SimpleNamespace(start_pivot=0.0, last_order=6),
+        mode=SimpleNamespace(order=9),
+        progress=SimpleNamespace(largest_pivot=2.0),
+        run=SimpleNamespace(
+            control=control, equations=SimpleNamespace(system=SimpleNamespace(counts=counts))
+        ),
+    )
+    Patched(monkeypatch, stepping, largest_used=0.0, is_accurate=False, time_to_no_length=9.0)
+    assert stepping.longest_step(1e-8, memory) == 0.125
+    for first, steps in ((0.0, 0), (0.125, 1), (0.75, 0)):
+        control.first_step, counts.steps = first, steps
+        assert stepping.longest_step(1e-8, memory) == pytest.approx(0.5)
+    Patched(monkeypatch, stepping, time_to_no_length=0.2)
+    assert stepping.longest_step(1e-8, memory) == pytest.approx(0.2 * stepping.OVERSHOOT)
+
+
 def test_the_smallest_term_of_a_series(monkeypatch):
     sizes = {2: 4.0, 3: 2.0, 4: 8.0, 5: 1e-9}
     monkeypatch.setattr(stepping, "largest_used", lambda k, memory: sizes[k])

@@ -211,6 +211,47 @@ def test_forces_of_loads_about_axes():
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-11)
 
 
+def test_rows_of_coupled_angles():
+    """Order k + 2 of an angle without that order of the variables; multipliers act two orders later.
+
+    Stiffness, damping and amount of a load count for nothing here.
+    """
+    of = SimpleNamespace(
+        constant=numbers(2, 9, seed=0.3),
+        form=numbers(18, NZ),
+        row=np.array([1, 0]),
+        factor=np.array([0.5, -2.0]),
+        **actions(),
+    )
+    memory = series(torsions=of)
+    memory.series.terms[:, NZ : NZ + 2] = multipliers = numbers(ORDERS + 2, 2, seed=0.9)
+    expected, of_rows = np.zeros((ORDERS, NZ)), np.zeros((ORDERS, 2))
+    for s, row in enumerate(of.row.tolist()):
+        form = of.form[9 * s : 9 * s + 9]
+        parts = polynomial(of.constant[s], form)
+        e1, e2, f = parts[:3], parts[3:6], parts[6:]
+        c, si = dot(e1, f), dot(e2, f)
+        for k in range(ORDERS):
+            moment = np.polynomial.Polynomial([*of.factor[s] * multipliers[2 : k + 2, row], 0.0])
+            for i in range(NZ):
+                d1, d2, df = form[:3, i], form[3:6, i], form[6:, i]
+                change = c * (dot(list(d2), f) + dot(e2, list(df))) - si * (
+                    dot(list(d1), f) + dot(e1, list(df))
+                )
+                expected[k, i] += first(moment * change)[k]
+            known = [np.polynomial.Polynomial(each.coef[: k + 2]) for each in parts]
+            cosine, sine = dot(known[:3], known[6:]), dot(known[3:6], known[6:])
+            angle = (cosine * sine.deriv() - sine * cosine.deriv()).integ()
+            of_rows[k, row] += of.factor[s] * angle.coef[k + 2]
+    for k in range(ORDERS + 2):
+        loads.grow_torsions(k, memory)
+    for k in range(ORDERS):
+        loads.add_torsions(k, memory)
+    assert memory.series.sums[:, :NZ] == pytest.approx(expected, rel=1e-10, abs=1e-12)
+    assert memory.series.sums[:, NZ : NZ + 2] == pytest.approx(of_rows, rel=1e-10, abs=1e-12)
+    assert not memory.series.sums[:, NZ + 2 :].any()
+
+
 def test_forces_of_loads_along_axes():
     of = SimpleNamespace(constant=numbers(2, 6, seed=0.3), form=numbers(12, NZ), **actions())
     memory = series(slides=of)
