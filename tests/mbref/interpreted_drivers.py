@@ -215,7 +215,7 @@ def test_the_distance_from_which_one_step_crosses(monkeypatch):
     least = driven.MIN_PREDICTOR_RATIO * 2.0
     assert driven.length_before(share + 1.001 * least, series()) == pytest.approx(1.001 * least)
     assert driven.length_before(share + 0.999 * least, series()) == 0.0
-    assert stubs.calls[0] == ("longest_step", pytest.approx(driven.ACCURATE_TOLERANCE**0.5))
+    assert stubs.calls[0] == ("longest_step", pytest.approx(1e-13**0.5, rel=1e-9)), "half of the order"
 
 
 @pytest.mark.parametrize(

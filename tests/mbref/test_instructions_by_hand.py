@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from llvmlite import ir
 
 from mbref.taylor.generated.instructions import WIDTH, Instructions
 
@@ -41,3 +42,19 @@ def test_a_sum_of_nothing_is_zero():
 def test_no_product_with_ones():
     assert instructions().times(np.ones(WIDTH), "a") == "a"
     assert instructions().times(np.arange(WIDTH), "a").endswith("*a")
+
+
+def test_arrays_of_a_function_do_not_overlap():
+    """Two arrays of doubles and one of integers; a number has no such attribute."""
+    module = ir.Module()
+    write = Instructions(module, "f", 2, 1, 1)
+    write.end()
+    assert len(write.pointers) == 3 and len(write.counts) == 1
+    [signature] = [line for line in str(module).splitlines() if line.startswith("define")]
+    arguments = signature.partition("(")[2].split(", ")
+    assert [("noalias" in argument, argument.split()[0]) for argument in arguments] == [
+        (True, "double*"),
+        (True, "double*"),
+        (True, "i64*"),
+        (False, "i64"),
+    ]

@@ -190,9 +190,8 @@ def test_reductions_of_the_latest_structures_are_kept(monkeypatch):
 
 
 def test_the_latest_geometries_are_kept(monkeypatch):
-    kept: dict[Any, Any] = {}
+    kept: dict[Any, Any] = dict.fromkeys(range(62))
     monkeypatch.setattr(geometry, "_known", kept)
-    monkeypatch.setattr(geometry, "MOST_GEOMETRIES", 2)
     monkeypatch.setattr(geometry, "_key", lambda model, start, moving: model)
     monkeypatch.setattr(geometry, "pose_of", lambda q: f"pose {q}")
     monkeypatch.setattr(geometry, "OneScene", lambda: "one")
@@ -202,9 +201,11 @@ def test_the_latest_geometries_are_kept(monkeypatch):
     of = lambda name, driven=False: geometry.geometry_of(name, start, "moving", driven)  # type: ignore[arg-type]  # noqa: E731
     first = of("a")
     assert first == ["geometry", "a", "pose q", "moving", False, "one"] and of("a") is first
-    assert of("a", True) is not first and [*kept] == [(False, "a"), (True, "a")]
+    assert of("a", True) is not first and [*kept] == [*range(62), (False, "a"), (True, "a")]
     of("b")
-    assert [*kept] == [(True, "a"), (False, "b")] and of("a") is not first
+    assert [*kept] == [*range(1, 62), (False, "a"), (True, "a"), (False, "b")] and of("a") is first
+    kept.pop((False, "a"))
+    assert of("a") is not first and len(kept) == 64
 
 
 # --- drawing ----------------------------------------------------------------------------------------------

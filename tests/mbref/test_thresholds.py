@@ -52,6 +52,7 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
             "interpreted_integrators",
             "interpreted_linear_algebra",
             "interpreted_loads",
+            "interpreted_parts_of_steps",
             "interpreted_pivots",
             "interpreted_projection",
             "interpreted_series",

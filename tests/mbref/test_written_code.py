@@ -263,7 +263,10 @@ def test_calls_pass_arrays_in_order_and_then_integers(name):
     names = CALLS[name].split()
     whole = {"row", "order"} & set(names)
     last = ["last"] if "expand" in name else []
-    kinds = {array: types.Array(types.int64 if array in whole else types.float64, 1, "C") for array in names}
+    kinds = {  # of as many dimensions as the number of the array, so that all differ
+        array: types.Array(types.int64 if array in whole else types.float64, number, "C")
+        for number, array in enumerate(names, 1)
+    }
     kinds |= dict.fromkeys(last, types.int64)
     made, emit = getattr(generated_calls, name)._defn(None, types.int64, *kinds.values())
     assert made.args == (types.int64, *kinds.values()) and made.return_type == types.void
