@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from mbref.scene_bodies import Body, Driver
 from mbref.scene_fields import Name, Positive, SceneEntry, VectorValue
@@ -118,11 +118,11 @@ class Scene(SceneEntry):
     gravity: VectorValue = (0.0, 0.0, 0.0)
     duration: Positive = 1.0
     ground: Literal["frame", "body"] = "frame"
-    body: Annotated[tuple[Body, ...], Field(min_length=1), Strict(False)]
-    joint: Annotated[tuple[Joint, ...], Strict(False)] = ()
-    coupling: Annotated[tuple[Coupling, ...], Strict(False)] = ()
-    driver: Annotated[tuple[Driver, ...], Strict(False)] = ()
-    load: Annotated[tuple[Load, ...], Strict(False)] = ()
+    body: Annotated[tuple[Body, ...], Field(min_length=1)]
+    joint: tuple[Joint, ...] = ()
+    coupling: tuple[Coupling, ...] = ()
+    driver: tuple[Driver, ...] = ()
+    load: tuple[Load, ...] = ()
 
     @model_validator(mode="wrap")
     @classmethod

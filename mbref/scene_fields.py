@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from reprlib import Repr
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, Strict
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
 from mbref.scene_units import angle, length, length_or_angle
 
@@ -119,21 +119,21 @@ Real = Annotated[float, Field(strict=True, allow_inf_nan=False), Sized]
 Positive = Annotated[float, Field(strict=True, allow_inf_nan=False, gt=0), AfterValidator(checked_length)]
 Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterValidator(checked_mass)]
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
-VectorValue = Annotated[tuple[Real, Real, Real], Strict(False), BeforeValidator(as_list)]
-Quaternion = Annotated[tuple[Real, Real, Real, Real], Strict(False), BeforeValidator(as_list)]
+VectorValue = Annotated[tuple[Real, Real, Real], BeforeValidator(as_list)]
+Quaternion = Annotated[tuple[Real, Real, Real, Real], BeforeValidator(as_list)]
 Name = Annotated[str, Field(min_length=1)]
-Pair = Annotated[tuple[Name, Name], Strict(False)]
-VectorPair = Annotated[tuple[VectorValue, VectorValue], Strict(False), BeforeValidator(as_list)]
-Reals = Annotated[tuple[Real, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
+Pair = tuple[Name, Name]
+VectorPair = Annotated[tuple[VectorValue, VectorValue], BeforeValidator(as_list)]
+Reals = Annotated[tuple[Real, ...], Field(min_length=1), BeforeValidator(as_list)]
 
 
 Length = Annotated[Real, BeforeValidator(length, json_schema_input_type=float | str)]  # m, or "300 mm"
 Angle = Annotated[Real, BeforeValidator(angle, json_schema_input_type=float | str)]  # rad, or "30 deg"
 LengthOrAngle = Annotated[Real, BeforeValidator(length_or_angle, json_schema_input_type=float | str)]
-Measures = Annotated[tuple[LengthOrAngle, ...], Field(min_length=1), Strict(False), BeforeValidator(as_list)]
+Measures = Annotated[tuple[LengthOrAngle, ...], Field(min_length=1), BeforeValidator(as_list)]
 Extent = Annotated[NotNegative, BeforeValidator(length, json_schema_input_type=float | str)]
-PointValue = Annotated[tuple[Length, Length, Length], Strict(False), BeforeValidator(as_list)]
-PointPair = Annotated[tuple[PointValue, PointValue], Strict(False), BeforeValidator(as_list)]
+PointValue = Annotated[tuple[Length, Length, Length], BeforeValidator(as_list)]
+PointPair = Annotated[tuple[PointValue, PointValue], BeforeValidator(as_list)]
 
 
 def direction(v: tuple[float, float, float]) -> tuple[float, float, float]:

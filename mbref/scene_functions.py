@@ -12,14 +12,14 @@ from collections.abc import Iterator
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from pydantic import BeforeValidator, Strict, field_validator
+from pydantic import BeforeValidator, field_validator
 
 from mbref.scene_fields import Angle, LengthOrAngle, NotNegative, Positive, Real, Reals, SceneEntry, as_list
 
 FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
 
-Row = Annotated[tuple[Real, Real], Strict(False)]
-Table = Annotated[tuple[Row, ...], Strict(False), BeforeValidator(as_list)]
+Row = tuple[Real, Real]
+Table = Annotated[tuple[Row, ...], BeforeValidator(as_list)]
 Cubic = tuple[float, float, float, float]
 ZEROS: Cubic = (0.0, 0.0, 0.0, 0.0)
 

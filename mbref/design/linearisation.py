@@ -32,9 +32,8 @@ class Tangent:
 
     def __init__(self, model: Model, q: np.ndarray, frame: Turning):
         self.model, self.q, self.frame = model, q, frame
-        length = max(model.length, 1e-12)
-        self.units = np.tile(np.repeat([1.0, 1.0 / length], 3), model.nb)
-        self.step = DIFFERENCE_STEP * length
+        self.units = np.tile(np.repeat([1.0, 1.0 / model.length], 3), model.nb)
+        self.step = DIFFERENCE_STEP * model.length
         self.basis = _null_space(model.terms(0.0, q).jacobian * self.units)
 
     @property

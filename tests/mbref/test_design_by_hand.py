@@ -513,6 +513,11 @@ def test_different_equilibria_in_the_order_in_which_they_are_found(monkeypatch):
     assert equilibrium.equilibria(DOOR, 4) == [("at", "a")], "free of forces in 2 s"
     scale = 1.01e-9 * length / 4.0
     assert len(equilibrium.equilibria(DOOR, 4)) == 2
+    far = DOOR.with_("body[bar].position", (4.0, 0.0, 0.0))
+    scale = equilibrium.FORCE_FREE * 4.0 / 2.0**2
+    assert equilibrium.equilibria(far, 4) == [("at", "a")], "a mechanism of 4 m, at the limit itself"
+    scale = math.nextafter(scale, 1.0)
+    assert len(equilibrium.equilibria(far, 4)) == 2
     reason = "the loads change"
     driven = DOOR.with_(gravity=(0.0, 0.0, -10.0), driver=(Driver(joint="A", polynomial=(0.0, 3.0)),))
     monkeypatch.setattr(equilibrium, "_frame", lambda scene: Turning(np.zeros(3), np.zeros(3), "A"))

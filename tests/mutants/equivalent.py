@@ -273,6 +273,16 @@ REASONS: dict[tuple[str, str, str], str] = {
     ("mbref/taylor/solver.py", "if i != r and entry != 0.0:", "(i != r)"): SKIPS_ZERO,
     ("mbref/taylor/solver.py", "if g != f and entry != 0.0:", "(g != f)"): SKIPS_ZERO,
     (
+        "mbref/design/equilibrium.py",
+        "if settled is not None and not any(_is_same(settled, other) for other in found):",
+        "_is_same(other, settled)",
+    ): SYMMETRY,
+    (
+        "mbref/design/equilibrium.py",
+        "apart = displacement(first.q, second.q) / first.units",
+        "displacement(second.q, first.q)",
+    ): "The displacements in both directions are opposite, about equal axes of the bodies.",
+    (
         "reports/sections/paper_sweep.py",
         "paper = sorted({cell.end for cell in cells if cell.end is not None})",
         "True",

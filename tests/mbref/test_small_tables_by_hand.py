@@ -1,0 +1,238 @@
+"""Figures of columns, fields of joints and loads, formats, and starts of batches by hand."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from mbref import formats, scene_fields, scene_joints, scene_loads
+from mbref.drawing import plot
+from mbref.drawing.svg import COLOURS, GREY
+from mbref.ensembles import candidates
+from mbref.equations.initial_state import Start
+from mbref.scene import SceneError
+
+X = (1.0, 0.0, 0.0)
+TIMES = np.array([0.0, 0.5, 2.0])
+
+
+def column(*values: float) -> np.ndarray:
+    return np.array(values)
+
+
+# --- figures ------------------------------------------------------------------------------------------------
+def test_the_panels_of_a_figure():
+    """Two panels: both angles, and a violation on a logarithmic scale."""
+    columns = {
+        "time": TIMES,
+        "A.angle": column(0.0, 1.0, 2.0),
+        "B.angle": column(0.0, -1.0, 3.0),
+        "position_violation": column(1e-15, 1e-13, 1e-12),
+    }
+    figure = plot.plot(columns, ["A.angle", "B.angle", "position_violation"])
+    assert figure.get_size_inches().tolist() == pytest.approx([7.2, 1.2 + 2 * 1.9])
+    assert type(figure.get_layout_engine()).__name__ == "ConstrainedLayoutEngine"
+    angles, violation = figure.axes
+    lines = [(line.get_label(), line.get_color()) for line in angles.lines]
+    assert lines == [("A.angle", COLOURS[0]), ("B.angle", COLOURS[1])]
+    assert angles.lines[1].get_xdata().tolist() == TIMES.tolist()
+    assert angles.lines[1].get_ydata().tolist() == [0.0, -1.0, 3.0]
+    assert angles.get_ylabel() == "angle, rad" and violation.get_ylabel() == "position violation, m or rad"
+    assert (angles.get_yscale(), violation.get_yscale()) == ("linear", "log")
+    assert (angles.get_xlabel(), violation.get_xlabel()) == ("", "time, s")
+    assert angles.get_shared_x_axes().joined(angles, violation)
+    for axes in (angles, violation):
+        assert [axes.spines[side].get_visible() for side in ("top", "right", "left")] == [False, False, True]
+        grid = axes.xaxis.get_gridlines()[0]
+        assert grid.get_visible() and grid.get_alpha() == 0.25 and grid.get_color() == GREY
+        key = axes.get_legend()
+        assert not key.get_frame_on() and key._loc == 6, "centre of the left side"
+        place = axes.transAxes.inverted().transform(key.get_bbox_to_anchor().get_points())
+        assert place[0] == pytest.approx([1.0, 0.5]) and place[1] == pytest.approx([1.0, 0.5])
+
+
+def test_the_eighth_line_of_a_panel_has_the_first_colour_again():
+    columns = {"time": TIMES, **{f"J{k}.angle": TIMES for k in range(len(COLOURS) + 1)}}
+    lines = plot.plot(columns, []).axes[0].lines
+    assert [line.get_color() for line in lines] == [*COLOURS, COLOURS[0]]
+
+
+# --- vectors ------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("vector", "says"),
+    [
+        ((0.0, 0.0, 0.0), "must have a length, got the zero vector"),
+        ((0.0, 3e-41, 4e-41), "must be at least 1e-40 in size, got 5e-41"),
+        ((3e40, 0.0, 4e40), "must be at most 1e[+]40 in size, got 5e[+]40"),
+    ],
+)
+def test_vectors_without_a_direction(vector, says):
+    with pytest.raises(ValueError, match=says):
+        scene_fields.direction(vector)
+
+
+@pytest.mark.parametrize("vector", [(1.0, 0.0, 0.0), (0.0, -2.0, 0.5), (0.0, 0.0, 3e-40)])
+def test_vectors_with_a_direction(vector):
+    assert scene_fields.direction(vector) == vector
+
+
+# --- batches ------------------------------------------------------------------------------------------------
+def test_starts_of_a_batch(monkeypatch):
+    """The second of three scenes has no start; places smaller than rounding become zero, velocities that
+    are given do not."""
+    nb = 1
+    places = np.arange(21.0).reshape(3, 7)
+    first, last = np.array([1e-17, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0]), np.arange(7.0) + 1.0
+    rates, given = np.array([1e-17, 5.0, 0, 0, 0, 0]), np.array([1e-17, 0.0, 0, 0, 0, 0])
+    starts: Any = SimpleNamespace(
+        starts=lambda: [
+            Start(first, rates, 0.25, 0.5, given),
+            SceneError(["cannot start"]),
+            Start(last, rates, 0.0, 0.0, 0 * given),
+        ]
+    )
+    packs: Any = SimpleNamespace(
+        start=places.copy, mass=np.ones((3, 6 * nb)), length=np.array([2.0, 1.0, 4.0])
+    )
+    seen: list[Any] = []
+
+    def without_rounding(q: np.ndarray, v: np.ndarray, given: np.ndarray, length: np.ndarray) -> Any:
+        seen.extend((q.tolist(), v.tolist(), given.tolist(), length.tolist()))
+        return q + 100.0, v + 200.0
+
+    monkeypatch.setattr(candidates, "without_rounding", without_rounding)
+    found, q, v = candidates._starts(None, packs, starts)  # type: ignore[arg-type]
+    assert seen == [
+        [first.tolist(), last.tolist()],
+        [rates.tolist()] * 2,
+        [given.tolist(), [0.0] * 6],
+        [2.0, 4.0],
+    ]
+    assert q.tolist() == [(first + 100.0).tolist(), places[1].tolist(), (last + 100.0).tolist()]
+    assert v.tolist() == [(rates + 200.0).tolist(), [0.0] * 6, (rates + 200.0).tolist()]
+    assert list(found) == [0, 2] and found[2].q is not last and found[2].q.tolist() == q[2].tolist()
+    assert found[0].v.tolist() == v[0].tolist()
+    nothing: Any = SimpleNamespace(starts=lambda: [SceneError(["cannot start"])] * 3)
+    found, q, v = candidates._starts(None, packs, nothing)  # type: ignore[arg-type]
+    assert found == {} and q.tolist() == places.tolist() and not v.any()
+
+
+# --- joints -------------------------------------------------------------------------------------------------
+def universal(first: Any, second: Any) -> Any:
+    made = scene_joints.Universal(name="U", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axes=(first, second))
+    return made.axes
+
+
+def test_the_second_axis_of_a_universal_joint_is_made_perpendicular():
+    """(1.04, 2.02, 1.96) is (1, 2, 2) and a fiftieth of (2, 1, -2), which is perpendicular."""
+    first, second = universal((2.0, 1.0, -2.0), (1.04, 2.02, 1.96))
+    assert first == (2.0, 1.0, -2.0) and second == pytest.approx((1.0, 2.0, 2.0))
+
+
+def test_axes_of_a_universal_joint_that_are_refused(monkeypatch):
+    """The cosine of (3, 4, 0) and x is 3/5."""
+    along, parallel = (0.9, 0.1, 0.2), (2.7, 0.30000000000000004, 0.6000000000000001)  # cosine 1 + 2e-16
+    opposite = tuple(-x for x in parallel)
+    for pair, angle in (
+        (((3.0, 4.0, 0.0), X), "53.1"),
+        (((-3.0, 4.0, 0.0), X), "127"),
+        ((along, parallel), "0"),
+        ((along, opposite), "180"),
+    ):
+        with pytest.raises(ValueError, match=f"must be perpendicular, but enclose {angle} degrees"):
+            scene_joints.Universal._axes_are_perpendicular(pair)
+    with pytest.raises(ValueError, match="zero vector"):
+        scene_joints.Universal._axes_are_perpendicular((X, (0.0, 0.0, 0.0)))
+    monkeypatch.setattr(scene_joints, "SKEW", 0.6)
+    assert universal((3.0, 4.0, 0.0), X)[1] == pytest.approx((16 / 25, -12 / 25, 0.0))
+    monkeypatch.setattr(scene_joints, "RIGHT_ANGLE", 0.6)
+    assert universal((3.0, 4.0, 0.0), X)[1] == X
+
+
+@pytest.mark.parametrize(
+    ("ratio", "says"),
+    [
+        (0.0, "must not be 0, which would lock the second joint"),
+        (-5e-41, "must be at least 1e-40 in size, got 5e-41"),
+        (-2e40, "must be at most 1e[+]40 in size, got -?2e[+]40"),
+    ],
+)
+def test_ratios_of_couplings_that_are_refused(ratio, says):
+    with pytest.raises(ValueError, match=says):
+        scene_joints.Coupling._ratio_is_not_zero(ratio)
+
+
+def test_coordinates_of_couplings():
+    """A cylindrical joint has two, a plane the angle alone; a slide has the displacement."""
+    of = {name: joint.facts for name, joint in scene_joints.JOINT_TYPES.items()}
+    chosen = scene_joints.default_coordinates
+    assert chosen((of["cylindrical"], of["translational"]), False) == ("angle", "displacement")
+    assert chosen((of["inline"], of["planar"]), False) == ("displacement", "angle")
+    assert chosen((of["spherical"], of["revolute"]), False) == ("angle", "angle")
+    assert chosen((of["revolute"], of["revolute"]), True) == ("angle", "displacement")
+    coordinates = {name: facts.coordinates for name, facts in of.items() if facts.coordinates}
+    assert coordinates == {
+        "revolute": ("angle",),
+        "translational": ("displacement",),
+        "cylindrical": ("angle", "displacement"),
+        "planar": ("angle",),
+        "inline": ("displacement",),
+    }
+
+
+@pytest.mark.parametrize(
+    ("kind", "rows", "translations", "rotations", "driven", "loaded"),
+    [
+        ("fixed", 6, 0, 0, None, ()),
+        ("revolute", 5, 0, 1, "angle", ("angle",)),
+        ("universal", 4, 0, 2, None, ()),
+        ("spherical", 3, 0, 3, None, ()),
+        ("translational", 5, 1, 0, "displacement", ("displacement",)),
+        ("cylindrical", 4, 1, 1, "angle", ("angle", "displacement")),
+        ("planar", 3, 2, 1, None, ()),
+        ("inline", 2, 1, 3, None, ()),
+        ("distance", 1, 2, 3, None, ()),
+    ],
+)
+def test_facts_of_joints(kind, rows, translations, rotations, driven, loaded):
+    facts = scene_joints.JOINT_TYPES[kind].facts
+    assert (facts.rows, facts.free_translations, facts.free_rotations) == (rows, translations, rotations)
+    assert (facts.driven, facts.loaded) == (driven, loaded)
+
+
+# --- loads --------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("points", "stiffness", "length", "faults"),
+    [
+        (((0.0, 0.0, 0.0), (0.0, 0.0, 1.0)), 2.0, 0.5, []),
+        (((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), 2.0, 0.0, []),
+        (((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), 0.0, 0.5, []),
+        (((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), 2.0, 0.5, ["natural_length"]),
+        (((0.0, 0.0, 1.0), (0.0, 0.0)), 2.0, 0.5, ["points"]),
+        (((0.0, 0.0, 1.0), (0.0, 0.0, 1.0)), -2.0, 0.5, ["stiffness"]),
+    ],
+)
+def test_faults_of_a_spring(points, stiffness, length, faults):
+    """A spring without stiffness, or of no length, needs no direction; a faulty field is reported alone."""
+    found: list[Any] = []
+    try:
+        scene_loads.Spring(bodies=("a", "b"), points=points, stiffness=stiffness, natural_length=length)
+    except ValidationError as error:
+        found = [fault["loc"][0] for fault in error.errors()]
+    assert found == faults
+
+
+# --- formats ------------------------------------------------------------------------------------------------
+def test_a_file_is_readable_if_any_format_reads_it(monkeypatch):
+    items = [SimpleNamespace(reads=(".a",)), SimpleNamespace(reads=(".b", ".c"))]
+    monkeypatch.setattr(
+        formats,
+        "entry_points",
+        lambda group: [SimpleNamespace(load=lambda item=item: item) for item in items],
+    )
+    found = {name: formats.is_readable(name) for name in ("x.a", "x.b", "x.c", "x.d", "x")}
+    assert found == {"x.a": True, "x.b": True, "x.c": True, "x.d": False, "x": False}
