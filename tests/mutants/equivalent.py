@@ -35,7 +35,7 @@ SYMMETRIC = {
         "_dot",
         "rotations.angle_between",
     },
-    1: {"np.swapaxes", "difference", "rod"},
+    1: {"np.swapaxes", "difference", "error_series", "rod"},
 }
 SYMMETRY = "The result is the same for these two arguments in any order."
 """Functions that treat two successive arguments alike, by the number of the first one, and the reason."""

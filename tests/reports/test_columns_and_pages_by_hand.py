@@ -601,6 +601,12 @@ def test_chapters_and_title_of_a_page():
     assert f"<title>{render.TITLE}</title>" in opened
 
 
+def test_a_cell_is_coloured_only_by_a_given_depth():
+    cells = [Cell("9", "kept"), Cell("8", "kept", 0.5)]
+    page = render.html([HeatMap("Heat.", "gap", ["1", "2"], {"row": cells})], {})
+    assert '<td class="kept">9</td><td class="kept" style="--depth:0.50">8</td>' in page
+
+
 def test_pictures_are_written_beside_the_page(tmp_path, monkeypatch):
     monkeypatch.setattr(figures, "png", lambda drawing: f"png of {drawing}".encode())
     plot = Plot("Speed.", "<svg/>", [], Figure("speed", "The plot.", lambda: "<svg>speed</svg>"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -165,6 +166,9 @@ def test_a_run_without_accelerations_has_no_digits():
     assert paper_methods._accelerations(motion).shape == (0,)
     assert paper_methods._accelerations(turning((1.0,)).trajectory).shape == (2, 1, 1, 3)
     assert paper_methods._accelerations(turning(()).trajectory).shape == (0,)
+    for name in ("acceleration", "angular_acceleration"):
+        half = replace(turning((1.0,)).trajectory, **{name: None})
+        assert paper_methods._accelerations(half).shape == (0,), name
     assert np.array_equal(paper_methods._accelerations(turning((2.0,)).trajectory)[1, 0, 0], [8, 0, 6])
 
 
