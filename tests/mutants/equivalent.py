@@ -47,6 +47,7 @@ PADDED = "Sizes of one and of two are both padded to eight lanes."
 ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number there."
 ANY_RANDOM = "Any random numbers serve; the seed only makes results repeatable."
 PATTERN = "The order of elimination and the fill depend on the pattern of the matrix alone."
+FOR_TYPES = "Type checkers alone read a type variable."
 SAMPLE = "(np.random.default_rng(1).uniform(0.5, 1.0, d.nnz), d.indices, d.indptr), shape=d.shape"
 DOMINANT = 's = s + eye_array(size, format="csc") * (10.0 * abs(s).sum(axis=0).max())'
 OPTIONS = (
@@ -261,6 +262,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "1",
     ): "Both bodies of a joint that turns have one anchor.",
     (
+        "mbref/taylor/generated/instructions.py",
+        'argument.add_attribute("noalias")',
+        "pass",
+    ): "The arrays do not overlap; the attribute permits the compiler to make faster code.",
+    (
         "mbref/taylor/polynomials.py",
         "self._lanes = padded_size(max(1, len(lane) + len(of.rows)))",
         "2",
@@ -308,6 +314,8 @@ def reason(mutant: Mutant, source: str) -> str:
     if re.search(r"\b0\.0 \* load\([\w.]+, $", before) and (mutant.old, mutant.new) == ("0", "1"):
         return ZERO_TIMES
     line = source.splitlines()[mutant.line - 1].strip()
+    if " = TypeVar(" in line:
+        return FOR_TYPES
     if mutant.file == "crosscheck/engines/compiled/run.py" and line.startswith(WITHOUT_SAMPLES):
         return NO_STEP
     if mutant.file == "crosscheck/engines/mujoco/model.py" and line.startswith(STANDING_IN):
