@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import math
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,11 +12,19 @@ import pytest
 from pydantic import ValidationError
 
 from mbref import formats, scene_fields, scene_joints, scene_loads
+from mbref.design.equilibrium import Equilibrium
 from mbref.drawing import plot
+from mbref.drawing.picture import Form, Look
 from mbref.drawing.svg import COLOURS, GREY
+from mbref.drawing.timeline import Timeline
 from mbref.ensembles import candidates
+from mbref.ensembles.simulate_all import Ended
 from mbref.equations.initial_state import Start
-from mbref.scene import SceneError
+from mbref.motion import Motion
+from mbref.scene import Body, Driver, Factor, Scene, SceneError, Sine
+from mbref.simulation import rounded_numbers
+from mbref.trajectory import Cost, Trajectory
+from mbref.variation import Variation
 
 X = (1.0, 0.0, 0.0)
 TIMES = np.array([0.0, 0.5, 2.0])
@@ -236,3 +246,135 @@ def test_a_file_is_readable_if_any_format_reads_it(monkeypatch):
     )
     found = {name: formats.is_readable(name) for name in ("x.a", "x.b", "x.c", "x.d", "x")}
     assert found == {"x.a": True, "x.b": True, "x.c": True, "x.d": False, "x": False}
+
+
+# --- rounded numbers ----------------------------------------------------------------------------------------
+EPSILON = 2.0**-52
+
+
+@pytest.mark.parametrize(
+    ("gap", "largest", "rows", "advised"),
+    [
+        (100 * EPSILON, 0.5, 1, False),
+        (math.nextafter(100 * EPSILON, 1.0), 0.5, 1, True),
+        (400 * EPSILON, 4.0, 1, False),
+        (math.nextafter(400 * EPSILON, 1.0), 4.0, 300, True),
+        (math.nextafter(1e-5, 0.0), 4.0, 1, True),
+        (1e-5, 4.0, 1, False),
+        (1e-6, 4.0, 301, False),
+    ],
+)
+def test_gaps_of_rounded_numbers(monkeypatch, gap, largest, rows, advised):
+    """A gap of 100 roundings of the largest coordinate, or of 1 m or rad, is of Newton's method."""
+    monkeypatch.setattr(rounded_numbers, "gap_of", lambda run: gap)
+    model, start = SimpleNamespace(m=rows), SimpleNamespace(q=np.array([0.25, -largest, 0.0]))
+    run: Any = SimpleNamespace(model=model, start=start)
+    says = f"a small motion opens redundant loops by {gap:.1g} m or rad" if advised else ""
+    assert rounded_numbers.advice(run).partition(",")[0] == says
+
+
+@pytest.mark.parametrize(
+    ("rows", "aim", "gap", "moves"),
+    [
+        ([[1, 0, 0], [1, 0, 0], [0, 2, 0]], [0.0, 0.02, 4.0], 0.01, [0.0, 0.0, 0.1]),
+        ([[1, 0, 0], [2, 0, 0]], [0.0, 0.05], 0.02, [0.0, 0.1, 0.1]),
+        ([[1, 0, 0], [0, 2, 0]], [1.0, 4.0], 0.0, None),
+        ([[1, 0, 0], [0, 2, 0], [0, 0, 1], [0, 0, 1]], [1.0, 4.0, 0.0, 1.0], 0.0, None),
+    ],
+)
+def test_the_gap_of_rows_that_contradict_each_other(monkeypatch, rows, aim, gap, moves):
+    """Rows x = 0 and x = 0.02 leave 0.01 open, x = 0 and 2 x = 0.05 leave 0.02; rows that are independent, or
+    leave no freedom, leave no gap."""
+    jacobian, moved = np.array(rows, dtype=float), list[Any]()
+
+    def terms(t: float, q: np.ndarray, v: np.ndarray) -> Any:
+        assert t == 0.0 and v.tolist() == [0.0] * 3
+        return SimpleNamespace(jacobian=jacobian, phi=jacobian @ q - aim)
+
+    def displaced(q: np.ndarray, change: np.ndarray) -> np.ndarray:
+        moved.append(change)
+        return q + change
+
+    def scaled(model: Any, t: float, q: np.ndarray) -> np.ndarray:
+        assert t == 0.0 and q.tolist() == [1.0, 1.0, 1.0]
+        return jacobian
+
+    monkeypatch.setattr(rounded_numbers, "scaled_jacobian", scaled)
+    monkeypatch.setattr(rounded_numbers, "displaced", displaced)
+    start = SimpleNamespace(q=np.ones(3))
+    run: Any = SimpleNamespace(model=SimpleNamespace(n=3, m=len(rows), terms=terms), start=start)
+    assert rounded_numbers.gap_of(run) == pytest.approx(gap, abs=1e-12)
+    assert len(moved) == (0 if moves is None else 13)
+    if moves is not None:
+        assert np.abs(moved[0]).max() == pytest.approx(0.1) and moved[0][0] == 0.0
+        assert (moved[0] != 0.0).tolist() == [move != 0.0 for move in moves]
+
+
+# --- defaults -----------------------------------------------------------------------------------------------
+ZERO = (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("of", "defaults"),
+    [
+        (Scene, {"gravity": ZERO, "duration": 1.0, "ground": "frame", "joint": (), "load": ()}),
+        (Body, {"mass": None, "orientation": (1.0, 0.0, 0.0, 0.0), "velocity": None}),
+        (Driver, {"polynomial": (0.0,), "sine": None, "table": None}),
+        (Sine, {"amplitude": 0.0, "frequency": 1.0, "phase": 0.0}),
+        (Factor, {"polynomial": None, "start": 0.0, "stop": None}),
+        (scene_joints.Revolute, {"armature": 0.0}),
+        (scene_joints.Translational, {"armature": 0.0}),
+        (scene_joints.Coupling, {"offset": 0.0, "coordinates": None}),
+        (scene_loads.Spring, {"damping": 0.0}),
+        (scene_loads.TorsionSpring, {"damping": 0.0, "natural_angle": 0.0}),
+        (scene_loads.SlideSpring, {"damping": 0.0, "natural_displacement": 0.0}),
+    ],
+)
+def test_defaults_of_entries(of, defaults):
+    fields = of.model_fields
+    assert {name: fields[name].default for name in defaults} == defaults
+    assert of.model_config["frozen"] and of.model_config["extra"] == "forbid"
+
+
+@pytest.mark.parametrize(
+    ("of", "defaults"),
+    [
+        (Form, {"width": 720.0, "margin": 64.0, "tallest": 520.0, "letters": 12, "columns": 1}),
+        (Look, {"colour": "", "thickness": 6.0, "opacity": 1.0}),
+        (scene_loads.Action, {"stiffness": 0.0, "damping": 0.0, "natural": 0.0, "amount": 0.0}),
+    ],
+)
+def test_defaults_of_tuples(of, defaults):
+    assert of()._asdict() == defaults
+
+
+@pytest.mark.parametrize(
+    ("of", "defaults"),
+    [
+        (
+            Cost,
+            {
+                "seconds": 0.0,
+                "build_seconds": 0.0,
+                "steps": 0,
+                "rejected": 0,
+                "rhs": 0,
+                "factorisations": 0,
+                "newton": 0,
+            },
+        ),
+        (Trajectory, {"t_end": 0.0, "message": "", "crossings": None, "reactions": None}),
+        (Equilibrium, {"rate": 0.0}),
+        (Ended, {"seconds": 0.0}),
+        (Variation, {"normal": False}),
+        (Timeline, {"marks": (), "label": ""}),
+    ],
+)
+def test_defaults_of_records(of, defaults):
+    found = {field.name: field.default for field in dataclasses.fields(of)}
+    assert {name: found[name] for name in defaults} == defaults
+
+
+def test_the_scene_of_a_motion_is_given_by_name():
+    fields = {field.name: field for field in dataclasses.fields(Motion)}
+    assert fields["mechanism"].kw_only and fields["mechanism"].default is dataclasses.MISSING
