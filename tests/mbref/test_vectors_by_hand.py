@@ -6,7 +6,7 @@ import ctypes
 import operator
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 import numpy as np
@@ -19,8 +19,9 @@ from numba.core.typing import templates
 from mbref.input_error import InputError
 from mbref.kernels import machine_code
 from mbref.method import Method
-from mbref.stepping.limits import GENERATED, GENERIC, Limits
+from mbref.stepping.limits import AUTO, GENERATED, GENERIC, Limits
 from mbref.taylor import simd, stepper
+from mbref.taylor.layout import SeriesOptions
 from mbref.taylor.numbers import BatchNumber, ManyScenes
 
 DOUBLES, WHOLE = ir.DoubleType().as_pointer(), ir.IntType(64)
@@ -300,11 +301,9 @@ def test_tolerance_and_order_of_steps():
     assert started()._kind_of_steps() == (False, pytest.approx(2e-9), 16)
     assert started(code=GENERATED)._kind_of_steps() == (False, pytest.approx(2e-9), 20)
     assert started(order=11)._kind_of_steps() == (False, pytest.approx(2e-9), 11)
-    predictor = stepper.PREDICTOR_TOLERANCE
-    assert started(driven=True)._kind_of_steps() == (True, predictor, stepper.PREDICTOR_ORDER)
-    least = stepper.LEAST_PREDICTOR_ORDER
-    assert started(order=least, driven=True)._kind_of_steps() == (True, predictor, least)
-    assert not started(order=least - 1, driven=True)._kind_of_steps()[0]
+    assert started(driven=True)._kind_of_steps() == (True, 3e-7, 16)
+    assert started(order=12, driven=True)._kind_of_steps() == (True, 3e-7, 12)
+    assert not started(order=11, driven=True)._kind_of_steps()[0]
     assert not started(driven=True, branches={1: 2})._kind_of_steps()[0]
 
 
@@ -319,3 +318,89 @@ def test_the_tolerance_of_ranks_lies_between_the_singular_values():
     settings.nearly_dependent, settings.rank_tolerance = 0, 1e-5
     found._decide_rank()
     assert settings.rank_tolerance == 1e-5
+
+
+class Ranks(NamedTuple):
+    """Rank of the rows, and singular values."""
+
+    rank: int
+    least: float = 4e-6
+    rounding: float = 1e-10
+
+
+@pytest.mark.parametrize(
+    ("rank", "angles", "loops", "order", "code", "options"),
+    [
+        (3, False, True, 0, GENERIC, (2e-9, 16, 1e-14, 22, 1)),
+        (3, False, True, 24, GENERIC, (2e-9, 24, 1e-14, 24, 1)),
+        (3, False, False, 0, GENERIC, (2e-9, 16, 1e-14, 16, 1)),
+        (4, False, True, 0, GENERIC, (3e-7, 16, 1e-13, 22, 0)),
+        (4, False, False, 0, GENERIC, (3e-7, 16, 1e-13, 16, 0)),
+        (4, True, True, 0, GENERIC, (2e-9, 16, 1e-14, 22, 0)),
+        (2, False, True, 0, GENERATED, (2e-9, 20, 1e-14, 22, 2)),
+    ],
+)
+@pytest.mark.parametrize(
+    ("rtol", "length", "change", "distance"), [(3e-8, 0.5, 3e-8, 2e-7), (1e-10, 3.0, 1e-9, 6e-7)]
+)
+def test_a_new_stepper(
+    monkeypatch, rank, angles, loops, order, code, options, rtol, length, change, distance
+):
+    """Four velocities; tolerance and order of regular and of high-accuracy steps, and the freedoms."""
+    calls: dict[str, Any] = {}
+
+    def noted(name: str, result: Any) -> Any:
+        return lambda *given: calls.setdefault(name, given) and result
+
+    of, run = stepper.SeriesStepper, started(order, code=code).run
+    run.memory.control.rtol, run.memory.control.atol = rtol, 4e-8 - rtol
+    run.memory.active = SimpleNamespace(velocities=np.array([0, 2, 3, 5]))
+    run.ranks, run.times, run.start = Ranks(rank), np.array([0.0, 2.0]), "start"
+    run.model = SimpleNamespace(n=6, has_angles=angles, closed_loops=loops, length=length)
+    pooled = SimpleNamespace(values="taylor", packed=SimpleNamespace(argument="argument"))
+    geometry = SimpleNamespace(polynomials=lambda model: ("polynomials", model))
+    for name, result in (
+        *(("Pace", "pace"), ("geometry_of", geometry), ("acquire_memory", pooled)),
+        *(("Departure", "departure"), ("leaving", None), ("fits_no_branch", True)),
+    ):
+        monkeypatch.setattr(stepper, name, noted(name, result))
+    monkeypatch.setattr(of, "_put_options", noted("put", None))
+    monkeypatch.setattr(of, "_put_code", noted("code", None))
+    found = of(run)
+    follows, moving = options[1] == 16 and options[0] == 3e-7, np.isin(range(6), (0, 2, 3, 5))
+    assert found.follows_drivers is follows and found._options == SeriesOptions(
+        *(pytest.approx(options[0]), options[1], pytest.approx(options[2]), options[3]),
+        *(change, pytest.approx(distance), options[4], follows),
+    )
+    assert (found.run, found.taylor, found.argument, found._calls, found._sampling) == (
+        *(run, "taylor", "argument", 0, 0.0),
+    )
+    model, start, given, driven = calls["geometry_of"]
+    assert (model, start, driven) == (run.model, "start", follows) and given.tolist() == moving.tolist()
+    assert calls["acquire_memory"] == (run, geometry, ("polynomials", run.model), options[3])
+    assert calls["Departure"] == (run, "taylor", found.expand, found._state_at)
+    assert (calls["Pace"], calls["leaving"], calls["fits_no_branch"]) == ((run,),) * 3
+    assert found._way is None and found._fits_no_branch is True and found._wants_code is False
+    assert ("code" in calls) is (code == GENERATED) and "put" in calls
+    assert run.memory.equations.system.settings.rank_tolerance == pytest.approx(2e-8)
+
+
+@pytest.mark.parametrize(("end", "way", "fits"), [(0.0, None, True), (2.0, "way", False)])
+def test_a_new_stepper_at_a_singular_start(monkeypatch, end, way, fits):
+    """A run of no time leaves no singular position; generated code is used where it pays."""
+    run = started(code=AUTO).run
+    run.memory.active, run.ranks = SimpleNamespace(velocities=np.arange(6)), Ranks(5)
+    run.times, run.start = np.array([0.0, end]), "start"
+    run.model = SimpleNamespace(n=6, has_angles=False, closed_loops=True, length=1.0)
+    pooled = SimpleNamespace(values="taylor", packed=SimpleNamespace(argument="argument"))
+    geometry = SimpleNamespace(polynomials=lambda model: None)
+    for name, result in (
+        *(("Pace", "pace"), ("geometry_of", geometry), ("acquire_memory", pooled)),
+        *(("Departure", "departure"), ("leaving", "way"), ("fits_no_branch", True)),
+    ):
+        monkeypatch.setattr(stepper, name, lambda *_, result=result: result)
+    monkeypatch.setattr(stepper.SeriesStepper, "_put_options", lambda _: None)
+    monkeypatch.setattr(stepper.SeriesStepper, "_put_code", lambda _: pytest.fail("no code yet"))
+    found = stepper.SeriesStepper(run)
+    assert (found._way, found._fits_no_branch, found._wants_code) == (way, fits, True)
+    assert (found._pace, found._departure) == ("pace", "departure")
