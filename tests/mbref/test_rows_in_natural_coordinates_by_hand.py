@@ -288,3 +288,45 @@ def test_the_variables_that_are_kept(monkeypatch):
     body, _, along, _ = vectors.pose_maps(range(6))
     assert body.tolist() == [0, 0, 0, 1, 1, 1] and along[3:, :3].tolist() == (0.5 * np.eye(3)).tolist()
     assert found.eliminate._may_go(0, 40) and not found.eliminate._may_go(0, 41)
+
+
+def test_rows_of_a_mechanism():
+    """x0 = 2 and 2 x3 + 2 x4 = 0 eliminate variables; variables 10 and 11 may not go, and 17 is prescribed.
+
+    A driver turns orientation 0, by which it needs no rows; a second driver of it is a row. Rows with fewer
+    terms come first, and rows of angles last.
+    """
+    angle = COUPLED_ANGLE
+    found = made(
+        kind=[DOT1, POINT, DOT1, DOT2, angle, angle, DISTANCE], driver=[4, 9, 0, -1, 9, 9, 7], begins=[1] * 7
+    )
+    free = {(8, 8): 1.0, (ONE, ONE): -1.0}
+    rows_of = lambda *rows: SimpleNamespace(rows=lambda: iter(rows))  # noqa: E731
+    found.orientations.numbered = {
+        -1: rows_of(),
+        0: rows_of({(6, 6): 1.0, (ONE, ONE): -1.0}),
+        1: rows_of(free),
+    }
+    found.eliminate, found.given = (
+        Elimination(lambda variable, _: variable not in (10, 11)),
+        {17: (4, COSINE)},
+    )
+    found._linear_equations = lambda: iter([{0: 1.0, ONE: -2.0}, {10: 1.0, 11: 2.0}])
+    found._turned = {0: 0, 2: 0}.get
+    turning, second = {(ONE, 6): 1.0, (ONE, 17): -1.0}, {(1, 2): 1.0, (ONE, 1): 3.0}
+    found._turning = {0: [turning]}.__getitem__
+    found._driven = {2: [second], 6: [{(4, 5): 1.0, (ONE, ONE): 1.0}]}.__getitem__
+    found._undriven = {3: {(0, 3): 1.0, (ONE, 4): 2.0}}.__getitem__
+    found._couplings = lambda: [({(3, 3): 1.0}, []), ({(0, 5): 1.0}, [(4, 1.0), (5, -0.5)])]
+    found.angles = {}
+    assert found._rows() == [
+        {(3, 3): 1.0},
+        free,
+        turning,
+        second,
+        {(3, 5): -1.0, (ONE, ONE): 1.0},
+        {(ONE, 10): 1.0, (ONE, 11): 2.0},
+        {(ONE, 5): 2.0},
+    ]
+    assert found.angles == {4: (6, 1.0), 5: (6, -0.5)}
+    assert found.eliminate.expressed == {0: {ONE: 2.0}, 4: {3: -1.0}}

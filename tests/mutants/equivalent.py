@@ -34,6 +34,7 @@ SYMMETRIC = {
         "convolved",
         "_dot",
         "rotations.angle_between",
+        "combination",
     },
     1: {"np.swapaxes", "difference", "error_series", "rod"},
 }
