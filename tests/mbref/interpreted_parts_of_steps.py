@@ -19,6 +19,7 @@ if not PLAIN:
 
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.taylor import angles, coefficients, correction, sample_completion, stepping
+from mbref.taylor.crossing import acceptance
 
 
 def noted(patch: pytest.MonkeyPatch, module: Any, calls: list[Any], **answers: Any) -> None:
@@ -281,6 +282,31 @@ def test_the_longest_regular_step_and_the_longest_that_crosses(
     assert stepping.first_lengths(left, memory) == pytest.approx(expected)
     assert memory.step.time_to_crossing == (0.0 if accurate else crossing)
     assert (("share", 0.125) in asked) is not accurate
+
+
+@pytest.mark.parametrize(("speeds", "speed"), [((0.25, -0.5), 0.5), ((-3.0, 2.0), 3.0)])
+def test_the_rounding_of_the_time_moves_drivers(speeds, speed):
+    """At 1e6 s by 3e-10 s times the speed; the third lane is no variable."""
+    memory = SimpleNamespace(
+        step=SimpleNamespace(crossed=0, start_pivot=0.25, start_violation=0.0),
+        progress=SimpleNamespace(largest_pivot=0.5),
+        series=SimpleNamespace(terms=np.array([[9.0] * 3, [*speeds, 9.0]])),
+        polynomials=SimpleNamespace(given=SimpleNamespace(driver=np.zeros(1))),
+        solver=SimpleNamespace(pivot_columns=np.zeros(2)),
+        run=SimpleNamespace(loop=SimpleNamespace(clock=SimpleNamespace(time=1e6))),
+    )
+    found = acceptance.violation_by_rounding
+    assert found(memory) == pytest.approx(3e-10 * speed, rel=1e-12, abs=0.0)
+    memory.step.crossed = 1
+    assert found(memory) == pytest.approx(3e-10 * speed, rel=1e-12, abs=0.0)
+    memory.polynomials.given.driver = np.zeros(0)
+    assert found(memory) == 1e-13
+    memory.step.crossed = 0
+    assert found(memory) == pytest.approx(5e-15, rel=1e-12, abs=0.0)
+    memory.step.start_violation = 1e-10
+    assert found(memory) == 2e-10
+    memory.step.start_pivot = memory.step.start_violation = 0.0
+    assert found(memory) == 1e-15
 
 
 # --- sizes ------------------------------------------------------------------------------------------------

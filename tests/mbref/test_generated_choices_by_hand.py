@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.taylor.generated import build, orders, power_orders
+from mbref.taylor.generated import build, driven_orders, orders, power_orders
+from mbref.taylor.generated.corrections import Correction
+from mbref.taylor.generated.driven_orders import DrivenOrders
+from mbref.taylor.generated.elimination import ResponseCode
+from mbref.taylor.generated.multiplier_orders import MultiplierOrders
+from mbref.taylor.generated.power_orders import PowerOrders
 
 WIDTH = 8
 
@@ -233,3 +238,101 @@ def test_parts_of_the_code(monkeypatch, names, rank, made):
         step for n in ("violation", "close", "close_rate") for step in (f"begin {n}", f"{n} {n}", f"end {n}")
     ]
     assert written == expected and text.startswith("; ModuleID")
+
+
+# --- vectors of variables and of rows ---------------------------------------------------------------------
+def written(pointers: int, counts: int = 0) -> Any:
+    """Stand-in for the instructions of a function, whose arguments and numbers are their names."""
+    return SimpleNamespace(
+        pointers=[f"p{k}" for k in range(pointers)],
+        counts=[f"n{k}" for k in range(counts)],
+        multiplied=lambda whole, factor: f"{factor} {whole}",
+        number=lambda pointer, k: f"{pointer}[{k}]",
+    )
+
+
+@pytest.mark.parametrize(
+    ("nz", "nr", "variables", "rows"),
+    [
+        (3, 2, 1, (0, 1)),
+        (8, 8, 1, (1, 2)),
+        (9, 7, 2, (1, 2)),
+        (9, 8, 2, (1, 3)),
+        (7, 1, 1, (0, 1)),
+        (16, 1, 2, (2, 3)),
+    ],
+)
+def test_no_vector_without_a_variable_or_a_row(nz, nr, variables, rows):
+    """Eight lanes a vector: variables first, then rows, both also in a vector that they share."""
+    taylor = series_of(None, nz, nr, lanes=24)
+    correction = Correction(taylor, written(4))
+    response = ResponseCode(taylor, 2, written(8))
+    for made in (correction, response):
+        assert (made._of_variables, made._of_rows) == (range(variables), range(*rows))
+        assert made._lanes == 24 and made._nz == nz
+    assert correction._rows == range(nz, nz + nr)
+    assert (correction._terms, correction._phi) == ("p0", "p1")
+    assert [correction._lanes_of(b) for b in range(2)] == [range(8), range(8, 16)]
+    masked = correction._masked(rows[0], np.arange(1.0, 9.0)).tolist()
+    assert masked == [k + 1.0 if nz <= 8 * rows[0] + k < nz + nr else 0.0 for k in range(8)]
+
+
+def test_arguments_of_the_response():
+    """Rows and variables are read from memory; rows are places of their first lanes."""
+    made = ResponseCode(series_of(None, 3, 2, lanes=24), 2, written(8))
+    names = "terms", "tableau", "particular", "null_space", "response", "last"
+    assert [getattr(made, f"_{name}") for name in names] == [f"p{k}" for k in range(6)]
+    assert made._rows == ["24 p6[0]", "24 p6[1]"] and made._columns == ["p7[0]", "p7[1]", "p7[2]"]
+    assert (made._rank, made._nr) == (2, 2)
+
+
+def test_sizes_of_orders_with_multipliers():
+    """Nine variables, four rows and two functions in 16 lanes; other products replace those of the scene."""
+    tables, other = products([[level(7)], [level(1)]]), products([[level(0)], [level(1)], [level(2)]])
+    made = MultiplierOrders(series_of(tables, 9, 4, drivers=2), written(7, 1))
+    assert made._products is tables and made._slots == 16 and made._lanes == 16
+    assert (made._scale, made._growth, made._sums) == ("p4", "p5", "p6")
+    assert (made._terms, made._response, made._left, made._right, made._last) == (
+        "p0",
+        "p1",
+        "p2",
+        "p3",
+        "n0",
+    )
+    assert (made._equations, made._functions, made._vectors) == (13, range(13, 15), range(2))
+    assert made._weights.tolist() == tables.weight.reshape(2, 8).tolist() and made._first == {}
+    made = MultiplierOrders(series_of(tables, 9, 4, drivers=2), written(7, 1), other)
+    assert made._products is other and made._slots == 24
+
+
+def test_sizes_of_orders_by_power():
+    """Nine variables and two rows: a vector of row products, then two of v_k and w_k."""
+    tables = products([[[(0, 1, 2, 0.5)]], [[(1, 1, 2, 0.5), (2, 3, 4, 0.25)], [(2, 5, 6, -1.0)]]])
+    taylor = series_of(tables, 9, 2)
+    mass = np.arange(9 * 16.0).reshape(9, 16)
+    inertia = {"force": np.arange(16.0), "mass": mass, "source": np.zeros(16, int)}
+    for moment in (0.0, 3.0):
+        weight = np.append(np.zeros(15), moment)
+        weight[[8, 15]] = moment, 0.0
+        taylor.polynomials.inertia = SimpleNamespace(**inertia, weight=weight, start=np.array([0, 8, 16]))
+        made = PowerOrders(taylor, written(5, 1))
+        assert made._power == range(16, 32, 8) and made._slots == 32 and made._sums == "p4"
+        assert made._vectors == range(2) and (made._nz, made._nr) == (9, 2)
+        assert made._mass.tolist() == mass[:, :9].tolist() and made._has_moments is (moment != 0.0)
+        assert made._moments[8, 0] == moment and np.count_nonzero(made._moments) == (moment != 0.0)
+        assert [[c.constant for c in v.constant] for v in made._force] == [[*range(8)], [*range(8, 16)]]
+    assert made._products.weight[:2].tolist() == [-0.5, -0.25] and made._products.start.tolist() == [0, 16]
+    assert made._products.weight[9] == 1.0 and np.count_nonzero(made._products.weight) == 3
+
+
+def test_lanes_of_driven_orders(monkeypatch):
+    """Nine lanes of two rows need two vectors, of which seven lanes are unused."""
+    term = (1, 2, 0.5)
+    monkeypatch.setattr(driven_orders, "terms_of_rows", lambda taylor: "terms")
+    monkeypatch.setattr(
+        driven_orders, "_lanes_of", lambda terms: [(k % 2, [term] * (1 + (k == 0))) for k in range(9)]
+    )
+    made = DrivenOrders(series_of(None, 9, 4, drivers=1), written(7, 1))
+    assert made._rows == [0, 1] * 4 + [0] and made._nz == 9
+    assert made._products.start.tolist() == [0, 16, 24] and made._slots == 24
+    assert np.flatnonzero(made._products.weight).tolist() == [*range(9), 16]

@@ -250,7 +250,7 @@ def test_directions_that_turn_about_an_axis_at_rest():
 def test_parallel_axes_and_axes_of_an_orientation():
     x, y, z = np.eye(3)
     assert orientations._are_parallel(x, -x) and orientations._are_parallel(x, x + 0.99e-9 * y)
-    assert not orientations._are_parallel(x, x + 1.01e-9 * y)
+    assert not orientations._are_parallel(x, x + 1.01e-9 * y) and not orientations._are_parallel(x, 1e-9 * y)
     known: dict[int, list[np.ndarray]] = {}
     assert orientations._keep(known, 2, x) and not orientations._keep(known, 2, -x)
     assert orientations._keep(known, 2, y) and not orientations._keep(known, 2, z)
@@ -263,6 +263,7 @@ def test_a_basis_has_directions_with_an_angle():
     near, far = (math.sqrt(1 - s * s) * x + s * y for s in (0.199, 0.201))
     found = orientations._basis(iter([x, near, far, z]))
     assert found == pytest.approx(np.array([x, far, z]), abs=1e-15)
+    assert orientations._basis(iter([x, 0.2 * y, z]))[1].tolist() == z.tolist()
 
 
 # --- tables -------------------------------------------------------------------------------------------------

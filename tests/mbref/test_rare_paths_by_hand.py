@@ -359,7 +359,9 @@ def test_steps_ahead_decide_on_generated_code(monkeypatch):
     memory = SimpleNamespace(
         equations=SimpleNamespace(system=SimpleNamespace(counts=counts)), loop=SimpleNamespace(clock=clock)
     )
-    found.run = SimpleNamespace(memory=memory, times=[0.0, 2.0], limits=SimpleNamespace(most_steps=1000))  # type: ignore[assignment]
+    found.run = SimpleNamespace(
+        memory=memory, times=[0.0, 0.25, 2.0], limits=SimpleNamespace(most_steps=1000)
+    )  # type: ignore[assignment]
     assert found._steps_ahead() == 60.0
     found.run.limits.most_steps = 50  # type: ignore[misc]
     assert found._steps_ahead() == 30.0

@@ -120,6 +120,7 @@ def test_coordinates_of_poses():
     centres, axes = natural.pose_of(poses.reshape(1, 14))
     assert centres.tolist() == [[[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]]
     assert axes.tolist() == [[np.eye(3).tolist(), np.diag([-1.0, -1.0, 1.0]).tolist()]]
+    assert natural.pose_of(poses.ravel()).centres.tolist() == centres[0].tolist()
 
 
 @pytest.mark.parametrize(("first", "second"), [(0, 1), (1, 2), (2, 0)])
@@ -264,8 +265,8 @@ def test_the_variables_that_are_kept(monkeypatch):
     """Those with most products come first; eliminated and prescribed variables are not kept."""
     rows = [
         {(0, 1): 1.0, (ONE, 2): 1.0},
-        {(1, 1): 1.0, (1, 4): 1.0, (4, 5): 1.0},
-        {(4, 5): 2.0, (ONE, 0): 1.0},
+        {(1, 1): 1.0, (1, 4): 1.0, (4, 5): 1.0, (ONE, 2): 1.0},
+        {(4, 5): 2.0, (ONE, 0): 1.0, (ONE, 2): 1.0},
     ]
     asked: list[Any] = []
 

@@ -34,7 +34,7 @@ def made(**changes: Any) -> Any:
     state = SimpleNamespace(coordinates=np.arange(7.0), velocities=np.arange(6.0))
     found.run = SimpleNamespace(  # type: ignore[assignment]
         crossings=[passed(), passed(), passed()],
-        times=np.array([0.0, 2.0]),
+        times=np.array([0.0, 0.5, 2.0]),
         making=0.0,
         limits=SimpleNamespace(branches={3: SMOOTH, 4: 2}, most_steps=100),
         model=SimpleNamespace(n=4),

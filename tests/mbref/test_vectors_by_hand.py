@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import operator
+import sys
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ from numba.core.typing import templates
 
 from mbref.input_error import InputError
 from mbref.kernels import machine_code
+from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import Method
 from mbref.stepping.limits import AUTO, GENERATED, GENERIC, Limits
 from mbref.taylor import simd, stepper
@@ -355,7 +357,7 @@ def test_a_new_stepper(
     of, run = stepper.SeriesStepper, started(order, code=code).run
     run.memory.control.rtol, run.memory.control.atol = rtol, 4e-8 - rtol
     run.memory.active = SimpleNamespace(velocities=np.array([0, 2, 3, 5]))
-    run.ranks, run.times, run.start = Ranks(rank), np.array([0.0, 2.0]), "start"
+    run.ranks, run.times, run.start = Ranks(rank), np.array([0.0, 0.0, 2.0]), "start"
     run.model = SimpleNamespace(n=6, has_angles=angles, closed_loops=loops, length=length)
     pooled = SimpleNamespace(values="taylor", packed=SimpleNamespace(argument="argument"))
     geometry = SimpleNamespace(polynomials=lambda model: ("polynomials", model))
@@ -390,7 +392,7 @@ def test_a_new_stepper_at_a_singular_start(monkeypatch, end, way, fits):
     """A run of no time leaves no singular position; generated code is used where it pays."""
     run = started(code=AUTO).run
     run.memory.active, run.ranks = SimpleNamespace(velocities=np.arange(6)), Ranks(5)
-    run.times, run.start = np.array([0.0, end]), "start"
+    run.times, run.start = np.array([0.0, 0.0, end]), "start"
     run.model = SimpleNamespace(n=6, has_angles=False, closed_loops=True, length=1.0)
     pooled = SimpleNamespace(values="taylor", packed=SimpleNamespace(argument="argument"))
     geometry = SimpleNamespace(polynomials=lambda model: None)
@@ -404,3 +406,18 @@ def test_a_new_stepper_at_a_singular_start(monkeypatch, end, way, fits):
     found = stepper.SeriesStepper(run)
     assert (found._way, found._fits_no_branch, found._wants_code) == (way, fits, True)
     assert (found._pace, found._departure) == ("pace", "departure")
+
+
+def test_generated_code_is_put_into_memory(monkeypatch):
+    """The time that it takes is counted apart; without the subpackage there is none."""
+    found = started()
+    found.run.making, found.taylor = 0.5, "taylor"
+    build = SimpleNamespace(put_code=lambda taylor: f"code of {taylor}")
+    monkeypatch.setitem(sys.modules, "mbref.taylor.generated.build", build)
+    monkeypatch.setattr(stepper.time, "process_time", iter([10.0, 13.0, 20.0]).__next__)
+    found._put_code()
+    assert found._code == "code of taylor" and found.run.making == 3.5
+    monkeypatch.setitem(sys.modules, "mbref.taylor.generated.build", None)
+    with pytest.raises(NoGeneratedCode, match="the subpackage mbref[.]taylor[.]generated is not installed"):
+        found._put_code()
+    assert found.run.making == 3.5

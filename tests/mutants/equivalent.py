@@ -111,6 +111,16 @@ REASONS: dict[tuple[str, str, str], str] = {
         "np.einsum('ki,ki->k', axis, speeds[1] - speeds[0])",
     ): SYMMETRY,
     (
+        "mbref/taylor/natural.py",
+        "moved = (combination((1.0, c), (1.0, a)) for c, a in zip(centre, arm, strict=True))",
+        "zip(arm, centre, strict=True)",
+    ): COMMUTES,
+    (
+        "mbref/taylor/natural.py",
+        "pairs = [*zip(apart, apart, strict=True), ({ONE: length}, {ONE: -length})]",
+        "({ONE: -length}, {ONE: length})",
+    ): COMMUTES,
+    (
         "mbref/taylor/generated/power_orders.py",
         "return self._write.total(list(map(self._write.product, factors, vectors)))",
         "map(self._write.product, vectors, factors)",
@@ -314,6 +324,11 @@ def reason(mutant: Mutant, source: str) -> str:
         return UNKNOWN_LENGTH
     if re.search(r"\b0\.0 \* load\([\w.]+, $", before) and (mutant.old, mutant.new) == ("0", "1"):
         return ZERO_TIMES
+    if mutant.kind == "argument order":
+        if re.search(r"\bproduct_sum\((\[\*)?$", before) and exchanges_parts(mutant, {"zip"}):
+            return COMMUTES
+        if re.search(r"\bnorm\($", before) and exchanges_parts(mutant, {"rotations.cross"}):
+            return SYMMETRY
     line = source.splitlines()[mutant.line - 1].strip()
     if " = TypeVar(" in line:
         return FOR_TYPES
