@@ -8,7 +8,7 @@ contain a singular position is replaced by high-accuracy steps (``mbref.taylor.c
 
 from __future__ import annotations
 
-from numpy import exp, isfinite, log
+from numpy import exp, inf, isfinite, log
 
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import OK, SINGULAR_AHEAD
@@ -133,7 +133,7 @@ def longest_predictor_step(memory):
     high order are rounding, which grows with the order, so that fewer terms allow a longer step.
     """
     step, control, full = memory.step, memory.run.control, memory.mode.order
-    best, step.used_order, largest = 0.0, full, log(control.largest_step)
+    best, step.used_order, largest = -inf, full, log(control.largest_step)
     fewest = 2 if step.start_pivot < PIVOT_NEAR * memory.progress.largest_pivot else 4
     for quarters in range(4, fewest - 1, -1):
         order, longest = full * quarters // 4, largest
@@ -141,7 +141,7 @@ def longest_predictor_step(memory):
             size = largest_used(k, memory)
             if size > 0.0:
                 longest = min(longest, log(PREDICTOR_TOLERANCE / size) / k)
-        if longest > best or quarters == 4:
+        if longest > best:
             best, step.used_order = longest, order
     h, first = exp(best), control.first_step
     return min(h, first) if memory.run.equations.system.counts.steps == 0 and first > 0.0 else h

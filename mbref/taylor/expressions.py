@@ -114,7 +114,7 @@ class Elimination:
 
     def settle(self) -> None:
         """Try the remaining equations again, until no remaining equation eliminates a variable."""
-        before = -1
+        before: int | None = None
         while before != len(self.expressed):
             before, equations, self.left = len(self.expressed), self.left, []
             for equation in equations:

@@ -135,7 +135,7 @@ class NaturalCoordinates:
         rows += [row for row, angles in couplings if not angles]
         free = (o for number, o in self.orientations.numbered.items() if number not in turned)
         rows = [row for orientation in free for row in orientation.rows()] + rows
-        before = -1
+        before: int | None = None
         while before != len(self.eliminate.expressed):
             before, rows = len(self.eliminate.expressed), [self._reduced(row) for row in rows]
             for row in rows:
@@ -255,7 +255,7 @@ class NaturalCoordinates:
         x, y = (self.direction(body, w) for w in (table.direction_first[p], table.turning_first[p]))
         turned = [product_sum([({cosine: 1.0}, b), ({sine: -1.0}, a)]) for a, b in zip(x, y, strict=True)]
         rows: list[Polynomial] = []
-        if max(map(degree, turned)) == 2 or not all(ONE in (i, j) for row in turned for i, j in row):
+        if max(map(degree, turned)) == 2:
             turned, rows = self._own_variables(p, turned)
         e = tuple(map(as_expression, turned))
         return [*rows, product_sum(zip(e, self._other_side(p), strict=True))]
