@@ -150,7 +150,7 @@ def _inertia(model: Model, forms: Forms, lanes: int) -> Inertia:
         terms[i].append((j, i * d + j))
     slots, start = _slots(terms, (0, d * d))
     source, place = (np.array([slot[k] for slot in slots], np.int64) for k in range(2))
-    weights = np.zeros((*scenes, d * d + 1))  # the last weight is that of slots without a term
+    weights = np.zeros((*scenes, d * d + 1))  # slots without a term use the last weight
     weights[..., :-1] = linear.reshape(*scenes, d * d)
     mass = np.zeros((*scenes, d, lanes))
     mass[..., :d] = forms.mass(data.bodies)

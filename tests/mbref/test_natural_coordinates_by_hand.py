@@ -295,6 +295,37 @@ def test_arrays_of_numbers_of_scenes():
     assert numbers.largest([one]).values.tolist() == [1.0, 4.0]
 
 
+def test_numbers_of_scenes_together():
+    """Numbers are floats where all scenes have the same bits; indices are those of the first scene."""
+    batch = numbers.ManyScenes(3)
+    mixed = batch.together(
+        np.array([[[1.0, 0.0], [3.0, 5.0]], [[1.0, -0.0], [3.0, 6.0]], [[1.0, 0.0], [3.0, 5.0]]])
+    )
+    assert mixed.dtype == object and mixed.shape == (2, 2) and (mixed[0, 0], mixed[1, 0]) == (1.0, 3.0)
+    assert isinstance(mixed[0, 0], float) and mixed[1, 1].values.tolist() == [5.0, 6.0, 5.0]
+    assert np.signbit(mixed[0, 1].values).tolist() == [False, True, False] and mixed[1, 1].batch is batch
+    spread = batch.spread(mixed)
+    assert spread.shape == (3, 2, 2) and spread[1].tolist() == [[1.0, 0.0], [3.0, 6.0]]
+    same = batch.together(np.array([[1.0, 2.0]] * 3))
+    assert same.dtype == float and same.tolist() == [1.0, 2.0]
+    assert batch.together(np.array([[1, 2], [3, 4]])).tolist() == [1, 2] and batch.agree.all()
+
+
+def test_patterns_of_numbers_of_scenes():
+    """The pattern is that of the first scene; scenes with an entry of another pattern are noted."""
+    batch, values = numbers.ManyScenes(4), np.ones((4, 2, 3))
+    values[:, 0, 1] = values[2, 1, 2] = values[3] = 0.0
+    values[1] *= -7.0
+    assert batch.pattern(values).tolist() == [[True, False, True], [True, True, True]]
+    assert batch.agree.tolist() == [True, True, False, False]
+    batch.agree[1] = False
+    batch.pattern(np.ones((4, 2)))
+    assert batch.agree.tolist() == [True, False, False, False]
+    one = numbers.OneScene()
+    assert one.pattern(np.array([0.0, -2.0])).tolist() == [False, True] and one.spread(values) is values
+    assert (one.number_type, batch.number_type) == (float, object)
+
+
 def decided(number: Any, batch: numbers.ManyScenes) -> tuple[bool, list[bool]]:
     return bool(number), batch.agree.tolist()
 
@@ -495,6 +526,51 @@ def test_forces_that_functions_multiply():
     assert found.constant.tolist() == [[0.0] * 7 + [-1.5, 0.0], [0, 0, 0, 1.0, 2.0, 3.0, 0, 0, 0]]
     assert found.linear[7, 8] == -1.5 and found.linear[8, 7] == 1.5
     assert np.count_nonzero(found.linear) == 2
+
+
+class Scenes(Shaped):
+    """Scenes whose forms differ by a factor each; the first axis counts them unless one is alone."""
+
+    def __init__(self, *factors: float, alone: bool = False) -> None:
+        super().__init__()
+        self.factors, self.alone = factors, alone
+        self.centres = self.spread(self.centres)
+
+    def spread(self, array: np.ndarray) -> np.ndarray:
+        found = np.array([factor * array for factor in self.factors])
+        return found[0] if self.alone else found
+
+
+def test_forces_and_moments_of_several_scenes():
+    """Each scene has its own masses, gravity and forces; together they have the same numbers as alone."""
+    kinds: Any = {"kind": [FORCE, MOMENT, MOMENT, FORCE], "first": [0, 1, 1, 1], "function": [-1, -1, 1, 0]}
+    force = np.cos(np.arange(36.0)).reshape(3, 4, 3)
+    mass, gravity = np.sin(1.0 + np.arange(6.0)).reshape(3, 2), np.cos(2.0 + np.arange(9.0)).reshape(3, 3)
+
+    def found(forms: Any, k: Any) -> list[np.ndarray]:
+        made = loads(force=force[k], **kinds)
+        data: Any = SimpleNamespace(loads=made, bodies=SimpleNamespace(mass=mass[k]), gravity=gravity[k])
+        _, constant, linear = load_polynomials.timed_forces(made, forms)
+        return [*load_polynomials.constant_forces(data, forms), constant, linear]
+
+    factors = 1.0, -2.0, 0.5
+    together = found(Scenes(*factors), slice(None))
+    assert [each.shape for each in together] == [(3, 9), (3, 9, 9), (3, 2, 9), (3, 18, 9)]
+    for k, factor in enumerate(factors):
+        for one, other in zip(together, found(Scenes(factor, alone=True), k), strict=True):
+            assert one[k] == pytest.approx(other, abs=1e-15) and np.abs(other).max() > 0.01
+
+
+def test_amounts_of_several_scenes():
+    """Torques and forces of two scenes; the coupled angle has none."""
+    kinds: Any = {"kind": [ABOUT_AXIS, ALONG_AXIS, ABOUT_AXIS], "first": [0] * 3, "second": [1] * 3}
+    made = loads(force=np.arange(18.0).reshape(2, 3, 3), **kinds)
+    shaped: Any = Shaped()
+    angles = load_polynomials.coupled_angles(shaped)
+    torsions = load_polynomials.torsions_of(made, shaped, angles)
+    assert torsions.amount.tolist() == [[0.0, 1.5, 0.0], [2.25, 3.75, 0.0]]
+    assert torsions.row.tolist() == [-1, -1, 4] and torsions.function.tolist() == [-1, -1, -1]
+    assert load_polynomials.slides_of(made, shaped).amount.tolist() == [[1.5], [6.0]]
 
 
 # --- orientations of a mechanism ----------------------------------------------------------------------------

@@ -592,7 +592,7 @@ def test_inertia_forces_and_moments_as_arrays(monkeypatch):
     )
     assert found.coupled.tolist() == [0, 1] and found.first.tolist() == [0, 1, 2]
     assert found.force.tolist() == [1.0, 2.0, *[0.0] * 6] and found.start.tolist() == [0, 8]
-    assert found.source[:2].tolist() == [1, 0] and found.weight.tolist() == [0.5, 0.25, *[0.0] * 6]
+    assert found.source.tolist() == [1, *[0] * 7] and found.weight.tolist() == [0.5, 0.25, *[0.0] * 6]
 
 
 def test_poses_and_prescribed_functions_as_arrays():
@@ -656,3 +656,80 @@ def test_values_of_all_scenes():
     indices = np.array([1, 2])
     assert values(indices, indices.copy(), batch).tolist() == [[1, 2]]
     assert values(indices, indices[::-1], batch) is None
+
+
+# --- geometries ---------------------------------------------------------------------------------------------
+def test_tables_of_a_geometry(monkeypatch):
+    """Lanes of two variables, three rows and two functions; tables of scenes without loads are made once."""
+    calls: list[Any] = []
+
+    def table(name: str) -> Callable[..., Any]:
+        return lambda *given: calls.append((name, *given)) or f"{name} {len(calls)}"
+
+    parts = ("_rows", "_products", "_poses", "_given", "_tableau", "_inertia", "coupled_angles")
+    for name in (*parts, "springs_of", "torsions_of", "slides_of", "timed_forces"):
+        monkeypatch.setattr(polynomials, name, table(name))
+    monkeypatch.setattr(polynomials, "Forms", lambda of: "forms")
+    monkeypatch.setattr(polynomials, "Polynomials", lambda **tables: tables)
+    monkeypatch.setattr(polynomials, "padded_size", lambda size: 10 * size)
+    vectors = SimpleNamespace(pose_maps=lambda kept: ("maps", kept))
+    of: Any = SimpleNamespace(
+        kept=[6, 4], rows=["row"] * 3, given={8: (3, 0), 9: (3, 1)}, direction_vectors=vectors
+    )
+    found = polynomials.Geometry(of)
+    lanes = {6: 0, 4: 1, 8: 5, 9: 6}
+    made = [
+        ("_rows", of, lanes, 70),
+        ("_products", of, lanes, 70),
+        ("_poses", of, "forms"),
+        ("_given", of),
+        ("_tableau", "_rows 1", 2, 3, 70),
+        ("coupled_angles", "forms"),
+    ]
+    assert calls == made and found.natural is of and found.pose_maps == ("maps", [6, 4])
+    assert found.tableau == "_tableau 5"
+
+    def model(loads: int) -> Any:
+        return SimpleNamespace(data=SimpleNamespace(loads=SimpleNamespace(kind=np.zeros(loads))))
+
+    several, none = model(2), model(0)
+    first = found.polynomials(several)
+    loads = several.data.loads
+    assert calls[6:] == [
+        ("_inertia", several, "forms", 70),
+        ("springs_of", loads, "forms"),
+        ("torsions_of", loads, "forms", "coupled_angles 6"),
+        ("slides_of", loads, "forms"),
+        ("timed_forces", loads, "forms"),
+    ]
+    assert first == {
+        **{"rows": "_rows 1", "products": "_products 2", "inertia": "_inertia 7", "poses": "_poses 3"},
+        **{"given": "_given 4", "springs": "springs_of 8", "torsions": "torsions_of 9"},
+        **{"slides": "slides_of 10", "timed": "timed_forces 11"},
+    }
+    assert found.polynomials(several)["springs"] == "springs_of 13"
+    assert [found.polynomials(none)["springs"] for _ in range(2)] == ["springs_of 18"] * 2
+    assert found.polynomials(several)["springs"] == "springs_of 24"
+    assert found.polynomials(none)["timed"] == "timed_forces 21"
+    of.kept = of.rows = ()
+    of.given = {}
+    polynomials.Geometry(of)
+    assert calls[-6] == ("_rows", of, {}, 10), "at least one lane"
+
+
+def test_tables_without_entries():
+    of: Any = SimpleNamespace(rows=[], kept=[], numbers=OneScene(), given={}, length=2.0)
+    assert [column.size for column in polynomials._rows(of, {}, 8)] == [0, 0, 0, 0, 0, 0, 0, 8]
+    assert [column.size for column in polynomials._given(of)] == [0, 0, 0]
+    assert [column.size for column in polynomials.products_of_lanes([])] == [0, 0, 0, 1]
+
+
+def test_the_mass_matrices_of_two_scenes():
+    """Masses and moments of two scenes of one body: the first axis counts the scenes."""
+    forms = Forms(Natural())  # type: ignore[arg-type]
+    mass, inertia = np.array([[3.0], [2.0]]), np.array([[[5.0, 4.0, 3.0]], [[1.0, 1.5, 2.0]]])
+    bodies: Any = SimpleNamespace(mass=mass, inertia=inertia)
+    alone = [SimpleNamespace(mass=mass[k], inertia=inertia[k]) for k in range(2)]
+    found = forms.mass(bodies)
+    assert found.shape == (2, 2, 2)
+    assert found.tolist() == [forms.mass(each).tolist() for each in alone]  # type: ignore[arg-type]

@@ -120,6 +120,13 @@ REASONS: dict[tuple[str, str, str], str] = {
         "pairs = [*zip(apart, apart, strict=True), ({ONE: length}, {ONE: -length})]",
         "({ONE: -length}, {ONE: length})",
     ): COMMUTES,
+    **{
+        ("mbref/taylor/load_polynomials.py", line, "4"): "A product of vectors has three components."
+        for line in (
+            "form = moving[..., k : k + 3, :]",
+            "turned = rotations.cross(moment, at_rest[..., k : k + 3])",
+        )
+    },
     (
         "mbref/taylor/generated/power_orders.py",
         "return self._write.total(list(map(self._write.product, factors, vectors)))",
