@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -90,22 +91,23 @@ class Reach:
     def ordered(self, mutant: Mutant, source: str, kills: Mapping[str, int]) -> dict[str, list[str]]:
         """Return the test files in the order in which they run, each with all of its tests.
 
-        Files that have killed most mutants of the same folder come first, then files with the least time for
-        each of these names that they contain: the functions and classes around a mutant, its module and its
-        package. In a file, tests that run the line come first, then tests with one of the names, then the
-        quickest. Tests that do not run the line may use a result that another test has left in memory.
+        Files come first that take little time, that contain many names, and that have killed many mutants of
+        the same folder. The names are the functions and classes around a mutant, or a constant and the
+        functions that use it, its module and its package. In a file, tests that run the line come first, then
+        tests with one of the names, then the quickest. Tests that do not run the line may use a result that
+        another test has left in memory.
         """
         tests, names = self.tests(mutant, source), around(source, mutant)
         package, module = ".".join(Path(mutant.file).parent.parts), Path(mutant.file).stem
         words = [re.escape(package), module, rf"{module}(\.\w+| import)", *names]
         named = re.compile("|".join(map(re.escape, [*names, module])))
 
-        def rank(file: str) -> tuple[int, float]:
+        def rank(file: str) -> float:
             count = sum(bool(re.search(rf"\b{word}\b", self._texts[file])) for word in words)
             seconds = min(self._records[file]["seconds"][test] for test in tests[file])
             needed = STARTING + self._records[file]["starting"] + seconds
             nearer = NEARER if file.startswith(f"tests/{package.partition('.')[0]}/") else 1.0
-            return -kills.get(file, 0), needed / (1 + count) / nearer
+            return needed / (1 + count) / (1 + math.log2(1 + kills.get(file, 0))) / nearer
 
         def in_order(file: str) -> list[str]:
             seconds, running = self._records[file]["seconds"], set(tests[file])
@@ -137,10 +139,8 @@ def lines_of(source: str, line: int) -> int:
         statements = [node for node in ast.walk(innermost) if isinstance(node, ast.stmt) and _has(node, line)]
         last = max(statements, key=lambda node: node.lineno)
         return _bits(last.lineno, _last_of_head(last))
-    names = {name for node in ast.walk(tree) if _has(node, line) for name in _targets(node)}
-    inner = [node for function in functions for node in ast.walk(function)]
-    users = {node.lineno for node in inner if isinstance(node, ast.Name) and node.id in names}
-    users |= {node.lineno for node in inner if isinstance(node, ast.Attribute) and node.attr in names}
+    names = _constants(tree, line)
+    users = {node.lineno for function in functions for node in ast.walk(function) if _names(node) & names}
     return sum(1 << k for k in users) or -1
 
 
@@ -167,11 +167,29 @@ def _targets(node: ast.AST) -> Iterator[str]:
         yield from (name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name))
 
 
+def _constants(tree: ast.AST, line: int) -> set[str]:
+    """Return the names that the assignments at a line define."""
+    return {name for node in ast.walk(tree) if _has(node, line) for name in _targets(node)}
+
+
+def _names(node: ast.AST) -> set[str]:
+    """Return the name that a node reads, in a set."""
+    return (
+        {node.id} if isinstance(node, ast.Name) else {node.attr} if isinstance(node, ast.Attribute) else set()
+    )
+
+
 def around(source: str, mutant: Mutant) -> list[str]:
-    """Return the names of the functions and classes that contain a mutant."""
-    return [
-        node.name
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef | ast.ClassDef)
-        and node.lineno <= mutant.line <= (node.end_lineno or 0)
-    ]
+    """Return the names of the functions and classes that contain a mutant.
+
+    Of a constant of a module or a class, these are its name and the names of the functions that use it, too.
+    """
+    tree = ast.parse(source)
+    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.ClassDef)]
+    found = [node.name for node in nodes if _has(node, mutant.line)]
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    if any(_has(node, mutant.line) for node in functions):
+        return found
+    constants = _constants(tree, mutant.line)
+    using = [f.name for f in functions if any(_names(node) & constants for node in ast.walk(f))]
+    return [*found, *sorted(constants), *using]

@@ -238,9 +238,16 @@ def test_tests_that_run_the_line_are_chosen_and_ordered(reach, tmp_path):
     }
     found = reach.ordered(mutant, source, {})
     assert found == expected and list(found) == list(expected)
-    assert next(iter(reach.ordered(mutant, source, {"tests/test_far.py": 1}))) == "tests/test_far.py"
+    first = [next(iter(reach.ordered(mutant, source, {"tests/test_far.py": n}))) for n in (1, 1000)]
+    assert first == ["tests/test_near.py", "tests/test_far.py"], "one kill does not outweigh the names"
     again = Reach(tmp_path / "lines.jsonl", tmp_path)
     assert again.missing() == [] and again.ordered(mutant, source, {}) == expected
+
+
+def test_a_constant_is_known_by_its_name_and_by_the_functions_that_use_it():
+    source = "LIMIT = 3\n\n\ndef within(x):\n    return x < LIMIT\n\n\ndef other(x):\n    return x < 4\n"
+    of = {m.line: m for m in mutants("mbref/a.py", source) if m.kind == "constant"}
+    assert around(source, of[1]) == ["LIMIT", "within"] and around(source, of[9]) == ["other"]
 
 
 def test_a_line_that_no_test_runs_is_left_to_tests_that_import_its_source(reach):
