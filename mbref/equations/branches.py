@@ -248,7 +248,7 @@ def _roots_of_many(forms: np.ndarray) -> tuple[list[np.ndarray], bool] | None:
 
     None if lines are not isolated: at most 2ᵈ⁻¹ isolated lines exist (Bézout).
     """
-    d, random = forms.shape[1], np.random.default_rng(0)
+    (_, d, _), random = forms.shape, np.random.default_rng(0)
     simple: list[np.ndarray] = []
     multiple: list[np.ndarray] = []
     for _ in range(ROOT_STARTS if len(forms) >= d - 1 else 0):
@@ -288,7 +288,7 @@ def _velocity(model: Model, found: SecondOrder, a: np.ndarray, v: np.ndarray) ->
         return u[:-1] / u[-1] if abs(u[-1]) > SAME * np.linalg.norm(u) else None
     energy, own = v @ (model.mass * v), u[:-1] @ (model.mass * u[:-1])
     along = v @ (model.mass * u[:-1])
-    return u[:-1] * np.sqrt(energy / own) * (1.0 if along >= 0 else -1.0)
+    return u[:-1] * np.copysign(np.sqrt(energy / own), along)
 
 
 def branches_passed(model: Model, passed: Passed) -> Branches:

@@ -50,8 +50,9 @@ def _free_names(scene: Scene, joints: list[Joint]) -> Iterator[str]:
     taken = {entry.name for entries in (scene.body, scene.joint, scene.coupling) for entry in entries}
     for joint in joints:
         name = f"armature of {joint.name}"
-        while name in taken:
-            name += "'"
+        for _ in taken:
+            if name in taken:
+                name += "'"
         yield name
 
 

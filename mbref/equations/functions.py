@@ -58,10 +58,11 @@ def select_pieces(t, equations):
     """Select the piece of every function that begins at time t (s) or before."""
     functions, piece = equations.scene.functions, equations.piece
     for f in range(piece.shape[0]):
-        p = functions.first[f]
-        while p + 1 < functions.first[f + 1] and functions.begin[p + 1] <= t:
-            p += 1
-        piece[f] = p
+        piece[f] = functions.first[f]
+        for p in range(functions.first[f] + 1, functions.first[f + 1]):
+            if functions.begin[p] > t:
+                break
+            piece[f] = p
 
 
 @kernel

@@ -280,7 +280,9 @@ def svd_solve(d, rhs, tolerance, x, dual):
     u, s, vt = np.linalg.svd(d, full_matrices=False)
     m, n = d.shape
     rank = 0
-    while rank < s.size and s[rank] > tolerance * s[0]:
+    for value in s:
+        if not value > tolerance * s[0]:
+            break
         rank += 1
     add_pseudo_solution(u, s, vt, rank, rhs, x, dual)
     for i in range(m):

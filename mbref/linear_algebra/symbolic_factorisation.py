@@ -96,7 +96,7 @@ def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
 def empty_factor() -> SparseFactor:
     """Return memory of a factor without rows."""
     nothing = np.zeros(0, dtype=np.int64)
-    return sparse_factor(symbolic_factorisation(nothing, nothing, nothing, np.zeros(0, dtype=bool)))
+    return sparse_factor(symbolic_factorisation(nothing, nothing, nothing, nothing))
 
 
 def sparse_factor(symbolic: Symbolic) -> SparseFactor:

@@ -62,9 +62,10 @@ def sort(values):
     """Sort values in increasing order, in place, by insertion."""
     for k in range(1, values.shape[0]):
         value, place = values[k], k
-        while place > 0 and values[place - 1] > value:
-            values[place] = values[place - 1]
-            place -= 1
+        for before in range(k - 1, -1, -1):
+            if not values[before] > value:
+                break
+            values[place], place = values[before], before
         values[place] = value
 
 

@@ -65,12 +65,12 @@ options_of, scratch_of = opener(Options), opener(Scratch)
 def jacobian_by_euler_parameters(q, equations, a):
     """Compute [Φ_r Φ_p; 0 2pᵀ] (m + nb, 7 nb) at the state of the last evaluation; Φ_p = 2 Φ_π' L."""
     bodies, blocks = equations.scene.row_bodies, equations.system.blocks
-    m, nq = bodies.shape[0], q.shape[0]
+    m, nb = bodies.shape[0], q.shape[0] // 7
     a[:] = 0.0
     for row in range(m):
         for side in range(bodies.shape[1]):
             b = bodies[row, side]
-            if 7 * b < nq:
+            if b < nb:
                 i, j = 7 * b, 6 * side
                 for k in range(3):
                     a[row, i + k] = blocks[row, j + k]
@@ -80,7 +80,7 @@ def jacobian_by_euler_parameters(q, equations, a):
                 a[row, i + 4] = w * r1 - z * r2 + y * r3
                 a[row, i + 5] = z * r1 + w * r2 - x * r3
                 a[row, i + 6] = -y * r1 + x * r2 + w * r3
-    for b in range(nq // 7):
+    for b in range(nb):
         for k in range(3, 7):
             a[m + b, 7 * b + k] = 2.0 * q[7 * b + k]
 

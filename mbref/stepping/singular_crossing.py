@@ -121,7 +121,7 @@ def zero_of_pivot(k, h, memory):
     The method is false position with the Pegasus rule (Dowell & Jarratt, BIT 12, 1972). Afterwards the factor
     belongs to the pose at this fraction.
     """
-    pivots, low, high, part = memory.loop.ends.pivots, 0.0, 1.0, 1.0
+    pivots, low, high = memory.loop.ends.pivots, 0.0, 1.0
     at_low, at_high = memory.loop.ends.squared_pivots[k], pivots[k]
     for _ in range(SEARCH):
         part = low + (high - low) * at_low / (at_low - at_high)
@@ -134,7 +134,7 @@ def zero_of_pivot(k, h, memory):
         high, at_high = part, found
         if abs(high - low) < PLACE_ERROR or found == 0.0:
             break
-    return part
+    return high
 
 
 @kernel

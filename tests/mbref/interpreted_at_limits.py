@@ -262,7 +262,34 @@ def passes(patch: Patch, pivot: float, of_product: float = -1.0, size: float = 1
 def test_limits_of_singular_positions_in_explicit_runs(monkeypatch):
     changes(monkeypatch, meets, 0.5, True, False)
     changes(monkeypatch, lambda patch, x: meets(patch, 0.5, x), 0.5, False, True)
-    assert singular_crossing.relative_pivot(Record(reference_pivot=0.0, smallest_pivot=0.5)) == 1.0
+    for reference, relative in ((0.0, 1.0), (0.5, 0.25), (2.0, 0.0625)):
+        watch = Record(reference_pivot=reference, smallest_pivot=0.125)
+        assert singular_crossing.relative_pivot(watch) == relative
+
+
+@pytest.mark.parametrize(
+    ("steps", "reached", "rtol", "expected"),
+    [
+        (1000, 1.0, 1e-6, 1.0),
+        (1001, 1.0, 1e-6, (1000 / 1001) ** 2),
+        (2000, 1.0, 1e-6, 0.25),
+        (2000, 0.5, 1e-6, 0.0625),
+        (2000, 1e-9, 1e-12, 0.1),
+        (2000, 0.5, 1e-14, 1.0),  # the least tolerance is larger than rtol
+        (49, 1e-9, 1e-6, 0.01),
+        (50, 1e-9, 1e-6, 1e-7),
+        (49, 0.0, 1e-14, 1.0),
+        (0, 0.0, 1e-6, 1.0),
+    ],
+)
+def test_tolerances_of_runs_of_many_steps(steps, reached, rtol, expected):
+    """A run of 1 s; of its first steps each is suggested to be 1e-9 s long."""
+    made = Record(
+        loop=Record(clock=Record(time=reached), times=np.array([0.0, 0.25, 1.0])),
+        equations=Record(system=Record(counts=Record(steps=steps))),
+        control=Record(rtol=rtol),
+    )
+    assert loop.share(1e-9, made) == pytest.approx(expected, rel=1e-12)
 
 
 def test_limits_of_singular_positions_inside_a_step(monkeypatch):

@@ -221,24 +221,46 @@ def test_newton_steps_of_the_dependent_coordinates(parts, violations, factors, s
     """A residual of (0.5, 0.25) is subtracted from coordinates 2 and 0; one that stays is rounding."""
     memory, left, good = part_memory(), list(violations), list(factors)
     evaluated: list[Any] = []
-    parts.setattr(partitioning, "predict_dependent", lambda t, memory: evaluated.append("predicted"))
-    parts.setattr(partitioning, "evaluate", lambda t, q, v, equations: evaluated.append(q.tolist()))
-    parts.setattr(partitioning, "find_violation", lambda memory: left.pop(0))
-    parts.setattr(partitioning, "factorise_dependent", lambda memory: good.pop(0))
-    parts.setattr(partitioning, "lu_solve", lambda a, rank, exchanges, b: None)
+    chart, solved = memory.chart, []
+
+    def predict(t: float, given: Any) -> None:
+        assert t == 0.5 and given is memory
+        evaluated.append("predicted")
+
+    def evaluate(t: float, q: np.ndarray, *others: Any) -> None:
+        assert t == 0.5 and others == ("v", memory.equations)
+        evaluated.append(q.tolist())
+
+    parts.setattr(partitioning, "predict_dependent", predict)
+    parts.setattr(partitioning, "evaluate", evaluate)
+    parts.setattr(partitioning, "find_violation", lambda given: given is memory and left.pop(0))
+    parts.setattr(partitioning, "factorise_dependent", lambda given: given is memory and good.pop(0))
+    parts.setattr(partitioning, "lu_solve", lambda *given: solved.append(given))
     y = np.array([8.0, 9.0, 1.0, 1.0])
     assert partitioning.solve_dependent_coordinates(0.5, y, memory) == status
     assert memory.equations.system.counts.newton == newton
     assert memory.state.coordinates.tolist() == [-0.25 * newton, 9.0, -0.5 * newton, 8.0]
     assert evaluated[:2] == ["predicted", [0.0, 9.0, 0.0, 8.0]]
+    assert len(solved) == newton
+    for given in solved:
+        assert given[0] is chart.dependent and given[1:3] == (2, "exchanges") and given[3] is chart.residual
 
 
 def test_rates_of_the_dependent_coordinates(parts):
     """Rows 1 and 2, the latter of Euler parameters; independent rates 10 and 20 of coordinates 3 and 1."""
     memory = part_memory()
     found: list[Any] = []
-    parts.setattr(partitioning, "lu_solve", lambda a, rank, exchanges, b: found.append(b[:2].tolist()))
-    parts.setattr(partitioning, "velocities_of_rates", lambda state: found.append("velocities"))
+
+    def solve(a: np.ndarray, rank: int, exchanges: Any, b: np.ndarray) -> None:
+        assert a is memory.chart.dependent and (rank, exchanges) == (2, "exchanges")
+        found.append(b[:2].tolist())
+
+    parts.setattr(partitioning, "lu_solve", solve)
+    parts.setattr(
+        partitioning,
+        "velocities_of_rates",
+        lambda state: found.append("velocities" * (state is memory.state)),
+    )
     partitioning.solve_dependent_rates(np.array([8.0, 9.0, 10.0, 20.0]), memory)
     residual = [7.0 - (7.0 * 10 + 5.0 * 20), 0.0 - (11.0 * 10 + 9.0 * 20)]
     assert found == [residual, "velocities"]
@@ -248,12 +270,17 @@ def test_rates_of_the_dependent_coordinates(parts):
 def test_the_factor_of_the_dependent_coordinates(parts):
     """Rows 1 and 2 of columns 2 and 0; pivots 4 and -0.5 have the ratio 0.125."""
     memory = part_memory()
-    parts.setattr(partitioning, "jacobian_by_euler_parameters", lambda *_: None)
     seen: list[Any] = []
 
+    def jacobian(q: np.ndarray, equations: Any, a: np.ndarray) -> None:
+        assert q is memory.state.coordinates and equations is memory.equations and a is memory.chart.jacobian
+
+    parts.setattr(partitioning, "jacobian_by_euler_parameters", jacobian)
     pivots: list[tuple[float, float]] = []
 
     def factor(lu: np.ndarray, rank: int, exchanges: Any, least: float) -> bool:
+        assert lu is memory.chart.dependent
+        assert (rank, exchanges, least) == (2, "exchanges", partitioning.SINGULAR_DEPENDENT)
         seen.append(lu.copy().tolist())
         lu[0, 0], lu[1, 1] = pivots[-1]
         return bool(lu[0, 0] != 4.0 or lu[1, 1] < 0.0)
@@ -283,14 +310,21 @@ def test_when_the_partition_is_chosen_anew(parts, changes, rank, status, chosen)
         calls.append("chosen")
         memory.chart.partition.rank = rank
 
-    parts.setattr(partitioning, "solve_dependent_coordinates", lambda *_: OK)
-    parts.setattr(partitioning, "solve_dependent_rates", lambda *_: calls.append("rates"))
-    parts.setattr(partitioning, "copy_state", lambda *given: calls.append("copied"))
+    def noted(name: str, result: Any = None) -> Any:
+        return lambda *given: calls.append((name, *given)) or result
+
+    for name in ("solve_dependent_rates", "copy_state", "gather_independent"):
+        parts.setattr(partitioning, name, noted(name))
+    parts.setattr(partitioning, "solve_dependent_coordinates", noted("coordinates", OK))
     parts.setattr(partitioning, "choose_coordinates", choose)
-    parts.setattr(partitioning, "gather_independent", lambda y, memory: calls.append("gathered"))
     assert partitioning.accept.function(0.75, "y", memory) == status
-    gathered = ["gathered"] * (status == CHANGED)
-    assert calls == ["rates", "copied", *["chosen"] * chosen, *gathered]
+    assert calls == [
+        ("coordinates", 0.75, "y", memory),
+        ("solve_dependent_rates", "y", memory),
+        ("copy_state", memory.state, "previous"),
+        *["chosen"] * chosen,
+        *[("gather_independent", "y", memory)] * (status == CHANGED),
+    ]
     assert memory.watch.accepted_time == 0.75
     if changes["chosen_pivot"] == 0.0:
         assert memory.chart.partition.chosen_pivot == 0.01
@@ -305,12 +339,27 @@ def test_rates_of_the_independent_coordinates(parts, solved, accelerated, status
     memory = part_memory()
     memory.state.coordinate_second = np.array([1.0, 2.0, 3.0, 4.0])
     memory.equations.system.acceleration = "acceleration"
-    memory.kernels = SimpleNamespace(accelerate=lambda system: accelerated)
+    calls: list[Any] = []
+
+    def noted(name: str, result: Any = None) -> Any:
+        return lambda *given: calls.append((name, *given)) or result
+
+    system = memory.equations.system
+    memory.kernels = SimpleNamespace(accelerate=noted("accelerate", accelerated))
     for name in ("solve_dependent_rates", "assemble_system", "second_rates"):
-        parts.setattr(partitioning, name, lambda *_: None)
-    parts.setattr(partitioning, "solve_dependent_coordinates", lambda *_: solved)
-    rates = np.zeros(4)
-    assert partitioning.rates.function(0.5, np.array([8.0, 9.0, 10.0, 20.0]), rates, memory) == status
+        parts.setattr(partitioning, name, noted(name))
+    parts.setattr(partitioning, "solve_dependent_coordinates", noted("coordinates", solved))
+    rates, y = np.zeros(4), np.array([8.0, 9.0, 10.0, 20.0])
+    memory.state.coordinates = "q"
+    assert partitioning.rates.function(0.5, y, rates, memory) == status
+    expected = [
+        ("coordinates", 0.5, y, memory),
+        ("solve_dependent_rates", y, memory),
+        ("assemble_system", 0.5, "q", "v", memory.equations),
+        ("accelerate", system),
+        ("second_rates", "acceleration", memory.state),
+    ]
+    assert calls == (expected if solved == OK else expected[:1])
     assert rates.tolist() == ([10.0, 20.0, 4.0, 2.0] if solved == OK else [0.0] * 4)
 
 

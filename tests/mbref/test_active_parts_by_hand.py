@@ -87,6 +87,59 @@ def test_degrees_of_freedom_beside_drivers(monkeypatch, rank, driver, later, fre
     assert diagnosis.freedoms_left(model, "start") == freedoms  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("rows", [40, 41])
+def test_the_rank_at_the_start(monkeypatch, rows):
+    """Sparse factors find it for more than 40 rows."""
+    model: Any = SimpleNamespace(m=rows)
+    start: Any = SimpleNamespace(q="q")
+    monkeypatch.setattr(
+        diagnosis, "_redundancy", lambda *given: (given == (model, start)) and SimpleNamespace(rank=17)
+    )
+    monkeypatch.setattr(diagnosis, "scaled_jacobian", lambda *given: given)
+    monkeypatch.setattr(diagnosis, "rank_of", lambda *given: given)
+    dense = (model, 0.0, "q"), 1e-10
+    assert diagnosis.rank_at_start(model, start) == (dense if rows == 40 else 17)
+
+
+@pytest.mark.parametrize("rows", [3, 40, 41, 300, 301])
+def test_parts_of_a_diagnosis(monkeypatch, rows):
+    """All rows have the length 0.5 and are perpendicular, except the last two, which are equal."""
+    names = [*["A"] * (rows - 2), "B", "C"]
+    model: Any = SimpleNamespace(m=rows, n=rows + 2, row_joint=names)
+    start: Any = SimpleNamespace(q="q")
+    jacobian = np.eye(rows, rows + 2) / 2
+    jacobian[-1] = jacobian[-2]
+    limit = diagnosis.UNIQUE_SHARE
+    shares = np.array([*[limit] * (rows - 2), np.nextafter(limit, 1.0), 0.5])
+    sparse = SimpleNamespace(rank=rows - 1, shares=shares, singular_values=lambda: (0.25, 4.0))
+    monkeypatch.setattr(diagnosis, "find_scene", lambda name: {"door": "scene"}[name])
+    monkeypatch.setattr(diagnosis, "Model", lambda scene: {"scene": model}[scene])
+    monkeypatch.setattr(diagnosis, "consistent_start", lambda given: start if given is model else None)
+    monkeypatch.setattr(diagnosis, "_redundancy", lambda *given: given == (model, start) and sparse)
+    monkeypatch.setattr(diagnosis, "_determined", lambda *given: given == (model, start) and "determined")
+    monkeypatch.setattr(
+        diagnosis, "scaled_jacobian", lambda *given: jacobian if given == (model, 0.0, "q") else None
+    )
+    found = diagnosis.diagnose("door")
+    assert found.counts.rank == rows - 1 and found.counts.redundant == 1
+    assert found.redundant_by_joint == {"B": 1, "C": 1} and found.unique_reactions == ("A",)
+    sizes = (found.smallest_singular_value, found.largest_singular_value)
+    assert sizes == pytest.approx((0.25, 4.0) if rows > 40 else (0.5, np.sqrt(0.5)))
+    assert found.determined_reactions == ("determined" if rows <= 300 else None)
+
+
+def test_a_diagnosis_without_rows(monkeypatch):
+    model: Any = SimpleNamespace(m=0, n=6, row_joint=[])
+    monkeypatch.setattr(diagnosis, "find_scene", lambda name: name)
+    monkeypatch.setattr(diagnosis, "Model", lambda scene: model)
+    monkeypatch.setattr(diagnosis, "consistent_start", lambda model: SimpleNamespace(q="q"))
+    monkeypatch.setattr(diagnosis, "_determined", lambda *given: {})
+    monkeypatch.setattr(diagnosis, "scaled_jacobian", lambda *given: np.zeros((0, 6)))
+    found = diagnosis.diagnose("free")
+    assert (found.smallest_singular_value, found.largest_singular_value) == (0.0, 0.0)
+    assert found.redundant_by_joint == {} and found.unique_reactions == () and found.counts.rank == 0
+
+
 # --- parts that move --------------------------------------------------------------------------------------
 def test_random_states_of_some_velocities():
     states = RandomStates(np.array([0.5, 0.25]), np.ones((2, 3)), 2 * np.ones((2, 3)))

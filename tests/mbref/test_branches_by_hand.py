@@ -94,6 +94,13 @@ def test_the_end_of_newtons_method():
     a, left, is_simple = b._root_from(np.array([[[1.0, 0.0], [0.0, 0.0]]]), np.array([1.0, 1.0]))
     assert left < 1e-12 and not is_simple
     assert b._root_from(np.array([[[1.0, 0.0], [0.0, 1.0]]]), np.array([3.0, 4.0]))[1] > 0.9
+    assert b._root_from(np.array([np.zeros((2, 2)), np.eye(2)]), np.array([3.0, 4.0]))[1] > 0.9
+
+
+def test_a_form_at_the_limit_has_a_line(monkeypatch):
+    monkeypatch.setattr(b, "SAME", 2.0**-13)
+    assert len(b._roots(np.diag([2.0**-13, 2.0**-13]))) == 1
+    assert b._roots(np.diag([2.0**-13, 1.01 * 2.0**-13])) == []
 
 
 # --- second order -----------------------------------------------------------------------------------------
@@ -158,6 +165,14 @@ def test_directions_and_forms_without_drivers():
     expected = along[:12].T @ (QUADRATIC[0] / 2 - QUADRATIC[1] / 5) @ along[:12]
     [form] = found.forms
     assert form / form[0, 0] == pytest.approx(expected / expected[0, 0]) and np.linalg.norm(form) == 1.0
+
+
+def test_rows_have_unit_length_whatever_the_sizes_of_bodies_are():
+    """Bodies of 0.1 mm and 10 km: a row for each turn, and one for a displacement, are independent."""
+    made = Curved(rows((0, 2.0), (3, 1.0), (9, 1.0)))
+    made.data = SimpleNamespace(lengths=np.array([1e-4, 1e4]))
+    found = b.second_order(made, 0.25, Q, np.ones(12))
+    assert found.kernel.shape == (13, 9) and found.forms.shape == (0, 9, 9)
 
 
 @pytest.mark.parametrize(("v", "time"), [(np.arange(12.0), None), (np.zeros(12), 1.0)])
@@ -226,11 +241,16 @@ def test_velocities_of_a_branch_without_drivers_have_the_energy_of_the_motion():
     assert b._velocity(MODEL, found, a, across)[0] > 0.0
 
 
-def test_velocities_of_a_branch_with_drivers_are_rates():
+def test_velocities_of_a_branch_with_drivers_are_rates(monkeypatch):
     found = order([], 0.25, np.eye(3))
     assert b._velocity(MODEL, found, np.array([1.0, 2.0, 4.0]), np.zeros(2)) == pytest.approx([0.5, 8.0])
     assert b._velocity(MODEL, found, np.array([1.0, 2.0, -4.0]), np.zeros(2)) == pytest.approx([-0.5, -8.0])
     assert b._velocity(MODEL, found, np.array([1.0, 2.0, 1e-4]), np.zeros(2)) is None
+    monkeypatch.setattr(b, "SAME", 2.0**-30)  # |u| is 1: the rate of time is at the limit, and above
+    assert b._velocity(MODEL, found, np.array([2.0, 0.0, 2.0**-28]), np.zeros(2)) is None
+    assert b._velocity(MODEL, found, np.array([2.0, 0.0, 2.0**-27]), np.zeros(2)) == pytest.approx(
+        [2.0**29, 0.0]
+    )
 
 
 def test_directions_that_agree_with_given_velocities(monkeypatch):
@@ -250,8 +270,16 @@ def test_directions_that_agree_with_given_velocities(monkeypatch):
 
 @pytest.fixture
 def set_order(monkeypatch: pytest.MonkeyPatch) -> Any:
-    """Let ``second_order`` give a result, whatever the model is."""
-    return lambda found: monkeypatch.setattr(b, "second_order", lambda *_: found)
+    """Let ``second_order`` give a result for MODEL at Q."""
+
+    def put(found: SecondOrder) -> None:
+        def second(model: Any, t: float, q: np.ndarray, v: np.ndarray) -> SecondOrder:
+            assert model is MODEL and t == 0.0 and q is Q and v.shape == (2,)
+            return found
+
+        monkeypatch.setattr(b, "second_order", second)
+
+    return put
 
 
 PLANE = np.eye(3)[:, :2]
@@ -282,6 +310,9 @@ def test_how_velocities_fit_branches(set_order):
     assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, 3.0])) == Fit(False, True)
     set_order(order([[[1.0, 0.0], [0.0, 0.0]]], kernel=PLANE))
     assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.0, 4.0])) == Fit(True, False)
+    set_order(order([CROSS, [[1, 0.5], [0.5, -2]]], kernel=PLANE))  # (x + y) (x - y) and (x - y) (x + 2 y)
+    assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, 4.0])) == Fit(True, True)
+    assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, -4.0])) == Fit(False, False)
     for value, fits in ((b.SAME, False), (math.nextafter(b.SAME, 0.0), True)):
         form = order([[[value, 0.0], [0.0, -1.0]]], kernel=PLANE)
         assert b._fits(form, np.array([1.0, 0.0])) is fits
@@ -320,6 +351,50 @@ def test_branches_and_their_sentence(set_order, found, v, others, sentence):
     for other, expected in zip(velocities[1:], others, strict=True):
         sign = 1.0 if np.dot(MODEL.mass * v, expected) >= 0 else -1.0
         assert other == pytest.approx(sign * np.array(expected) * size(v) / size(expected))
+
+
+@pytest.mark.parametrize(
+    ("forms", "count", "sentence"),
+    [
+        ([CROSS], 2, "2 branches"),
+        ([[[1, 0], [0, 1]]], 1, b.ALONE),
+        ([CROSS, [[1, 0.5], [0.5, -2]]], 1, b.ALONE),  # (x + y) (x - y) and (x - y) (x + 2 y)
+    ],
+)
+def test_branches_of_a_scene_at_rest(set_order, forms, count, sentence):
+    """All branches have the velocity zero."""
+    set_order(order(forms, kernel=PLANE))
+    velocities, said = b.branches(MODEL, 0.0, Q, np.zeros(2))
+    assert velocities.tolist() == [[0.0, 0.0]] * count and said == sentence
+
+
+@pytest.mark.parametrize(("angle", "count"), [(b.SAME, 1), (math.nextafter(b.SAME, 1.0), 3)])
+def test_directions_at_a_small_angle_to_the_motion_are_its_branch(monkeypatch, set_order, angle, count):
+    set_order(order([CROSS], kernel=PLANE))
+    asked: list[Any] = []
+    monkeypatch.setattr(b, "_lines", lambda found: ([np.array([0.6, 0.8]), np.array([0.8, 0.6])], ""))
+    monkeypatch.setattr(b, "_angle", lambda *lines: asked.append(lines) or angle)
+    velocities, said = b.branches(MODEL, 0.0, Q, np.array([0.5, 4.0]))
+    assert len(velocities) == count and said == (b.ALONE if count == 1 else "3 branches")
+    assert asked[0][0].tolist() == [0.6, 0.8] and asked[0][1] == pytest.approx([math.sqrt(0.5)] * 2)
+
+
+@pytest.mark.parametrize(("size", "is_simple"), [(0.45, False), (0.55, True)])
+def test_a_direction_is_simple_where_the_rate_of_its_form_exceeds_the_limit(set_order, size, is_simple):
+    """The rate of the form s x² along x = 1 is 2 s."""
+    found = order([[[size * b.SAME, 0.0], [0.0, 0.0]]], kernel=PLANE)
+    set_order(found)
+    assert b.fit_to_branches(MODEL, 0.0, Q, np.array([0.5, 0.0])) == Fit(True, is_simple)
+    assert b._root_from(found.forms * 0.0, np.array([3.0, 0.0]))[1:] == (0.0, False)
+
+
+@pytest.mark.parametrize(("size", "is_simple"), [(0.45, False), (0.55, True)])
+def test_a_root_is_simple_where_the_rates_of_its_forms_exceed_the_limit(monkeypatch, size, is_simple):
+    """The rate of the form 2 s x y at x = 1 is 2 s along y."""
+    monkeypatch.setattr(b, "ROOT_ITERATIONS", 1)
+    form = np.array([[[0.0, size * b.SAME], [size * b.SAME, 0.0]]])
+    a, left, found = b._root_from(form, np.array([3.0, 0.0]))
+    assert a == pytest.approx([1.0, 0.0]) and left <= 1e-12 and found is is_simple
 
 
 def test_the_branches_of_a_crossing_that_was_passed(monkeypatch):

@@ -56,3 +56,10 @@ def test_equations_that_contradict_each_other():
 def test_nothing_and_zero(shape):
     x, basis = least_norm_and_null_space(np.zeros(shape), np.zeros(shape[0]), TOLERANCE)
     assert not x.any() and basis.shape == (shape[1], shape[1])
+
+
+def test_singular_values_are_compared_with_the_largest():
+    """Both values are far below one; the smaller counts from a tenth on."""
+    matrix, rhs = np.diag([1e-8, 1e-9]), np.array([2e-8, 3e-9])
+    assert least_norm(matrix, rhs, 0.099) == pytest.approx([2.0, 3.0])
+    assert least_norm(matrix, rhs, 0.101) == pytest.approx([2.0, 0.0])

@@ -62,6 +62,13 @@ def test_principal_moments_and_axes():
     assert min(flat) == 0.0
 
 
+def test_numbers_of_bodies():
+    """Position, orientation, mass and moments; 1 kg and 1 kg m² where the scene gives none."""
+    bare = Body(name="a", position=(3.0, 4.0, 5.0), orientation=(0.0, 0.0, 1.0, 0.0))
+    assert packing._of_body(bare) == ((3, 4, 5, 0, 0, 1, 0, 1, 1, 1, 1), None)
+    assert packing._of_body(body(position=(3.0, 4.0, 5.0)))[0] == (3, 4, 5, 1, 0, 0, 0, 2, 1, 2, 2.5)
+
+
 def test_bodies_with_and_without_a_tensor():
     """The second body's frame is turned to its principal axes; the fixed frame comes last."""
     p = rotations.from_vector(np.array([0.0, 0.0, 0.6]))
