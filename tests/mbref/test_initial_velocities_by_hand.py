@@ -424,3 +424,47 @@ def test_anchors_on_second_bodies():
     found = of.anchors(q)
     assert found[:, 1].tolist() == [[7.0, 8.0, 9.0]] * 2
     assert found[0, 0] == pytest.approx([0.0, 4.0, 2.0]) and found[1, 0] == pytest.approx([9.0, 20.0, 32.0])
+
+
+def test_memory_of_a_model_is_acquired_once_and_released_once(monkeypatch):
+    """Memory of another scene of equal structure gets the numbers of this scene."""
+    asked: list[Any] = []
+    pooled = SimpleNamespace(values="values")
+    made = model.Model(Scene(name="s", body=(body("a"),)))
+
+    def acquire(key: Any, make: Any) -> Any:
+        assert key == (model.Equations, made.structure) and make == made.equations
+        asked.append("acquired")
+        return pooled
+
+    monkeypatch.setattr(model, "acquire", acquire)
+    monkeypatch.setattr(model, "release", lambda given: asked.append(("released", given)))
+    monkeypatch.setattr(model.Model, "put_numbers", lambda self, *given: asked.append(given))
+    made.release()
+    for _ in range(2):
+        assert made.memory is pooled  # type: ignore[comparison-overlap]
+    assert asked == ["acquired", ("values", made.data)]
+    made.release()
+    made.release()
+    assert asked[2:] == [("released", pooled)]
+    assert made.memory is pooled and asked[3] == "acquired"  # type: ignore[comparison-overlap]
+
+
+def test_numbers_of_a_scene_in_memory_of_evaluations():
+    first, second = (
+        model.Model(Scene(name="s", gravity=(0.0, 0.0, g), body=(body("a", mass=m),)))
+        for g, m in ((-1.0, 2.0), (-3.0, 4.0))
+    )
+    memory = first.equations()
+    assert memory.frames.rotation.tolist() == [[1, 0, 0, 0, 1, 0, 0, 0, 1]] * 2
+    assert (
+        memory.scene.gravity.tolist() == [0.0, 0.0, -1.0] and memory.scene.gravity is not first.data.gravity
+    )
+    assert memory.system.mass[:3].tolist() == [2.0] * 3
+    second.put_numbers(memory, second.data)
+    assert memory.scene.gravity.tolist() == [0.0, 0.0, -3.0] and memory.scene.bodies.mass.tolist() == [4.0]
+    assert memory.system.mass[:3].tolist() == [4.0] * 3
+    assert memory.system.inverse_root[:3].tolist() == [0.5] * 3
+    assert first.data.gravity.tolist() == [0.0, 0.0, -1.0]
+    other = first.equations(data=second.data)
+    assert other.scene.gravity.tolist() == [0.0, 0.0, -3.0] and other.system.mass[0] == 2.0

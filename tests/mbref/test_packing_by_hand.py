@@ -238,6 +238,18 @@ def test_lengths_of_a_scene_and_of_its_bodies():
     assert alone.length.tolist() == [1.0] and alone.data.lengths.tolist() == [[1.0]]
 
 
+def test_rotors_of_armatures_do_not_count_in_the_length_of_a_scene():
+    """The centre at 10 m and the hinge at 11 m are 1 m apart; the rotor is at the origin."""
+    hinge = Revolute(
+        name="A", bodies=("ground", "a"), anchor=(11.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), armature=0.5
+    )
+    scene = Scene(name="s", body=(body(position=(10.0, 0.0, 0.0)),), joint=(hinge,))
+    packs = packing.Packs([scene])
+    assert packs.nb == 2 and packs.length.tolist() == [1.0] and packs.data.lengths[0, 0] == 1.0
+    assert packs.index == {"a": 0, "armature of A": 1, "ground": 2, packing.FRAME: 2}
+    assert packing.Packs([scene, scene]).length.tolist() == [1.0, 1.0]
+
+
 # --- shared entries ---------------------------------------------------------------------------------------
 def test_a_function_is_called_once_for_each_entry():
     one, two = [1], [1]
