@@ -371,6 +371,39 @@ def test_orders_of_a_motion_satisfy_its_equations(rows):
     assert not memory.series.terms[:, NZ + len(rows) :].any()
 
 
+@pytest.mark.parametrize("rows", [[CIRCLE], [SADDLE, CIRCLE]])
+def test_the_right_hand_side_of_the_first_order(rows):
+    """``put_sums`` finds forces over -2 at the place, and minus the products of the rates in rows."""
+    memory = system(rows)
+    series.start_sums(memory)
+    assert memory.series.sums[0, :NZ].tolist() == (-FORCE).tolist() and not memory.series.sums[1:].any()
+    memory.solver.rhs[:] = 9.0
+    series.put_sums(0, memory)
+    products = [sum(c * RATE[i] * RATE[j] for (i, j), c in row.items() if i != ONE) for row in rows]
+    assert memory.solver.rhs[:NZ] == pytest.approx(0.5 * (FORCE + LINEAR @ PLACE), abs=1e-15)
+    assert memory.solver.rhs[NZ : NZ + len(rows)] == pytest.approx([-p for p in products], abs=1e-15)
+    assert not memory.solver.rhs[NZ + len(rows) :].any()
+
+
+def test_products_of_later_orders():
+    """After ``solve_order`` of 0 to 2, ``add_to_later_sums`` fills orders 3 and 4, up to the last one."""
+    for last, filled in ((LAST, (3, 4)), (3, (3,)), (2, ())):
+        memory = consistent([SADDLE])
+        series.start_sums(memory)
+        for k in range(3):
+            series.solve_order(k, last, memory)
+        z = memory.series.terms[:, :NZ]
+        rates = [z[1], z[2], z[3]]  # factors one order later than the sums
+
+        def row(a: np.ndarray, b: np.ndarray) -> float:
+            return float(sum(c * (a[i] * b[j] + a[j] * b[i]) / 2 for (i, j), c in SADDLE.items() if i != ONE))
+
+        expected = {3: 2.0 * row(rates[1], rates[2]), 4: row(rates[2], rates[2])}
+        found = memory.series.sums[:, NZ]
+        for order in (3, 4, 5):
+            assert found[order] == pytest.approx(expected[order] if order in filled else 0.0, abs=1e-12)
+
+
 def test_orders_of_a_driven_motion():
     """The third row drives x with -0.3 + 0.3 t + 0.2 t² - 0.1 t³; the rows determine all orders."""
     rows = [CIRCLE, SADDLE, {(ONE, 0): 1.0, (ONE, 3): -1.0}]
