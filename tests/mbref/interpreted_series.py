@@ -19,7 +19,7 @@ if not PLAIN:
     pytest.skip("kernels are interpreted by test_thresholds.py", allow_module_level=True)
 
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
-from mbref.taylor import correction, partition, polynomials, series, solver, step_start
+from mbref.taylor import correction, partition, polynomials, series, simd, solver, step_start
 from mbref.taylor.crossing import determinants, uniqueness
 from mbref.taylor.expressions import ONE
 from mbref.taylor.numbers import OneScene
@@ -35,70 +35,77 @@ PLACE, RATE = np.array([0.6, 0.7, 0.5]), np.array([0.3, -0.4, 0.8])
 
 
 def system(
-    rows: list[Any], given: Any = (), driven: bool = False, mass: np.ndarray = MASS, **more: Any
+    rows: list[Any],
+    given: Any = (),
+    driven: bool = False,
+    mass: np.ndarray = MASS,
+    place: np.ndarray = PLACE,
+    linear_force: np.ndarray = LINEAR,
+    **more: Any,
 ) -> Any:
-    """Memory of a system with the variables 0, 1, 2; prescribed functions have the next numbers."""
-    nr, kept = len(rows), [0, 1, 2]
+    """Memory of a system with the variables 0, 1, 2 …; prescribed functions have the next numbers."""
+    nr, nz = len(rows), place.size
+    lanes = simd.padded_size(nz + nr + len(given))
     of = SimpleNamespace(
-        rows=rows, kept=kept, given={v: (0, 0) for v in given}, driven=driven, numbers=OneScene()
+        rows=rows, kept=range(nz), given={v: (0, 0) for v in given}, driven=driven, numbers=OneScene()
     )
-    lane = {0: 0, 1: 1, 2: 2} | {v: NZ + nr + g for g, v in enumerate(given)}
-    table, products = polynomials._rows(of, lane, LANES), polynomials._products(of, lane, LANES)
-    linear, place = polynomials._tableau(table, NZ, nr, LANES)
-    terms: Any = [[(j, 3 * i + j) for j in range(3) if LINEAR[i, j]] for i in range(3)] + [[]] * 5
-    slots, start = polynomials._slots(terms, (0, 9))
-    weights = np.append(LINEAR.ravel(), 0.0)
+    lane = {v: v for v in range(nz)} | {v: nz + nr + g for g, v in enumerate(given)}
+    table, products = polynomials._rows(of, lane, lanes), polynomials._products(of, lane, lanes)
+    linear, places = polynomials._tableau(table, nz, nr, lanes)
+    terms: Any = [[(j, nz * i + j) for j in range(nz) if linear_force[i, j]] for i in range(nz)]
+    slots, start = polynomials._slots(terms + [[]] * (lanes - nz), (0, nz * nz))
+    weights = np.append(linear_force.ravel(), 0.0)
     coupled = np.nonzero(mass)
     inertia = Inertia(
-        np.pad(mass, ((0, 0), (0, LANES - NZ))),
+        np.pad(mass, ((0, 0), (0, lanes - nz))),
         coupled[1],
-        np.searchsorted(coupled[0], np.arange(NZ + 1)),
-        np.pad(FORCE, (0, LANES - NZ)),
+        np.searchsorted(coupled[0], np.arange(nz + 1)),
+        np.pad(np.resize(FORCE, nz), (0, lanes - nz)),
         np.array([j for j, _ in slots]),
         weights[[k for _, k in slots]],
         start,
     )
     grown = np.arange(1.0, LAST + 2) * np.arange(2.0, LAST + 3)
-    scale, growth = np.zeros((LAST + 1, LANES)), np.ones((LAST + 1, LANES))
-    scale[:, :NZ], scale[:, NZ : NZ + nr], growth[:, NZ : NZ + nr] = -1 / grown[:, None], -1.0, grown[:, None]
-    variable = np.array([1.0] * NZ + [0.0] * (LANES - NZ))
-    size = (LAST + 3, LANES)
+    scale, growth = np.zeros((LAST + 1, lanes)), np.ones((LAST + 1, lanes))
+    scale[:, :nz], scale[:, nz : nz + nr], growth[:, nz : nz + nr] = -1 / grown[:, None], -1.0, grown[:, None]
+    variable = np.array([1.0] * nz + [0.0] * (lanes - nz))
+    size = (LAST + 3, lanes)
     memory = SimpleNamespace(
         polynomials=SimpleNamespace(
             rows=table,
             products=products,
             inertia=inertia,
             given=SimpleNamespace(driver=np.zeros(len(of.given), int)),
-            torsions=SimpleNamespace(row=np.zeros(0, int), form=np.zeros((0, NZ))),
+            torsions=SimpleNamespace(row=np.zeros(0, int), form=np.zeros((0, nz))),
         ),
         series=SimpleNamespace(
             terms=np.zeros(size),
             past=np.zeros(size),
             left=np.zeros((LAST + 3, products.left.size)),
             right=np.zeros((LAST + 3, products.left.size)),
-            sums=np.full((LAST + 1, LANES), 9.0),
+            sums=np.full((LAST + 1, lanes), 9.0),
             scale=scale,
             growth=growth,
             variable=variable,
         ),
         solver=SimpleNamespace(
             pivot_rows=np.arange(nr),
-            pivot_columns=np.arange(NZ),
-            work=np.full((nr, NZ), 9.0),
-            left=np.zeros(LANES),
+            pivot_columns=np.arange(nz),
+            work=np.full((nr, nz), 9.0),
+            left=np.zeros(lanes),
             row_max=np.zeros(nr),
-            first=np.zeros(NZ),
-            last=np.zeros(NZ),
-            past=np.zeros(NZ),
-            past_motion=np.zeros(NZ),
-            place=place,
+            first=np.zeros(nz),
+            last=np.zeros(nz),
+            past=np.zeros(nz),
+            past_motion=np.zeros(nz),
+            place=places,
             linear=linear,
-            tableau=np.full((nr + 1, LANES), 9.0),
-            null_space=np.zeros((NZ, LANES)),
-            **{name: np.full((NZ, LANES), 9.0) for name in ("particular", "momentum", "forces")},
-            reduced=np.full((NZ, NZ), 9.0),
-            response=np.zeros((LANES, LANES)),
-            **{name: np.zeros(LANES) for name in ("rhs", "phi", "change")},
+            tableau=np.full((nr + 1, lanes), 9.0),
+            null_space=np.zeros((nz, lanes)),
+            **{name: np.full((nz, lanes), 9.0) for name in ("particular", "momentum", "forces")},
+            reduced=np.full((nz, nz), 9.0),
+            response=np.zeros((lanes, lanes)),
+            **{name: np.zeros(lanes) for name in ("rhs", "phi", "change")},
         ),
         partition=SimpleNamespace(rank=0, partition_id=4, parity=7, replaced_pivot=0.0),
         step=SimpleNamespace(
@@ -116,7 +123,7 @@ def system(
         ),
         kernels=SimpleNamespace(choose=step_start.choose.function, respond=solver.respond_in_loops.function),
     )
-    memory.series.terms[0, :NZ], memory.series.terms[1, :NZ] = PLACE, RATE
+    memory.series.terms[0, :nz], memory.series.terms[1, :nz] = place, np.resize(RATE, nz)
     for name, value in more.items():
         setattr(memory.code, name, value)
     return memory
@@ -609,3 +616,143 @@ def test_multipliers_by_code_or_by_loops(monkeypatch, code, varies, status, call
     memory.step.deceleration = 9.0
     assert series.expand_with_multipliers.function(memory) == status and memory.calls == calls
     assert memory.step.deceleration == 0.0
+
+
+# --- systems of several vectors -----------------------------------------------------------------------------
+WIDE = 10
+WIDE_PLACE = np.sin(1.0 + 1.7 * np.arange(WIDE))
+WIDE_LINEAR = np.where(np.cos(2.3 * np.arange(100.0)) > 0.4, np.cos(1.9 * np.arange(100.0)), 0.0).reshape(
+    WIDE, WIDE
+)
+COUPLING = np.sin(1.3 * np.arange(100.0)).reshape(WIDE, WIDE)
+WIDE_MASS = 3.0 * np.eye(WIDE) + np.where(
+    abs(COUPLING + COUPLING.T) > 0.5, 0.2 * (COUPLING + COUPLING.T), 0.0
+)
+
+
+def wide_rows(count: int, functions: Any = ()) -> list[Any]:
+    """Rows of second degree that are zero at the place, with terms of functions of value 0.9 and 1.3."""
+    random, rows = np.random.default_rng(count), []
+    at = {**dict(enumerate(WIDE_PLACE)), **dict(zip(functions, (0.9, 1.3), strict=False)), ONE: 1.0}
+    for r in range(count):
+        row = {(ONE, int(v)): float(random.normal()) for v in random.permutation(WIDE)[:5]}
+        row |= {(min(p), max(p)): float(random.normal()) for p in random.integers(0, WIDE, (4, 2)).tolist()}
+        row |= {(ONE, v): 0.5 + r for v in functions} | {(r, v): 0.25 for v in functions}
+        rows.append({**row, (ONE, ONE): -sum(c * at[i] * at[j] for (i, j), c in row.items())})
+    return rows
+
+
+def wide(count: int, functions: Any = ()) -> tuple[list[Any], Any]:
+    """Memory of ten variables in two or three vectors, with other numbers where results are put."""
+    rows = wide_rows(count, functions)
+    memory = system(rows, functions, mass=WIDE_MASS, place=WIDE_PLACE, linear_force=WIDE_LINEAR)
+    memory.series.terms[0, WIDE + count : WIDE + count + len(functions)] = (0.9, 1.3)[: len(functions)]
+    memory.solver.response[:] = memory.solver.change[:] = 9.0
+    memory.solver.null_space[:, :WIDE] = 9.0
+    return rows, memory
+
+
+@pytest.mark.parametrize("count", [1, 3, 7, 9])
+def test_the_response_of_several_vectors(count):
+    rows, memory = wide(count)
+    response = respond(memory)
+    expected = dense(gradient(rows, WIDE_PLACE, WIDE), WIDE_MASS)
+    assert memory.partition.rank == count and response.shape[0] > WIDE + count
+    assert response[: WIDE + count, : WIDE + count] == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    assert not response[: WIDE + count, WIDE + count :].any()
+
+
+def test_the_response_of_several_vectors_without_freedom():
+    rows, memory = wide(WIDE)
+    response = respond(memory)
+    inverse = response[WIDE:20, :WIDE].T
+    assert inverse == pytest.approx(np.linalg.inv(gradient(rows, WIDE_PLACE, WIDE)), rel=1e-8, abs=1e-9)
+    assert response.shape[0] == 24
+    assert not response[:WIDE].any() and not response[:20, WIDE:].any() and (response[20:] == 9.0).all()
+
+
+@pytest.mark.parametrize("count", [2, 6])
+def test_functions_of_several_vectors(count):
+    """Functions stand in lanes 12 and 13, or 16 and 17."""
+    functions, n = (WIDE, WIDE + 1), WIDE + count
+    rows, memory = wide(count, functions)
+    respond(memory)
+    assert solver.factorise_equations(memory) == OK
+    found, at = memory.solver.response, np.append(WIDE_PLACE, (0.9, 1.3))
+    inverse, along = dense(gradient(rows, at, WIDE), WIDE_MASS), gradient(rows, at, WIDE + 2)[:, WIDE:]
+    assert found[:n, :n] == pytest.approx(inverse, rel=1e-8, abs=1e-9) and not found[:n, n:].any()
+    assert found[n : n + 2, :n] == pytest.approx(-along.T @ inverse[WIDE:], rel=1e-8, abs=1e-9)
+    assert found[n : n + 2, n:].tolist() == np.eye(2, found.shape[1] - n).tolist()
+
+
+@pytest.mark.parametrize("count", [3, 7])
+def test_corrections_of_several_vectors(count):
+    rows, memory = wide(count)
+    respond(memory)
+    memory.series.terms[0, :WIDE] += 0.01 * np.cos(np.arange(WIDE))
+    place = memory.series.terms[0, :WIDE].copy()
+    expected = values(rows, place)
+    assert correction.violation(memory) == pytest.approx(abs(expected).max(), rel=1e-12)
+    assert memory.solver.phi[WIDE : WIDE + count] == pytest.approx(expected, abs=1e-13)
+    inverse = dense(gradient(rows, WIDE_PLACE, WIDE), WIDE_MASS)
+    correction.subtract_violation(0, memory)
+    change = -inverse[:WIDE, WIDE:] @ expected
+    assert memory.solver.change[:WIDE] == pytest.approx(change, abs=1e-10)
+    assert not memory.solver.change[WIDE:].any()
+    assert memory.series.terms[0, :WIDE] - place == pytest.approx(change, abs=1e-10)
+    correction.violation_rate_in_loops(memory)
+    moved, rate = memory.series.terms[:2, :WIDE].copy()
+    expected = gradient(rows, moved, WIDE) @ rate
+    assert memory.solver.phi[WIDE : WIDE + count] == pytest.approx(expected, abs=1e-12)
+    correction.subtract_violation(1, memory)
+    change = -inverse[:WIDE, WIDE:] @ expected
+    assert memory.series.terms[1, :WIDE] - rate == pytest.approx(change, abs=1e-10)
+    assert correction.largest_change(memory) == pytest.approx(abs(change).max(), rel=1e-9)
+    assert memory.series.terms[0, :WIDE].tolist() == moved.tolist()
+
+
+@pytest.mark.parametrize("count", [3, 7])
+def test_orders_of_several_vectors(count):
+    rows, memory = wide(count)
+    respond(memory)
+    for _ in range(4):
+        assert correction.correct_state.function(memory) == OK
+    series.start_sums(memory)
+    series.expand_without_loads(LAST, memory)
+    z, multipliers = memory.series.terms[:, :WIDE].T, memory.series.terms[2:, WIDE : WIDE + count].T
+    one = np.eye(1, z.shape[1])[0]
+    at = {ONE: one, **dict(enumerate(z))}
+    for row in rows:
+        parts = np.array([c * product(at[i], at[j]) for (i, j), c in row.items()])
+        assert (np.abs(parts.sum(axis=0)) < 1e-7 * np.abs(parts).max(axis=0)).all()
+    orders, force = np.arange(LAST + 1), np.resize(FORCE, WIDE)
+    outside = force[:, None] * one[: LAST + 1] + WIDE_LINEAR @ z[:, : LAST + 1]
+    inertia = WIDE_MASS @ (z[:, 2:] * (orders + 1) * (orders + 2))
+    size = np.abs(inertia).max(axis=0)
+    for row, of_row in zip(rows, multipliers, strict=True):
+        for (i, j), c in row.items():
+            for one_factor, other in ((i, j), (j, i)):
+                if one_factor != ONE:
+                    inertia[one_factor] += c * product(at[other][: LAST + 1], of_row)
+    assert (np.abs(inertia - outside).max(axis=0) < 1e-7 * size).all()
+    assert not memory.series.terms[:, WIDE + count :].any()
+
+
+# --- loads that vary ----------------------------------------------------------------------------------------
+def test_loads_are_expanded_before_each_order(monkeypatch):
+    """Vectors of order k + 1, then forces of order k, and the order itself; the last order is two lower."""
+    calls: list[Any] = []
+    grow, add = (
+        ("grow_springs", "grow_torsions", "grow_slides"),
+        ("springs", "torsions", "slides", "timed_forces"),
+    )
+    for name in (*grow, *(f"add_{each}" for each in add)):
+        monkeypatch.setattr(series, name, lambda k, memory, name=name: calls.append((name, k)))
+    monkeypatch.setattr(series, "solve_order", lambda k, last, memory: calls.append(("solve", k, last)))
+    assert series.expand_with_loads.function(SimpleNamespace(mode=SimpleNamespace(order=3))) == OK
+    expected: list[Any] = [(name, 0) for name in grow]
+    for k in range(2):
+        expected += (
+            [(name, k + 1) for name in grow] + [(f"add_{each}", k) for each in add] + [("solve", k, 1)]
+        )
+    assert calls == expected
