@@ -441,6 +441,20 @@ def test_an_equilibrium_beyond_the_constraints_is_not_found(moving):
     assert len(moving) == 11 and np.linalg.norm(moving[-1]) < 1e-5
 
 
+def test_damped_steps_towards_an_equilibrium(moving):
+    """One coordinate, 1 m from its equilibrium: the damped step is 1 m / (1 + damping), at most 0.6 m."""
+    start = Slope(np.array([1.0]), np.array([2.0]), np.array([[3.0]]), off=1.0)
+    assert equilibrium._balanced(start, 1.0) is None  # type: ignore[arg-type]
+    damping = np.array([0.0, *10.0 ** np.arange(-3, 7)])
+    assert np.array(moving)[:, 0] == pytest.approx(np.minimum(0.6, 1 / (1 + damping)))
+    moving.clear()
+    start.off = 1.07
+    assert equilibrium._balanced(start, 1.0) is None  # type: ignore[arg-type]
+    left = 1.0 - 1 / 101
+    steps = [0.6, 0.6, 0.6, 0.6, 0.5, 1 / 11, 1 / 101, left / 11, left / 101]
+    assert np.array(moving)[:9, 0] == pytest.approx(np.array(steps)), "a step of damping 100 is taken first"
+
+
 def test_a_pose_whose_slope_leaves_the_constraints_is_no_equilibrium(moving):
     start = Slope(np.array([1.0, 1.0]), np.array([2.0, 1.0]), STIFF)
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from mbref import formats, scene_fields, scene_joints, scene_loads
+from mbref import formats, rotations, scene_fields, scene_joints, scene_loads
 from mbref.design.equilibrium import Equilibrium
 from mbref.drawing import plot
 from mbref.drawing.picture import Form, Look
@@ -378,3 +378,117 @@ def test_defaults_of_records(of, defaults):
 def test_the_scene_of_a_motion_is_given_by_name():
     fields = {field.name: field for field in dataclasses.fields(Motion)}
     assert fields["mechanism"].kw_only and fields["mechanism"].default is dataclasses.MISSING
+
+
+# --- functions of time --------------------------------------------------------------------------------------
+TABLE = ((0.0, 1.0), (1.0, 2.0), (2.0, 9.0), (3.0, 28.0))  # 1 + t³
+
+
+def test_coefficients_of_factors():
+    assert Factor().coefficients == (1.0,) and Factor(start=1.0, stop=2.0).coefficients == (1.0,)
+    assert Factor(sine=Sine(amplitude=2.0)).coefficients == (0.0,)
+    assert Factor(table=TABLE).coefficients == (0.0,)
+    assert Factor(sine=Sine(amplitude=2.0), polynomial=(3.0, 4.0)).coefficients == (3.0, 4.0)
+    assert Factor().interval == (0.0, math.inf) and Factor(start=1.0, stop=2.0).interval == (1.0, 2.0)
+    assert Driver(joint="A").interval == (-math.inf, math.inf)
+
+
+def test_values_of_a_switched_table():
+    """2 + sin t + 1 + t³ from 0.5 s until before 2.5 s; nothing before and after."""
+    factor = Factor(polynomial=(2.0,), sine=Sine(amplitude=1.0), table=TABLE, start=0.5, stop=2.5)
+    times = np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.25, 2.5, 3.0])
+    values = np.where((times >= 0.5) & (times < 2.5), 3.0 + np.sin(times) + times**3, 0.0)
+    assert factor.values(times) == pytest.approx(values)
+    begins = [(piece.begin, piece.part) for piece in factor.pieces()]
+    assert begins == [(0.0, 0.0), (0.5, 1.0), (1.0, 1.0), (2.0, 1.0), (2.5, 0.0)]
+    assert factor.pieces()[1].cubic == pytest.approx((1.125, 0.75, 1.5, 1.0)), "1 + (0.5 + s)³"
+    assert factor.pieces()[2].cubic == pytest.approx((2.0, 3.0, 3.0, 1.0)), "1 + (1 + s)³"
+    assert factor.pieces()[4].cubic == (0.0, 0.0, 0.0, 0.0)
+    shifted = Factor(table=tuple((t - 1.5, x) for t, x in TABLE), start=0.0)
+    assert [piece.begin for piece in shifted.pieces()] == [0.0, 0.5]
+    assert shifted.pieces()[0].cubic == pytest.approx((4.375, 6.75, 4.5, 1.0)), "1 + (1.5 + s)³"
+
+
+@pytest.mark.parametrize(
+    ("factor", "constant"),
+    [
+        (Factor(), True),
+        (Factor(polynomial=(2.0, 0.0)), True),
+        (Factor(polynomial=(2.0, 1.0)), False),
+        (Factor(sine=Sine(amplitude=0.0, frequency=3.0)), True),
+        (Factor(sine=Sine(amplitude=1.0)), False),
+        (Factor(table=TABLE), False),
+        (Factor(start=0.5), False),
+        (Factor(stop=0.5), False),
+    ],
+)
+def test_factors_that_never_change(factor, constant):
+    assert factor.is_constant == constant
+
+
+@pytest.mark.parametrize(
+    ("fields", "says"),
+    [
+        ({"stop": 1.0, "start": 1.0}, "must be later than start, 1 s, got 1"),
+        ({"stop": 0.5, "start": 1.0}, "must be later than start, 1 s, got 0.5"),
+        ({"table": TABLE[:3]}, r"must have at least 4 rows \[time, value\], got 3"),
+        ({"table": (*TABLE[:3], (2.0, 0.0))}, "times must increase, but row 3 is at 2 s and row 2 at 2 s"),
+    ],
+)
+def test_functions_that_are_refused(fields, says):
+    with pytest.raises(ValidationError, match=says):
+        Factor(**fields)
+
+
+# --- rotations ----------------------------------------------------------------------------------------------
+P, Q = np.array([0.1, -0.7, 0.5, 0.5]), np.array([0.8, 0.4, -0.2, 0.4])  # of unit length
+
+
+def turned(p: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The vector part of p v p*: v + 2 w (u × v) + 2 u × (u × v)."""
+    w, u = p[0], p[1:]
+    return v + 2 * w * np.cross(u, v) + 2 * np.cross(u, np.cross(u, v))
+
+
+def test_matrices_and_products_of_quaternions():
+    for p in (P, Q):
+        columns = np.stack([turned(p, axis) for axis in np.eye(3)], axis=1)
+        assert rotations.to_matrix(p) == pytest.approx(columns)
+        sign = 1.0 if p[0] >= 0 else -1.0
+        assert rotations.from_matrix(columns) == pytest.approx(sign * p)
+        assert rotations.conjugate(p).tolist() == [p[0], -p[1], -p[2], -p[3]]
+    product = rotations.multiply(P, Q)
+    vector = P[0] * Q[1:] + Q[0] * P[1:] + np.cross(P[1:], Q[1:])
+    assert product == pytest.approx([P[0] * Q[0] - P[1:] @ Q[1:], *vector])
+    both = rotations.multiply(np.stack([P, Q]), Q)
+    assert both.shape == (2, 4) and both[0] == pytest.approx(product)
+
+
+@pytest.mark.parametrize("k", range(4))
+def test_quaternions_whose_largest_entry_is_each(k):
+    """Of half turns and others, also from a stack of matrices; entry 0 is not negative."""
+    p = np.array([0.1, 0.3, -0.5, 0.2])
+    p[k] = 2.0
+    p /= np.linalg.norm(p)
+    matrices = np.stack([rotations.to_matrix(p), np.eye(3)])
+    found = rotations.from_matrix(matrices)
+    assert found == pytest.approx(np.array([p, [1.0, 0.0, 0.0, 0.0]]), abs=1e-15)
+    p[0] = -p[0]
+    assert rotations.from_matrix(rotations.to_matrix(p)) == pytest.approx(-p)
+
+
+def test_products_and_directions_of_vectors():
+    a, b = np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 0.0]]), np.array([[-2.0, 0.5, 4.0], [0.0, 0.0, 2.0]])
+    assert rotations.cross(a, b) == pytest.approx(np.cross(a, b))
+    whole = rotations.cross(np.array([1, 2, 3]), np.array([3, 2, 1]))
+    assert whole.tolist() == [-4.0, 8.0, -4.0] and whole.dtype == float
+    assert rotations.unit([0.0, -3.0, 4.0]) == pytest.approx([0.0, -0.6, 0.8])
+    assert rotations.unit([0.0, 0.0]).tolist() == [0.0, 0.0]
+    turn = rotations.from_vector(np.array([[0.0, 0.0, 0.6], [0.0, -0.8, 0.0]]))
+    expected = [[math.cos(0.3), 0, 0, math.sin(0.3)], [math.cos(0.4), 0, -math.sin(0.4), 0]]
+    assert turn == pytest.approx(np.array(expected))
+    assert rotations.to_vector(-turn) == pytest.approx(np.array([[0.0, 0.0, 0.6], [0.0, -0.8, 0.0]]))
+    assert rotations.angle_between(turn[0], -turn[1]) == pytest.approx(
+        2 * math.acos(math.cos(0.3) * math.cos(0.4))
+    )
+    assert rotations.rotate(turn[0], X) == pytest.approx([math.cos(0.6), math.sin(0.6), 0.0])

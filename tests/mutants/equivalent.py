@@ -303,6 +303,41 @@ REASONS: dict[tuple[str, str, str], str] = {
     ): PADDED,
     ("mbref/taylor/solver.py", "if i != r and entry != 0.0:", "(i != r)"): SKIPS_ZERO,
     ("mbref/taylor/solver.py", "if g != f and entry != 0.0:", "(g != f)"): SKIPS_ZERO,
+    **{
+        (file, line, new): "Each factor is 1 or -1."
+        for file, line, new in (
+            (
+                "mbref/rotations.py",
+                "return np.asarray(p, dtype=float) * np.array([1.0, -1.0, -1.0, -1.0])",
+                "((np.asarray(p, dtype=float)) / (np.array([1.0, -1.0, -1.0, -1.0])))",
+            ),
+            (
+                "mbref/drawing/marks.py",
+                "sign = _turning(stage, axis * sense, 15.0)",
+                "((axis) / (sense))",
+            ),
+            (
+                "mbref/drawing/marks.py",
+                "sign = _arrow_from_origin(stage, axis * sense)",
+                "((axis) / (sense))",
+            ),
+            (
+                "mbref/drawing/marks.py",
+                "sense = axis * np.copysign(1.0, load.action.amount)",
+                "((axis) / (np.copysign(1.0, load.action.amount)))",
+            ),
+        )
+    },
+    (
+        "mbref/scenes/bricard.py",
+        "inertia = triple(about if p != q else across for p, q in zip(start, end, strict=True))",
+        "zip(end, start, strict=True)",
+    ): SYMMETRY,
+    (
+        "mbref/scenes/links.py",
+        "return triple((p + q) / 2 for p, q in zip(start, end, strict=True))",
+        "zip(end, start, strict=True)",
+    ): SYMMETRY,
     (
         "mbref/design/equilibrium.py",
         "if settled is not None and not any(_is_same(settled, other) for other in found):",
