@@ -10,7 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import ValidationError
 
-from mbref.scene_fields import SMALLEST, checked_length, checked_size, field_of, is_some, meant, shown
+from mbref.scene_fields import checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene_function_faults import Faults, factor_faults, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate, default_coordinates
 from mbref.scene_loads import LOAD_TYPES, JointLoad
@@ -66,11 +66,11 @@ def checked_inertia(value: Any) -> tuple[Any, ...]:
         raise ValueError("must be finite")
     checked_size(float(abs(array).max()))
     matrix = np.diag(array) if array.ndim == 1 else array
-    tolerance = INERTIA_TOLERANCE * max(abs(matrix).max(), 1e-300)
+    tolerance = INERTIA_TOLERANCE * abs(matrix).max()
     if abs(matrix - matrix.T).max() > tolerance:
         raise ValueError("must be symmetric")
     moments = np.linalg.eigvalsh(matrix)
-    for moment in moments[(moments > 0) & (moments < SMALLEST)]:
+    for moment in moments[moments > 0]:
         checked_length(float(moment))
     if moments[0] < -tolerance:
         raise ValueError(f"must have no negative principal moment, got {moments[0]:.6g}")
@@ -140,10 +140,10 @@ def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[
     """Return ``path: message`` for every fault, with a unique name as index: body[rod].mass."""
     for path, message in faults.items():
         match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.)", path)
-        name = _own_name(data, match[1], int(match[2])) if match else ""
-        yield (
-            f"{match[1]}[{name}]{path[match.end() :]}: {message}" if match and name else f"{path}: {message}"
-        )
+        if match and (name := _own_name(data, match[1], int(match[2]))):
+            yield f"{match[1]}[{name}]{path[match.end() :]}: {message}"
+        else:
+            yield f"{path}: {message}"
 
 
 def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
