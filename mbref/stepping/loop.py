@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from numpy import isnan
+
 from mbref.equations.coordinates import copy_state, fastest_turn
 from mbref.equations.functions import end_of_pieces, select_pieces
 from mbref.equations.loads import remember_angles
@@ -115,7 +117,9 @@ def advance_to_end(memory):
         status = evaluate_state(y, y_rate, memory)
         if status != OK:
             return status
-        while clock.sample < times.shape[0] and clock.time >= times[clock.sample]:
+        for _ in range(clock.sample, times.shape[0]):
+            if clock.time < times[clock.sample]:
+                break
             take_sample(memory)
         if clock.sample == times.shape[0]:
             return DONE
@@ -196,8 +200,8 @@ def advance(target, y, y_rate, memory):
         else:
             h = step_within(interval, suggested)
         ratio = take_step(memory.kernels.rates, t, h, y, y_rate, y_new, memory)
-        status = OK if ratio >= 0.0 else (int(-ratio) if ratio < 0.0 else NOT_FINITE)
-        if status == OK and h <= control.forced_step:
+        status = NOT_FINITE if isnan(ratio) else (OK if ratio >= 0.0 else int(-ratio))
+        if h <= control.forced_step:
             ratio = min(ratio, 1.0)
         if status == OK and ratio <= 1.0:
             status = accept_step(target if h == interval else t + h, h, suggested, ratio, memory)

@@ -148,6 +148,44 @@ def test_errors_are_weighed_by_the_order():
     assert made.progress.error_below == pytest.approx(0.5 * 32.0 * 3.0 / 12)
 
 
+@pytest.mark.parametrize(("difference", "order"), [(-0.4, 2), (-0.3, 3)])
+def test_errors_below_use_the_factors_of_their_own_orders(difference, order):
+    """In tolerances of 0.25 the errors are 5/6, 1/4, and 0.5 · 4 (0.5 + 0.25 d) · 2 · 0.5 at order 1."""
+    made = past(1, order=3)
+    made.sigma[2:5], made.beta[1:5] = (2.0, 3.0, 5.0), (9.0, 0.25, 0.5, 8.0)
+    made.change[0], made.differences[3, 0], made.differences[2, 0] = 2.0, -3.0, difference
+    adams.estimate(0.5, 3, np.zeros(1), made, SimpleNamespace(atol=0.25, rtol=0.0))
+    assert made.progress.error == pytest.approx(5 / 6) and made.progress.error_below == pytest.approx(0.25)
+    assert made.progress.next_order == order
+
+
+@pytest.mark.parametrize("k", [1, 2, 5, 12])
+def test_coefficients_of_equal_steps(k):
+    """ψ_i = i h, β = σ = 1, g as for constant steps: 1, 1/2, 5/12, 3/8; other places stay as they are."""
+    made = past(1)
+    made.past_psi[1:] = 0.5 * np.arange(1, SIZE)
+    adams.find_coefficients(0.5, k, made)
+    assert made.psi[1:14].tolist() == (0.5 * np.arange(1, 14)).tolist()
+    assert made.beta[1:14].tolist() == [1.0] * 13 and made.sigma[1 : k + 2].tolist() == [1.0] * (k + 1)
+    known = [1, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288]
+    assert made.g[1 : k + 2][:6] == pytest.approx(known[: k + 1])
+    assert made.psi[14] == made.beta[14] == 7.0
+    for values in (made.g, made.sigma, made.integrals):
+        assert values[0] == 7.0 and (values[k + 2 :] == 7.0).all()
+
+
+@pytest.mark.parametrize(("steps", "known"), [(0, 1), (1, 2), (3, 4), (12, 13)])
+def test_coefficients_after_few_steps(steps, known):
+    """Places of steps that the run has not taken are zero."""
+    made = past(1)
+    made.past_psi[1:] = [0.5 * i if i <= steps else 0.0 for i in range(1, SIZE)]
+    adams.find_coefficients(0.25, 1, made)
+    expected = [0.25 + 0.5 * i if i < known else 0.0 for i in range(13)]
+    assert made.psi[1:14].tolist() == expected
+    assert made.beta[1] == 1.0 and (made.beta[2 : known + 1] > 0.0).all()
+    assert not made.beta[known + 1 : 14].any()
+
+
 def test_a_step_of_adams_whose_rates_fail():
     made = past(1, order=1, next_order=9)
     adams.forget(made, 0)
@@ -168,6 +206,20 @@ def test_equal_steps_are_counted(last_step, equal, last_order, found):
     progress = made.progress
     assert progress.equal_steps == found
     assert (progress.last_order, progress.last_step, progress.failed) == (4, 0.5, 0)
+
+
+def test_differences_after_a_step_of_order_two():
+    """y' is 3 more than predicted; β = 1, 0.5 and 0.25 of orders 1 to 3."""
+    made = past(1)
+    made.beta[1:4], made.differences[1:6, 0], made.implied[0] = (
+        (1.0, 0.5, 0.25),
+        (10.0, 4.0, 8.0, 9.0, 7.0),
+        1.0,
+    )
+    made.psi[:] = np.arange(15.0)
+    adams.remember(0.5, 2, np.array([4.0]), made)
+    assert made.differences[1:6, 0].tolist() == [15.0, 5.0, 3.0, 1.0, 7.0]
+    assert made.past_psi.tolist() == [7.0, *range(1, 14), 7.0]
 
 
 def test_a_new_piece_begins_at_the_first_order():

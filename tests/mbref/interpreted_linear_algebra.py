@@ -490,6 +490,23 @@ def test_iterations_until_the_next_change_is_small(epsilon, most, count, status)
     assert target == pytest.approx([5.0, 0.5 * done]) and multipliers == pytest.approx([7.0, 7.0, -done])
 
 
+@pytest.mark.parametrize(
+    ("changes", "epsilon", "count"),
+    [
+        ([0.5, 0.25], 0.125, 2),  # the next change is estimated as 0.125
+        ([0.5, 0.25, 0.125], math.nextafter(0.125, 0.0), 3),
+        ([0.25, 0.5], 0.25, 2),  # the least estimate counts; a change that grows is no factor
+        ([0.25, 0.5, 0.125], 0.1, 3),
+        ([0.0, 0.0], 0.0, 2),
+    ],
+)
+def test_iterations_end_at_the_estimate_of_the_next_change(monkeypatch, changes, epsilon, count):
+    made, left = of_one_row(4.0), list(changes)
+    monkeypatch.setattr(minimum_norm, "change_by_step", lambda factor, target: left.pop(0))
+    assert minimum_norm.solve_to_tolerance(made, epsilon, 9, "target", np.zeros(3)) == OK
+    assert len(changes) - len(left) == count
+
+
 def test_a_change_is_relative_to_a_target_longer_than_one():
     """A change of 0.4 to (0, 3) and to (0, 0.5): relative to 3, and to 1."""
     made = of_one_row(4.0)
@@ -586,6 +603,43 @@ def test_multipliers_nearest_to_forces(force):
     made, multipliers = of_one_row(4.0), np.full(3, 7.0)
     minimum_norm.find_least_multipliers(made, np.array([99.0, force]), multipliers)
     assert multipliers == pytest.approx([7.0, 7.0, force / 2]) and abs(made.change[0]) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("steps", "count"),
+    [
+        ([4.0, 1.0], 2),  # 1 is less than a quarter of 5
+        ([4.0, 2.0, 1.0], 3),  # 2 is more than a quarter of 6, 1 less than a quarter of 7
+        ([1.0, 2.0], 2),  # the change grows
+        ([1.0, 1.0], 2),  # the change stays
+        ([0.125, 0.0625, 0.03125], 3),
+        ([8.0, 7.0, 6.0, 5.0], 3),  # the largest number of iterations
+        ([0.0], 1),
+    ],
+)
+def test_multipliers_are_improved_until_rounding_is_left(monkeypatch, steps, count):
+    monkeypatch.setattr(minimum_norm, "LAST_CHANGE", 0.25)
+    monkeypatch.setattr(minimum_norm, "ITERATIONS", 3)
+    made, left, calls = of_one_row(4.0), list(steps), []
+
+    def solve(factor: Any, b: np.ndarray) -> None:
+        assert factor is made and b is made.step and b[0] == made.residual[0] == -1.5
+        b[0] = left.pop(0)
+
+    def subtract(factor: Any, x: np.ndarray, b: np.ndarray) -> None:
+        assert factor is made and x is made.change and b is made.residual and b[0] == 0.0
+        b[0] = -1.5
+
+    monkeypatch.setattr(minimum_norm, "solve", solve)
+    monkeypatch.setattr(minimum_norm, "subtract_product", subtract)
+    monkeypatch.setattr(minimum_norm, "add_transpose", lambda *given: calls.append(given))
+    multipliers = np.full(3, 7.0)
+    minimum_norm.find_least_multipliers(made, np.array([9.0, 3.0]), multipliers)
+    assert len(steps) - len(left) == len(calls) == count
+    assert multipliers.tolist() == [7.0, 7.0, -sum(steps[:count])]
+    for factor, step, x in calls:
+        assert factor is made and step is made.step and x is made.change
+    assert made.change.tolist() == [1.5], "half of the force, which add_transpose did not change here"
 
 
 # --- patterns of factors ----------------------------------------------------------------------------------

@@ -100,6 +100,7 @@ def test_status_of_singular_values(monkeypatch):
 def test_the_worst_row_and_the_state_of_a_step():
     phi = np.array([0.1, -0.4, 0.4, 0.2])
     assert loop.worst_row(phi) == 1 and loop.worst_row(np.zeros(0)) == -1
+    assert loop.worst_row(np.array([1.0, 2.0, -3.0])) == 2 and loop.worst_row(np.zeros(2)) == 0
     clock = SimpleNamespace(violated_row=9)
     memory = SimpleNamespace(
         equations=SimpleNamespace(rows=SimpleNamespace(phi=phi)),
@@ -115,6 +116,53 @@ def test_the_worst_row_and_the_state_of_a_step():
     assert loop.check_state(good, good, memory) == VIOLATED and clock.violated_row == 0
     memory.equations.rows.phi = np.zeros(0)
     assert loop.check_state(good, good, memory) == OK and clock.violated_row == -1
+
+
+def test_a_sample_has_all_numbers_of_the_last_evaluation():
+    """The second of three samples; vectors of different lengths."""
+    names = {"coordinates": 7, "velocities": 6, "accelerations": 6, "multipliers": 2}
+    given = {name: 10.0 * k + np.arange(n) for k, (name, n) in enumerate(names.items())}
+    samples = SimpleNamespace(**{name: np.full((3, n), -1.0) for name, n in names.items()})
+    memory = SimpleNamespace(
+        loop=SimpleNamespace(samples=samples, clock=SimpleNamespace(sample=1)),
+        state=SimpleNamespace(coordinates=given["coordinates"], velocities=given["velocities"]),
+        equations=SimpleNamespace(
+            system=SimpleNamespace(
+                acceleration=given["accelerations"].copy(), multipliers=given["multipliers"].copy()
+            )
+        ),
+    )
+    loop.take_sample(memory)
+    for name, n in names.items():
+        rows = getattr(samples, name)
+        assert rows[1].tolist() == given[name].tolist() and (rows[[0, 2]] == -1.0).all(), (name, n)
+    assert memory.loop.clock.sample == 2
+    system = memory.equations.system
+    assert system.acceleration.tolist() == given["accelerations"].tolist()
+    assert system.multipliers.tolist() == given["multipliers"].tolist()
+
+
+def test_an_accepted_state_is_kept_with_its_time_and_angles(monkeypatch):
+    calls: list[Any] = []
+    for name in ("copy_state", "remember_angles"):
+        monkeypatch.setattr(loop, name, lambda *given, name=name: calls.append((name, *given)))
+    memory = SimpleNamespace(
+        state="state", previous="previous", watch=SimpleNamespace(accepted_time=0.0), equations="equations"
+    )
+    loop.remember_accepted_state(0.75, memory)
+    assert calls == [("copy_state", "state", "previous"), ("remember_angles", "equations")]
+    assert memory.watch.accepted_time == 0.75
+
+
+@pytest.mark.parametrize(
+    ("fastest", "turn", "h"), [(0.0, 1.0, 0.5), (1.0, 1.0, 0.5), (4.0, 1.0, 0.25), (0.5, 0.125, 0.25)]
+)
+def test_steps_are_limited_by_the_user_and_by_the_fastest_body(monkeypatch, fastest, turn, h):
+    monkeypatch.setattr(loop, "fastest_turn", lambda v: fastest if v == "v" else None)
+    memory = SimpleNamespace(
+        control=SimpleNamespace(largest_step=0.5, largest_turn=turn), state=SimpleNamespace(velocities="v")
+    )
+    assert loop.largest_step(memory) == h
 
 
 def test_samples_and_the_ends_of_a_call(monkeypatch):
@@ -134,11 +182,16 @@ def test_samples_and_the_ends_of_a_call(monkeypatch):
 
     def step(target: float, y: np.ndarray, y_rate: np.ndarray, memory: Any) -> int:
         assert y.size == y_rate.size == 2
+        assert y.base is memory.loop.y and y_rate.base is memory.loop.y_rate
         clock.time, counts.steps = min(clock.time + 0.4, target), counts.steps + 1
         events.append((target, round(clock.time, 9)))
         return OK
 
-    monkeypatch.setattr(loop, "evaluate_state", lambda *_: OK)
+    def evaluate(y: np.ndarray, y_rate: np.ndarray, given: Any) -> int:
+        assert given is memory and y.base is memory.loop.y and y_rate.base is memory.loop.y_rate
+        return OK
+
+    monkeypatch.setattr(loop, "evaluate_state", evaluate)
     monkeypatch.setattr(loop, "take_sample", sample)
     monkeypatch.setattr(loop, "advance", step)
     advance = loop.advance_to_end.function
@@ -186,7 +239,7 @@ def test_a_state_is_evaluated_with_outputs_at_a_sample(
         loop=SimpleNamespace(clock=clock, times=np.array([0.0, 0.5])), kernels=kernels, equations="equations"
     )
     monkeypatch.setattr(loop, "select_pieces", lambda *given: selected.append(given))
-    monkeypatch.setattr(loop, "check_state", lambda *given: checked)
+    monkeypatch.setattr(loop, "check_state", lambda *given: given == ("y", "y'", memory) and checked)
     monkeypatch.setattr(loop, "remember_accepted_state", lambda t, memory: remembered.append(t))
     assert loop.evaluate_state("y", "y'", memory) == status and remembered == kept
     assert asked == [(called, time, "y", "y'", memory)] and selected == [(time, "equations")]
@@ -210,11 +263,23 @@ def test_what_is_kept_of_a_step(monkeypatch, accepted, meets, status, watched, p
     memory = SimpleNamespace(
         loop=SimpleNamespace(clock=clock, y=np.zeros(2), y_new=np.array([3.0, 4.0])),
         equations=SimpleNamespace(system=SimpleNamespace(counts=counts)),
-        kernels=SimpleNamespace(accept=lambda *_: accepted),
     )
-    monkeypatch.setattr(loop, "keep_position", lambda share, length, memory: kept.append((share, length)))
-    monkeypatch.setattr(loop, "meets_singular_position", lambda length, memory: seen.append(length) or meets)
-    monkeypatch.setattr(loop, "remember_watch", lambda memory: kept.append("watch"))
+
+    def accept(now: float, y: np.ndarray, given: Any) -> int:
+        assert now == 2.5 and y is memory.loop.y_new and given is memory
+        return accepted
+
+    def meeting(length: float, given: Any) -> bool:
+        assert given is memory
+        seen.append(length)
+        return meets
+
+    memory.kernels = SimpleNamespace(accept=accept)
+    monkeypatch.setattr(
+        loop, "keep_position", lambda share, length, given: kept.append((share, length)) or given.kernels
+    )
+    monkeypatch.setattr(loop, "meets_singular_position", meeting)
+    monkeypatch.setattr(loop, "remember_watch", lambda given: kept.append("watch") or given.kernels)
     assert loop.accept_step(2.5, 0.5, 0.6, 0.8, memory) == status
     is_kept = status in (OK, CHANGED)
     assert kept == [*places, *["watch"] * watched] and seen == [0.5] * (accepted == OK)
@@ -256,16 +321,18 @@ def advanced(monkeypatch: pytest.MonkeyPatch) -> Any:
         ends: list[Any] = []
         left = list(ratios)
 
-        def step(rates: Any, t: float, h: float, y: Any, y_rate: Any, y_new: Any, memory: Any) -> float:
-            assert (rates, t, y, y_rate) == ("rates", 2.0, "y", "y'") and y_new.size == 2
+        def step(rates: Any, t: float, h: float, y: Any, y_rate: Any, y_new: Any, given: Any) -> float:
+            assert (rates, t, y, y_rate) == ("rates", 2.0, "y", "y'") and y_new.size == 2 and given is memory
             tried.append(round(h, 12))
             return left.pop(0) if left else 0.5
 
-        def propose(length: float, suggested: float, ratio: float, *_: Any) -> float:
+        def propose(length: float, suggested: float, ratio: float, *others: Any) -> float:
+            assert others == ("y", "y'", memory)
             proposals.append((round(length, 12), round(suggested, 12), ratio))
             return 0.4 if len(proposals) == 1 else 0.5 * suggested
 
-        def accept(now: float, h: float, suggested: float, ratio: float, memory: Any) -> int:
+        def accept(now: float, h: float, suggested: float, ratio: float, given: Any) -> int:
+            assert given is memory
             ends.append((round(now, 12), round(h, 12), round(suggested, 12), ratio))
             memory.loop.clock.time = now
             return accepted
@@ -328,6 +395,11 @@ def test_first_forced_and_fixed_steps(advanced):
     status, tried, _, _ = advanced(stepping_memory(forced_step=0.15), [7.0, 7.0, 7.0])
     assert status == OK and tried == [0.4, 0.2, 0.15]
     assert advanced(stepping_memory(fixed_step=0.3), [0.5])[1] == [0.25], "four equal steps in 1 s"
+    for more, h in ((0.5e-6, 0.25), (1.5e-6, 0.2)):  # steps of a millionth too many are rounding
+        assert advanced(stepping_memory(fixed_step=1.0 / (4.0 + more)), [0.5])[1] == [h]
+    assert advanced(stepping_memory(fixed_step=5.0), [0.5])[1] == [1.0]
+    memory = stepping_memory(forced_step=0.45, smallest_step=0.3)
+    assert advanced(memory, [-float(NOT_CONVERGED)] * 9)[:2] == (NOT_CONVERGED, [0.45])
     assert advanced(stepping_memory(fixed_step=0.5), [0.5])[1] == [0.5]
     assert advanced(stepping_memory(fixed_step=7.0), [0.5])[1] == [1.0]
     status, tried, _, _ = advanced(stepping_memory(fixed_step=0.5), [-float(SINGULAR)])

@@ -72,6 +72,8 @@ def test_the_regularised_inverse_of_unit_rows():
     expected = np.linalg.solve(unit @ unit.T + np.eye(3) / ALPHA, b)
     assert norm.d.toarray() == pytest.approx(unit)
     assert norm.regularised_solution(b) == pytest.approx(expected, rel=1e-6)
+    short = MinimumNorm(csr_array([[0.3, 0.8], [0.0, 0.0]]), np.array([1.0, 4.0]))
+    assert short.d.toarray() == pytest.approx(np.array([[0.6, 0.8], [0.0, 0.0]]))
     with_zero = MinimumNorm(csr_array(np.vstack([np.zeros(4), ROWS[0]])), np.ones(4))
     assert with_zero.regularised_solution(np.array([2.0, 3.0]))[0] == 2.0 * ALPHA
 

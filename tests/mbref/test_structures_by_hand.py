@@ -63,6 +63,22 @@ def test_a_coupling_of_joints_with_a_common_body():
     assert found.sizes["angles"] == 2 and found.has_angles
 
 
+def test_an_angle_that_is_the_only_one():
+    """The angle of a coupling, or of a load, has the index 0."""
+    pair = (
+        PrimitivePlace(COUPLED_ANGLE, "C", 0, 1, -1, 1, "A"),
+        PrimitivePlace(COUPLED_SLIDE, "C", 1, 2, -1, 2, "B"),
+    )
+    coupled = structure_of(Places(3, pair, (), (), (), 1))
+    assert coupled.places_in_row[3].tolist() == [0, -1] and coupled.angle.size == 0
+    loaded = structure_of(Places(3, (), (LoadPlace(ABOUT_AXIS, 0, 1, -1),), (), (), 1))
+    assert loaded.angle.tolist() == [0] and loaded.places_in_row.size == 0
+    assert coupled.has_angles and loaded.has_angles
+    assert coupled.sizes["angles"] == loaded.sizes["angles"] == 1
+    neither = structure_of(Places(3, (), (LoadPlace(FORCE, 0, 1, -1),), (), (), 1))
+    assert not neither.has_angles
+
+
 def test_columns_of_blocks():
     columns = WHOLE.entry_columns
     assert columns[4].tolist() == [*range(12), *range(18, 24), *range(18, 24)]
