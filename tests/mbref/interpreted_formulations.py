@@ -336,7 +336,9 @@ def test_no_solution_at_once_without_a_factor():
 def test_which_rows_are_solved_at_once(monkeypatch, independent, nearly, exactly, calls):
     made, seen = dual(), []
     made.settings.independent, made.settings.nearly_dependent = independent, nearly
-    monkeypatch.setattr(alf_dual, "solve_exactly", lambda given: seen.append("exactly") or exactly)
+    monkeypatch.setattr(
+        alf_dual, "solve_exactly", lambda given: seen.append("exactly") or (given is made and exactly)
+    )
     monkeypatch.setattr(alf_dual, "iterate_until_solved", lambda given: seen.append("iterated") or SINGULAR)
     status = alf_dual.accelerate.function(made)
     assert seen == calls and status == (SINGULAR if "iterated" in calls else OK)
@@ -355,11 +357,42 @@ def test_numbers_of_an_iteration(monkeypatch):
 def test_conjugate_directions_for_rows_that_are_nearly_dependent(monkeypatch):
     asked: list[Any] = []
     monkeypatch.setattr(alf_dual, "go_on_by_conjugate_directions", lambda *given: asked.append(given) or OK)
-    monkeypatch.setattr(alf_dual, "iterate_with", lambda alpha, given: NOT_CONVERGED)
+    tried: list[Any] = []
+    monkeypatch.setattr(alf_dual, "iterate_with", lambda *given: tried.append(given) or NOT_CONVERGED)
     made = dual(alpha=1e9)
     made.settings.nearly_dependent = 1
     assert alf_dual.iterate_until_solved(made) == OK
-    assert asked == [(made.scratch, 1e9, made.acceleration, made.multipliers)]
+    assert asked == [(made.scratch, 1e9, made.acceleration, made.multipliers)] and tried == [(1e9, made)]
+
+
+@pytest.mark.parametrize(
+    ("independent", "statuses", "first", "others"),
+    [
+        (1, [OK], 1e10, []),
+        (1, [NOT_CONVERGED, OK], 1e10, [1e13]),
+        (1, [NOT_CONVERGED] * 3, 1e10, [1e13, 1e16]),
+        (0, [NOT_CONVERGED], 1e10, []),
+        (1, [NOT_CONVERGED], 1e16, []),
+        (1, [NOT_CONVERGED] * 2, 0.99e16, [0.99e19]),
+        (1, [SINGULAR], 1e10, []),
+        (1, [NOT_CONVERGED, SINGULAR, OK], 1e10, [1e13, 1e15]),
+        (1, [NOT_CONVERGED, NOT_CONVERGED, SINGULAR, SINGULAR], 1e10, [1e13, 1e16, 1e15]),
+    ],
+)
+def test_penalties_that_are_tried(monkeypatch, independent, statuses, first, others):
+    """Independent rows get a penalty a thousand times as large, up to 1e16; 1e15 after rounding."""
+    made, left = dual(alpha=first), list(statuses)
+    made.settings.independent = independent
+    asked: list[float] = []
+
+    def iterate(alpha: float, given: Any) -> int:
+        assert given is made
+        asked.append(alpha)
+        return left.pop(0)
+
+    monkeypatch.setattr(alf_dual, "iterate_with", iterate)
+    assert alf_dual.iterate_until_solved(made) == statuses[-1]
+    assert asked == pytest.approx([first, *others], rel=1e-12) and not left
 
 
 # --- Moore–Penrose ----------------------------------------------------------------------------------------

@@ -197,11 +197,20 @@ def test_norms_are_computed_again_after_cancellation(share, anew):
     assert made.norms[1].tolist() == [4.0, pytest.approx(share if anew else 1.0)]
 
 
+def test_norms_of_a_ten_thousandth_are_not_computed_again():
+    """The squares 1111 and 11110000 = 3333² + 1111 have that ratio without rounding."""
+    made = of_qr([[4000.0, 3333.0], [0.0, 33.0], [0.0, 4.0], [0.0, 2.0], [0.0, 1.0], [0.0, 1.0]])
+    assert orthogonal.qr_pivoted(1e-9, made) == 2 and made.norms[:, 1].tolist() == [1111.0, 11110000.0]
+
+
 def test_norms_are_exchanged_with_their_columns():
     """Lengths 1, 2 and 3: the largest column comes first, and the norms of the first go to its place."""
     made = of_qr(np.diag([1.0, 2.0, 3.0]))
     assert orthogonal.qr_pivoted(1e-9, made) == 3 and made.order.tolist() == [2, 1, 0]
     assert made.norms[:, 1:].tolist() == [[4.0, 1.0]] * 2
+    made = of_qr([[3.0, 1.0, 0.0], [0.0, 0.0, 2.0], [0.0, 1.0, 0.0]])  # the second column keeps 1 of 2
+    assert orthogonal.qr_pivoted(1e-9, made) == 3 and made.order.tolist() == [0, 2, 1]
+    assert made.norms.tolist() == [[9.0, 1.0, 1.0], [9.0, 2.0, 2.0]]
 
 
 def test_least_norm_and_multipliers_of_three_rows_of_rank_two():
