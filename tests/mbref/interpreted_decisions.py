@@ -25,12 +25,21 @@ from mbref.taylor.mode import PREDICTOR, REGULAR
 
 
 class Patched:
-    """Functions of a module that give values and note their calls."""
+    """Functions of a module that give values and note their calls, and the arguments of the last one."""
 
     def __init__(self, patch: pytest.MonkeyPatch, module: Any, **values: Any) -> None:
         self.calls: list[str] = []
+        self.given: dict[str, tuple[Any, ...]] = {}
         for name, value in values.items():
-            patch.setattr(module, name, lambda *_, name=name, value=value: self.calls.append(name) or value)
+            patch.setattr(module, name, self._stub(name, value))
+
+    def _stub(self, name: str, value: Any) -> Any:
+        def stub(*given: Any) -> Any:
+            self.calls.append(name)
+            self.given[name] = given
+            return value
+
+        return stub
 
 
 # --- start ------------------------------------------------------------------------------------------------
@@ -836,7 +845,7 @@ def contains(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> bool:
         "determinant_changes_sign",
         lambda h, count, memory: parts.append(count) or given["sign"],
     )
-    Patched(
+    made = Patched(
         monkeypatch,
         detection,
         distance_moved=given["moved"],
@@ -851,6 +860,16 @@ def contains(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> bool:
     found = detection.contains_singular_position.function(0.5, 0.2, memory)
     expected = min(int(given["moved"] / detection.PART_LENGTH) + 1, detection.MAX_PARTS)
     assert parts in ([], [expected])
+    wanted = {
+        **dict.fromkeys(("distance_moved", "vanishes_inside"), (0.5, memory)),
+        **dict.fromkeys(("keeps_signs", "replaced_pivot", "changes_signs"), (memory,)),
+        **{
+            "is_near_singular": (0.2, memory),
+            "dips_to_zero": (0.5, 0.2, memory),
+            "turns_back": ("terms", memory),
+        },
+    }
+    assert all(arguments == wanted[name] for name, arguments in made.given.items())
     return bool(found)
 
 

@@ -273,7 +273,7 @@ def test_forces_that_functions_of_time_multiply():
     timed = SimpleNamespace(
         function=np.array([1, 0]), constant=numbers(2, NZ), linear=numbers(2 * NZ, NZ, seed=0.7)
     )
-    timed.linear[1, 0] = 0.0
+    timed.linear[1, 0], timed.linear[2, 1] = 0.0, 1.0
     memory = series(timed=timed)
     expected = np.zeros((ORDERS, NZ))
     x = [np.polynomial.Polynomial(X[:, j]) for j in range(NZ)]
@@ -283,6 +283,32 @@ def test_forces_that_functions_of_time_multiply():
             expected[:, i] -= first(factor * (timed.constant[s, i] + dot(x, list(timed.linear[NZ * s + i]))))
     found = grown(memory, lambda k, memory: None, loads.add_timed_forces)
     assert found == pytest.approx(expected, rel=1e-12, abs=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("natural", "damping", "directed"),
+    [(0.0, 0.0, False), (0.5, 0.0, True), (0.0, 0.5, True), (0.5, 0.5, True)],
+)
+def test_springs_whose_force_depends_on_their_direction(natural, damping, directed):
+    of = SimpleNamespace(natural=np.array([9.0, natural]), damping=np.array([9.0, damping]))
+    assert bool(loads.has_direction(1, of)) is directed
+
+
+@pytest.mark.parametrize("kind", ["springs", "torsions", "slides", "timed", ""])
+def test_loads_that_vary(kind):
+    """One load of a kind suffices; constant forces are no entry of these tables."""
+    parts = {
+        name: SimpleNamespace(damping=np.zeros(int(name == kind)))
+        for name in ("springs", "torsions", "slides")
+    }
+    polynomials = SimpleNamespace(**parts, timed=SimpleNamespace(function=np.zeros(int(kind == "timed"))))
+    assert loads.varies(polynomials) is loads.has_varying_loads(polynomials) is bool(kind)
+
+
+def test_a_driver_that_stands_still():
+    functions = np.full((7, 2), 99.0)
+    loads.expand_angle(np.zeros(7), functions, 0)
+    assert functions.tolist() == [[1.0, 0.0], *[[0.0, 0.0]] * 6]
 
 
 @pytest.mark.parametrize("last", [6, 2, 1])

@@ -19,18 +19,20 @@ if not PLAIN:
 
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
 from mbref.taylor import angles, coefficients, correction, sample_completion, stepping
-from mbref.taylor.crossing import acceptance
+from mbref.taylor.crossing import acceptance, determinants, location, rounding_pole, uniqueness
 
 
 def noted(patch: pytest.MonkeyPatch, module: Any, calls: list[Any], **answers: Any) -> None:
-    """Replace functions of a module by ones that note their name and arguments; lists answer in turn."""
+    """Replace functions of a module by ones that note name and arguments; lists answer in turn."""
     for name, answer in answers.items():
         patch.setattr(module, name, noting(calls, name, answer))
 
 
 def noting(calls: list[Any], name: str, answer: Any = None) -> Callable[..., Any]:
+    """Return a function that notes its name and arguments, ``...`` for a record."""
+
     def function(*given: Any) -> Any:
-        calls.append((name, *[each for each in given if not isinstance(each, SimpleNamespace)]))
+        calls.append((name, *[... if isinstance(each, SimpleNamespace) else each for each in given]))
         return answer.pop(0) if isinstance(answer, list) else answer
 
     return function
@@ -89,7 +91,7 @@ def test_one_sample_is_completed(monkeypatch, k, exact, expanded, balanced, stat
     assert memory.angles.tolist() == [first, second]
     assert memory.run.equations.angles.tolist() == [second, 9.0, first]
     if "balance" in names:
-        assert ("balance", [0.0, 0.5, 0.75, 1.0][k]) in calls
+        assert ("balance", [0.0, 0.5, 0.75, 1.0][k], ...) in calls
 
 
 @pytest.mark.parametrize(
@@ -138,10 +140,10 @@ def test_the_series_is_restored_after_samples(monkeypatch):
     sample_completion.return_to_series(memory)
     assert calls == [
         ("restore_variables", "start", "terms", "angles"),
-        ("select_pieces", 0.25),
-        ("expand_functions", 0.25),
-        ("partition",),
-        ("terms",),
+        ("select_pieces", 0.25, ...),
+        ("expand_functions", 0.25, ...),
+        ("partition", ...),
+        ("terms", ...),
     ]
 
 
@@ -159,12 +161,34 @@ def test_the_state_and_the_start_of_a_series_are_saved_before_samples(monkeypatc
     noted(monkeypatch, sample_completion, calls, complete_until=OK, **answers)
     assert sample_completion.complete_samples.function(1, memory) == OK
     assert calls == [
-        ("save_state", "before"),
+        ("save_state", ..., "before"),
         ("save_variables", "terms", "angles", "start"),
-        ("complete_until", 4),
-        ("restore_state", "before"),
-        ("return_to_series",),
+        ("complete_until", 4, ...),
+        ("restore_state", "before", ...),
+        ("return_to_series", ...),
     ]
+
+
+def test_all_samples_are_completed_up_to_the_end(monkeypatch):
+    """Two of four samples: the later ones wait for their steps."""
+    clock, pieces = SimpleNamespace(sample=9, time=0.0), []
+
+    def sample(memory: Any) -> int:
+        clock.sample += 1
+        return OK
+
+    memory = SimpleNamespace(
+        run=SimpleNamespace(
+            loop=SimpleNamespace(clock=clock, times=np.array([0.0, 0.5, 1.5, 2.0])), equations="e"
+        ),
+        progress=SimpleNamespace(completed=1),
+        mode=SimpleNamespace(order=20, tolerance=1e-9),
+        options=SimpleNamespace(accurate_tolerance=1e-13),
+        kernels=SimpleNamespace(sample=sample),
+    )
+    monkeypatch.setattr(sample_completion, "select_pieces", lambda *given: pieces.append(given))
+    assert sample_completion.complete_until(3, memory) == OK and memory.progress.completed == 3
+    assert pieces == [(0.5, "e"), (1.5, "e")] and clock.time == 1.5
 
 
 # --- corrections ------------------------------------------------------------------------------------------
@@ -193,7 +217,7 @@ def test_corrections_until_one_leaves_rounding(monkeypatch, left, factors, chang
     assert memory.step.violation == pytest.approx(left[0], nan_ok=True)
     is_judged = status == OK or changes
     assert memory.step.correction == (0.5 if is_judged else 9.0)
-    assert [given for name, *given in made if name == "changes_factor"] == [[left[-1]]] * is_judged
+    assert [given for name, *given in made if name == "changes_factor"] == [[left[-1], ...]] * is_judged
 
 
 # --- ends of attempts -------------------------------------------------------------------------------------
@@ -217,7 +241,7 @@ def test_an_attempt_is_expanded_at_its_end(monkeypatch, last):
     noted(monkeypatch, stepping, calls, evaluate_series=None, put_angles=None)
     assert stepping.expand_at(0.25, last, memory) == NOT_CONVERGED and memory.mode.order == 7
     evaluated, put, (name, t, order, found) = calls
-    assert (evaluated, put) == (("evaluate_series", 0.25), ("put_angles", 0.25))
+    assert (evaluated, put) == (("evaluate_series", 0.25, ...), ("put_angles", 0.25, ...))
     assert (name, t, order) == ("expand", 2.25, 2 if last else 7)
     assert found[:2].tolist() == (variable * state[:2]).tolist() and (found[2:] == 99.0).all()
 
@@ -240,15 +264,15 @@ def test_a_pole_is_removed_unless_steps_become_short(monkeypatch, pole, lengths,
     noted(monkeypatch, stepping, made, time_of_pole=pole, step_tolerance=1e-9, longest_step=lengths)
     assert stepping.save_series_without_pole.function(SimpleNamespace()) == OK
     assert [name for name, *_ in made if name in ("save", "remove")] == calls and not lengths
-    assert [given for name, *given in made if name == "remove"] == [[pole]] * ("remove" in calls)
-    assert [given for name, *given in made if name == "longest_step"] == [[1e-9]] * (2 if pole else 0)
+    assert [given for name, *given in made if name == "remove"] == [[pole, ...]] * ("remove" in calls)
+    assert [given for name, *given in made if name == "longest_step"] == [[1e-9, ...]] * (2 if pole else 0)
 
 
 def test_pivots_are_saved_before_the_series(monkeypatch):
     calls: list[Any] = []
     noted(monkeypatch, stepping, calls, save_pivots=None)
     stepping.save_start(SimpleNamespace(kernels=SimpleNamespace(save_series=noting(calls, "series"))))
-    assert calls == [("save_pivots",), ("series",)]
+    assert calls == [("save_pivots", ...), ("series", ...)]
 
 
 @pytest.mark.parametrize(
@@ -281,7 +305,7 @@ def test_the_longest_regular_step_and_the_longest_that_crosses(
     monkeypatch.setattr(stepping, "longest_step", lambda tolerance, memory: lengths[tolerance])
     assert stepping.first_lengths(left, memory) == pytest.approx(expected)
     assert memory.step.time_to_crossing == (0.0 if accurate else crossing)
-    assert (("share", 0.125) in asked) is not accurate
+    assert (("share", 0.125, ...) in asked) is not accurate
 
 
 @pytest.mark.parametrize(("speeds", "speed"), [((0.25, -0.5), 0.5), ((-3.0, 2.0), 3.0)])
@@ -307,6 +331,80 @@ def test_the_rounding_of_the_time_moves_drivers(speeds, speed):
     assert found(memory) == 2e-10
     memory.step.start_pivot = memory.step.start_violation = 0.0
     assert found(memory) == 1e-15
+
+
+# --- singular positions -----------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("accurate", "part", "found"),
+    [
+        (True, 2.0, 0.1),
+        (True, 0.5, 0.1),
+        (False, 0.999, 0.1),
+        (False, 1.0, 0.0),
+        (True, 0.0, 0.0),
+        (False, 0.0, 0.0),
+    ],
+)
+def test_poles_of_series_near_singular_positions(monkeypatch, accurate, part, found):
+    """Pivots relative to CROSSING_START of the largest one, 2; high-accuracy steps may start anywhere."""
+    past = np.zeros((23, 8))
+    past[:, 1] = 1e-17 * 0.1 ** -np.arange(23.0)
+    monkeypatch.setattr(rounding_pole, "is_accurate", lambda memory: accurate)
+    memory = SimpleNamespace(
+        series=SimpleNamespace(past=past),
+        mode=SimpleNamespace(order=22),
+        step=SimpleNamespace(start_pivot=part * rounding_pole.CROSSING_START * 2.0),
+        progress=SimpleNamespace(largest_pivot=2.0),
+        solver=SimpleNamespace(pivot_columns=np.zeros(3)),
+    )
+    assert rounding_pole.time_of_pole(memory) == pytest.approx(found)
+    if accurate:
+        memory.step.start_pivot = 1.0
+        assert rounding_pole.time_of_pole(memory) == pytest.approx(0.1)
+
+
+def test_the_energy_in_the_middle_of_a_step(monkeypatch):
+    calls: list[Any] = []
+    noted(monkeypatch, uniqueness, calls, evaluate_series=None, kinetic_energy=7.0)
+    clock = SimpleNamespace(length=0.5)
+    memory = SimpleNamespace(run=SimpleNamespace(loop=SimpleNamespace(clock=clock)), state="state")
+    assert uniqueness.energy_in_middle(memory) == 7.0
+    assert calls == [("evaluate_series", 0.25, ...), ("kinetic_energy", "state", ...)]
+
+
+@pytest.mark.parametrize(("depth", "pair"), [(-0.25, False), (-0.2500001, True), (0.25, False)])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_pair_of_crossings_has_a_depth(monkeypatch, depth, pair, side):
+    """A hundredth of the step of 2 s beside the minimum at 1.5 s, on either side."""
+    calls: list[Any] = []
+    monkeypatch.setattr(location, "PAIR_DEPTH", 0.25)
+    monkeypatch.setattr(location, "PAIR_OFFSET", 0.01)
+    noted(monkeypatch, location, calls, log_determinant_at_start=0.5, time_of_minimum=1.5, bisect=[0.7, 1.9])
+    asked: list[float] = []
+
+    def value_at(t: float, unit: float, memory: Any) -> float:
+        assert unit == 0.5
+        asked.append(t)
+        return depth if t == pytest.approx(1.5 + side * 0.02) else 1.0
+
+    monkeypatch.setattr(location, "value_at", value_at)
+    assert location.find_pair(2.0, SimpleNamespace()) == ((0.7, 1.9) if pair else (1.5, -1.0))
+    at = 1.5 + side * 0.02
+    ends = [("bisect", 0.0, pytest.approx(at), 0.5, ...), ("bisect", 2.0, pytest.approx(at), 0.5, ...)]
+    assert [call for call in calls if call[0] == "bisect"] == (ends if pair else [])
+    assert ("time_of_minimum", 2.0, location.SECTIONS, ...) in calls
+    assert asked == pytest.approx([1.48, 1.52] if side > 0 or not pair else [1.48])
+
+
+def test_the_determinant_at_the_start_by_pivots_and_the_null_vector():
+    """det(G₀ G₀ᵀ) is the square of the product of pivots, 3 and -2, times that of the null vector."""
+    memory = SimpleNamespace(
+        solver=SimpleNamespace(
+            past=np.array([3.0, -2.0, 9.0]), past_motion=np.array([1.0, -0.5, 2.0]), pivot_columns=np.zeros(3)
+        ),
+        partition=SimpleNamespace(rank=2),
+    )
+    assert determinants.log_start_by_null_vector(memory) == pytest.approx(np.log(36.0 * 5.25))
 
 
 # --- sizes ------------------------------------------------------------------------------------------------

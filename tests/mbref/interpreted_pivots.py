@@ -390,10 +390,20 @@ def test_the_partition_by_complete_pivoting(monkeypatch, tolerance, rank, parity
     )
     assert step_start.choose.function(memory) == rank and memory.partition.parity is parity
     assert memory.partition.partition_id == 7 and put == [1]
+    free = np.array([1.0] * 4 + [0.0] * 4)
+    free[solver.pivot_columns[:rank]] = 0.0
+    assert solver.left.tolist() == free.tolist()
     if rank >= 2:
         assert solver.pivot_rows.tolist() == [1, 0, 2] and solver.pivot_columns.tolist() == [1, 2, 0, 3]
     if rank == 3:
         assert solver.row_max[2] == pytest.approx(0.14) and solver.row_max[0] == pytest.approx(1.5)
+
+
+@pytest.mark.parametrize(("first", "place"), [(0, 1), (1, 1), (2, 2), (3, 3)])
+def test_the_first_of_equal_rows_is_chosen(first, place):
+    """Entries 3, 5, 5 and 4 of rows 2, 0, 3 and 1."""
+    sizes, rows = np.array([5.0, 4.0, 3.0, 5.0]), np.array([2, 0, 3, 1])
+    assert step_start.place_of_largest_row(sizes, rows, first) == place
 
 
 def test_the_series_at_the_start_of_a_step_is_saved():

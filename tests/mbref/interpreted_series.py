@@ -549,6 +549,40 @@ def test_the_determinant_at_the_start_is_saved_by_the_pivots_of_an_unchanged_par
     assert all(y is memory.series.past for y in asked) and len(asked) == 2
 
 
+@pytest.mark.parametrize("rows", [[SADDLE], [CIRCLE, SADDLE], [PLANE, CIRCLE, SADDLE]])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_determinant_of_gradients_at_two_times(rows, sign):
+    """det(G G₀ᵀ) of a random G₀ in pivot order, or det G of a square gradient times its sign at the start."""
+    memory, count = system(rows), len(rows)
+    respond(memory)
+    order, columns = memory.solver.pivot_rows, memory.solver.pivot_columns
+    there = np.zeros((1, LANES))
+    there[0, :NZ] = PLACE[::-1]
+    memory.kernels.gradient = determinants.evaluate_gradient.function
+    memory.solver.product, before = (
+        np.full((3, 3), 9.0),
+        sign * np.cos(np.arange(3.0 * count)).reshape(count, 3),
+    )
+    memory.solver.past_gradient = before.T.copy()
+    memory.step.start_negative, memory.step.start_logarithm = sign < 0, 0.75
+    found = gradient(rows, PLACE[::-1])[order]
+    square = np.linalg.det(found[:, columns]) if count == NZ else np.linalg.det(found @ before.T)
+    expected = sign * square * np.exp(0.75) if count == NZ else square
+    negative, size = determinants.gradient_determinant.function(there, memory)
+    assert bool(negative) is bool(expected < 0.0) and size == pytest.approx(np.log(abs(expected)))
+
+
+def test_gradients_of_angles_are_added_to_the_tableau(monkeypatch):
+    memory, added = system([CIRCLE]), []
+    monkeypatch.setattr(partition, "add_angle_gradients", lambda *given: added.append(given))
+    partition.put_rows(memory)
+    assert not added
+    memory.polynomials.torsions.row = np.array([-1])
+    partition.put_rows(memory)
+    [(terms, tableau, given)] = added
+    assert terms is memory.series.terms and tableau is memory.solver.tableau and given is memory
+
+
 # --- which code computes the orders -------------------------------------------------------------------------
 def expanding(patch: pytest.MonkeyPatch, deceleration: float = 0.0, length: float = 0.0, **code: Any) -> Any:
     """A series of rates up to 4 /s, whose code by power finds that its speed changes at a rate (1/s)."""
@@ -647,7 +681,7 @@ def wide(count: int, functions: Any = ()) -> tuple[list[Any], Any]:
     rows = wide_rows(count, functions)
     memory = system(rows, functions, mass=WIDE_MASS, place=WIDE_PLACE, linear_force=WIDE_LINEAR)
     memory.series.terms[0, WIDE + count : WIDE + count + len(functions)] = (0.9, 1.3)[: len(functions)]
-    memory.solver.response[:] = memory.solver.change[:] = 9.0
+    memory.solver.response[:] = memory.solver.change[:] = memory.solver.rhs[:] = 9.0
     memory.solver.null_space[:, :WIDE] = 9.0
     return rows, memory
 

@@ -179,14 +179,14 @@ def test_values_and_rates_of_variables(monkeypatch):
     made.run.equations.frames = frames
     made.pose_maps = SimpleNamespace(
         body=np.array([1, 1, 0]),
-        driver=np.array([-1, 3, -1]),
+        driver=np.array([-1, 0, -1]),
         along=waves(3, 12),
         across=waves(3, 12, seed=5.0),
     )
     asked: list[Any] = []
     monkeypatch.setattr(pose_maps, "set_poses", lambda *found: asked.append(found))
     monkeypatch.setattr(pose_maps, "set_velocities", lambda *found: asked.append(found))
-    monkeypatch.setattr(pose_maps, "function_value", lambda k, t, _: (0.1 * k * t, 1.5, 9.0))
+    monkeypatch.setattr(pose_maps, "function_value", lambda k, t, _: (0.3 + 0.1 * k + 0.075 * t, 1.5, 9.0))
     pose_maps.read_variables(4 / 3, made)
     state = made.run.state
     assert [
@@ -392,6 +392,7 @@ def test_a_determinant_that_stays_level(monkeypatch, first, second, level):
         (1.4, 0.0, False, False),
         (1.38, -27.01, True, True),
         (1.38, -26.99, True, False),
+        (1.4, -27.01, True, False),
     ],
 )
 def test_a_determinant_that_dips_where_the_pivot_vanishes(monkeypatch, dip, lowest, accurate, vanishes):

@@ -44,6 +44,7 @@ def test_each_decision_changes_at_its_threshold_and_each_check_fails_when_that_m
     [
         (
             "interpreted_at_limits",
+            "interpreted_code_of_systems",
             "interpreted_crossings",
             "interpreted_decisions",
             "interpreted_drivers",
