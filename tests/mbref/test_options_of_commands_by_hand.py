@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +15,7 @@ from mbref.cli import ensemble, options
 from mbref.cli.commands import parser
 from mbref.input_error import InputError
 from mbref.scene import Body, Scene
+from mbref.trajectory import Outcome
 
 RUN = {"rtol": 1e-9, "code": "auto", "max_step": 0.0, "method": None, "json": False, "out": None}
 WHEN = {"times": None, "samples": None, "duration": None}
@@ -86,6 +90,7 @@ def test_sample_times_that_options_ask_for():
         ({"times": "1,x"}, "--times: must be numbers separated by commas, got '1,x'"),
         ({"times": "-1,2"}, "--times: must be finite, not negative and increasing, got -1,2"),
         ({"times": "1,1"}, "--times: must be finite, not negative and increasing, got 1,1"),
+        ({"times": "1,3,2"}, "--times: must be finite, not negative and increasing, got 1,3,2"),
         ({"times": "1,nan"}, "--times: must be finite, not negative and increasing, got 1,nan"),
         ({"times": "2,3", "duration": 1.0}, "--times: none is within --duration 1"),
     ],
@@ -132,3 +137,41 @@ def test_an_ensemble_of_one_variant(monkeypatch, count, workers):
     with pytest.raises(KeyError) as end:
         ensemble._ensemble(asked)
     assert end.value.args == (("s", ["body[b].mass"], count, 7),)
+
+
+def test_runs_of_an_ensemble_a_second(monkeypatch, capsys):
+    """Two variants between 10 s and 14 s on the clock."""
+    clock, told = iter([10.0, 14.0]), list[Any]()
+
+    @contextlib.contextmanager
+    def shown(what: Any, end: Any = None) -> Iterator[Any]:
+        told.append((what, end))
+        yield told.append
+
+    def spread(scene: Scene, end: float, completed: Any, rate: float, asked: Any) -> None:
+        told.append((scene.name, end, completed, rate, asked.count))
+
+    runs = [SimpleNamespace(outcome=Outcome.COMPLETED), SimpleNamespace(outcome=Outcome.COMPLETED)]
+    monkeypatch.setattr(ensemble, "find_scene", lambda name: SCENE)
+    monkeypatch.setattr(ensemble, "warn", lambda scene: None)
+    monkeypatch.setattr(ensemble, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    monkeypatch.setattr(ensemble, "progress_bar", shown)
+    monkeypatch.setattr(ensemble, "_show_spread", spread)
+    monkeypatch.setattr("mbref.ensembles.processes.processes", shown)
+    monkeypatch.setattr(
+        "mbref.ensembles.ensemble.ensemble", lambda *given: iter([(1, runs[1]), (0, runs[0])])
+    )
+    words = [
+        "ensemble",
+        "s",
+        "--vary",
+        "body[b].mass=1:2",
+        "--count",
+        "2",
+        "--workers",
+        "3",
+        "--times",
+        "1,2",
+    ]
+    assert ensemble._ensemble(parser().parse_args(words)) == 0
+    assert told == [(3, None), ("simulating", 2), 1, 2, ("s", 2.0, runs, 0.5, 2)]

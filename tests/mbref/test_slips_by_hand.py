@@ -11,6 +11,7 @@ import pytest
 
 from mbref import scene_slips
 
+ZERO = (0.0, 0.0, 0.0)
 X, Y, Z, TILTED = (1.0, 0.0, 0.0), (0.0, 3.0, 0.0), (0.0, 0.0, 2.0), (1.0, 0.0, 1.0)
 LOOP = ("ground a", "a b", "b c", "c ground", "d ground")
 
@@ -71,6 +72,9 @@ def test_cosines_and_planes_at_their_limits():
     assert scene_slips._unit((0.0, 3.0, 4.0)) == pytest.approx([0.0, 0.6, 0.8])
     for height, flat in ((1e-6, True), (math.nextafter(1e-6, 1.0), False)):
         assert scene_slips._is_flat(scene([Z, Z], heights=(0.0, height)), np.array([0.0, 0.0, 1.0])) == flat
+    for height, flat in ((2e-6, True), (math.nextafter(2e-6, 1.0), False)):
+        longer = scene([Z, Z, Z], heights=(0.0, height, 0.0))
+        assert scene_slips._is_flat(longer, np.array([0.0, 0.0, 1.0])) == flat, "2 m long"
     assert scene_slips._size(scene([Z, Z, Z], heights=(0.0, 5.0, 1.0))) == 5.0
 
 
@@ -149,3 +153,70 @@ def test_scenes_without_joints_and_strong_gravity():
     heavy.gravity = (0.0, -981.0, 0.0)
     says = "gravity: 981 m/s² is 100 times the earth's; is it in mm/s²?"
     assert list(scene_slips._gravity(heavy)) == [says]
+
+
+def test_gravity_above_the_limit():
+    heavy: Any = SimpleNamespace(gravity=(0.0, 0.0, math.nextafter(100.0, 200.0)))
+    assert len(list(scene_slips._gravity(heavy))) == 1
+
+
+def test_values_of_drivers_are_computed_at_101_times():
+    seen: list[np.ndarray] = []
+    facts = SimpleNamespace(facts=SimpleNamespace(driven="angle"))
+    given = SimpleNamespace(joint="A", values=lambda times: seen.append(times) or np.zeros(1))
+    made: Any = SimpleNamespace(duration=2.0, driver=[given], joint_named=lambda name: facts)
+    assert list(scene_slips._far_drivers(made)) == []
+    assert seen[0] == pytest.approx(0.02 * np.arange(101))
+
+
+def test_distances_between_the_joints_of_bodies():
+    """Body b has three joints, c only one; the joints of a distance have two anchors."""
+    places = {
+        "A": ("ground a", ZERO, ZERO),
+        "B": ("a b", (3.0, 0.0, 0.0), (3.0, 0.0, 0.0)),
+        "C": ("b ground", (3.0, 4.0, 0.0), (6.0, 8.0, 0.0)),
+        "D": ("b c", (3.0, 0.0, 12.0), (3.0, 0.0, 1.0)),
+    }
+    joints = [
+        SimpleNamespace(name=name, bodies=tuple(pair.split()), anchor_pair=ends)
+        for name, (pair, *ends) in places.items()
+    ]
+    made: Any = SimpleNamespace(joint=joints, body=[SimpleNamespace(name=name) for name in "abc"])
+    assert scene_slips.link_lengths(made) == {
+        "a": {"A–B": 3.0},
+        "b": {"B–C": 4.0, "B–D": 12.0, "C–D": pytest.approx(math.hypot(4.0, 12.0))},
+        "ground": {"A–C": 10.0},
+    }
+
+
+@pytest.mark.parametrize(
+    ("mass", "inertia", "said"),
+    [
+        (2.0, (0.0, 7200.0, 7200.0), False),
+        (2.0, (0.0, 7201.0, 7201.0), True),
+        (2.0, ((7201.0, 0.0, 0.0), (0.0, 7201.0, 9.0), (0.0, 9.0, 0.0)), True),
+        (2.0, ((7200.0, 0.0, 0.0), (0.0, 7200.0, 9.0), (0.0, 9.0, 0.0)), False),
+        (0.0, (0.0, 7201.0, 7201.0), False),
+        (None, (0.0, 7201.0, 7201.0), False),
+        (2.0, None, False),
+    ],
+)
+def test_inertias_of_a_mechanism_of_two_metres(mass, inertia, said):
+    """√(14400 / 2 / 2) m is 30 times 2 m, the largest radius of gyration that is no mistake."""
+    body = SimpleNamespace(name="a", mass=mass, inertia=inertia, position=(0.0, 0.5, 2.0))
+    joint = SimpleNamespace(anchor_pair=(ZERO, (1.0, 0.0, 0.0)))
+    made: Any = SimpleNamespace(body=[body], joint=[joint])
+    says = "body[a].inertia: suits a body 60 m across, the mechanism measures 2 m; is it in kg m²?"
+    assert list(scene_slips._inertias(made)) == [says] * said
+    body.position, joint.anchor_pair = ZERO, (ZERO, ZERO)
+    assert list(scene_slips._inertias(made)) == []
+
+
+def test_a_mechanism_that_is_as_small_as_rounding_has_no_size(monkeypatch):
+    """Points at 1 m and 2 m, of which half of 2 m counts as rounding."""
+    monkeypatch.setattr(scene_slips, "COINCIDENT", 0.5)
+    body = SimpleNamespace(name="a", mass=1.0, inertia=(1e6, 1e6, 1e6), position=(1.0, 0.0, 0.0))
+    made: Any = SimpleNamespace(body=[body], joint=[SimpleNamespace(anchor_pair=((2.0, 0.0, 0.0),) * 2)])
+    assert list(scene_slips._inertias(made)) == []
+    body.position = (math.nextafter(1.0, 0.0), 0.0, 0.0)
+    assert len(list(scene_slips._inertias(made))) == 1

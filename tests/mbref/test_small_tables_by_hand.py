@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from types import SimpleNamespace
@@ -20,9 +21,10 @@ from mbref.drawing.timeline import Timeline
 from mbref.ensembles import candidates
 from mbref.ensembles.simulate_all import Ended
 from mbref.equations.initial_state import Start
+from mbref.input_error import InputError
 from mbref.motion import Motion
 from mbref.scene import Body, Driver, Factor, Scene, SceneError, Sine
-from mbref.simulation import rounded_numbers
+from mbref.simulation import rounded_numbers, simulate
 from mbref.trajectory import Cost, Trajectory
 from mbref.variation import Variation
 
@@ -492,3 +494,46 @@ def test_products_and_directions_of_vectors():
         2 * math.acos(math.cos(0.3) * math.cos(0.4))
     )
     assert rotations.rotate(turn[0], X) == pytest.approx([math.cos(0.6), math.sin(0.6), 0.0])
+
+
+# --- simulation ---------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        (["x"], "times: must be numbers"),
+        (None, "times: needs at least one sample time|times: must be finite"),
+        ([], "times: needs at least one sample time"),
+        ([[0.0, 1.0]], "times: needs at least one sample time"),
+        ([0.0, 2.0, 1.0], "times: must be finite, not negative and increasing"),
+        ([0.0, 1.0, 1.0], "times: must be finite, not negative and increasing"),
+        ([-0.5, 1.0], "times: must be finite, not negative and increasing"),
+        ([0.0, math.nan, 1.0], "times: must be finite, not negative and increasing"),
+        ([0.0, math.inf], "times: must be finite, not negative and increasing"),
+    ],
+)
+def test_sample_times_that_are_refused(times, says):
+    with pytest.raises(InputError, match=says):
+        simulate.checked_times(times)
+
+
+def test_sample_times_that_are_taken():
+    assert simulate.checked_times([0, 1, 3]).tolist() == [0.0, 1.0, 3.0]
+    assert simulate.checked_times((0.5,)).dtype == float
+
+
+@pytest.mark.parametrize(
+    ("branches", "passed", "says"),
+    [
+        ({}, 0, ""),
+        ({2: 1}, 2, ""),
+        ({1: 2, 3: 2}, 2, "the motion passes 2 singular positions up to t = 2.5 s, and no number 3"),
+        ({2: 1}, 1, "the motion passes 1 singular position up to t = 2.5 s, and no number 2"),
+        ({1: 1}, 0, "the motion passes 0 singular positions up to t = 2.5 s, and no number 1"),
+    ],
+)
+def test_branches_at_positions_that_are_not_passed(branches, passed, says):
+    limits, times = SimpleNamespace(branches=tuple(branches.items())), np.array([0.0, 2.5])
+    run: Any = SimpleNamespace(limits=limits, crossings=[None] * passed, times=times)
+    with pytest.raises(InputError) if says else contextlib.nullcontext() as fault:
+        simulate._check_branches(run)
+    assert not says or str(fault.value) == f"branches: {says}"
