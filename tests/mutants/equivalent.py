@@ -34,6 +34,7 @@ SYMMETRIC = {
         "convolved",
         "_dot",
         "rotations.angle_between",
+        "distances",
         "combination",
         "_angle",
     },
