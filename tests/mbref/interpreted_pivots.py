@@ -42,16 +42,27 @@ def passed(monkeypatch: pytest.MonkeyPatch, memory: Any, at_pose: dict[int, floa
     """Whether the rank drops where pivots k change their signs, with the least pivots at these poses."""
     calls: list[Any] = []
     looked: list[int] = []
-    monkeypatch.setattr(crossing, "factorise_product", lambda *given: calls.append("product"))
-    monkeypatch.setattr(crossing, "put_rates", lambda memory: calls.append("rates"))
-    monkeypatch.setattr(
-        crossing, "zero_of_pivot", lambda k, h, memory: looked.append(k) or calls.append(k) or 0.25
-    )
-    monkeypatch.setattr(crossing, "pivot_at_pose", lambda memory: at_pose[looked[-1]])
-    monkeypatch.setattr(crossing, "keep_position", lambda part, h, memory: calls.append(("kept", part, h)))
-    monkeypatch.setattr(
-        crossing, "expand_product_at", lambda part, h, memory: calls.append(("back", part, h))
-    )
+
+    def product(*given: Any) -> None:
+        ends = memory.loop.ends
+        assert given == ("factor", "gradient", crossing.PRODUCT_ALPHA, ends)
+        calls.append("product")
+
+    def zero(k: int, h: float, given: Any) -> float:
+        assert h == 0.5 and given is memory
+        looked.append(k)
+        calls.append(k)
+        return 0.25
+
+    def noted(name: str) -> Any:
+        return lambda part, h, given: given is memory and calls.append((name, part, h))
+
+    monkeypatch.setattr(crossing, "factorise_product", product)
+    monkeypatch.setattr(crossing, "put_rates", lambda given: given is memory and calls.append("rates"))
+    monkeypatch.setattr(crossing, "zero_of_pivot", zero)
+    monkeypatch.setattr(crossing, "pivot_at_pose", lambda given: at_pose[looked[-1]])
+    monkeypatch.setattr(crossing, "keep_position", noted("kept"))
+    monkeypatch.setattr(crossing, "expand_product_at", noted("back"))
     return bool(crossing.passes_singular_position(0.5, memory)), calls
 
 
@@ -70,9 +81,10 @@ def test_pivots_that_change_their_signs_and_vanish(monkeypatch):
 
 
 def test_the_pose_inside_a_step_is_a_cubic(monkeypatch):
-    """x(t) = 1 + 2 t - t² + 3 t³ over 0.5 s, from its values and rates at both ends."""
-    monkeypatch.setattr(crossing, "normalise", lambda q: None)
-    x = np.polynomial.Polynomial([1.0, 2.0, -1.0, 3.0])
+    """x(t) = 3 + 2 t - t² + 3 t³ over 0.5 s, from its values and rates at both ends."""
+    normalised: list[Any] = []
+    monkeypatch.setattr(crossing, "normalise", normalised.append)
+    x = np.polynomial.Polynomial([3.0, 2.0, -1.0, 3.0])
     rate, h = x.deriv(), 0.5
     ends = SimpleNamespace(rates=np.array([[rate(0.0)], [rate(h)]]), pose=np.zeros(1))
     memory = SimpleNamespace(
@@ -83,6 +95,7 @@ def test_the_pose_inside_a_step_is_a_cubic(monkeypatch):
     for part in (0.0, 0.2, 0.7, 1.0):
         crossing.put_pose(part, h, memory)
         assert ends.pose[0] == pytest.approx(x(part * h))
+    assert len(normalised) == 4 and all(q is ends.pose for q in normalised)
 
 
 def test_rates_at_both_ends_of_a_step(monkeypatch):
@@ -125,10 +138,75 @@ def test_the_place_where_a_pivot_vanishes(monkeypatch, function, zero):
     assert asked[0] == pytest.approx(first) and len(asked) <= 12
 
 
+@pytest.mark.parametrize(
+    ("error", "most", "found", "asked"),
+    [
+        (1e-9, 9, [0.5, 0.25, 0.0], [0.5, 5 / 9, 187 / 315]),
+        (0.5, 9, [-1.0, 0.5], [0.5, 8 / 21]),  # the first interval has the length 0.5
+        (0.51, 9, [-1.0], [0.5]),
+        (1e-9, 2, [-1.0, 0.5, 0.5], [0.5, 8 / 21]),
+        (1e-9, 9, [0.0], [0.5]),
+    ],
+)
+def test_evaluations_that_locate_a_pivot(monkeypatch, error, most, found, asked):
+    """From 4 and -4 at both ends; the value that stays is multiplied by f₁ / (f₁ + f₂) for equal signs."""
+    monkeypatch.setattr(crossing, "PLACE_ERROR", error)
+    monkeypatch.setattr(crossing, "SEARCH", most)
+    ends = SimpleNamespace(pivots=np.array([9.0, -4.0]), squared_pivots=np.array([9.0, 4.0]))
+    memory, parts, left = SimpleNamespace(loop=SimpleNamespace(ends=ends)), [], list(found)
+
+    def expand(part: float, h: float, given: Any) -> None:
+        assert h == 0.25 and given is memory
+        parts.append(part)
+        ends.pivots[1] = left.pop(0)
+
+    monkeypatch.setattr(crossing, "expand_product_at", expand)
+    assert crossing.zero_of_pivot(1, 0.25, memory) == parts[-1] and parts == pytest.approx(asked)
+
+
+@pytest.mark.parametrize(
+    ("loops", "reference", "pivot", "past", "passes", "meets", "kept"),
+    [
+        (1.0, 2.0, 1e-3, 1.0, False, True, True),
+        (1.0, 2.0, 3e-3, 1.0, False, False, False),
+        (1.0, 2.0, 3e-3, 1.0, True, True, False),
+        (1.0, 2.0, 1e-3, 1e-3, False, False, False),
+        (2.0, 2.0, 1e-3, 1e-3, True, True, False),
+        (0.0, 2.0, 1e-3, 1.0, True, False, False),
+        (1.0, 0.0, 1e-3, 1.0, True, False, False),
+        (1.0, 1.0, 5e-4, 1.0, False, True, True),
+    ],
+)
+def test_steps_that_reach_or_pass_a_singular_position(
+    monkeypatch, loops, reference, pivot, past, passes, meets, kept
+):
+    """A pivot that falls to a thousandth of the reference ends the run; rows without loops never do."""
+    watch = SimpleNamespace(reference_pivot=reference, smallest_pivot=pivot, past_pivot=past)
+    memory, calls = SimpleNamespace(watch=watch, control=SimpleNamespace(closed_loops=loops)), []
+    monkeypatch.setattr(crossing, "keep_position", lambda *given: calls.append(given))
+    monkeypatch.setattr(
+        crossing, "passes_singular_position", lambda h, given: h == 0.25 and given is memory and passes
+    )
+    assert crossing.meets_singular_position(0.25, memory) is meets
+    assert calls == [(1.0, 0.25, memory)] * kept
+
+
+def test_the_place_and_the_pose_of_a_singular_position_are_kept(monkeypatch):
+    calls: list[Any] = []
+    monkeypatch.setattr(crossing, "put_pose", lambda *given: calls.append(given))
+    memory = SimpleNamespace(watch=SimpleNamespace(singular_part=9.0))
+    crossing.keep_position(0.75, 0.5, memory)
+    assert memory.watch.singular_part == 0.75 and calls == [(0.75, 0.5, memory)]
+
+
 def test_the_least_pivot_of_the_independent_rows(monkeypatch):
     """Squares of 9, 4, 1 and 0.25: with three independent rows the least pivot is 1."""
-    factor = SimpleNamespace(squared_pivots=np.array([9.0, 0.25, 4.0, 1.0]))
-    monkeypatch.setattr(crossing, "find_squared_pivots", lambda factor: None)
+    factor = SimpleNamespace(squared_pivots=np.zeros(4))
+
+    def find(given: Any) -> None:
+        given.squared_pivots[:] = [9.0, 0.25, 4.0, 1.0]
+
+    monkeypatch.setattr(crossing, "find_squared_pivots", find)
     monkeypatch.setattr(crossing, "sort", lambda squares: squares.sort())
     memory = SimpleNamespace(factor=factor, watch=SimpleNamespace(generic_rank=3))
     assert crossing.pivot_at_pose(memory) == 1.0
