@@ -146,10 +146,55 @@ def test_random_states_of_some_velocities():
     some = states.of(np.array([True, False, True]))
     assert some.part.tolist() == [0.5, 0.25]
     assert some.displacement.tolist() == [[1, 0, 1]] * 2 and some.velocity.tolist() == [[2, 0, 2]] * 2
+    states = RandomStates(np.array([0.5]), np.array([[4.0, 5.0]]), np.array([[8.0, 9.0]]))
+    some = states.of(np.array([True, False]))
+    assert some.displacement.tolist() == [[4.0, 0.0]] and some.velocity.tolist() == [[8.0, 0.0]]
     found = active.random_states(3, 4)
     assert found.part.shape == (3,) and found.displacement.shape == found.velocity.shape == (3, 4)
     assert ((found.part >= 0.1) & (found.part <= 1.0)).all() and len(set(found.velocity.ravel())) == 12
     assert active.random_states(3, 4) is found
+
+
+def test_times_and_places_of_random_states(monkeypatch):
+    monkeypatch.setattr(active, "all_displaced", lambda *given: given)
+    states = RandomStates(np.array([0.5, 0.25]), np.ones((2, 3)), 2 * np.ones((2, 3)))
+    times, (q, x), v = states.about("q", 4.0)  # type: ignore[arg-type]
+    assert times.tolist() == [2.0, 1.0] and q == "q" and x is states.displacement and v is states.velocity
+
+
+def test_states_are_read_until_no_further_velocity_is_reached(monkeypatch):
+    """At first nothing moves; the start moves column 0, whose motion reaches column 2."""
+    asked: list[Any] = []
+    sample = RandomStates(np.array([0.5]), np.ones((1, 3)), np.ones((1, 3)))
+    monkeypatch.setattr(active, "random_states", lambda count, n: sample if (count, n) == (2, 3) else None)
+    monkeypatch.setattr(active, "_steady", lambda model: None)
+    monkeypatch.setattr(RandomStates, "about", lambda self, q, duration: (self.velocity, q, duration))
+    moved = [np.array(m, dtype=bool) for m in ([1, 0, 0], [1, 0, 1], [1, 0, 1])]
+    entries = [np.eye(2, dtype=bool), np.zeros((2, 2), dtype=bool)]
+
+    def patterns(model: Any, terms: Any) -> Any:
+        asked.append(terms)
+        first = len(asked) == 1
+        return entries[0 if first else 1].copy(), np.array([False, first]), np.array([False, False, False])
+
+    def reached(model: Any, found: Any, rows: np.ndarray, columns: np.ndarray) -> Any:
+        assert found.tolist() == [[True, False], [False, True]]
+        assert rows.tolist() == [False, True] and columns.tolist() == [True, False, False]
+        return moved.pop(0), np.array([True, False])
+
+    monkeypatch.setattr(active, "patterns", patterns)
+    monkeypatch.setattr(active, "reached", reached)
+    model: Any = SimpleNamespace(n=3, scene=SimpleNamespace(duration=4.0), terms=lambda *given: given)
+    read: list[RandomStates] = []
+    moving, kept = active.active_entries(model, "q", np.array([0.5, 0.0, 0.0]), read)  # type: ignore[arg-type]
+    assert moving.tolist() == [True, False, True] and kept.tolist() == [[True, False], [False, False]]
+    assert [each.velocity.tolist() for each in read] == [[[0, 0, 0]], [[1, 0, 0]], [[1, 0, 1]]]
+    assert asked[0][0].tolist() == [0.0] and asked[0][1] == "q" and asked[0][2].tolist() == [0.5, 0.0, 0.0]
+    assert [(given[0].tolist(), *given[1:]) for given in asked[1:]] == [
+        ([[0, 0, 0]], "q", 4.0),
+        ([[1, 0, 0]], "q", 4.0),
+        ([[1, 0, 1]], "q", 4.0),
+    ]
 
 
 def model_of(columns: list[list[int]]) -> Any:
@@ -196,6 +241,10 @@ def test_numbers_of_the_size_of_rounding_become_zero():
     places, rates = active.without_rounding(q, v, given, np.array([10.0]))
     assert places.tolist() == [[0.0, 10.1 * still, 5.0, 1.0, 0.0, 1.1 * still, 0.0]]
     assert rates.tolist() == [[4.0, 0.0, 4.1 * still, 0.0, -3.9 * still, 0.0]]
+    least = np.array([[still, 2.0, 3.0, 1.0, still, 0.0, 0.0]])
+    rates_of = np.array([[1.0, still, 0.0, 0.0, 0.0, 0.0]])
+    places, rates = active.without_rounding(least, rates_of, np.zeros((1, 6)), np.ones(1))
+    assert places.tolist() == least.tolist() and rates.tolist() == rates_of.tolist(), "at the limit"
     two = (np.vstack([numbers] * 2) for numbers in (q, v, given))
     both = active.without_rounding(*two, np.array([10.0, 1.0]))
     assert both[0][1, 0] == 9.9 * still and both[0][0, 0] == 0.0

@@ -400,6 +400,72 @@ def test_largest_rows_at_each_sample():
     assert along_trajectory._largest(np.zeros((2, 0))).tolist() == [0.0, 0.0]
 
 
+@pytest.mark.parametrize("accelerates", [True, False])
+def test_violations_of_rows_at_each_sample(monkeypatch, accelerates):
+    """Two samples, rows A and gear, three velocities; the gear's row is 2 · 5 - 3 · 7 = -11 and 2 - 3."""
+    jacobian = np.array([[[1.0, 2.0, 0.0], [0.0, 1.0, 1.0]], [[1.0, 0.0, 0.0], [0.0, 0.0, 3.0]]])
+    v, a = np.array([[1.0, 1.0, 1.0], [2.0, 0.0, 0.0]]), np.array([[4.0, 0.0, 0.0], [0.0, 0.0, 5.0]])
+    terms = SimpleNamespace(
+        phi=np.array([[-2.0, 99.0], [6.0, 99.0]]),
+        nu=np.array([[1.0, 0.0], [0.5, 8.0]]),
+        gamma=np.array([[0.0, 0.5], [0.0, 1.0]]),
+        jacobian=jacobian,
+    )
+    released: list[int] = []
+    motion: Any = SimpleNamespace(times="times")
+    made: Any = SimpleNamespace(
+        terms=lambda *given: terms if given == ("times", "q", v) else None,
+        scene="bare scene",
+        row_joint=("A", "gear"),
+        release=lambda: released.append(1),
+    )
+    coupled = SimpleNamespace(
+        name="gear",
+        joints=(SimpleNamespace(name="A"), SimpleNamespace(name="B")),
+        coordinates=("angle", "displacement"),
+        factors=(2.0, -3.0),
+    )
+    places = {("A", "angle"): np.array([5.0, 1.0]), ("B", "displacement"): np.array([7.0, 1.0])}
+    for name, stand_in in {
+        "Model": lambda scene: made if scene == "bare scene" else None,
+        "without_armatures": lambda scene: f"bare {scene}",
+        "coordinates": lambda *given: given == (made, motion) and ("q", v, a if accelerates else None),
+        "couplings_of": lambda scene: [coupled] if scene == "bare scene" else [],
+        "joint_motion": lambda *given: given[2] if given[:2] == ("bare scene", motion) else None,
+        "along": lambda moved, coordinate: (places[moved, coordinate], None),
+    }.items():
+        monkeypatch.setattr(along_trajectory, name, stand_in)
+    found = along_trajectory.violations("scene", motion)  # type: ignore[arg-type]
+    position, velocity, acceleration = found
+    assert position.tolist() == [11.0, 6.0] and velocity.tolist() == [2.0, 8.0] and released == [1]
+    assert (acceleration.tolist() == [4.0, 14.0]) if accelerates else (acceleration is None)
+
+
+def test_determined_reactions_of_a_trajectory(monkeypatch):
+    released: list[int] = []
+    motion: Any = SimpleNamespace(times="times")
+    made: Any = SimpleNamespace(nb=2, release=lambda: released.append(1))
+
+    def terms(times: str, q: np.ndarray) -> Any:
+        assert times == "times" and q.shape == (3, 2, 7)
+        return SimpleNamespace(blocks="blocks")
+
+    def determined(model: Any, q: np.ndarray, blocks: str) -> dict[str, Any]:
+        assert model is made and q[1, 1].tolist() == list(range(21, 28)) and blocks == "blocks"
+        return {"A": "mask"}
+
+    made.terms = terms
+    monkeypatch.setattr(along_trajectory, "Model", lambda scene: made if scene == "bare scene" else None)
+    monkeypatch.setattr(along_trajectory, "without_armatures", lambda scene: f"bare {scene}")
+    moved = np.arange(42.0).reshape(3, 14)
+    monkeypatch.setattr(
+        along_trajectory, "coordinates", lambda *given: given == (made, motion) and (moved, None, None)
+    )
+    monkeypatch.setattr(along_trajectory, "determined_components", determined)
+    assert along_trajectory.determined_reactions("scene", motion) == {"A": "mask"}  # type: ignore[arg-type]
+    assert released == [1]
+
+
 def test_scenes_without_armatures():
     joints = (hinge("A", "ground", "a", armature=8.0), slide("B", "a", "b"))
     found = along_trajectory.without_armatures(Scene(name="s", body=BASE["body"], joint=joints))

@@ -240,6 +240,16 @@ REASONS: dict[tuple[str, str, str], str] = {
         )
     },
     **{("mbref/linear_algebra/symbolic_factorisation.py", OPTIONS, new): PATTERN for new in ("1.0", "True")},
+    (
+        "mbref/equations/active_coordinates.py",
+        "found = np.append(columns, np.zeros(6, dtype=bool))",
+        "7",
+    ): "The fixed frame has six columns; no entry has a seventh.",
+    (
+        "mbref/equations/branches.py",
+        "return right[sizes > ZERO_FORM * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)",
+        "1.0",
+    ): "The largest size counts as one at least.",
     ("mbref/equations/active_coordinates.py", "rng = np.random.default_rng(1)", "2"): ANY_RANDOM,
     (
         "mbref/equations/branches.py",
