@@ -95,7 +95,8 @@ def as_determinant(monkeypatch, value, end):
     def found(number):
         return number < 0.0, math.log(max(abs(number), 1e-300))
 
-    monkeypatch.setattr(KERNELS, "determinant", lambda *_: found(value(times[-1])))
+    at_state = lambda y, made: found(value(times[-1])) if y is made.state else None  # noqa: E731
+    monkeypatch.setattr(KERNELS, "determinant", at_state)
     monkeypatch.setattr(location, "save_start_determinant", lambda _: None)
     monkeypatch.setattr(location, "gradient_determinant_at_end", lambda _: found(value(end)))
     monkeypatch.setattr(location, "log_determinant_at_start", lambda _: math.log(abs(value(0.0))))
@@ -175,11 +176,12 @@ def test_kinetic_energy_is_a_quadratic_form_of_the_rates():
 
 
 def test_a_motion_keeps_moving_down_to_a_fiftieth_of_its_energy(monkeypatch):
-    monkeypatch.setattr(uniqueness, "turns_back", lambda *_: False)
+    turned = [False]
+    monkeypatch.setattr(uniqueness, "turns_back", lambda y, made: turned[0] and y is made.series.terms)
     assert uniqueness.keeps_moving(0.02, 1.0, memory())
     assert not uniqueness.keeps_moving(0.0199, 1.0, memory())
     assert not uniqueness.keeps_moving(0.0, 0.0, memory())
-    monkeypatch.setattr(uniqueness, "turns_back", lambda *_: True)
+    turned[0] = True
     assert not uniqueness.keeps_moving(1.0, 1.0, memory())
     resting = memory()
     resting.series.past[1] = 0.0
@@ -194,15 +196,27 @@ def test_pivots_are_compared_with_the_largest_pivot():
 # --- crossings ------------------------------------------------------------------------------------------
 def ended(monkeypatch, status, agrees=True, rank=1):
     """Status after a crossing, whether a perturbed run was made, and the memory."""
-    state, made = memory(rank=rank), []
-    state.crossing_result = None
+    state, made, saved = memory(rank=rank), [], []
+    state.crossing_result = "result"
     state.run.loop.times = np.array([0.0, 1.0, 2.5])
-    state.run.equations.system.counts.factorisations = 0
+    counts = state.run.equations.system.counts
+    counts.steps, counts.rejected, counts.factorisations = 5, 6, 7
+
+    def perturbed(*given):
+        made.append(1)
+        assert given == (1e-9, state)
+        counts.steps, counts.rejected, counts.factorisations = 50, 60, 70
+        return agrees
+
     for name in ("save_state", "restore_state", "set_regular"):
-        monkeypatch.setattr(long_crossing, name, lambda *_: None)
-    monkeypatch.setattr(long_crossing, "perturbed_run_agrees", lambda *_: made.append(1) or agrees)
+        monkeypatch.setattr(long_crossing, name, lambda *given, name=name: saved.append((name, *given)))
+    monkeypatch.setattr(long_crossing, "perturbed_run_agrees", perturbed)
     state.run.control.rtol = 1e-9
-    return long_crossing.end_crossing.function(status, state), bool(made), state
+    found = long_crossing.end_crossing.function(status, state)
+    pair = [("save_state", state.run, "result"), ("restore_state", "result", state.run)]
+    assert saved == [*(pair if status in (PAUSED, DONE) else []), ("set_regular", state)]
+    assert (counts.steps, counts.rejected, counts.factorisations) == (5, 6, 7)
+    return found, bool(made), state
 
 
 def test_a_long_crossing_is_confirmed_by_a_perturbed_run(monkeypatch):
@@ -248,7 +262,9 @@ def test_steps_across_or_near_singular_positions_are_judged(monkeypatch, kind, c
     state = memory(kind=kind, pivot=pivot)
     state.kernels = SimpleNamespace(detect=lambda h, least, _: crossed * (h == 0.5) * (least == pivot))
     monkeypatch.setattr(acceptance, "ends_near_singular", lambda least, _: least < 0.3)
-    monkeypatch.setattr(acceptance, "turns_back", lambda *_: "turned")
+    monkeypatch.setattr(
+        acceptance, "turns_back", lambda y, made: "turned" if y is made.series.terms else None
+    )
     for name in ("crossing", "approach"):
         monkeypatch.setattr(acceptance, f"judge_{name}", lambda *given, name=name: (name, *given[:-1]))
     assert acceptance.judge_branch(0.5, 1, state) == expected

@@ -35,6 +35,7 @@ class Patched:
 
     def _stub(self, name: str, value: Any) -> Any:
         def stub(*given: Any) -> Any:
+            assert isinstance(given[-1], SimpleNamespace), f"memory is the last argument of {name}"
             self.calls.append(name)
             self.given[name] = given
             return value
@@ -226,6 +227,16 @@ def test_a_series_begins_once():
 
 
 # --- one step ---------------------------------------------------------------------------------------------
+def with_memory(function: Any, memory: Any) -> Any:
+    """Return a function whose last argument must be memory."""
+
+    def call(*given: Any) -> Any:
+        assert given[-1] is memory
+        return function(*given)
+
+    return call
+
+
 def one_step(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> tuple[int, list[float], Any, list[str]]:
     """Take a step from 2 s, whose longest length is 0.4 s; return status, attempts, memory and calls."""
     given: dict[str, Any] = {
@@ -260,27 +271,33 @@ def one_step(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> tuple[int, list
     )
 
     def expand(h: float, last: Any, memory: Any) -> int:
+        assert last is ((h, end) == (0.4, 7.0))
         tried.append(round(h, 12))
         return given["expand"].pop(0) if given["expand"] else OK
 
+    def judge(h: float, last: Any, memory: Any) -> int:
+        assert (h, last) == (pytest.approx(tried[-1]), (h, end) == (0.4, 7.0))
+        return given["judge"].pop(0) if given["judge"] else OK
+
+    end = 7.0
     replace = {
         "end_of_step": lambda memory: 7.0,
         "save_start": lambda memory: calls.append("save_start"),
         "first_lengths": lambda left, memory: lengths.pop(0) if left == 5.0 else None,
-        "turns_back_in": lambda h, memory: given["turns"],
+        "turns_back_in": lambda h, memory: given["turns"] and h == 0.4,
         "is_accurate": lambda memory: given["accurate"],
         "is_last": lambda h, stop, memory: (h, stop) == (0.4, 7.0),
         "expand_at": expand,
-        "judge_step": lambda h, last, memory: given["judge"].pop(0) if given["judge"] else OK,
+        "judge_step": judge,
         "time_to_singular_position": lambda h, memory: 10.0 * h,
         "next_length": lambda h, regular, memory: 0.5 * h,
         "end_step": lambda h, stop, memory: calls.append(f"end_step {h:g} {stop:g}"),
         "put_angles": lambda h, memory: calls.append(f"put_angles {h:g}"),
-        "count_crossings": lambda h, memory: 2,
+        "count_crossings": lambda h, memory: 2 if h == tried[-1] else 99,
         "begin_pieces": lambda stop, memory: 77,
     }
     for name, value in replace.items():
-        monkeypatch.setattr(stepping, name, value)
+        monkeypatch.setattr(stepping, name, with_memory(value, memory))
     status = stepping.take_step.function(memory)
     assert memory.step.start_violation == 0.0 and calls[0] == "save_start"
     return status, tried, memory, calls[1:]
@@ -573,7 +590,9 @@ def crossing_steps(monkeypatch: pytest.MonkeyPatch, **changes: Any) -> tuple[boo
         kernels=SimpleNamespace(step=step, record=lambda memory: delays.append("recorded")),
     )
     Patched(monkeypatch, short_crossing, freedoms=given["free"], least_pivot=0.125)
-    monkeypatch.setattr(short_crossing, "kinetic_energy", lambda terms, memory: next(energies))
+    monkeypatch.setattr(
+        short_crossing, "kinetic_energy", lambda terms, memory: next(energies) if terms == "terms" else None
+    )
     monkeypatch.setattr(short_crossing, "energy_in_middle", lambda memory: next(energies))
     monkeypatch.setattr(
         short_crossing,

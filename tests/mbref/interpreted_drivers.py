@@ -28,6 +28,7 @@ class Stubs:
         answers = iter(value) if isinstance(value, list) else None
 
         def call(*arguments: Any) -> Any:
+            assert isinstance(arguments[-1], SimpleNamespace), f"memory is the last argument of {name}"
             self.calls.append((name, *arguments[:-1]))
             return value if answers is None else next(answers)
 
@@ -253,6 +254,7 @@ def follow(monkeypatch: pytest.MonkeyPatch, memory: Any, **values: object) -> tu
     stubs = Stubs(monkeypatch, **{**common, **steps, **values})
     memory.series = SimpleNamespace(past="past")
     status = driven.follow_drivers.function(memory)
+    assert all(given == ["past"] for name, *given in stubs.calls if name == "put_terms")
     return status, [name for name, *_ in stubs.calls]
 
 

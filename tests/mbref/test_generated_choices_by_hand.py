@@ -131,6 +131,10 @@ def test_scenes_without_code(monkeypatch, tmp_path):
     monkeypatch.setattr(build, "_key", lambda taylor, names: f"key {names}")
     monkeypatch.setattr(build, "code_at", lambda path, write: (path, write()))
     monkeypatch.setattr(build, "write_code", lambda taylor, names: f"code of {names}")
+    monkeypatch.setattr(build, "PLAIN", False)
+    assert build.code_of(series_of(None, 7, 6, lanes=120), "ab")[1] == "code of ab"  # 1800 vectors
+    with pytest.raises(NoGeneratedCode, match="takes 2048 products of vectors, more than 2000"):
+        build.code_of(series_of(None, 7, 6, lanes=128), "ab")
     monkeypatch.setattr(build, "MOST_VECTORS", 32)
     taylor = series_of(None, 7, 6, lanes=16)
     monkeypatch.setattr(build, "PLAIN", True)
@@ -336,3 +340,18 @@ def test_lanes_of_driven_orders(monkeypatch):
     assert made._rows == [0, 1] * 4 + [0] and made._nz == 9
     assert made._products.start.tolist() == [0, 16, 24] and made._slots == 24
     assert np.flatnonzero(made._products.weight).tolist() == [*range(9), 16]
+
+
+def test_sums_of_eight_slots_are_found_in_one_loop():
+    """Ten slots: sums of both orders and the other factors of eight, then of two; the last product follows."""
+    made, asked = MultiplierOrders.__new__(MultiplierOrders), []
+    made._write = SimpleNamespace(  # type: ignore[assignment]
+        repeat=lambda first, k, begun, body: asked.append((first, k, begun[-1], len(begun))) or begun,
+        total=lambda parts: [str(part)[-4:] for part in parts],
+        product=lambda one, other: f"{one} {other}",
+    )
+    factors: Any = {c: orders.Factors(f"l{c}", f"r{c}", f"w{c}") for c in range(0, 80, 8)}
+    sums, ahead = made._inner("k", factors)  # type: ignore[arg-type]
+    assert asked == [(1, "k", "r56", 24), (1, "k", "r72", 6)] and list(sums) == list(factors)
+    assert all(number.constant == 0.0 for each in sums.values() for number in each.constant)
+    assert [each[1] for each in ahead.values()] == [f"w{c} r{c}"[-4:] for c in factors]
