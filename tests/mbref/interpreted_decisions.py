@@ -369,7 +369,7 @@ def test_the_length_of_the_next_attempt(monkeypatch, crossed, pivot, h, used, ex
     monkeypatch.setattr(stepping, "order_of_least_term", lambda h, memory: asked.append(h) or 11)
     step = SimpleNamespace(used_order=used, last_order=20, crossed=crossed, start_pivot=2.0)
     found = stepping.next_length(h, 0.3, SimpleNamespace(step=step))
-    scale = {1.0: stepping.OVERSHOOT * 0.8, 0.3: 0.3, 0.7: stepping.SHORTER * 0.3}[expected]
+    scale = {1.0: stepping.OVERSHOOT * 0.8, 0.3: 0.3, 0.7: 0.7 * 0.3}[expected]
     assert found == pytest.approx(scale) and step.used_order == order
     assert asked == ([pytest.approx(scale)] if order == 11 else [])
 
@@ -923,6 +923,21 @@ def parabola(
 
     monkeypatch.setattr(module, "logarithm_at", logarithm)
     return asked
+
+
+def test_the_logarithm_of_a_negative_determinant(monkeypatch):
+    """It is less than every other one; the golden section is (√5 - 1) / 2."""
+    assert pytest.approx((math.sqrt(5.0) - 1.0) / 2.0, rel=1e-15) == location.GOLDEN
+    made, times = SimpleNamespace(state="state", kernels=SimpleNamespace()), []
+    monkeypatch.setattr(location, "evaluate_series", lambda h, memory: times.append((h, memory)))
+    for negative, expected in ((False, 0.25), (True, -1e300)):
+        made.kernels.determinant = lambda y, memory, negative=negative: (
+            (negative, 0.25) if (y, memory) == ("state", made) else None
+        )
+        assert location.logarithm_at(0.5, made) == expected
+        at = location.value_at(0.5, 0.75, made)
+        assert at == pytest.approx((-1.0 if negative else 1.0) * math.exp(-0.5))
+    assert times == [(0.5, made)] * 4
 
 
 def test_the_smallest_determinant_by_golden_section(monkeypatch):

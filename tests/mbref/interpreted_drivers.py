@@ -98,7 +98,7 @@ def test_a_refused_step_is_shortened_until_the_shortest(monkeypatch):
     )
     tried = [call[1] for call in calls if call[0] == "attempt_predictor_step"]
     assert status == OK and memory.run.equations.system.counts.rejected == 2
-    assert tried == pytest.approx([0.3, 0.3 * driven.SHORTER, 0.3 * driven.SHORTER**2])
+    assert tried == pytest.approx([0.3, 0.3 * 0.7, 0.3 * 0.7**2])
     assert calls.count(("return",)) == 2
     memory.run.control.smallest_step = 0.3
     status, calls = take(
@@ -135,13 +135,9 @@ def test_a_step_into_a_singular_position_starts_accurate_steps(monkeypatch):
 def test_the_longest_step_by_the_last_two_terms(monkeypatch, near, first, steps, sizes, h, order):
     """(tolerance / size)^(1/k) of both; near a singular position fewer terms may allow more."""
     monkeypatch.setattr(driven, "largest_used", lambda k, memory: sizes.get(k, 0.0))
-    memory = series(start_pivot=(0.99 if near else 1.01) * driven.PIVOT_NEAR * 0.5)
+    memory = series(start_pivot=(0.99 if near else 1.01) * 0.3 * 0.5)
     memory.run.control.first_step, memory.run.equations.system.counts.steps = first, steps
-    expected = (
-        min((driven.PREDICTOR_TOLERANCE / sizes[k]) ** (1 / k) for k in (order - 1, order))
-        if h is None
-        else h
-    )
+    expected = min((3e-7 / sizes[k]) ** (1 / k) for k in (order - 1, order)) if h is None else h
     assert driven.longest_predictor_step(memory) == pytest.approx(expected)
     assert memory.step.used_order == order
 
@@ -159,8 +155,8 @@ def test_the_longest_step_by_the_last_two_terms(monkeypatch, near, first, steps,
 )
 def test_a_predictor_step_is_judged(monkeypatch, crossed, near, off, violation, expected):
     """Errors and violations relative to their limits."""
-    limit = driven.LOST_MOTION * 64 * driven.PREDICTOR_TOLERANCE
-    memory = series(violation=violation * driven.LOST_ROWS * driven.PREDICTOR_TOLERANCE)
+    limit = 30.0 * 64 * 3e-7
+    memory = series(violation=violation * 100.0 * 3e-7)
     detected = []
     memory.kernels.detect = lambda h, pivot, memory: detected.append((h, pivot)) or crossed
     stubs = Stubs(
@@ -212,8 +208,8 @@ def test_accurate_steps_begin_at_the_distance_that_one_step_crosses(
 
 def test_the_distance_from_which_one_step_crosses(monkeypatch):
     stubs = Stubs(monkeypatch, longest_step=2.0)
-    share = driven.CROSSING_START * 2.0
-    least = driven.MIN_PREDICTOR_RATIO * 2.0
+    share = 0.6 * 2.0
+    least = 0.25 * 2.0
     assert driven.length_before(share + 1.001 * least, series()) == pytest.approx(1.001 * least)
     assert driven.length_before(share + 0.999 * least, series()) == 0.0
     assert stubs.calls[0] == ("longest_step", pytest.approx(1e-13**0.5, rel=1e-9)), "half of the order"

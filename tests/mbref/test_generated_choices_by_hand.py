@@ -343,7 +343,7 @@ def test_lanes_of_driven_orders(monkeypatch):
 
 
 def test_sums_of_eight_slots_are_found_in_one_loop():
-    """Ten slots: sums of both orders and the other factors of eight, then of two; the last product follows."""
+    """Ten slots: sums of both orders and the other factors of eight, then of two."""
     made, asked = MultiplierOrders.__new__(MultiplierOrders), []
     made._write = SimpleNamespace(  # type: ignore[assignment]
         repeat=lambda first, k, begun, body: asked.append((first, k, begun[-1], len(begun))) or begun,

@@ -354,7 +354,7 @@ def test_the_highest_order_of_an_integrator(wanted, good):
             made.highest_order({"max_order": wanted})
 
 
-def test_steps_ahead_decide_on_generated_code(monkeypatch):
+def test_steps_ahead_decide_on_generated_code():
     """20 steps to 0.5 s of 2 s: 60 more are ahead, or as many as the run may take."""
     found, put = stepper.SeriesStepper.__new__(stepper.SeriesStepper), []
     counts, clock = SimpleNamespace(steps=20), SimpleNamespace(time=0.5)
@@ -373,8 +373,7 @@ def test_steps_ahead_decide_on_generated_code(monkeypatch):
         raise NoGeneratedCode("none")
 
     found._put_code = make  # type: ignore[method-assign]
-    for steps, wants, calls in ((29.0, True, 0), (30.0, False, 0), (30.0, True, 1)):
-        monkeypatch.setattr(stepper, "STEPS_WORTH_CODE", 30)
+    for steps, wants, calls in ((19999.0, True, 0), (20000.0, False, 0), (20000.0, True, 1)):
         found._steps_ahead, found._wants_code = lambda steps=steps: steps, wants  # type: ignore[method-assign]
         put.clear()
         found._generate_where_it_pays()

@@ -51,6 +51,14 @@ ZERO_ALREADY = "Memory is zero at first, and no kernel writes another number the
 ANY_RANDOM = "Any random numbers serve; the seed only makes results repeatable."
 PATTERN = "The order of elimination and the fill depend on the pattern of the matrix alone."
 FOR_TYPES = "Type checkers alone read a type variable."
+UNUSED_LANE = "A lane whose weight is zero may hold any number."
+NUMBERS = (
+    (r"reshape\([^()]*-$", "1", "2", UNKNOWN_LENGTH),
+    (r"\b0\.0 \* load\([\w.]+, $", "0", "1", ZERO_TIMES),
+    (r"np\.where\(weights?, .*, $", "-1", "(+1)", UNUSED_LANE),
+    (r"np\.where\(weights?, .*, -$", "1", "2", UNUSED_LANE),
+)
+"""The text before a number, the number, another one that changes nothing, and the reason."""
 SAMPLE = "(np.random.default_rng(1).uniform(0.5, 1.0, d.nnz), d.indices, d.indptr), shape=d.shape"
 DOMINANT = 's = s + eye_array(size, format="csc") * (10.0 * abs(s).sum(axis=0).max())'
 OPTIONS = (
@@ -130,6 +138,11 @@ REASONS: dict[tuple[str, str, str], str] = {
             "turned = rotations.cross(moment, at_rest[..., k : k + 3])",
         )
     },
+    (
+        "mbref/taylor/orientations.py",
+        "pairs = [*zip(direction_vectors[i], direction_vectors[j], strict=True), (square, {ONE: 1.0})]",
+        "zip(direction_vectors[j], direction_vectors[i], strict=True)",
+    ): COMMUTES,
     (
         "mbref/taylor/generated/power_orders.py",
         "return self._write.total(list(map(self._write.product, factors, vectors)))",
@@ -380,10 +393,9 @@ def reason(mutant: Mutant, source: str) -> str:
     ):
         return SYMMETRY
     before = source.encode()[: mutant.start].decode()
-    if re.search(r"reshape\([^()]*-$", before) and (mutant.old, mutant.new) == ("1", "2"):
-        return UNKNOWN_LENGTH
-    if re.search(r"\b0\.0 \* load\([\w.]+, $", before) and (mutant.old, mutant.new) == ("0", "1"):
-        return ZERO_TIMES
+    for pattern, old, new, why in NUMBERS:
+        if (mutant.old, mutant.new) == (old, new) and re.search(pattern, before):
+            return why
     if mutant.kind == "argument order":
         if re.search(r"\bproduct_sum\((\[\*)?$", before) and exchanges_parts(mutant, {"zip"}):
             return COMMUTES
