@@ -36,6 +36,10 @@ SYMMETRIC = {
         "rotations.angle_between",
         "distances",
         "combination",
+        "self._inner_product",
+        "self._combined",
+        "self._plus",
+        "self._sum",
         "_angle",
     },
     1: {"np.swapaxes", "difference", "error_series", "rod"},
@@ -131,6 +135,47 @@ REASONS: dict[tuple[str, str, str], str] = {
         "pairs = [*zip(apart, apart, strict=True), ({ONE: length}, {ONE: -length})]",
         "({ONE: -length}, {ONE: length})",
     ): COMMUTES,
+    **{
+        (f"mbref/taylor/generated/{file}.py", line, new): COMMUTES
+        for file, line, new in (
+            (
+                "power_orders",
+                "return self._put(k, turned, power, self._inverse_of_growth(k))",
+                "self._put(k, turned, self._inverse_of_growth(k), power)",
+            ),
+            (
+                "power_orders",
+                "row = self._put(WHOLE(0), self._scaled(HALF, self._turned(velocity)), power, HALF)",
+                "self._put(WHOLE(0), self._scaled(HALF, self._turned(velocity)), HALF, power)",
+            ),
+            (
+                "power_orders",
+                "return [self._write.total(pair) for pair in zip(one, other, strict=True)]",
+                "zip(other, one, strict=True)",
+            ),
+            (
+                "power_orders",
+                "row = [write.total(pair) for pair in zip(row, moved, strict=True)]",
+                "zip(moved, row, strict=True)",
+            ),
+            (
+                "power_orders",
+                "lost = (write.minus(write.product(n, z)) for n, z in zip(newest, row, strict=True))",
+                "zip(row, newest, strict=True)",
+            ),
+            (
+                "power_orders",
+                "return [self._write.product(one, other) "
+                "for one, other in zip(along, self._row(k), strict=True)]",
+                "zip(self._row(k), along, strict=True)",
+            ),
+            (
+                "elimination",
+                "reduced = [[self._inner(momenta[f], motions[g]) for g in free] for f in free]",
+                "self._inner(motions[g], momenta[f])",
+            ),
+        )
+    },
     **{
         ("mbref/taylor/load_polynomials.py", line, "4"): "A product of vectors has three components."
         for line in (
