@@ -18,7 +18,10 @@ NO_STEP = "A run without samples takes no step; its numbers only give the types 
 STANDING_IN = "GENERAL = ((1.0, 1.1, 1.2),", "UNIT = (1.0, 0.0, 0.0, 0.0)"
 WRITTEN_LATER = "The true masses and axes are written after compilation; a body without inertia has no axes."
 """Lines of MuJoCo's model with numbers that are replaced later, and the reason."""
-COMMUTATIVE = {"add", "product_order", "write.product", "self._write.product"}
+COMMUTATIVE = {
+    *("add", "product_order", "write.product", "self._write.product"),
+    *(f"self._builder.{name}" for name in ("add", "and_", "fadd", "fmul", "mul")),
+}
 COMMUTES = "A sum or a product is the same for its two parts in any order."
 """Functions of mbref whose first two arguments may be exchanged, and the reason."""
 EXCHANGES = {"exchange_rows", "exchange_columns", "exchange_entries"}
