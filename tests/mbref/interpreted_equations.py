@@ -287,6 +287,16 @@ def test_the_jacobian_and_rates_of_violation():
     assert made.rows.phi_rate == pytest.approx(JACOBIAN @ v - [0.5, 0.25])
     none = np.zeros((0, 12))
     evaluation.assemble_jacobian(made, none)
+    for count in (1, 3):  # more or fewer rows than bodies of a row
+        made.scene.row_bodies = np.array([[1, 2], [0, 1], [0, 2]])[:count]
+        made.system.blocks = np.arange(1.0, 37.0).reshape(3, 12)[:count]
+        made.rows.nu, made.rows.phi_rate = np.array([0.5, 0.25, 2.0])[:count], np.full(count, 9.0)
+        whole = np.vstack([JACOBIAN, [*range(25, 31), *[0.0] * 6]])[:count]
+        dense = np.full((count, 12), 9.0)
+        evaluation.assemble_jacobian(made, dense)
+        evaluation.violation_rate(v, made)
+        assert dense.tolist() == whole.tolist()
+        assert made.rows.phi_rate == pytest.approx(whole @ v - made.rows.nu)
 
 
 @pytest.mark.parametrize(("velocity", "position"), [(0.0, 0.0), (2.0, 0.0), (0.0, 3.0), (2.0, 3.0)])

@@ -128,6 +128,28 @@ def test_parts_of_a_diagnosis(monkeypatch, rows):
     assert found.determined_reactions == ("determined" if rows <= 300 else None)
 
 
+def test_terms_of_a_diagnosis_are_those_of_the_start(monkeypatch):
+    """The unit rows, the sparse rows, and the components of reactions, all at t = 0."""
+    start: Any = SimpleNamespace(q=np.arange(14.0))
+
+    def terms(t: Any, q: np.ndarray) -> Any:
+        blocks = f"blocks of {np.shape(t)}" if not np.any(t) and q.size == 14 else None
+        return SimpleNamespace(jacobian=np.array([[3.0, 4.0]]) + np.max(t), blocks=blocks)
+
+    structure = SimpleNamespace(sparse=lambda blocks: f"sparse {blocks}")
+    model: Any = SimpleNamespace(terms=terms, nb=2, structure=structure)
+    monkeypatch.setattr(diagnosis, "Redundancy", lambda matrix: f"redundancy of {matrix}")
+    assert diagnosis._redundancy(model, start) == "redundancy of sparse blocks of ()"  # type: ignore[comparison-overlap]
+    assert diagnosis.scaled_jacobian(model, 0.0, start.q).tolist() == [[0.6, 0.8]]
+
+    def determined(given: Any, q: np.ndarray, blocks: str) -> dict[str, np.ndarray]:
+        assert given is model and q.shape == (1, 2, 7) and blocks == "blocks of (1,)"
+        return {"A": np.array([[True, False, True, False, False, True]])}
+
+    monkeypatch.setattr(diagnosis, "determined_components", determined)
+    assert diagnosis._determined(model, start) == {"A": ("force x", "force z", "moment z")}
+
+
 def test_a_diagnosis_without_rows(monkeypatch):
     model: Any = SimpleNamespace(m=0, n=6, row_joint=[])
     monkeypatch.setattr(diagnosis, "find_scene", lambda name: name)
