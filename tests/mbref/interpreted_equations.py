@@ -470,3 +470,37 @@ def test_angles_of_loads_and_couplings_are_remembered():
     of_coupling = value("angle", 0, 1, 0.0, 1.0)[0]
     wanted = [of_load + last, of_coupling - last]
     assert made.angles == pytest.approx(wanted)
+
+
+# --- loads on the last of many bodies ---------------------------------------------------------------------
+def frames_of(count: int) -> Any:
+    """Frames of bodies and the fixed frame, parallel to the world's axes."""
+    return SimpleNamespace(
+        rotation=np.tile(np.eye(3).ravel(), (count + 1, 1)), angular_velocity=np.zeros((count + 1, 3))
+    )
+
+
+def test_a_force_on_the_ninth_body():
+    frames, g = frames_of(9), np.zeros(54)
+    loads.push(8, (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), frames, g)
+    assert g[48:].tolist() == [1.0, 2.0, 3.0, -2.0, 1.0, 0.0] and not g[:48].any()
+    loads.push(9, (0.0, 0.0, 1.0), (1.0, 2.0, 3.0), frames, g)
+    assert not g[:48].any() and g[50] == 3.0, "the fixed frame"
+
+
+@pytest.mark.parametrize(("first", "second"), [(7, 8), (9, 8), (8, 9), (0, 1)])
+def test_a_spring_about_the_axis_of_two_of_nine_bodies(monkeypatch, first, second):
+    """Torque 10, stiffness 2 at 0.5 - 0.25 rad, damping 4 at 1.5 - 1 rad/s: 7.5 N m about z."""
+    frames, g = frames_of(9), np.zeros(54)
+    frames.angular_velocity[first, 2], frames.angular_velocity[second, 2] = 1.0, 1.5
+    made = SimpleNamespace(
+        first=[9, first], second=[9, second], axis=np.array([[9.0, 9.0, 9.0], [0.0, 0.0, 1.0]]),
+        stiffness=[9.0, 2.0], natural=[9.0, 0.25], damping=[9.0, 4.0],
+    )  # fmt: skip
+    monkeypatch.setattr(
+        loads, "angle_of_load", lambda *given: 0.5 if given == (1, "angles", made, frames.rotation) else None
+    )
+    loads.act_about_axis(1, 10.0, made, frames, "angles", g)
+    expected = np.zeros(60)
+    expected[6 * second + 5], expected[6 * first + 5] = 7.5, -7.5
+    assert g.tolist() == expected[:54].tolist()

@@ -311,6 +311,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "return right[sizes > ZERO_FORM * max(1.0, sizes.max(initial=0.0))].reshape(-1, d, d)",
         "1.0",
     ): "The largest size counts as one at least.",
+    (
+        "mbref/equations/functions.py",
+        "if functions.amplitude[f] == 0.0 or functions.part[p] == 0.0:",
+        "(functions.part[p] == 0.0)",
+    ): "A sine without amplitude adds zeros.",
     ("mbref/equations/active_coordinates.py", "rng = np.random.default_rng(1)", "2"): ANY_RANDOM,
     (
         "mbref/equations/branches.py",
