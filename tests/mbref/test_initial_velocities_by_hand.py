@@ -154,9 +154,59 @@ def test_the_velocities_that_satisfy_the_rows_best(monkeypatch, off, best):
     left = iter(off)
     monkeypatch.setattr(initial_state, "rate_violation", lambda model, q, v: next(left))
     terms = SimpleNamespace(jacobian=np.array([[0.0, 5.0]]), nu=np.array([10.5]))
-    of: Any = SimpleNamespace(terms=lambda t, q, v: terms)
-    found = initial_state._best_met(of, np.zeros(7), along)
+    q = np.zeros(7)
+
+    def terms_at(t: float, at: np.ndarray, v: np.ndarray) -> Any:
+        assert t == 0.0 and at is q and v is along[best]
+        return terms
+
+    of: Any = SimpleNamespace(terms=terms_at)
+    found = initial_state._best_met(of, q, along)
     assert found == pytest.approx([1.0 + best, 2.1])
+
+
+def test_the_largest_violation_of_unit_rows_at_the_start():
+    """Rows of lengths 5 and 2, which v misses by 11 - 6 and 4 - 5; its largest entry has the size 2."""
+    terms = SimpleNamespace(jacobian=np.array([[3.0, -4.0], [0.0, -2.0]]), nu=np.array([6.0, 5.0]))
+    q, v = np.zeros(7), np.array([1.0, -2.0])
+    of: Any = SimpleNamespace(terms=lambda *given: terms if given == (0.0, q, v) else None)
+    assert initial_state.rate_violation(of, q, v) == pytest.approx(max(5 / 5, 1 / 2) / 2.0)
+
+
+def test_least_changes_in_the_metric_of_masses():
+    """Masses 4 kg, 0.25 kg and none, which counts as 1 kg: the changes are as their inverses."""
+    structure = SimpleNamespace(dense=lambda blocks: blocks)
+    scenes: Any = SimpleNamespace(
+        model=SimpleNamespace(m=1, structure=structure), mass=np.array([[9.0] * 3, [4.0, 0.25, 0.0]])
+    )
+    found = initial_state._least_changes(scenes, np.array([1]), np.ones((1, 1, 3)), np.array([[10.5]]))
+    assert found == pytest.approx(np.array([[0.5, 8.0, 2.0]]))
+
+
+def test_limits_of_corrected_positions(monkeypatch):
+    """The limits are 0.05 m before the correction and 1e-10 m after it."""
+    closed = initial_state.CLOSED
+    before = np.array([[0.0, -0.05], [0.0, math.nextafter(0.05, 1.0)], [0.01, 0.0], [0.0, 0.0]])
+    after = np.array([[2e-10, 0.0], [0.0, 2e-10], [closed, 0.0], [0.0, -math.nextafter(closed, 1.0)]])
+    scenes: Any = SimpleNamespace(length=np.array([1.0, 0.5, 1.0, 1.0]))
+    scenes.model = SimpleNamespace(row_joint=("A", "B"))
+    terms = SimpleNamespace(phi=after)
+    asked: list[Any] = []
+    monkeypatch.setattr(
+        initial_state, "_solved", lambda *given: asked.append(given) or ("moved", before, terms)
+    )
+    q, first, faults, found = initial_state._corrected(scenes, "q")  # type: ignore[arg-type]
+    [(given, start, most)] = asked
+    assert given is scenes and start == "q" and most.tolist() == [0.05] * 4
+    assert q == "moved" and found is terms  # type: ignore[comparison-overlap]
+    assert first.tolist() == [0.05, math.nextafter(0.05, 1.0), 0.01, 0.0]
+    says = {k: str(fault) for k, fault in faults.items()}
+    assert sorted(says) == [0, 1, 3]
+    assert "joint[A]: no nearby positions satisfy it; 2e-10 m or rad remain" in says[0]
+    assert "joint[B]: positions given to bodies violate it by 0.05 m or rad" in says[1]
+    assert "joint[B]: no nearby positions satisfy it; 1e-10 m or rad remain" in says[3]
+    after[[0, 1, 3]] = 0.0
+    assert initial_state._corrected(scenes, "q")[2] == {}  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
@@ -490,6 +540,57 @@ def test_anchors_on_second_bodies():
     found = of.anchors(q)
     assert found[:, 1].tolist() == [[7.0, 8.0, 9.0]] * 2
     assert found[0, 0] == pytest.approx([0.0, 4.0, 2.0]) and found[1, 0] == pytest.approx([9.0, 20.0, 32.0])
+
+
+@pytest.mark.parametrize(
+    ("rows", "is_open", "speed", "branch", "asks"),
+    [
+        (40, True, 2.0, 5.0, True),
+        (41, True, 2.0, 5.0, True),
+        (40, True, 2.0, None, True),
+        (40, False, 2.0, 5.0, False),
+        (40, True, 0.0, 5.0, False),
+    ],
+)
+def test_the_start_of_one_scene(monkeypatch, rows, is_open, speed, branch, asks):
+    """Velocities of a branch replace open velocities; more than 40 rows are solved sparsely."""
+    scenes: Any = SimpleNamespace(model=SimpleNamespace(m=rows), model_of=lambda k: f"model {k}")
+    rates = Rates(*np.arange(10.0).reshape(5, 2))
+    asked: list[Any] = []
+
+    def way(name: str) -> Any:
+        return lambda *given: asked.append((name, *given)) or (np.array([0.0, speed]), 0.25, is_open)
+
+    def along(*given: Any) -> Any:
+        asked.append(("branch", *given))
+        return None if branch is None else np.array([0.0, branch])
+
+    monkeypatch.setattr(initial_state, "_velocities", way("dense"))
+    monkeypatch.setattr(initial_state, "_sparse_velocities", way("sparse"))
+    monkeypatch.setattr(initial_state, "_along_branch", along)
+    q = np.arange(7.0)
+    found: Any = initial_state._start(scenes, 3, q, 0.75, rates)
+    follows = asks and branch is not None
+    assert asked[0][:3] == ("sparse" if rows > 40 else "dense", scenes, 3) and asked[0][3] is rates
+    assert len(asked) == 1 + asks
+    if asks:
+        name, model_of, at, v, given = asked[1]
+        assert (name, model_of) == ("branch", "model 3") and at is q and given is rates.given
+        assert v.tolist() == [0.0, speed]
+    assert found.q is q and found.v.tolist() == [0.0, branch if follows else speed] and found.given is rates.v
+    assert (found.position_violation, found.velocity_violation) == (0.75, 0.25)
+    assert found.follows_branch is follows
+
+
+def test_a_fault_of_one_scene_is_returned(monkeypatch):
+    fault = SceneError(["joint[A]: contradicts"])
+
+    def fails(*given: Any) -> Any:
+        raise fault
+
+    monkeypatch.setattr(initial_state, "_velocities", fails)
+    scenes: Any = SimpleNamespace(model=SimpleNamespace(m=1))
+    assert initial_state._start(scenes, 0, None, 0.0, None) is fault  # type: ignore[arg-type]
 
 
 def test_memory_of_a_model_is_acquired_once_and_released_once(monkeypatch):

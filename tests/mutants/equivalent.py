@@ -445,6 +445,8 @@ def reason(mutant: Mutant, source: str) -> str:
         exchanges_parts(mutant, names, first) for first, names in SYMMETRIC.items()
     ):
         return SYMMETRY
+    if mutant.kind == "argument order" and re.search(r"\.swapaxes\([-12]+, [-12]+\)$", mutant.old):
+        return SYMMETRY
     before = source.encode()[: mutant.start].decode()
     for pattern, old, new, why in NUMBERS:
         if (mutant.old, mutant.new) == (old, new) and re.search(pattern, before):
