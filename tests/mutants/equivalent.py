@@ -441,11 +441,10 @@ def reason(mutant: Mutant, source: str) -> str:
             return COMMUTES
         if exchanges_parts(mutant, EXCHANGES, 2):
             return EXCHANGED
-    if mutant.kind == "argument order" and any(
-        exchanges_parts(mutant, names, first) for first, names in SYMMETRIC.items()
+    if mutant.kind == "argument order" and (
+        re.search(r"\.swapaxes\([-12]+, [-12]+\)$", mutant.old)
+        or any(exchanges_parts(mutant, names, first) for first, names in SYMMETRIC.items())
     ):
-        return SYMMETRY
-    if mutant.kind == "argument order" and re.search(r"\.swapaxes\([-12]+, [-12]+\)$", mutant.old):
         return SYMMETRY
     before = source.encode()[: mutant.start].decode()
     for pattern, old, new, why in NUMBERS:
