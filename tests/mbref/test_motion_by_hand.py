@@ -18,6 +18,7 @@ from mbref.scene import (
     Cylindrical,
     Driver,
     Force,
+    Inline,
     Moment,
     Revolute,
     Scene,
@@ -349,3 +350,22 @@ def test_rotations_used_above():
     assert rotations.rotate(np.array(about_z(math.pi / 2)), np.array([1.0, 0.0, 0.0])) == pytest.approx(
         [0, 1, 0]
     )
+
+
+def test_the_sign_of_quaternions_does_not_count():
+    """With either sign of all quaternions, or of the later ones, the arm turns by 0, 2 and 4 rad."""
+    for signs in ([-1.0, -1.0, -1.0], [1.0, -1.0, -1.0], [-1.0, 1.0, -1.0]):
+        turned = motion()
+        turned.orientation[:, 0] *= np.array(signs)[:, None]
+        assert joint_motion(scene(), turned, "A").angle == pytest.approx([0.0, 2.0, 4.0])
+
+
+def test_a_point_slides_along_an_axis_of_the_first_body_alone():
+    """The block turns freely about its point on the arm, which alone turns the axis."""
+    along = tuple(3 * out(np.array(0.2)))
+    point = Inline(name="B", bodies=("arm", "block"), anchor=along, axis=along)
+    free = motion()
+    free.angular_velocity[:, 1] = [5.0, -2.0, 7.0]
+    found = joint_motion(scene(joint=(scene().joint[0], point)), free, "B")
+    assert found.displacement == pytest.approx(SLID) and found.displacement_rate == pytest.approx(SPEED)
+    assert found.angle is None

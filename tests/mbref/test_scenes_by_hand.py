@@ -268,6 +268,33 @@ def test_andrews_mechanism_has_the_published_sizes():
     assert scene.duration == 0.03 and scene.gravity == NONE
 
 
+def test_places_in_the_links_of_andrews_mechanism():
+    """Centres of mass, the end of the spring and further joints in the frames of links."""
+    scene = SCENES["andrews_squeezer"]()
+    at = {joint.name: np.array(joint.anchor_pair[0]) for joint in scene.joint}
+    bodies = {body.name: body for body in scene.body}
+    spring = scene.load[1]
+    for name, joint, place, along, across in (
+        ("K1", "O", bodies["K1"].position, 0.00092, 0.0),
+        ("K1", "O", at["F"], 0.007, 0.0),
+        ("K2", "F", bodies["K2"].position, -0.0115, 0.0),
+        ("K2", "F", at["E3"], -0.028, 0.0),
+        ("K3", "B", bodies["K3"].position, 0.01043, -0.01874),
+        ("K3", "B", spring.points[0], 0.02, -0.018),
+        ("K4", "G", bodies["K4"].position, 0.0, 0.01421 - 0.02),
+        ("K5", "A5", bodies["K5"].position, 0.02308, 0.00916),
+        ("K5", "A5", at["G"], 0.04, 0.0),
+        ("K6", "H", bodies["K6"].position, 0.02 - 0.01421, 0.0),
+        ("K7", "A7", bodies["K7"].position, 0.00449, -0.01228),
+        ("K7", "A7", at["H"], 0.0, -0.04),
+    ):
+        w, _, _, z = bodies[name].orientation
+        cosine, sine = w * w - z * z, 2 * w * z
+        x, y, _ = np.array(place) - at[joint]
+        local = (cosine * x + sine * y, cosine * y - sine * x)
+        assert local == pytest.approx((along, across), abs=1e-15), (name, joint)
+
+
 def test_angles_of_andrews_mechanism():
     """Angles of the published start: β, β + Θ, γ, Φ + δ, δ, Ω + ε, ε."""
     turned = [2 * math.atan2(b.orientation[3], b.orientation[0]) for b in SCENES["andrews_squeezer"]().body]

@@ -405,6 +405,29 @@ REASONS: dict[tuple[str, str, str], str] = {
             ),
         )
     },
+    **{
+        (f"mbref/scenes/{file}.py", line, new): "A rod's mass in kg and its length in m are equal."
+        for file, line, new in (
+            ("bennett", "inertia=rod_inertia(mass, length),", "rod_inertia(length, mass)"),
+            ("links", "inertia=rod_inertia(mass, length),", "rod_inertia(length, mass)"),
+            (
+                "sarrus",
+                "name=name, mass=MASS, inertia=rod_inertia(MASS, LENGTH), position=middle, "
+                "orientation=orientation",
+                "rod_inertia(LENGTH, MASS)",
+            ),
+            (
+                "planar_slider_crank",
+                "along, across, _ = rod_inertia(DENSITY * length, length)",
+                "rod_inertia(length, DENSITY * length)",
+            ),
+        )
+    },
+    (
+        "mbref/scenes/andrews_squeezer.py",
+        "ANGLES = (BETA, BETA + THETA, GAMMA, PHI + DELTA, DELTA, OMEGA + EPSILON, EPSILON)  # rad, at t = 0",
+        "((BETA) - (THETA))",
+    ): "The published angle is zero.",
     (
         "mbref/scenes/bricard.py",
         "inertia = triple(about if p != q else across for p, q in zip(start, end, strict=True))",
