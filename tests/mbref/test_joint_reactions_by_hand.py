@@ -6,6 +6,7 @@ The multipliers λ balance the forces that a test writes down: Φ_qᵀ λ = Q.
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,27 @@ def test_shares_at_the_limit_are_rounding(monkeypatch):
         "J1": [1],
         "free": [1],
     }
+
+
+def test_changes_at_the_limit_leave_a_component_determined(monkeypatch):
+    """A moment counts over the scene's length of 2 m; the second of two combinations changes one force."""
+    limit, units = joint_reactions.SHARE, np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+    changes = [limit * units, np.array([0.0, -1.0001, 0.0, 0.0, 0.0, -2.0001]) * limit]
+    vanishing, lengths = np.array([[[1.0, 2.0], [3.0, 4.0]]]), np.array([[0.5, 0.25]])
+    asked: list[Any] = []
+
+    def found_for(given: Any, q: Any, blocks: Any, multipliers: np.ndarray) -> Any:
+        asked.append((q, blocks, multipliers.tolist()))
+        return {"A": changes[len(asked) - 1][None]}
+
+    monkeypatch.setattr(joint_reactions, "reactions", found_for)
+    monkeypatch.setattr(joint_reactions, "vanishing_combinations", lambda *given: (vanishing, lengths))
+    system: Any = SimpleNamespace(length=2.0, scene=SimpleNamespace(joint=[SimpleNamespace(name="A")]))
+    found = determined_components(system, "q", "blocks")  # type: ignore[arg-type]
+    assert {name: mask.tolist() for name, mask in found.items()} == {
+        "A": [[True, False, True, True, True, False]]
+    }
+    assert asked == [("q", "blocks", [[2.0, 12.0]]), ("q", "blocks", [[4.0, 16.0]])]
 
 
 def test_a_single_hinge_leaves_nothing_open():

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from mbref import rotations
+from mbref.equations.joints import AXES, ORIGIN, ROWS_OF, Primitive
 from mbref.equations.model import Model
+from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 from mbref.scene import JOINT_TYPES, Body, Scene
 
 ANCHOR = np.array([0.4, -0.3, 0.2])
@@ -126,3 +128,11 @@ def test_a_distance_keeps_the_length_between_its_anchors():
     """The second body turns about the first anchor, so that the second anchor keeps its distance."""
     assert violation("distance", ANY, STILL) < 1e-14
     assert violation("distance", ONE, FAR - ANCHOR) == pytest.approx(1.5 * np.linalg.norm(FAR - ANCHOR))
+
+
+def test_facts_of_primitives():
+    """A point has three rows; a primitive has zeros where nothing is given, and is not driven."""
+    assert np.array(AXES).tolist() == np.eye(3).tolist() and ORIGIN == (0.0, 0.0, 0.0)
+    single = (DOT1, DOT2, DISTANCE, COUPLED_ANGLE, COUPLED_SLIDE)
+    assert dict(ROWS_OF) == {POINT: 3, **dict.fromkeys(single, 1)}
+    assert Primitive(DOT1) == (DOT1, *[(0.0, 0.0, 0.0)] * 5, 0.0, False)
