@@ -338,6 +338,8 @@ def test_violations_of_rounding_have_no_exponent():
 
     assert paper_teaching.exponent(growing([1.0, 2.0], [limit, limit])) == pytest.approx(0.0, abs=1e-12)
     assert math.isnan(paper_teaching.exponent(growing([1.0, 2.0], [0.99 * limit] * 2)))
+    across = growing([1.0, 2.0], [0.5 * limit, 2.0 * limit])
+    assert paper_teaching.exponent(across) == pytest.approx(2.0), "the largest violation counts"
     from_tenth = growing([0.1, 0.2, 2.0], [1.0, 1e-6, 1e-3])
     assert paper_teaching.exponent(from_tenth) == pytest.approx(3.0)
 

@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 import pytest
+from matplotlib.colors import to_rgba
 from synthetic import scene
 from test_figures_by_hand import BLOCK, RECORDS, SCENE, group, moving, of, plain
 
@@ -389,6 +390,7 @@ def test_end_times_of_the_sweep_in_their_panels():
     assert axes.title.get_fontsize() == 9
     [bar, _] = [patch for patch in axes.patches if patch.get_height()]
     assert bar.get_x() <= 0.0378 <= bar.get_x() + bar.get_width() and bar.get_width() == pytest.approx(1e-3)
+    assert bar.get_facecolor() == to_rgba(figures.COLOURS[0])
     *crossings_, triangles = axes.lines
     assert triangles.get_marker() == "^" and set(triangles.get_ydata()) == {0.0}
     assert not triangles.get_clip_on()
