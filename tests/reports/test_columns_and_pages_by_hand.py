@@ -444,20 +444,6 @@ def test_names_of_a_part_of_a_motion():
 
 
 # --- figures ----------------------------------------------------------------------------------------------
-def test_the_style_of_figures():
-    """Sizes in points; two of the four sides of the axes are drawn."""
-    figure, (axes,) = figures.canvas(4.0, 3.0)
-    axes.plot([0.0, 1.0], [0.2, 0.8], label="a line")
-    axes.set(xlabel="x", yscale="log")
-    figures.legend_below(figure, axes)
-    assert {name for name, side in axes.spines.items() if side.get_visible()} == {"left", "bottom"}
-    assert axes.xaxis.label.get_size() == 9.0 and axes.xaxis.get_gridlines()[0].get_linewidth() == 0.6
-    assert axes.xaxis.get_gridlines()[0].get_visible()
-    [legend] = figure.legends
-    assert legend.get_texts()[0].get_size() == 8.0 and legend.handlelength == 3.2
-    assert "3×10⁻¹" in figures.svg(figure, "within"), "ticks within a decade have labels"
-
-
 def test_sizes_in_the_benchmark_s_figure():
     curves = [{"engine": name, "cost": [0.25, 0.5]} for name in ("a", "limit")]
     figure = benchmark_plot.draw({"scenes": {"first": {"levels": [1e-3, 1e-6], "curves": curves}}})

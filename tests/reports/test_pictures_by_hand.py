@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
 import math
 import re
-import struct
 import xml.etree.ElementTree as ET
 from types import SimpleNamespace
 
-import matplotlib
 import numpy as np
 import pytest
 from test_figures_by_hand import SCENE, group, moving, plain
@@ -228,59 +225,11 @@ def test_sizes_of_other_figures():
     }
     sizes = {name: figure.get_size_inches().tolist() for name, figure in drawn.items()}
     assert sizes == {"rates": [7.2, 3.6], "speed": [7.6, 4.8]}
-    figure, panels = figures.canvas()
-    assert figure.get_size_inches().tolist() == [7.2, 4.0] and len(panels) == 1
-    figure, panels = figures.canvas(3.0, 2.0, 3)
-    assert len(panels) == 3 and figure.get_size_inches().tolist() == [3.0, 2.0]
+    _, panels = figures.canvas(rows=3)
     panels[0].set_xlim(0, 7)
     assert panels[2].get_xlim() == (0, 7), "panels have one axis of time"
     tops = [axes.get_subplotspec().rowspan.start for axes in panels]
     assert tops == [0, 1, 2]
-
-
-def test_looks_of_curves_and_the_legend():
-    looks = figures.looks([("b", "y"), ("a", "x"), ("a", "w"), ("a", "x")])
-    assert {k: (v["linestyle"], v["marker"]) for k, v in looks.items()} == {
-        ("a", "w"): ("-", "o"),
-        ("a", "x"): ("--", "s"),
-        ("b", "y"): ("-", "o"),
-    }
-    assert {v["color"] for v in looks.values()} == {figures.COLOURS[-1]}, "engines of other packages"
-    dash_dot_dot, dots = figures.DASHES[4:]
-    assert dash_dot_dot == (0, (6, 1.5, 1, 1.5, 1, 1.5)), "a dash of 6 and two dots of 1, at distances of 1.5"
-    assert dots == (0, (1, 3)), "dots of 1 at distances of 3"
-    figure, (axes,) = figures.canvas()
-    figures.legend_below(figure, axes)
-    assert not figure.legends, "nothing to explain"
-    for name in "abcdef":
-        axes.plot([1, 2], label=name)
-    figures.legend_below(figure, axes)
-    [legend] = figure.legends
-    assert legend._ncols == 3
-    legend.remove()
-    figures.legend_below(figure, axes, 5)
-    [legend] = figure.legends
-    assert legend._ncols == 5 and not legend.get_frame_on()
-    assert [text.get_text() for text in legend.get_texts()] == list("abcdef")
-
-
-def test_files_of_figures():
-    figure, (axes,) = figures.canvas(4.0, 3.0)
-    axes.plot([1.0, 1e3], [1e-3, 1.0])
-    axes.set(xscale="log", yscale="log")
-    text = figures.svg(figure, "one")
-    assert text.startswith("<svg") and "10⁻³" in text and figures.svg("<svg/>", "x") == "<svg/>"
-    assert text == figures.svg(figure, "one") != figures.svg(figure, "two")
-    width, height = struct.unpack(">II", figures.png(figure)[16:24])
-    assert (width, height) == (440, 330), "110 dots per inch"
-    assert matplotlib.image.imread(io.BytesIO(figures.png(figure))).std() > 0.01
-
-
-def test_powers_of_ten_with_a_factor():
-    formatter = figures.PlainPowers()
-    formatter.create_dummy_axis()
-    formatter.axis.set_view_interval(1e-4, 1.0)
-    assert formatter(1e-4).strip() == "10⁻⁴" and formatter(1e12).strip() == "10¹²"
 
 
 def test_the_most_accurate_motion_is_shown():
@@ -362,13 +311,3 @@ def test_ladders_are_kept_in_a_folder_that_does_not_exist_yet(tmp_path):
         ladders.keep(source, tmp_path / "new" / "place")
     kept = list(ladders.looked_at(tmp_path / "new" / "place" / ladders.FILE).values())
     assert [r["key"] for r in kept] == ["ax", "ay", "bx"] and "bodies" not in kept[0]
-
-
-def test_dense_curves_are_drawn_to_half_a_point():
-    """A wave of 230 points of height takes some 45 lines at a tolerance of 0.5 points, and some 90 at 1/9."""
-    figure, [axes] = figures.canvas()
-    axes.set_ylim(0.0, 1.0)
-    x = np.linspace(0.0, 1.0, 2000)
-    axes.plot(x, 0.5 + 0.4 * np.sin(2 * np.pi * x))
-    curves = re.findall(r'<g id="line2d_\d+">\s*<path d="([^"]*)" clip-path', figures.svg(figure, "wave"))
-    assert 30 < curves[-1].count("L") < 60

@@ -7,8 +7,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.backends.backend_svg import FigureCanvasSVG
-from matplotlib.layout_engine import ConstrainedLayoutEngine
 from test_figures_by_hand import BLOCK, SCENE, group, moving, of, plain
 
 from crosscheck.setting import BRANCHES
@@ -107,31 +105,6 @@ def test_records_are_ordered_by_engine_and_from_coarse_to_fine():
 
 
 # --- figures ----------------------------------------------------------------------------------------------
-def drawing() -> Any:
-    figure, (axes,) = figures.canvas(4.0, 3.0)
-    axes.plot([1.0, 2.0], [3.0, 1e5], label="a long name of a line")
-    axes.set(xlabel="a label", ylabel="another", title="a title")
-    figures.legend_below(figure, axes)
-    return figure
-
-
-def test_the_layout_of_a_figure_is_found_once_and_is_that_of_the_picture(monkeypatch):
-    """The layout of 72 dots an inch, which the SVG has; savefig does not find it again."""
-    wanted, found, executed = drawing(), drawing(), []
-    wanted.dpi = 72
-    FigureCanvasSVG(wanted)
-    wanted.get_layout_engine().execute(wanted)
-    execute = ConstrainedLayoutEngine.execute
-    monkeypatch.setattr(
-        ConstrainedLayoutEngine, "execute", lambda self, fig: executed.append(fig.dpi) or execute(self, fig)
-    )
-    figures.svg(found, "found")
-    assert executed == [72] and found.get_layout_engine() is None
-    assert found.axes[0].get_position().bounds == wanted.axes[0].get_position().bounds
-    once = figures.svg(found, "found")
-    assert once == figures.svg(found, "found"), "a figure without a layout engine"
-
-
 def test_colours_of_engines_are_those_of_their_order():
     first, second, *_ = figures.engine_names()
     assert [figures.colour(name) for name in (first, second)] == list(figures.COLOURS[:2])
