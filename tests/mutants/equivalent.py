@@ -454,6 +454,11 @@ REASONS: dict[tuple[str, str, str], str] = {
         "displacement(second.q, first.q)",
     ): "The displacements in both directions are opposite, about equal axes of the bodies.",
     (
+        "reports/mechanisms.py",
+        "samples = np.unique(np.linspace(0, len(motion.times) - 1, number).astype(int))",
+        "np.linspace(len(motion.times) - 1, 0, number)",
+    ): "The samples are sorted afterwards.",
+    (
         "reports/sections/paper_sweep.py",
         "paper = sorted({cell.end for cell in cells if cell.end is not None})",
         "True",

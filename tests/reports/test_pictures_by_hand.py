@@ -276,6 +276,7 @@ def test_path_between_samples_is_cubic():
     assert points.shape == (36, 3)
     assert points[:, 0] == pytest.approx(np.linspace(0.0, 2.0, 36) ** 3, abs=1e-14)
     assert mechanisms.path(cubic(np.array([1.0])), 0).tolist() == [[1.0, 0.0, 0.0]]
+    assert mechanisms.path(cubic(np.array([0.0, 1.0])), 0).shape == (24, 3), "two samples suffice"
 
 
 def test_poses_are_thin_and_pale_before_the_last():
