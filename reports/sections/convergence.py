@@ -117,9 +117,9 @@ def slope(group: SceneRuns, curve: Curve) -> float:
     line."""
     runs = group.curves().get(curve, ())
     option = swept_option(runs)
-    judged = [run for run in runs if run.completed and math.isfinite(run.error) and run.error > 0]
-    if option is None or not judged:
+    if option is None:
         return math.nan
+    judged = [run for run in runs if run.completed]
     order = order_of_convergence(
         [run.record["settings"][option] for run in judged], [run.error for run in judged]
     )

@@ -13,6 +13,7 @@ from test_figures_by_hand import BLOCK, RECORDS, SCENE, group, moving, of, plain
 from crosscheck.paper.cells import Cell
 from crosscheck.paper.runs import HEAVY, UNEQUAL, Label
 from crosscheck.setting import BRANCHES
+from crosscheck.study.stability import Ladder
 from mbref.trajectory import Outcome
 from reports import benchmark_plot, figures, speed_figure
 from reports.blocks import Table
@@ -342,6 +343,20 @@ def test_support_of_the_engines_that_have_records():
     )
     assert {len(row) for row in table.rows} == {2} and {row[1][:1] for row in table.rows} <= {"✓", "–"}
     assert [text.text[:3] for text in reasons] == [f"{i}. " for i in range(1, len(reasons) + 1)]
+
+
+def test_runs_of_a_method_are_right_or_ended_or_false():
+    """Of four runs on two ladders two are right, one ends early, and one is false."""
+    ends = {"gap[1]": ("COMPLETED", 1e-9), "gap[2]": ("COMPLETED", 0.5), "mass[1]": ("STEP_FAILED", 0.5)}
+    ends["mass[2]"] = ("COMPLETED", 1e-9)
+    records = [
+        {**plain("mujoco", "x", e, 1.0, outcome), "scene": name} for name, (outcome, e) in ends.items()
+    ]
+    found = stability._runs(records)
+    curve = ("mujoco", "x")
+    shown = [Ladder("gap", "", "", ()), Ladder("mass", "", "", ())]
+    assert stability._counts(shown, found) == {curve: stability.Count(2, 1, 1)}
+    assert stability._counts(shown[:1], found) == {curve: stability.Count(1, 0, 1)}
 
 
 def test_sentences_of_the_ladders_need_taylor_and_another_method():
