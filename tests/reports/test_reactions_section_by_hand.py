@@ -74,9 +74,9 @@ def test_components_that_redundancy_leaves_open(
     """At the middle of the shortest run; sizes below 1e-11 of the largest reaction, 200 N, are none."""
     asked: list[Any] = []
     monkeypatch.setattr(reactions, "side_by_side", lambda scene, runs, sample: asked.append(sample) or sizes)
-    largest = {5: 200.0, 4: 50.0}
+    largest = {7: 200.0, 4: 50.0}
     monkeypatch.setattr(reactions, "largest_reaction", lambda scene, run: largest[len(run.times)])
-    runs = {"a": motion(0.0, 0.25, 0.5, 0.75, 1.0), "b": motion(0.0, 0.3, 0.6, 0.9)}
+    runs = {"a": motion(0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5), "b": motion(0.0, 0.3, 0.6, 0.9)}
     found = reactions._choices(SCENE, runs)
     assert asked == [2]
     if rows is None:
@@ -93,6 +93,16 @@ def test_components_that_redundancy_leaves_open(
     )
     assert table.caption.startswith("The engine's choice: size (N) at t = 0.5 s of the components")
     assert table.right == {1, 2}
+
+
+def test_rows_of_one_engine() -> None:
+    """The joints in the scene's order, then what a body gets in all."""
+    found = Comparison({"A": Reaction(2, 0.5, 0.25), "B": Reaction(0, 0.125, 0.0)}, 0.75)
+    assert reactions._rows(SCENE, {"a": found}) == [
+        ("A", "2", "5.0e-01"),
+        ("B", "0", "1.2e-01"),
+        ("on a body", "0", "7.5e-01"),
+    ]
 
 
 def section(monkeypatch: pytest.MonkeyPatch, exact: Any, scene: Scene = SCENE) -> tuple[list[Any], list[Any]]:
