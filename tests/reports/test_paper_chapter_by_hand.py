@@ -193,6 +193,7 @@ def test_digits_of_both_forms_over_the_penalty(monkeypatch):
     assert table.rows[1] == ("1e+03", "2.0e-09", "–", "COMPLETED", "NOT_CONVERGED")
     assert len(table.rows) == len(ALPHAS) and right(table) == ["α", "ALF", "ALF, dual"]
     assert "the closed form (mpi-svd: 4.0e-16), iterated to ε = 1e-14 or 100 times" in table.caption
+    assert (figure.name, figure.caption) == ("paper-alf-digits", "The table above.")
     assert isinstance(figure, Figure) and figure.draw.func is paper_methods.plot_digits
     [errors] = figure.draw.args
     assert list(errors) == [PENALTY, DUAL] and errors[PENALTY][2] == pytest.approx(3e-9)
