@@ -10,6 +10,7 @@ import pytest
 from test_figures_by_hand import SCENE, plain
 
 from crosscheck.study.verdict import Judged
+from mbref.scenes import SCENES
 from reports import which_engine as page
 from reports.runs import Run, SceneRuns
 from reports.which_engine import Kind
@@ -59,7 +60,8 @@ def test_answers_in_short():
         (Kind("Open chains and more", "About.", ("block",)), [group(RECORDS)]),
         (Kind("Loops", "About.", ("block",)), [group(RECORDS[3:4])]),
     ]
-    *_, rule, first, second, last = page._in_short(kinds)
+    title, head, rule, first, second, last = page._in_short(kinds)
+    assert title == "## In short\n" and head.endswith("| next engine | defaults that end wrong or fail |")
     assert rule == "|---|---|---|---|" and last == ""
     assert first == (
         "| [Open chains and more](#open-chains-and-more) | Pinocchio, `tuned`, 2 s | MuJoCo, `tuned`, 4 s | "
@@ -79,7 +81,8 @@ def test_the_table_of_a_scene():
         "`block` over 1 s: 1 body, 6 degrees of freedom, no redundant rows. `crosscheck compare 'block'` "
         "repeats these runs.\n"
     )
-    assert header.count("|") == rule.count("|") == 7 and end == ""
+    assert header.endswith("| time | error | least error | library defaults |") and end == ""
+    assert rule == "|---|---|--:|--:|--:|---|" and header.count("|") == 7
     late = page._failed(RECORDS[4])
     assert rows == [
         "| Pinocchio | `tuned`, step=0.1 | 2 s | 5.00e-08 | 5.00e-08 | no such settings |",
@@ -104,7 +107,8 @@ def test_lines_to_copy(monkeypatch):
     monkeypatch.setattr(
         page, "own_code", lambda scene, r: f"<{r['family']}/>" if r["engine"] == "mujoco" else ""
     )
-    _, fence, line, close, end = page._lines(judged())
+    about, fence, line, close, end = page._lines(judged())
+    assert about.startswith("\nLines to copy, ") and about.endswith("otherwise the most accurate run.\n")
     assert (fence, close, end) == ("```text", "```", "")
     assert line == "MuJoCo, error 1.00e-07: <tuned/>"
     *_, line, _, _ = page._lines(judged(*RECORDS[1:3]))
@@ -120,16 +124,33 @@ def test_a_section_has_a_table_for_each_scene():
 
 
 def test_many_variants_cost_construction_and_steps():
-    """Half a second to build Pinocchio's model and 2 s of steps; MuJoCo's is built in 10 ms."""
+    """The sums of both times are 2.1, 2.3 and 2.5 s; neither part alone has this order."""
+    costs = {"mujoco": (0.1, 2.2), "pinocchio": (1.5, 1.0), "simbody": (1.3, 0.8)}
     made = [
-        record("mujoco", "tuned", 1e-7, 2.4, cost={"build_seconds": 0.01, "seconds": 2.4}),
-        record("pinocchio", "tuned", 1e-7, 2.0, cost={"build_seconds": 0.5, "seconds": 2.0}),
+        record(engine, "tuned", 1e-7, steps, cost={"build_seconds": build, "seconds": steps})
+        for engine, (build, steps) in costs.items()
     ]
-    rows = [line for line in page._many(group(tuple(made))) if line.startswith("| ") and "`" in line]
+    title, about, head, rule, *rows, hint, link = page._many(group(tuple(made)))
+    assert title == "## Many variants at once\n" and about.endswith(
+        "One run of `block`, the fastest of each engine within 1e-6:\n"
+    )
+    assert (head, rule) == ("| engine | construction | stepping | both |", "|---|--:|--:|--:|")
     assert rows == [
-        "| MuJoCo, `tuned` | 10 ms | 2.4 s | 2.41 s |",
-        "| Pinocchio, `tuned` | 500 ms | 2 s | 2.5 s |",
+        "| Simbody, `tuned` | 1.3 s | 800 ms | 2.1 s |",
+        "| MuJoCo, `tuned` | 100 ms | 2.2 s | 2.3 s |",
+        "| Pinocchio, `tuned` | 1.5 s | 1 s | 2.5 s |",
     ]
+    assert hint.startswith("\n`mbref ensemble`") and link == (
+        "([Many runs at once](methods.md#many-runs-at-once)).\n"
+    )
+
+
+def test_kinds_of_mechanisms_have_a_title_a_sentence_and_scenes():
+    assert len({kind.title for kind in page.KINDS}) == len(page.KINDS)
+    for kind in page.KINDS:
+        assert kind.title[0].isupper() and not kind.title.endswith("."), kind
+        assert kind.about[0].isupper() and kind.about.endswith("."), kind
+        assert {name.partition("[")[0] for name in kind.scenes} <= {*SCENES}, kind
 
 
 def test_failed_checks_and_findings(monkeypatch, tmp_path):
@@ -147,7 +168,12 @@ def test_failed_checks_and_findings(monkeypatch, tmp_path):
     monkeypatch.setattr(page, "findings", lambda: found)
     monkeypatch.setattr(page, "verified", lambda folder: documents if folder == tmp_path else [])
     assert list(page._checks(tmp_path)) == [("mujoco", 1, 3), ("pinocchio", 0, 1)]
-    rows = [line for line in page._failures(tmp_path) if line.startswith("| ")][1:]
+    title, about, head, rule, *rows, hint = page._failures(tmp_path)
+    assert title == "## What each engine fails at\n" and about.endswith("defects that a script shows:\n")
+    assert (head, rule) == ("| engine | checks that fail | of | findings |", "|---|--:|--:|---|")
+    assert (
+        hint == "\n`crosscheck verify ENGINE` runs the checks, `crosscheck findings --recheck` the scripts."
+    )
     assert rows == [
         "| MuJoCo | 1 | 3 | [drift](findings.md#drift), [jump](findings.md#jump) |",
         "| Pinocchio | 0 | 1 | none |",
