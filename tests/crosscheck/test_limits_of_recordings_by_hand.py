@@ -56,7 +56,7 @@ def test_a_motion_that_begins_late_is_interpolated():
 
 
 def test_the_last_sample_ends_the_last_interval():
-    """Every second one of twelve samples is a node, and so is the last one."""
+    """Every second sample of twelve is a node, and the last sample is a node."""
     given = difference(TIMES[:12], **{"A.angle": TIMES[:12]})
     found = {s: c["A.angle"] for s, _, c in explanations._interpolations(given)}
     lines, steps = (found[name] for name in list(found)[:2])

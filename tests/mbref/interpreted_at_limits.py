@@ -87,7 +87,7 @@ def put_back(patch: Patch, pivot: float) -> float:
 
 
 def newton(patch: Patch, **numbers: float) -> list[str]:
-    """What a step of Newton's method does: a new factor, a correction, or both."""
+    """A step of Newton's method factorises, corrects, or does both."""
     numbers = {"before": 0.125, "violation": 0.0, "moved": 0.0, "tolerance": 8.0, "rounding": 8.0, **numbers}
     done: list[str] = []
     put(
@@ -186,7 +186,7 @@ def trend_at(patch: Patch, share: float) -> float:
     )
     found = one_step.trend(1.0, 1.0, made)
     counts.steps = 4
-    assert one_step.trend(1.0, 1.0, made) == 1.0, "one step tells no trend"
+    assert one_step.trend(1.0, 1.0, made) == 1.0, "one step has no trend"
     return found
 
 

@@ -397,7 +397,7 @@ def test_a_pair_of_crossings_has_a_depth(monkeypatch, depth, pair, side):
 
 
 def test_the_determinant_at_the_start_by_pivots_and_the_null_vector():
-    """det(G₀ G₀ᵀ) is the square of the product of pivots, 3 and -2, times that of the null vector."""
+    """det(G₀ G₀ᵀ) is the squared product of the pivots 3 and -2, times the square of the null vector."""
     memory = SimpleNamespace(
         solver=SimpleNamespace(
             past=np.array([3.0, -2.0, 9.0]), past_motion=np.array([1.0, -0.5, 2.0]), pivot_columns=np.zeros(3)

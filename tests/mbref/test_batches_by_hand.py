@@ -174,7 +174,7 @@ def test_runs_that_may_lead(monkeypatch, given, leads):
 
 
 def test_scenes_of_a_batch_that_complete(monkeypatch):
-    """Of the scenes 1, 3 and 4, the second is undecided; the last passes two positions."""
+    """Scene 3 is undecided, and scene 4 passes two positions."""
     made: Any = Batch.__new__(Batch)
     ends = {1: (DONE, 0.5), 3: (UNDECIDED, 0.25), 4: (DONE, 2.0)}
     written: list[int] = []

@@ -291,7 +291,7 @@ def test_arguments_of_the_response():
 
 
 def test_sizes_of_orders_with_multipliers():
-    """Nine variables, four rows and two functions in 16 lanes; other products replace those of the scene."""
+    """Nine variables, four rows and two functions in 16 lanes; the test replaces the products."""
     tables, other = products([[level(7)], [level(1)]]), products([[level(0)], [level(1)], [level(2)]])
     made = MultiplierOrders(series_of(tables, 9, 4, drivers=2), written(7, 1))
     assert made._products is tables and made._slots == 16 and made._lanes == 16

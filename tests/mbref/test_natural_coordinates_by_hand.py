@@ -296,7 +296,7 @@ def test_arrays_of_numbers_of_scenes():
 
 
 def test_numbers_of_scenes_together():
-    """Numbers are floats where all scenes have the same bits; indices are those of the first scene."""
+    """Numbers are floats where all scenes have the same bits; the first scene gives the indices."""
     batch = numbers.ManyScenes(3)
     mixed = batch.together(
         np.array([[[1.0, 0.0], [3.0, 5.0]], [[1.0, -0.0], [3.0, 6.0]], [[1.0, 0.0], [3.0, 5.0]]])
@@ -312,7 +312,7 @@ def test_numbers_of_scenes_together():
 
 
 def test_patterns_of_numbers_of_scenes():
-    """The pattern is that of the first scene; scenes with an entry of another pattern are noted."""
+    """The first scene gives the pattern; scenes with an entry outside it are noted."""
     batch, values = numbers.ManyScenes(4), np.ones((4, 2, 3))
     values[:, 0, 1] = values[2, 1, 2] = values[3] = 0.0
     values[1] *= -7.0

@@ -141,15 +141,15 @@ def test_an_ensemble_of_one_variant(monkeypatch, count, workers):
 
 def test_runs_of_an_ensemble_a_second(monkeypatch, capsys):
     """Two variants between 10 s and 14 s on the clock."""
-    clock, told = iter([10.0, 14.0]), list[Any]()
+    clock, reported = iter([10.0, 14.0]), list[Any]()
 
     @contextlib.contextmanager
     def shown(what: Any, end: Any = None) -> Iterator[Any]:
-        told.append((what, end))
-        yield told.append
+        reported.append((what, end))
+        yield reported.append
 
     def spread(scene: Scene, end: float, completed: Any, rate: float, asked: Any) -> None:
-        told.append((scene.name, end, completed, rate, asked.count))
+        reported.append((scene.name, end, completed, rate, asked.count))
 
     runs = [SimpleNamespace(outcome=Outcome.COMPLETED), SimpleNamespace(outcome=Outcome.COMPLETED)]
     monkeypatch.setattr(ensemble, "find_scene", lambda name: SCENE)
@@ -174,4 +174,4 @@ def test_runs_of_an_ensemble_a_second(monkeypatch, capsys):
         "1,2",
     ]
     assert ensemble._ensemble(parser().parse_args(words)) == 0
-    assert told == [(3, None), ("simulating", 2), 1, 2, ("s", 2.0, runs, 0.5, 2)]
+    assert reported == [(3, None), ("simulating", 2), 1, 2, ("s", 2.0, runs, 0.5, 2)]

@@ -36,7 +36,7 @@ VALUES = {
 
 
 class Turned:
-    """Orientations of both bodies and of the ground, whose principal axes are those of the world."""
+    """Orientations of both bodies and of the ground; the axes of the ground are the axes of the world."""
 
     def __init__(self) -> None:
         self.numbered = {
