@@ -34,7 +34,7 @@ def forces(t, equations):
         w = vector(frames.angular_velocity, b)
         gyroscopic = cross((inertia[b, 0] * w[0], inertia[b, 1] * w[1], inertia[b, 2] * w[2]), w)
         for k in range(3):
-            g[6 * b + k] = mass[b] * gravity[k]
+            g[6 * b + k] = mass[b] * gravity[b, k]
             g[6 * b + 3 + k] = gyroscopic[k]
     loads = scene.loads
     for k in range(loads.kind.shape[0]):

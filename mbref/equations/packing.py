@@ -166,7 +166,13 @@ class Packs:
         return np.array([*rows], dtype=float).reshape(len(self.scenes), -1, width)
 
     def _gravity(self) -> np.ndarray:
-        return np.array([ORIGIN if self.kinematic else scene.gravity for scene in self.scenes], dtype=float)
+        """Return the acceleration of gravity (s, nb, 3) of each body. A rotor and a modelled ground have no
+        weight: their masses are not masses of the scene."""
+        found = np.zeros((len(self.scenes), self.nb, 3))
+        if not self.kinematic:
+            for k, scene in enumerate(self.scenes):
+                found[k, : len(scene.body)] = scene.gravity
+        return found
 
     def _bodies(self) -> Bodies:
         """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""

@@ -89,7 +89,7 @@ FIRST_OF_LOADS = Loads._fields.index("force")
 class SceneData(NamedTuple):
     """A scene as kernels read it; no kernel changes it."""
 
-    gravity: Annotated[Vector, 3]
+    gravity: Annotated[Matrix, "nb", 3]  # m/s², of each body; zero for rotors and a modelled ground
     lengths: Annotated[Vector, "nb"]  # lengths of the bodies (m), see equations.units
     metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies

@@ -18,7 +18,7 @@ def constant_forces(data: SceneData, forms: Forms) -> tuple[np.ndarray, np.ndarr
     """Return forces on the variables: constant forces (…, d), and the matrix (…, d, d) of forces that are
     linear in the variables."""
     of, loads, d = forms.of, data.loads, forms.d
-    weight = data.bodies.mass[..., None] * (data.gravity / of.length)[..., None, :]
+    weight = data.bodies.mass[..., None] * data.gravity / of.length
     by_weight = weight[..., None] * forms.centres
     force = by_weight.reshape(*by_weight.shape[:-3], 3 * of.nb, d).sum(axis=-2)
     linear = np.zeros((*force.shape, d))

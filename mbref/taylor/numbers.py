@@ -59,7 +59,7 @@ class ManyScenes:
         found = np.empty((self.agree.size, array.size))
         for k, number in enumerate(array.ravel().tolist()):
             found[:, k] = number.values if isinstance(number, BatchNumber) else number
-        return found.reshape(-1, *array.shape)
+        return found.reshape(self.agree.size, *array.shape)
 
     def pattern(self, values: np.ndarray) -> np.ndarray:
         """Return which values (s, …) of the first scene are other than zero."""

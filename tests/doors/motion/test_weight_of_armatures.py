@@ -1,0 +1,109 @@
+"""Reflected inertia resists acceleration and has no weight, in every method, in batches and in equilibria."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numba
+import numpy as np
+import pytest
+
+from mbref import Limits, Scene, ensemble, equilibria, simulate
+from mbref.formulations import FORMULATIONS
+from mbref.stabilisation import STABILISATIONS
+
+MASS, ARMATURE = 0.8, 1.7
+TIMES = np.linspace(0.0, 0.6, 4)
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, -0.8))
+GRAVITIES = ((-3.0, 0.0, 0.0), (0.0, 2.5, 0.0), (4.0, -1.0, 2.0))
+DRIVEN_ONLY = "mpi-gs-literal"
+METHODS = (
+    "taylor",
+    *(f"{name}+projection" for name in FORMULATIONS if name != DRIVEN_ONLY),
+    *(f"alf-dual+{name}/rk4[step=0.01]" for name in STABILISATIONS),
+)
+ROUNDING = 1e-13  # relative to the distance fallen: a few hundred roundings of steps
+
+
+def slide(gravity=GRAVITIES[2], axis=AXES[2], **changes) -> Scene:
+    """A carriage with a motor's reflected mass on a guide."""
+    body = {"name": "carriage", "mass": MASS, "inertia": [0.01, 0.02, 0.03], "position": [0.4, -0.1, 0.2]}
+    guide = {
+        "name": "G",
+        "type": "translational",
+        "bodies": ["ground", "carriage"],
+        "anchor": [0.4, -0.1, 0.2],
+        "axis": axis,
+        "armature": ARMATURE,
+    }
+    return Scene(**{"name": "slide", "gravity": gravity, "body": [body], "joint": [guide], **changes})
+
+
+def fallen(scene: Scene) -> np.ndarray:
+    """Return the displacement ½ m (g·a) / (m + I) t² along the guide."""
+    pull = MASS * np.dot(scene.gravity, scene.joint[0].axis)
+    return pull / (MASS + ARMATURE) * TIMES**2 / 2
+
+
+def off(found: np.ndarray, exact: np.ndarray) -> float:
+    """Return the largest error, relative to a fall of one metre."""
+    return float(np.abs(found - exact).max())
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_slide_with_armature_falls_as_its_closed_form(method):
+    scene = slide()
+    motion = simulate(scene, method, TIMES)
+    assert motion.outcome.name == "COMPLETED", motion.message
+    assert off(motion.joint("G").displacement, fallen(scene)) < 100 * ROUNDING
+    assert off(motion.energy, motion.energy[0]) < 1000 * ROUNDING
+
+
+@pytest.mark.parametrize("ground", ["frame", "body"])
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("gravity", GRAVITIES)
+def test_direction_of_gravity_and_guide_do_not_matter(gravity, axis, ground):
+    scene = slide(gravity, axis, ground=ground)
+    assert off(simulate(scene, times=TIMES).joint("G").displacement, fallen(scene)) < 10 * ROUNDING
+
+
+@pytest.mark.skipif(numba.config.DISABLE_JIT, reason="code is generated where kernels are compiled")
+def test_generated_code_gives_the_rotor_no_weight():
+    scene = slide()
+    motion = simulate(scene, "taylor", TIMES, Limits(code="generated"))
+    assert off(motion.joint("G").displacement, fallen(scene)) < 10 * ROUNDING
+
+
+def test_every_scene_of_a_batch_has_its_own_gravity_and_no_weight_of_its_rotor():
+    scenes = [slide(gravity) for gravity in GRAVITIES for _ in range(2)]
+    with ThreadPoolExecutor(1) as pool:
+        found = dict(ensemble(scenes, TIMES, executor=pool))
+    for place, scene in enumerate(scenes):
+        moved = found[place].position[:, 0] - scene.body[0].position
+        assert off(moved @ scene.joint[0].axis, fallen(scene)) < 10 * ROUNDING
+
+
+def test_equilibrium_of_a_hanging_slide_bears_its_own_weight_alone():
+    stiffness = 50.0
+    spring = {"type": "slide_spring", "joint": "G", "stiffness": stiffness}
+    scene = slide(load=[spring])
+    (found,) = equilibria(scene, starts=2)
+    moved = np.subtract(found.scene.body[0].position, scene.body[0].position) @ AXES[2]
+    assert moved == pytest.approx(MASS * np.dot(scene.gravity, AXES[2]) / stiffness, abs=1e-10)
+    assert np.abs(found.eigenvalues) == pytest.approx(np.sqrt(stiffness / (MASS + ARMATURE)), rel=1e-8)
+
+
+@pytest.mark.parametrize("kind", ["revolute", "cylindrical"])
+def test_rotor_of_a_hinge_turns_a_balanced_wheel_no_way(kind):
+    """The centre of mass lies on the axis, so gravity moves nothing about it."""
+    body = {"name": "wheel", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "position": [0.3, 0.1, -0.2]}
+    hinge = {
+        "name": "H",
+        "type": kind,
+        "bodies": ["ground", "wheel"],
+        "anchor": [0.3, 0.1, -0.2],
+        "axis": [0.0, 0.0, 1.0],
+        "armature": 3.0,
+    }
+    scene = Scene(name="wheel", gravity=(5.0, -4.0, 0.0), body=[body], joint=[hinge])
+    assert np.abs(simulate(scene, times=TIMES).joint("H").angle).max() < ROUNDING
