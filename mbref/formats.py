@@ -27,7 +27,7 @@ class ImportOptions:
     without : collection of str
         Kinds of parts that may be left out although they change the motion, such as ``armature``.
     keyframe : str
-        Name of the pose to begin at; the reference pose if empty.
+        Name or number of the pose to begin at; the reference pose if empty.
     pose : mapping of str to float
         Joint coordinates to begin at (rad or m), by joint.
     close : sequence of str
@@ -62,11 +62,14 @@ def add_options(parser: Any) -> None:
         metavar="KINDS",
         default="",
         help="kinds of parts that may be left out although they change the motion, separated by commas:\n"
-        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, motors,\n"
-        "springs, or everything",
+        "armature, couplings, damping, flexible-bodies, fluid, friction, gravity-compensation, limits,\n"
+        "motors, springs, or everything; what a scene can describe stays",
     )
     parser.add_argument(
-        "--keyframe", metavar="NAME", default="", help="begin at the pose of a keyframe (MJCF)"
+        "--keyframe",
+        metavar="NAME",
+        default="",
+        help="begin at the pose of a keyframe, by its name or its number from 0 (MJCF)",
     )
     parser.add_argument(
         "--pose",

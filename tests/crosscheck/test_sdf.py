@@ -201,7 +201,10 @@ def test_a_link_is_held_on_request(tmp_path):
         ("<sdf><world name='w'/></sdf>", "has no model"),
         (pair("gear"), "joint 'B': type 'gear' is none of"),
         (pair("gearbox"), "joint 'B': a gearbox needs gearbox_reference_body"),
-        (pair("screw"), "joint 'B': a screw needs screw_thread_pitch"),
+        (
+            pair("screw").replace("<axis>", "<thread_pitch>0</thread_pitch><axis>"),
+            "thread_pitch must not be 0",
+        ),
         (pair(more="<dynamics><friction>1</friction></dynamics>"), "dry friction of joint 'B': it changes"),
         (pair("universal", "<dynamics><damping>1</damping></dynamics>"), "damping of joint 'B': it changes"),
         (pair().replace("<parent>a<", "<parent>c<"), "joint 'B': the file has no link or frame 'c'"),
@@ -245,8 +248,8 @@ def test_a_link_is_held_on_request(tmp_path):
             "has no body that moves",
         ),
         (
-            pair(more='<mimic joint="A"><multiplier>1</multiplier><offset>1</offset></mimic>'),
-            "its offset contradicts the poses",
+            pair(more='<mimic joint="A"><multiplier>0</multiplier></mimic>'),
+            "joint 'B': mimic multiplier must not be 0",
         ),
     ],
 )

@@ -11,9 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.scene import SceneError
+from mbref.scene_fields import LARGEST, shown
 
 MODEL = "__model__"
 WORLD = "world"
+NAMED = ("link", "joint", "frame")
 
 
 class Pose(NamedTuple):
@@ -40,8 +42,10 @@ def numbers(element: ET.Element | None, where: str, count: int) -> np.ndarray:
         found = np.full(1, math.nan)
     if not found.size:
         return np.zeros(count)
-    if found.size != count or not np.isfinite(found).all():
-        raise SceneError([f"{where}: must be {count} numbers, got {text.strip()!r}"])
+    if found.size != count or not (np.abs(found) <= LARGEST).all():
+        what = "a number" if count == 1 else f"{count} numbers"
+        what += f" of at most {LARGEST:g} in size" if found.size == count else ""
+        raise SceneError([f"{where}: must be {what}, got {shown(text.strip())}"])
     return found
 
 
@@ -86,32 +90,46 @@ class Frames:
 
     def __post_init__(self) -> None:
         self._elements: dict[str, ET.Element] = {}
-        self._known: dict[str, Pose] = {WORLD: ORIGIN}
-        for element in self.model:
-            if element.tag in ("link", "joint", "frame"):
-                self._elements[str(element.get("name"))] = element
+        self._known: dict[int, Pose] = {}
+        own = self.model.findall(f"frame[@name='{MODEL}']")
+        named = (element for tag in NAMED for element in self.model.findall(tag))
+        for element in (*own, *named):  # a link has its name before a joint and a frame, as in libsdformat
+            self._elements.setdefault(str(element.get("name")), element)
 
     def has(self, name: str) -> bool:
         """Return whether the model has a link, joint or frame of this name."""
         return name in self._elements
 
-    def world(self, name: str, within: tuple[str, ...] = ()) -> Pose:
-        """Return the world pose of a frame; raises SceneError for an unknown frame and for frames that refer
-        to each other in a circle."""
-        if name in self._known:
-            return self._known[name]
+    def world(self, name: str) -> Pose:
+        """Return the world pose of a named frame; raises SceneError as ``pose``."""
+        return ORIGIN if name == WORLD else self.pose(self._named(name))
+
+    def pose(self, element: ET.Element) -> Pose:
+        """Return the world pose of a link, joint or frame, whose name another element may have too.
+
+        Raises SceneError for an unknown frame and for frames that refer to each other in a circle.
+        """
+        way, passed_ones = [element], {id(element)}
+        while id(way[-1]) not in self._known and (base := _base(way[-1])) != WORLD:
+            way.append(self._named(base))
+            if id(way[-1]) in passed_ones:
+                names = [str(passed.get("name")) for passed in way]
+                raise SceneError(
+                    [f"frame {names[-1]!r}: is given relative to itself, by {' → '.join(names)}"]
+                )
+            passed_ones.add(id(way[-1]))
+        found = self._known.get(id(way[-1]), ORIGIN)
+        for passed in reversed(way):
+            if id(passed) not in self._known:
+                where = f"{passed.tag} {passed.get('name')!r}: pose"
+                self._known[id(passed)] = found.then(pose_of(passed, where))
+            found = self._known[id(passed)]
+        return found
+
+    def _named(self, name: str) -> ET.Element:
         if name not in self._elements:
             raise SceneError([f"frame {name!r}: the model has no link, joint or frame of this name"])
-        if name in within:
-            raise SceneError(
-                [f"frame {name!r}: is given relative to itself, by {' → '.join((*within, name))}"]
-            )
-        element = self._elements[name]
-        pose = element.find("pose")
-        relative_to = str(pose.get("relative_to")) if pose is not None else WORLD
-        base = self.world(relative_to, (*within, name))
-        self._known[name] = base.then(pose_of(element, f"{element.tag} {name!r}: pose"))
-        return self._known[name]
+        return self._elements[name]
 
     def link_of(self, name: str) -> str:
         """Return the link to which a frame is attached, or the world."""
@@ -125,3 +143,18 @@ class Frames:
             seen.append(name)
             name = element.findtext("child", "").strip() or element.get("attached_to") or ""
         return name
+
+
+def _base(element: ET.Element) -> str:
+    """Return the name of the frame in which an element gives its pose."""
+    pose = element.find("pose")
+    return WORLD if pose is None else str(pose.get("relative_to"))
+
+
+def check_names(model: ET.Element) -> None:
+    """Raise SceneError for a link or frame without a name, or with the name of the fixed frame."""
+    for element in (part for tag in ("link", "frame") for part in model.findall(tag)):
+        own = str(element.get("name")).rpartition("::")[2]
+        if own in (WORLD, "None", ""):
+            why = f"{own!r}: the name means the fixed frame" if own == WORLD else "without a name"
+            raise SceneError([f"{element.tag} {why}; give it another name"])

@@ -8,6 +8,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from crosscheck.engines import xml_files
+from crosscheck.engines.xml_files import DEEPEST
 from mbref.scene import SceneError
 
 VARIABLES = ("SDF_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")
@@ -39,26 +41,28 @@ def state_frame_of_axes(root: ET.Element) -> None:
                 ET.SubElement(axis, "use_parent_model_frame").text = str(in_model).lower()
 
 
-def _version(root: ET.Element) -> tuple[int, ...]:
+def _version(root: ET.Element, where: str = "") -> tuple[int, ...]:
     try:
         return tuple(int(word) for word in root.get("version", "").split("."))
     except ValueError:
-        raise SceneError([f"version {root.get('version')!r}: is no version of SDF"]) from None
+        raise SceneError([f"{where}version {root.get('version')!r}: is no version of SDF"]) from None
 
 
-def _expand(element: ET.Element, files: tuple[Path, ...]) -> None:
+def _expand(element: ET.Element, files: tuple[Path, ...], depth: int = 1) -> None:
     """Replace the includes of an element and its parts; ``files`` includes the file of the element last."""
+    if depth > DEEPEST:
+        raise SceneError([f"{files[-1]}: models are nested more than {DEEPEST} deep, with their includes"])
     for part in element.findall("include"):
         if part.findtext("uri", "").strip().rpartition("/")[2] in STILL:
             element.remove(part)
     for k, part in enumerate(list(element)):
         if part.tag == "include":
-            element[k] = _included(part, files)
+            element[k] = _included(part, files, depth)
         elif part.tag in ("world", "model"):
-            _expand(part, files)
+            _expand(part, files, depth + 1)
 
 
-def _included(include: ET.Element, files: tuple[Path, ...]) -> ET.Element:
+def _included(include: ET.Element, files: tuple[Path, ...], depth: int) -> ET.Element:
     uri = include.findtext("uri", "").strip()
     if include.get("merge", "false").lower() in ("true", "1"):
         raise SceneError([f"include {uri!r}: merge='true' is not read; give the model a name of its own"])
@@ -67,10 +71,7 @@ def _included(include: ET.Element, files: tuple[Path, ...]) -> ET.Element:
     path = _file_of(uri, files[-1].parent)
     if path in files:
         raise SceneError([f"include {uri!r}: {path} includes itself"])
-    try:
-        root = ET.parse(path).getroot()
-    except ET.ParseError as error:
-        raise SceneError([f"include {uri!r}: {path} is no XML: {error}"]) from None
+    root = xml_files.parsed_bytes(path.read_bytes(), f"include {uri!r}: {path}")
     model = root.find("model")
     if model is None:
         raise SceneError([f"include {uri!r}: {path} has no model"])
@@ -81,7 +82,7 @@ def _included(include: ET.Element, files: tuple[Path, ...]) -> ET.Element:
             for own in model.findall(tag):
                 model.remove(own)
             model.append(given)
-    _expand(model, (*files, path))
+    _expand(model, (*files, path), depth + 1)
     return model
 
 
@@ -122,6 +123,8 @@ def _main_file(folder: Path) -> str:
     configuration = folder / CONFIGURATION
     if not configuration.is_file():
         return MODEL_FILE
-    found = ET.parse(configuration).getroot().findall("sdf")
-    newest = max(found, key=lambda sdf: [int(n) for n in sdf.get("version", "0").split(".")], default=None)
-    return MODEL_FILE if newest is None else str(newest.text).strip()
+    root = xml_files.parsed(configuration)
+    found = [(_version(sdf, f"{configuration}: "), (sdf.text or "").strip()) for sdf in root.findall("sdf")]
+    if any(not name for _, name in found):
+        raise SceneError([f"{configuration}: <sdf> names no file"])
+    return max(found, default=((), MODEL_FILE))[1]

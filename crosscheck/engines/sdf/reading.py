@@ -4,20 +4,31 @@ from __future__ import annotations
 
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from crosscheck.engines import xml_files
+from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_others
-from crosscheck.engines.sdf import gearing
+from crosscheck.engines.sdf import gearing, limits
+from crosscheck.engines.sdf.elements import (
+    direction,
+    inertia_of,
+    is_true,
+    limits_of,
+    number,
+    pitch,
+    plain,
+    unused,
+)
 from crosscheck.engines.sdf.flattening import STATIC, flattened
-from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, Pose, numbers, pose_of
+from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, check_names, numbers, pose_of
 from crosscheck.engines.sdf.including import expanded
 from mbref import rotations
-from mbref.formats import Imported, ImportOptions, numbered
+from mbref.formats import Imported, ImportOptions
 from mbref.scene import (
     GROUND,
     Body,
@@ -37,6 +48,7 @@ from mbref.scene import (
 
 GRAVITY = (0.0, 0.0, -9.8)  # m/s², the format's default for a file without gravity
 ENDS, GEARBOX = ("parent", "child"), "gearbox"
+ROUNDED = 1e-12  # offset of a mimic / its terms; a smaller offset is rounding of the file's numbers
 SQUARE = 1e-6  # cosine between the axes of a universal joint; a larger cosine is no rounding
 TYPES: dict[str, Any] = {
     "fixed": Fixed,
@@ -48,14 +60,6 @@ TYPES: dict[str, Any] = {
     "revolute2": Universal,
     "screw": Cylindrical,
 }
-UNUSED = {
-    "plugin": ("plugin", "plugins"),
-    "actor": ("actor", "actors"),
-    "light": ("light", "lights"),
-    "gripper": ("gripper", "grippers"),
-    "collision": ("shape that could touch others", "shapes that could touch others"),
-    "sensor": ("sensor", "sensors"),
-}
 
 
 def read(path: Path, options: ImportOptions) -> Imported:
@@ -66,10 +70,7 @@ def read(path: Path, options: ImportOptions) -> Imported:
         raise SceneError(
             ["--keyframe, --pose, --close: an SDF file gives the poses and closes its own loops"]
         )
-    try:
-        root = ET.fromstring(path.read_text(encoding="utf-8"))
-    except ET.ParseError as error:
-        raise SceneError([f"{path}: is no XML: {error}"]) from None
+    root = xml_files.parsed(path)
     reader = _Reader()
     world = root.find("world")
     parts = {part.tag for part in (root if world is None else world)}
@@ -79,23 +80,16 @@ def read(path: Path, options: ImportOptions) -> Imported:
     reader.read(flattened(root))
     if not reader.bodies:
         raise SceneError([f"{path}: has no body that moves"])
-    refuse_others(reader.parts, without)
     given = root.find("world/gravity")
     gravity = GRAVITY if given is None else tuple(numbers(given, "gravity", 3).tolist())
+    refuse_others(reader.parts, without)
     scene = reader.scene(path.stem, gravity, options.hold)
+    acting = list(limits.acting(scene, reader.limits))
+    refuse_others(acting, without)
+    reader.parts += acting
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     notes = [] if given is not None else ["gravity is 9.8 m/s² downwards, the default of SDF"]
-    return Imported(scene, (*wanted, *_unused(root)), tuple([*reader.notes, *notes]))
-
-
-def _unused(root: ET.Element) -> Iterator[str]:
-    """Return sentences on parts that a scene cannot contain and that do not change a motion without
-    contacts."""
-    counts = [(len(list(root.iter(tag))), *names) for tag, names in UNUSED.items()]
-    limits = sum(limit.find("lower") is not None for limit in root.iter("limit"))
-    for count in (*counts, (limits, "limit of a joint", "limits of joints")):
-        if count[0]:
-            yield numbered(*count)
+    return Imported(scene, (*wanted, *unused(root)), tuple([*reader.notes, *notes]))
 
 
 @dataclass
@@ -108,6 +102,7 @@ class _Reader:
     loads: list[Any] = field(default_factory=list)
     parts: list[Part] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    limits: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def scene(self, name: str, gravity: Any, hold: Any) -> Scene:
         """Return the scene of all models, with some bodies fixed to the ground; raises SceneError for an
@@ -129,6 +124,7 @@ class _Reader:
         """Read a flat model."""
         frames = Frames(model)
         self.name_of = {WORLD: GROUND}
+        check_names(model)
         for link in model.findall("link"):
             own = str(link.get("name"))
             is_fixed = link.get(STATIC) is not None
@@ -144,7 +140,7 @@ class _Reader:
 
     def _body(self, link: ET.Element, own: str, frames: Frames) -> Body:
         inertial = link.find("inertial")
-        at, place = frames.world(own), ORIGIN
+        at, place = frames.pose(link), ORIGIN
         mass, inertia = 1.0, np.eye(3)  # the defaults of the format
         if inertial is None:
             self.notes.append(f"link {own!r} has no inertial: 1 kg and 1 kg m², the defaults of SDF")
@@ -152,22 +148,26 @@ class _Reader:
             place = pose_of(inertial, f"link {own!r}: inertial pose")
             if inertial.get("auto", "false").lower() in ("true", "1"):
                 raise SceneError([f"link {own!r}: inertial auto='true' is not read; give mass and inertia"])
-            mass = _number(inertial.find("mass"), f"link {own!r}: mass", 1.0)
+            mass = number(inertial.find("mass"), f"link {own!r}: mass", 1.0)
             if not mass > 0:
                 raise SceneError([f"link {own!r}: mass must be positive, got {mass:g}"])
-            inertia = _inertia(inertial.find("inertia"), own)
+            inertia = inertia_of(inertial.find("inertia"), own)
+            if faults := list(xml_files.inertia_faults(inertia, own, ("<ixx>", "<iyy>", "<izz>"))):
+                raise SceneError(faults)
             if inertial.find("fluid_added_mass") is not None:
                 self.parts.append(Part("fluid", f"the added mass of link {own!r} in a fluid"))
-        if link.find("gravity") is not None and not _is_true(link.find("gravity")):
+        if link.find("gravity") is not None and not is_true(link.find("gravity")):
             self.parts.append(Part("gravity-compensation", f"link {own!r} without weight"))
         if link.find("velocity_decay") is not None:
             self.parts.append(Part("damping", f"velocity_decay of link {own!r}"))
         centre = at.then(place)
         turn = place.turn
-        return Body(
+        return entry(
+            f"link {own!r}",
+            Body,
             name=self.name_of[own],
             mass=mass,
-            inertia=_plain(turn @ inertia @ turn.T),
+            inertia=plain(turn @ inertia @ turn.T),
             position=centre.position.tolist(),
             orientation=rotations.from_matrix(at.turn).tolist(),
         )
@@ -182,8 +182,8 @@ class _Reader:
         if first == second:
             self.notes.append(f"joint {name!r}: both sides are fixed to the ground")
             return
-        at = frames.world(name)
-        axes = [_axis(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
+        at = frames.pose(joint)
+        axes = [direction(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
         places = {
             "anchor": at.position.tolist(),
             "axis": axes[0].tolist(),
@@ -191,7 +191,7 @@ class _Reader:
         }
         if TYPES[kind] is Universal and abs(axes[0] @ axes[1]) > SQUARE:
             raise SceneError([f"joint {name!r}: the axes of a universal joint must be perpendicular"])
-        made: Joint = TYPES[kind].at(name, (first, second), **places)
+        made: Joint = entry(f"joint {name!r}", TYPES[kind].at, name, (first, second), **places)
         self.joints.append(made)
         if kind == "screw":
             self._screw(joint, made)
@@ -199,6 +199,7 @@ class _Reader:
             if (axis := joint.find(tag)) is not None:
                 self._dynamics(axis, made)
                 self._mimic(axis, made)
+                self._limit(axis, made, tag)
 
     def _body_at(self, joint: ET.Element, end: str, frames: Frames) -> str:
         """Return the body of a link or frame that a joint names."""
@@ -211,18 +212,25 @@ class _Reader:
         name, reference = str(joint.get("name")), gearing.reference_of(joint)
         ends = *(joint.findtext(side, "") for side in ENDS), reference
         parent, child, base = (self._body_at(joint, end, frames) for end in ends)
-        at = frames.world(name)
-        axes = [_axis(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
-        ratio = _number(joint.find("gearbox_ratio"), f"joint {name!r}: gearbox_ratio", 1.0)
+        at = frames.pose(joint)
+        axes = [direction(joint.find(tag), name, at, frames) for tag in ("axis", "axis2")]
+        ratio = number(joint.find("gearbox_ratio"), f"joint {name!r}: gearbox_ratio", 1.0)
         links = parent, child, base
         self.couplings.append(gearing.of_gearbox(name, links, axes, ratio, self.joints))
 
     def _screw(self, joint: ET.Element, made: Joint) -> None:
-        if joint.find("screw_thread_pitch") is None:
-            raise SceneError([f"joint {made.name!r}: a screw needs screw_thread_pitch (m a turn)"])
-        pitch = _number(joint.find("screw_thread_pitch"), f"joint {made.name!r}: screw_thread_pitch", 0.0)
         pair = made.name, made.name
-        self.couplings.append(Coupling(name=f"{made.name} thread", joints=pair, ratio=pitch / (2 * math.pi)))
+        ratio = pitch(joint) / (2 * math.pi)
+        where = f"joint {made.name!r}: thread"
+        self.couplings.append(entry(where, Coupling, name=f"{made.name} thread", joints=pair, ratio=ratio))
+
+    def _limit(self, axis: ET.Element, made: Joint, tag: str) -> None:
+        """Collect the limits of a hinge or slide; another joint is only compared with its zero position."""
+        low, high = limits_of(axis, made.name)
+        if tag == "axis" and made.facts.driven:
+            self.limits[made.name] = low, high
+        elif low > 0.0 or high < 0.0:
+            self.parts.append(Part("limits", f"limit of joint {made.name!r}, which acts at the start"))
 
     def _dynamics(self, axis: ET.Element, made: Joint) -> None:
         """Add a spring and damper of a hinge or a slide; friction and springs of other joints are parts to be
@@ -231,22 +239,23 @@ class _Reader:
         if found is None:
             return
         damping, friction, rest, stiffness = (
-            _number(found.find(tag), f"joint {made.name!r}: {tag}", 0.0)
+            number(found.find(tag), f"joint {made.name!r}: {tag}", 0.0)
             for tag in ("damping", "friction", "spring_reference", "spring_stiffness")
         )
         if friction:
             self.parts.append(Part("friction", f"dry friction of joint {made.name!r}"))
+        where = f"joint {made.name!r}: dynamics"
         given: dict[str, Any] = {"joint": made.name, "stiffness": stiffness, "damping": damping}
         if not (damping or stiffness):
             return
         if made.type == "revolute":
-            self.loads.append(TorsionSpring(**given, natural_angle=rest))
+            self.loads.append(entry(where, TorsionSpring, **given, natural_angle=rest))
             return
         if made.type == "translational":
-            self.loads.append(SlideSpring(**given, natural_displacement=rest))
+            self.loads.append(entry(where, SlideSpring, **given, natural_displacement=rest))
             return
-        for kind, number in (("damping", damping), ("springs", stiffness)):
-            if number:
+        for kind, size in (("damping", damping), ("springs", stiffness)):
+            if size:
                 self.parts.append(Part(kind, f"{kind} of joint {made.name!r}"))
 
     def _mimic(self, axis: ET.Element, made: Joint) -> None:
@@ -255,59 +264,21 @@ class _Reader:
             return
         other, where = str(mimic.get("joint")), f"joint {made.name!r}: mimic"
         ratio, offset, reference = (
-            _number(mimic.find(tag), f"{where} {tag}", default)
+            number(mimic.find(tag), f"{where} {tag}", default)
             for tag, default in (("multiplier", 1.0), ("offset", 0.0), ("reference", 0.0))
         )
-        if offset != ratio * reference:
-            raise SceneError(
-                [f"{where}: its offset contradicts the poses of the file, where all joints are 0"]
+        moved = offset - ratio * reference  # of this joint where the other one is at 0
+        if abs(moved) <= ROUNDED * (abs(offset) + abs(ratio * reference)):
+            moved = 0.0
+        if not ratio:
+            raise SceneError([f"{where} multiplier must not be 0, which would lock the joint"])
+        name = f"{made.name} mimics {other}"
+        if moved:
+            self.notes.append(
+                f"{name} with an offset of {moved:.6g}: the motion starts where the joints obey it"
             )
         pair = other, made.name
-        self.couplings.append(Coupling(name=f"{made.name} mimics {other}", joints=pair, ratio=ratio))
-
-
-def _axis(axis: ET.Element | None, name: str, at: Pose, frames: Frames) -> np.ndarray:
-    """Return the world direction (3,) of a joint's axis."""
-    if axis is None:
-        return np.array(at.turn[:, 2])
-    where = f"joint {name!r}: axis"
-    xyz = axis.find("xyz")
-    direction = np.array([0.0, 0.0, 1.0]) if xyz is None else numbers(xyz, where, 3)
-    size = float(np.linalg.norm(direction))
-    if not size:
-        raise SceneError([f"{where}: has no length"])
-    expressed = xyz.get("expressed_in") if xyz is not None else None
-    turn = at.turn if expressed is None else frames.world(expressed).turn
-    return np.asarray(turn @ direction / size)
-
-
-def _number(element: ET.Element | None, where: str, default: float) -> float:
-    return default if element is None else float(numbers(element, where, 1)[0])
-
-
-def _is_true(element: ET.Element | None) -> bool:
-    return element is not None and (element.text or "").strip().lower() in ("true", "1")
-
-
-def _inertia(element: ET.Element | None, link: str) -> np.ndarray:
-    """Return the inertia matrix (3, 3) of an element, with ones in the diagonal if the element gives no
-    inertia."""
-    if element is None:
-        return np.eye(3)
-
-    def entry(i: int, j: int) -> float:
-        tag = f"i{'xyz'[min(i, j)]}{'xyz'[max(i, j)]}"
-        return _number(element.find(tag), f"link {link!r}: {tag}", float(i == j))
-
-    return np.array([[entry(i, j) for j in range(3)] for i in range(3)])
-
-
-def _plain(inertia: np.ndarray) -> Any:
-    """Return principal moments if the matrix is diagonal, otherwise the matrix."""
-    inertia = (inertia + inertia.T) / 2
-    diagonal = np.diag(inertia)
-    is_diagonal = np.abs(inertia - np.diag(diagonal)).max() <= 1e-15 * np.abs(inertia).max()
-    return (diagonal if is_diagonal else inertia).tolist()
+        self.couplings.append(entry(where, Coupling, name=name, joints=pair, ratio=ratio, offset=moved))
 
 
 class SdfFiles:

@@ -20,7 +20,8 @@ KINDS = {  # kinds of parts that change the motion → their description
     "fluid": "forces of a fluid around the bodies",
     "friction": "dry friction of joints and tendons",
     "gravity-compensation": "bodies whose weight is compensated",
-    "motors": "actuators with a control value, except motors of single joints",
+    "limits": "limits of joints and tendons that act at the start",
+    "motors": "actuators that exert a force and that no load of a scene describes",
     "springs": "springs of joints and tendons that no load of a scene describes",
 }
 EVERYTHING = "everything"

@@ -1,0 +1,171 @@
+"""SDF files mean what their format says: frames of equal names, threads, mimic joints, limits, inertias."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import mbref
+
+INERTIA = (
+    "<inertial><mass>2</mass><inertia><ixx>0.02</ixx><iyy>0.03</iyy><izz>0.04</izz></inertia></inertial>"
+)
+
+
+def link(name: str, pose: str = "0 0 0 0 0 0", inertia: str = INERTIA) -> str:
+    return f"<link name='{name}'><pose>{pose}</pose>{inertia}</link>"
+
+
+def joint(
+    name: str, kind: str, parent: str, child: str, axis: str = "0 0 1", more: str = "", inside: str = ""
+):
+    axis = f"<axis><xyz>{axis}</xyz>{inside}</axis>"
+    ends = f"<parent>{parent}</parent><child>{child}</child>"
+    return f"<joint name='{name}' type='{kind}'>{ends}{more}{axis}</joint>"
+
+
+def mimics(name: str, ratio: float, offset: float, reference: float) -> str:
+    parts = (("multiplier", ratio), ("offset", offset), ("reference", reference))
+    return f"<mimic joint='{name}'>{''.join(f'<{tag}>{v}</{tag}>' for tag, v in parts)}</mimic>"
+
+
+def sdf(*parts: str, version: str = "1.6") -> str:
+    return f"<sdf version='{version}'><model name='m'>{''.join(parts)}</model></sdf>"
+
+
+@pytest.mark.parametrize("name", ["world", "arm", "hand", "__model__"])
+def test_a_joint_is_at_its_child_whatever_its_name(files, name):
+    text = sdf(
+        link("arm", "0.5 0 0 0 0 0"),
+        link("hand", "0.9 0.2 0 0 0 0"),
+        joint("shoulder", "revolute", "world", "arm"),
+        joint(name, "revolute", "arm", "hand"),
+    )
+    scene, _ = files.scene(text, "arm.sdf")
+    assert scene.joint_named(name).anchor == (0.9, 0.2, 0.0)
+    assert [body.position for body in scene.body] == [(0.5, 0.0, 0.0), (0.9, 0.2, 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("more", "metres_a_turn"),
+    [
+        ("<thread_pitch>50</thread_pitch>", -2 * math.pi / 50),
+        ("<screw_thread_pitch>0.03</screw_thread_pitch>", 0.03),
+        ("<thread_pitch>50</thread_pitch><screw_thread_pitch>-0.03</screw_thread_pitch>", -0.03),
+        ("", 1.0),
+    ],
+)
+def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
+    scene, _ = files.scene(sdf(link("nut"), joint("s", "screw", "world", "nut", more=more)), "screw.sdf")
+    motion = mbref.simulate(scene.with_(gravity=(0.0, 0.0, -9.81)), times=[0.0, 0.3])
+    turned, moved = motion.joint("s").angle[-1], motion["nut"].position[-1][2]
+    assert abs(turned) > 1e-2
+    assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)
+
+
+def test_a_mimic_with_an_offset_starts_where_both_joints_obey(files):
+    mimic = mimics("lead", -1.5, 0.2, -0.4)
+    arm = "<inertial><pose>0.2 0 0 0 0 0</pose><mass>1</mass></inertial>"
+    text = sdf(
+        link("a", inertia=arm),
+        link("b", "1 0 0 0 0 0", inertia=arm),
+        joint("lead", "revolute", "world", "a"),
+        joint("follow", "revolute", "world", "b", inside=mimic),
+    )
+    scene, out = files.scene(text, "pair.sdf")
+    assert "follow mimics lead with an offset of -0.4" in out
+    start = scene.assembled()
+    angles = [2 * math.atan2(body.orientation[3], body.orientation[0]) for body in start.body]
+    assert angles[1] == pytest.approx(-1.5 * (angles[0] + 0.4) + 0.2, abs=1e-12)
+    assert max(map(abs, angles)) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
+)
+def test_an_offset_by_rounding_is_none(files, ratio, reference, offset):
+    mimic = mimics("a", ratio, offset, reference)
+    text = sdf(
+        link("p"),
+        link("q"),
+        joint("a", "revolute", "world", "p"),
+        joint("b", "revolute", "world", "q", inside=mimic),
+    )
+    scene, _ = files.scene(text, "pair.sdf")
+    assert scene.coupling[0].offset == 0.0
+
+
+def inertia(xx: float, yy: float, zz: float) -> str:
+    entries = "".join(f"<i{k}{k}>{v}</i{k}{k}>" for k, v in zip("xyz", (xx, yy, zz), strict=True))
+    return f"<inertial><mass>1</mass><inertia>{entries}</inertia></inertial>"
+
+
+def test_an_impossible_inertia_is_named_with_its_moments(files):
+    text = sdf(link("plate", inertia=inertia(0.2, 0.9, 0.3)), joint("j", "revolute", "world", "plate"))
+    said = files.refusal(text, "plate.sdf")
+    assert "link 'plate'" in said and "0.2, 0.3, 0.9" in said and "<ixx>, <iyy>, <izz>" in said
+    scene, _ = files.scene(
+        sdf(link("plate", inertia=inertia(0.1, 0.2, 0.3)), joint("j", "revolute", "world", "plate")),
+        "flat.sdf",
+    )
+    assert scene.body[0].inertia == (0.1, 0.2, 0.3)
+
+
+def hanging(limit: str, kind: str = "revolute") -> str:
+    """A body that gravity turns about y towards larger angles, or that falls along -z."""
+    axis, at = ("0 1 0", "0.3 0 0 0 0 0") if kind == "revolute" else ("0 0 1", "0 0 0 0 0 0")
+    body = f"<inertial><pose>{at}</pose><mass>1</mass></inertial>"
+    return sdf(
+        link("a", inertia=body), joint("j", kind, "world", "a", axis, inside=f"<limit>{limit}</limit>")
+    )
+
+
+@pytest.mark.parametrize(
+    ("limit", "kind", "acts"),
+    [
+        ("<lower>-1</lower><upper>0</upper>", "revolute", True),
+        ("<lower>0</lower><upper>1</upper>", "revolute", False),
+        ("<lower>0</lower><upper>1</upper>", "prismatic", True),
+        ("<lower>-1</lower><upper>0</upper>", "prismatic", False),
+        ("<lower>0.1</lower><upper>1</upper>", "revolute", True),
+        ("<lower>0</lower><upper>0</upper>", "revolute", True),
+        ("<lower>-inf</lower><upper>inf</upper>", "revolute", False),
+        ("<lower>-1e16</lower><upper>1e16</upper>", "prismatic", False),
+    ],
+)
+def test_a_limit_that_acts_at_the_start_is_an_error(files, limit, kind, acts):
+    text = hanging(limit, kind)
+    if not acts:
+        assert "1 limit of a joint" in files.scene(text, "a.sdf")[1]
+        return
+    assert "limit of joint 'j', which acts at the start" in files.refusal(text, "a.sdf")
+    assert "(--without limits)" in files.scene(text, "a.sdf", "--without", "limits")[1]
+
+
+def test_unknown_elements_are_listed(files):
+    text = sdf(
+        link("a").replace("<inertial>", "<hovers>1</hovers><inertial>"),
+        joint(
+            "j", "revolute", "world", "a", more="<physics><ode><cfm_damping>1</cfm_damping></ode></physics>"
+        ),
+    )
+    _, out = files.scene(text, "a.sdf")
+    assert "left out: <hovers> of link 'a': is not read" in out
+    assert "left out: <physics> of joint 'j': is not read" in out
+
+
+def test_many_frames_in_a_row_are_followed(files):
+    frames = "".join(
+        f"<frame name='f{k}'><pose relative_to='f{k + 1}'>0.001 0 0 0 0 0</pose></frame>" for k in range(2000)
+    )
+    text = sdf(
+        "<frame name='f2000'/>",
+        frames,
+        "<link name='a'><pose relative_to='f0'/></link>",
+        joint("j", "revolute", "world", "a"),
+        version="1.9",
+    )
+    scene, _ = files.scene(text, "far.sdf")
+    assert np.allclose(scene.body[0].position, [2.0, 0.0, 0.0], rtol=0, atol=2000 * 2e-16 * 2)

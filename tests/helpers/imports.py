@@ -1,0 +1,41 @@
+"""`mbref import` on the text of a file: the scene that it writes and its lines, or its refusal."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from mbref.cli import main
+from mbref.scene import Scene
+
+
+class Files:
+    """Files in a folder of one test, imported by the command line."""
+
+    def __init__(self, folder: Path, capsys: pytest.CaptureFixture):
+        self.folder, self.capsys = folder, capsys
+
+    def run(self, text: str | bytes, name: str, *words: str) -> tuple[int, str, str]:
+        """Return the exit status, the output and the errors of an import of a file with this text."""
+        path = self.folder / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        self.capsys.readouterr()
+        try:
+            status = main(["import", str(path), "--out", str(self.folder / "out.toml"), *words])
+        except SystemExit as end:
+            status = int(end.code or 0)
+        return status, *self.capsys.readouterr()
+
+    def scene(self, text: str, name: str, *words: str) -> tuple[Scene, str]:
+        """Return the scene that the command writes, and its output."""
+        status, out, errors = self.run(text, name, *words)
+        assert status == 0, errors
+        return Scene.from_file(self.folder / "out.toml"), out
+
+    def refusal(self, text: str | bytes, name: str, *words: str) -> str:
+        """Return the sentences with which the command refuses a file; the exit status is 2."""
+        status, _, errors = self.run(text, name, *words)
+        assert status == 2, (status, errors)
+        assert errors.strip(), "no sentence"
+        return errors
