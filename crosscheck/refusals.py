@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from mbref.scene import Scene
 
+LONGEST_TEXT = 1000  # characters of an engine's message that are kept: about ten lines of a terminal
 TABLE, FACTOR = "table", "factor"  # features of a driver and of a load
 
 
@@ -33,14 +34,25 @@ class Cannot:
     owner : Owner
         The part that is the cause: adapter, engine, or the engine's model.
     reason : str
-        One sentence about the scene.
+        One sentence about the scene, cut after LONGEST_TEXT characters.
     """
 
     owner: Owner
     reason: str
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "reason", shortened(self.reason))
+
     def __str__(self) -> str:
         return f"{self.reason} ({self.owner.value})"
+
+
+def shortened(text: object) -> str:
+    """Return an engine's text, cut after LONGEST_TEXT characters with a note of its length."""
+    whole = str(text)
+    if len(whole) <= LONGEST_TEXT:
+        return whole
+    return f"{whole[:LONGEST_TEXT]} … ({len(whole)} characters)"
 
 
 @dataclass(frozen=True)

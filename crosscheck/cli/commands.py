@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
-import signal
-import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
@@ -33,6 +29,7 @@ from crosscheck.cli.running import (
     standard_output_kept,
     studied,
 )
+from crosscheck.processes.program import run_program
 from crosscheck.study.grid import Record, key
 from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
@@ -150,29 +147,9 @@ def _paper(arguments: argparse.Namespace) -> int:
 
 
 def _rendered(options: Sequence[str]) -> int:
-    """Run `python -m reports` as a program. This package must not import `reports`, which depends on it.
-
-    The program has a process group of its own, so that it gets each interrupt once, from here.
-    """
-    command = [sys.executable, "-m", "reports", *options]
-    with subprocess.Popen(command, process_group=0) as program, passed_on(program):
-        status = program.wait()
+    """Run `reports` as a program. This package must not import `reports`, which depends on it."""
+    status = run_program("reports", options)
     return status if status >= 0 else KILLED - status
-
-
-@contextlib.contextmanager
-def passed_on(program: subprocess.Popen[Any]) -> Iterator[None]:
-    """Pass SIGINT and SIGTERM on to a program during the ``with`` block, unless this process ignores them."""
-    before = {
-        number: signal.signal(number, lambda received, _: program.send_signal(received))
-        for number in (signal.SIGINT, signal.SIGTERM)
-        if signal.getsignal(number) is not signal.SIG_IGN
-    }
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:

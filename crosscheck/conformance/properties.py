@@ -39,6 +39,7 @@ from crosscheck.judge.tolerances import (
     STAYS_CLOSED,
     UNIT_NORM,
 )
+from crosscheck.refusals import shortened
 from mbref import rotations
 from mbref.scene import Moment, Scene, SceneError
 from mbref.trajectory import Outcome, Trajectory
@@ -205,7 +206,7 @@ def silence(bench: Bench) -> Finding:
     if seen.printed or seen.files:  # allowed if it happens once on a machine
         seen = bench.observed(bench.scene, bench.times, bench.settings[-1])
     said = seen.printed.strip().splitlines()
-    remark = "; ".join([*(f"printed {line!r}" for line in said[:1]), *seen.files[:3]])
+    remark = "; ".join([*(f"printed {shortened(line)!r}" for line in said[:1]), *seen.files[:3]])
     return Finding(float(len(said) + len(seen.files)), 0.0, remark)
 
 

@@ -19,6 +19,7 @@ from crosscheck.engine import Cannot, Engine, Setting, engine
 from crosscheck.processes import serve
 from crosscheck.processes.answer import answered
 from crosscheck.processes.pool import ChildFailed, Observation, ask, observe, run_isolated
+from crosscheck.refusals import shortened
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
@@ -61,7 +62,7 @@ def answering() -> Iterator[None]:
     except ImportError:
         raise
     except Exception as error:
-        raise ChildFailed(Outcome.CRASHED, f"{type(error).__name__}: {error}") from error
+        raise ChildFailed(Outcome.CRASHED, shortened(f"{type(error).__name__}: {error}")) from error
 
 
 @dataclass(frozen=True)
@@ -169,5 +170,5 @@ class InProcess:
                 f"no result after {self.time_limit + self.engine.compile_seconds:g} s",
             )
         except Exception as error:
-            outcome, words = Outcome.CRASHED, f"{type(error).__name__}: {error}"
+            outcome, words = Outcome.CRASHED, shortened(f"{type(error).__name__}: {error}")
         return serve.failed(self.name, self.engine.version(), scene, setting, outcome, words)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Engine, Setting
+from crosscheck.refusals import shortened
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -55,11 +56,12 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
     }
     if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=2) - 1) > UNIT_TOLERANCE):
         raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
-    texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method", "message")}
+    texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method")}
     return replace(
         answer,
         **plain,
         **texts,
+        message=shortened(answer.message),
         times=reached,
         bodies=tuple(answer.bodies),
         settings=_settings(answer.settings),

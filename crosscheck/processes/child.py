@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 
 import psutil
 
-from crosscheck.processes import fork_server
+from crosscheck.processes import fork_server, serve
 from crosscheck.processes.fork_server import Forked
 from mbref.trajectory import Outcome
 
@@ -33,6 +33,7 @@ INTERVAL = 0.2  # s, between two readings of a child's CPU time
 LOADED = 10.0  # largest wall time of a call on a busy machine / its limit of CPU time
 ORPHAN_SECONDS = 10.0  # s after which a child ends itself if its parent has died
 ENDING_SECONDS = 10.0  # s in which a child without connection must end by itself
+WAKING_SECONDS = 10.0  # s in which a waiting child must answer a greeting, on a loaded machine
 TAIL = 4000  # last bytes of the output, searched for the last printed line
 PRINTED = 200  # characters of the last printed line that a message quotes
 
@@ -74,6 +75,14 @@ class Child:
     def is_alive(self) -> bool:
         """Return whether the process is running."""
         return self._process.poll() is None
+
+    def answers(self) -> bool:
+        """Return whether the waiting child answers a greeting; a child that was killed meanwhile does not."""
+        try:
+            self._channel.send(serve.GREETING)
+            return self._channel.poll(WAKING_SECONDS) and self._channel.recv_bytes() == b""
+        except (EOFError, OSError):
+            return False
 
     def call(
         self, function: Function, arguments: Arguments, time_limit: float, in_copy: bool = False

@@ -195,20 +195,22 @@ def _keep(channel: int, printed: int, news: int) -> None:
 
 
 def _status(worker: int, news: int) -> int:
-    """Wait for the worker and return its status; a worker whose parent has ended is killed, with its child
-    processes, unless it ends by itself within a second.
+    """Wait for the worker, kill the processes that it leaves behind, and return its status.
 
-    The parent has ended if no process reads ``news``.
+    A worker whose parent has ended is killed unless it ends by itself within a second. The parent has ended
+    if no process reads ``news``.
     """
     reader = select.poll()
     reader.register(news, 0)
-    while not (ended := os.waitpid(worker, os.WNOHANG))[0]:
+    # the ended worker stays a zombie for now, so that no other process gets its number
+    while not os.waitid(os.P_PID, worker, os.WEXITED | os.WNOHANG | os.WNOWAIT):
         has_parent = not reader.poll(0)
         signal.sigtimedwait({signal.SIGCHLD}, ENDING_SECONDS)
         if not has_parent:
-            with contextlib.suppress(ProcessLookupError):  # the worker has ended
-                os.killpg(worker, signal.SIGKILL)
-    return ended[1]
+            os.kill(worker, signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError):  # the worker has ended before it had a group
+        os.killpg(worker, signal.SIGKILL)
+    return os.waitpid(worker, 0)[1]
 
 
 if __name__ == "__main__":

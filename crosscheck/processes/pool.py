@@ -251,9 +251,17 @@ def _in_use(engine_name: str, instead: str = NO_ENGINE) -> Iterator[Child]:
 
 
 def _idle_child(engine_name: str) -> Child | None:
-    """Return the engine's latest idle child, which is then in use; None if there is none."""
+    """Return the engine's latest idle child that answers, which is then in use; None if there is none."""
+    while child := _taken(engine_name):
+        if child.answers():
+            return child
+        child.close()  # it was killed while it waited
+    return None
+
+
+def _taken(engine_name: str) -> Child | None:
     with _lending:
-        known = [entry for entry in _idle if entry[0] == engine_name and entry[1].is_alive]
+        known = [entry for entry in _idle if entry[0] == engine_name]
         if not known:
             return None
         _idle.remove(known[-1])

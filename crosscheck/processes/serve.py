@@ -3,7 +3,8 @@ connection.
 
 ``python -m crosscheck.processes.serve`` has the channel to its parent as standard input.  The parent sends
 (directory, seconds after which the child ends itself if the parent has died, function, arguments, whether a
-copy of the child calls the function). The child answers (True, value) or (False, sentence).
+copy of the child calls the function). The child answers (True, value) or (False, sentence). It answers
+GREETING by no bytes, which shows the parent that it is alive.
 """
 
 from __future__ import annotations
@@ -25,11 +26,13 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.processes.answer import answered
+from crosscheck.refusals import shortened
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]
+GREETING = None
 
 
 def get_ready(engine_name: str, families: Sequence[str]) -> tuple[str, float]:
@@ -145,9 +148,13 @@ def main() -> None:
         os.dup2(nothing.fileno(), 0)
     while True:
         try:
-            folder, last_resort, function, arguments, in_copy = channel.recv()
+            job = channel.recv()
         except EOFError:
             return
+        if job is GREETING:
+            channel.send_bytes(b"")
+            continue
+        folder, last_resort, function, arguments, in_copy = job
         os.chdir(folder)
         called = _answer_of_copy if in_copy else _answer_within
         channel.send_bytes(called(last_resort, function, arguments))
@@ -189,7 +196,7 @@ def _answer(function: Callable[..., Any], arguments: tuple[Any, ...]) -> bytes:
         with warnings.catch_warnings():  # reset the filter, so that each call warns again
             return pickle.dumps((True, function(*arguments)))
     except Exception as error:  # the parent turns the message into an Outcome
-        return pickle.dumps((False, traceback.format_exception_only(error)[-1].strip()))
+        return pickle.dumps((False, shortened(traceback.format_exception_only(error)[-1].strip())))
     finally:
         sys.stdout.flush()
         sys.stderr.flush()

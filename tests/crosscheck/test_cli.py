@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
 import shlex
-import signal
-import subprocess
-import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -557,47 +553,6 @@ def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
     sentences: list[str] = []
     assert timed([case], [record], 5, sentences.append) == [record]
     assert len(sentences) == 1 and "SIGSEGV" in sentences[0], sentences
-
-
-def test_report_command_and_the_program_it_starts(monkeypatch):
-    started = []
-    monkeypatch.setattr(signal, "getsignal", lambda number: signal.SIG_DFL)  # also where a shell ignores it
-
-    class Program(contextlib.nullcontext):
-        def __init__(self, command: list[str], process_group: int) -> None:
-            assert process_group == 0, "the terminal interrupts this process alone"
-            self.command = command
-
-        def __enter__(self):
-            return self
-
-        def send_signal(self, number: int) -> None:
-            started.append(number)
-
-        def wait(self) -> int:
-            started.append(self.command)
-            signal.raise_signal(signal.SIGINT)
-            return 130
-
-    monkeypatch.setattr(subprocess, "Popen", Program)
-    assert (
-        main(["report", "my.toml", "--engine", "casadi", "--quick", "--out", "x", "--section", "speed"])
-        == 130
-    )
-    asked = [
-        "my.toml",
-        "--out",
-        "x",
-        "--engine",
-        "casadi",
-        "--depth",
-        "quick",
-        "--reference-time",
-        "20",
-        "--section",
-        "speed",
-    ]
-    assert started == [[sys.executable, "-m", "reports", *asked], signal.SIGINT], started
 
 
 def test_cost_fields_and_the_trajectory_s():

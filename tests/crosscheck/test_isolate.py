@@ -12,12 +12,10 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-from crosscheck.cli.commands import passed_on
 from crosscheck.conformance.runners import InProcess
 from crosscheck.engine import Setting
 from crosscheck.processes import fork_server
@@ -237,16 +235,6 @@ def test_engines_do_not_share_a_process(tmp_path: Path):
     assert first == again, "the child of the first engine did not wait for it"
 
 
-def test_child_that_died_while_it_waited_is_replaced(tmp_path: Path):
-    log = tmp_path / "log"
-    for _ in range(2):
-        ended = run("RECORDER", still(str(log)))
-        assert ended.outcome is Outcome.COMPLETED, ended.message
-        pid = int(log.read_text().splitlines()[-1].split()[1])
-        os.kill(pid, signal.SIGKILL)
-        assert gone(pid)
-
-
 def test_no_child_outlives_its_parent(tmp_path: Path):
     """Neither one that waits after the parent's normal end, nor one whose parent is killed."""
     log = tmp_path / "log"
@@ -373,26 +361,3 @@ def test_an_interrupt_ends_the_calls_of_threads(tmp_path: Path):
             raise KeyboardInterrupt
         assert calls[0].result(timeout=0).message == "the process was ended by SIGKILL"
         assert calls[1].cancelled()
-
-
-WAITING = (
-    "import signal, time; signal.signal(signal.SIGINT, signal.SIG_DFL); print('begun', flush=True); "
-    "time.sleep(60)"
-)
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("handler", [signal.SIG_DFL, signal.SIG_IGN])
-def test_signals_are_passed_on_to_a_program_unless_they_are_ignored(handler: Any, number: signal.Signals):
-    command, before = [sys.executable, "-S", "-c", WAITING], signal.signal(number, handler)
-    try:
-        with subprocess.Popen(command, stdout=subprocess.PIPE, process_group=0) as program:
-            with passed_on(program):
-                assert program.stdout is not None and program.stdout.readline() == b"begun\n"
-                signal.raise_signal(number)
-                if handler is signal.SIG_IGN:
-                    program.kill()
-                assert program.wait() == -(signal.SIGKILL if handler is signal.SIG_IGN else number)
-            assert signal.getsignal(number) is handler
-    finally:
-        signal.signal(number, before)

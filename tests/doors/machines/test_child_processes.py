@@ -1,0 +1,133 @@
+"""Child processes: one that was killed while it waited is replaced, and none outlives its parent."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.processes.pool import end_idle, run_isolated
+from mbref.trajectory import Outcome
+from tests.helpers.still_engines import resting
+
+ENGINES = "tests.helpers.still_engines"
+ROOT = Path(__file__).parents[3]
+PATIENCE = 60.0  # s in which a killed process disappears on a loaded machine
+RUN = """
+import sys
+from crosscheck.engine import Setting
+from crosscheck.processes.pool import run_isolated
+from tests.helpers.still_engines import resting
+run_isolated(sys.argv[1], resting(), [0.0, 1.0], Setting("plain", {}), 60.0)
+sys.stdin.read()
+"""
+PROGRAM = """
+import sys
+from crosscheck.processes.program import run_program
+sys.exit(run_program("waiting_module", sys.argv[1:]))
+"""
+WAITING = """
+import os, signal, subprocess, sys, time
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+started = subprocess.Popen([sys.executable, "-S", "-c", "import time; time.sleep(60)"])
+print(os.getpid(), started.pid, *sys.argv[1:], flush=True)
+time.sleep(60)
+"""
+
+
+@pytest.fixture
+def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """File to which engines append the numbers of their processes."""
+    monkeypatch.setenv("STILL_LOG", str(tmp_path / "log"))
+    return tmp_path / "log"
+
+
+def is_gone(process: int) -> bool:
+    """Return whether a process ends within PATIENCE."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        status = Path(f"/proc/{process}/stat")
+        if not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] == "Z":
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def numbers_in(log: Path) -> list[int]:
+    """Return the process numbers of the log's last line, waiting for it."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if log.exists() and (text := log.read_text()).endswith("\n"):
+            return [int(number) for number in text.splitlines()[-1].split()]
+        time.sleep(0.02)
+    raise AssertionError(f"nothing was written to {log}")
+
+
+def test_child_that_is_killed_while_it_waits_is_replaced(log: Path):
+    end_idle()
+    for _ in range(5):
+        run = run_isolated(f"{ENGINES}:LOGGED", resting(), np.array([0.0, 1.0]), Setting("plain", {}), 60.0)
+        assert run.outcome is Outcome.COMPLETED, run.message
+        os.kill(numbers_in(log)[-1], signal.SIGKILL)  # the next run begins before or after its end
+    assert len(set(log.read_text().split())) == 5
+    end_idle()
+
+
+@pytest.mark.parametrize("engine", ["LEAVES_A_PROGRAM", "WAITS_WITH_A_PROGRAM"])
+def test_programs_that_an_engine_started_end_with_the_parent(engine: str, log: Path):
+    command = [sys.executable, "-c", RUN, f"{ENGINES}:{engine}"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT) as parent:
+        processes = numbers_in(log)
+        parent.kill()
+    assert all(map(is_gone, processes)), processes
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_program_ends_with_its_parent(number: signal.Signals, tmp_path: Path):
+    (tmp_path / "waiting_module.py").write_text(WAITING)
+    environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
+    command = [sys.executable, "-c", PROGRAM, "--option"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment, cwd=tmp_path) as parent:
+        assert parent.stdout is not None
+        program, started, *options = parent.stdout.readline().split()
+        parent.send_signal(number)
+        status = parent.wait()
+    assert is_gone(int(program)), "the program outlives its parent"
+    assert options == [b"--option"]
+    if number is signal.SIGKILL:
+        assert is_gone(int(started)), "a process of the program outlives the parent"
+    else:
+        assert status == 256 - number, "the status is not the program's"
+        os.kill(int(started), signal.SIGKILL)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["report", "compare"])
+def test_command_that_is_killed_leaves_no_process(command: str, log: Path, tmp_path: Path):
+    options = ["--out", str(tmp_path / "out")] if command == "report" else []
+    resting().save(tmp_path / "resting.toml")
+    asked = [command, str(tmp_path / "resting.toml"), "--engine", f"{ENGINES}:WAITS_WITH_A_PROGRAM", *options]
+    with subprocess.Popen([sys.executable, "-m", "crosscheck", *asked], cwd=ROOT) as parent:
+        numbers_in(log)
+        assert len(logging_to(log)) > 2
+        parent.kill()
+    assert all(map(is_gone, logging_to(log)))
+
+
+def logging_to(log: Path) -> list[int]:
+    """Return the numbers of the processes, except this one, whose environment names the log."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            if f"STILL_LOG={log}".encode() in (folder / "environ").read_bytes():
+                found.append(int(folder.name))
+        except OSError:  # another user's process, or one that has just ended
+            continue
+    return found
