@@ -1,0 +1,1 @@
+"""Tests through doors: the public interface, command lines and files; each states a truth about an output."""

@@ -1,0 +1,1 @@
+"""Motions of mbref against exact motions and balances."""

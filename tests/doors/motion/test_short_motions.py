@@ -1,0 +1,74 @@
+"""Short motions of every joint, load, driver and coupling against exact states, by the default method."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from tests.helpers.errors import pose_error, rate_error
+from tests.helpers.exact_motions import stored
+from tests.helpers.newton_euler import unbalanced
+from tests.helpers.short_motions import CROSSED, MOTIONS, times_of
+
+ROUNDING = 2.2e-16
+STEPS = 1050  # of all motions together; 970 when the catalogue was made: more mean that steps became shorter
+
+
+def tolerance(steps: int) -> float:
+    """Return the error that rounding of so many steps explains, with a margin of 20 for each of them."""
+    return 20 * ROUNDING * (20 + steps)
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_motion_has_the_exact_states(name):
+    scene = MOTIONS[name]()
+    found = mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
+    assert found.outcome.name == "COMPLETED", found.message
+    _, crossings = CROSSED.get(name, (0, None))
+    sharp = 1.0 if crossings is None else 100.0  # a singular position magnifies rounding
+    limit = sharp * tolerance(found.cost.steps)
+    exact = stored()[name]
+    assert pose_error(found, exact) < limit
+    assert rate_error(found, exact) < 10 * limit
+    assert found.violation.position.max() < 10 * limit
+    if crossings is not None:
+        assert len(found.crossings) == crossings
+
+
+@pytest.mark.parametrize("name", MOTIONS)
+def test_accelerations_are_the_rates_of_velocities(name):
+    """A central difference of velocities, which the samples give, has the accelerations to its own order."""
+    scene = MOTIONS[name]()
+    middle, apart = 0.43 * scene.duration, 1e-4 * scene.duration
+    run = mbref.simulate(scene, "taylor", times=[middle - apart, middle, middle + apart], rtol=1e-12)
+    for rate, acceleration in (
+        (run.velocity, run.acceleration),
+        (run.angular_velocity, run.angular_acceleration),
+    ):
+        slope = (rate[2] - rate[0]) / (2 * apart)
+        assert acceleration is not None
+        curvature = np.abs(acceleration[2] - acceleration[0]).max()
+        scale = np.abs(acceleration).max() + np.abs(rate).max() / scene.duration
+        assert np.abs(slope - acceleration[1]).max() <= 1e-4 * scale + 0.01 * curvature
+
+
+BARE = [
+    name
+    for name, make in MOTIONS.items()
+    if not ((scene := make()).load or scene.coupling or any(joint.reflected_inertia for joint in scene.joint))
+]
+
+
+@pytest.mark.parametrize("name", BARE)
+def test_reactions_and_gravity_move_every_body(name):
+    """Newton's and Euler's equations of each body, for mechanisms without loads, couplings and armatures."""
+    scene = MOTIONS[name]()
+    run = mbref.simulate(scene, "taylor", times=times_of(scene), rtol=1e-12)
+    force, moment = unbalanced(scene, run)
+    assert max(force, moment) < 1e-9
+
+
+def test_all_motions_together_take_few_steps():
+    runs = [mbref.simulate(s := make(), "taylor", times=times_of(s), rtol=1e-12) for make in MOTIONS.values()]
+    assert sum(run.cost.steps for run in runs) < STEPS

@@ -1,0 +1,55 @@
+"""Exact poses of the short motions, by the judge: python -m tests.helpers.exact_motions writes them anew."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.judge.truth import truth_for
+from mbref.scene import Scene
+from tests.helpers.short_motions import MOTIONS, times_of
+
+STORED = Path(__file__).parents[1] / "doors" / "motion" / "exact_motions.json"
+SECONDS = 60.0  # CPU time that a reference may take
+
+
+def exact(scene: Scene) -> dict[str, Any]:
+    """Return the judge's states at the sample times, and its bound on their errors."""
+    truth = truth_for(scene, reference_time=SECONDS)
+    assert truth is not None
+    found = truth.poses(times_of(scene))
+    states = {
+        name: np.asarray(getattr(found, name)).tolist()
+        for name in ("position", "orientation", "velocity", "angular_velocity")
+    }
+    return {"by": truth.name, "bound": truth.accuracy, **states}
+
+
+@functools.cache
+def stored() -> dict[str, dict[str, Any]]:
+    """Return the stored exact states of all short motions by name."""
+    return json.loads(STORED.read_text())
+
+
+def main() -> None:
+    """Compute the motions that are named, or those that are not stored yet; store them."""
+    known = dict(stored()) if STORED.exists() else {}
+    for name in sys.argv[1:] or [n for n in MOTIONS if n not in known]:
+        known[name] = exact(MOTIONS[name]())
+        print(f"{name}: {known[name]['by']}, bound {known[name]['bound']:.1e}", flush=True)
+        STORED.write_text(
+            "{\n"
+            + ",\n".join(
+                f"{json.dumps(k)}: {json.dumps(v)}" for k, v in sorted(known.items()) if k in MOTIONS
+            )
+            + "\n}\n"
+        )
+
+
+if __name__ == "__main__":
+    main()
