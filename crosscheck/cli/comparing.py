@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.comparison import WIDTH, comparisons
-from crosscheck.cli.request import Choice, RequestError
+from crosscheck.cli.request import Choice
 from crosscheck.cli.running import COMPLETED, OTHERWISE, asked_of, console, missing_truths, notice, print_json
 from crosscheck.engine import engine
 from crosscheck.study import sweep
@@ -19,7 +19,7 @@ from crosscheck.study.grid import study
 from crosscheck.study.ladder import families
 from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
-from crosscheck.study.timings import REPEATS, with_timings
+from crosscheck.study.timings import with_timings
 from crosscheck.study.tuning import by_closure, by_error, tuned
 from mbref.formats import import_options
 
@@ -27,8 +27,6 @@ from mbref.formats import import_options
 def compare(arguments: argparse.Namespace) -> int:
     """Print a verdict, tables and a plot for each scene, or the records with the verdict as JSON; returns 1
     if engines simulate different mechanisms."""
-    if arguments.repeats < REPEATS:
-        raise RequestError(f"--repeats: must be at least {REPEATS}, got {arguments.repeats}")
     asked = asked_of(arguments, sweep.QUICK_SAMPLES)
     wanted = Wanted(
         asked.times,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,12 @@ from mbref.command_line import output_file, output_folder
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
+MOST_SECONDS = 1e7  # s, about four months: ten times as much is still a time that the system can wait
+MOST_SAMPLES = 1_000_000  # of one run; `request.MOST_STATES` limits samples times bodies
+MOST_REPEATS = 1000
+MOST_MECHANISMS = 100_000  # their verdicts need about 20 kB each
+MOST_SEED = 10**12
+MOST_STARTS = 10_000
 DIGITS = f"{FEWEST_DIGITS} to {MOST_DIGITS}"  # allowed values of --digits
 
 
@@ -55,13 +62,20 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     add_depth(parser)
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
-    when.add_argument("--samples", type=int, metavar="N", help="equally spaced samples, both ends included")
+    add_samples(when)
     parser.add_argument(
         "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser, None)
     add_reading(parser)
+
+
+def add_samples(group: Any, default: int | None = None) -> None:
+    """Add the option ``--samples`` to a parser or a group of its options."""
+    about = f"equally spaced samples, both ends included (2 to {MOST_SAMPLES})"
+    about += "" if default is None else f"; default: {default}"
+    group.add_argument("--samples", type=whole(2, MOST_SAMPLES), default=default, metavar="N", help=about)
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
@@ -123,6 +137,19 @@ def not_negative(text: str) -> float:
     return number
 
 
+def seconds(text: str) -> float:
+    """Parse a CPU time (s) from 0 to MOST_SECONDS."""
+    number = _number(text)
+    if not 0 <= number <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"must be from 0 to {MOST_SECONDS:g} s, got {text}")
+    return number
+
+
+def time_limit(text: str) -> float:
+    """Parse a positive CPU time (s) up to MOST_SECONDS."""
+    return seconds(repr(positive(text)))
+
+
 def numbers(text: str) -> list[float]:
     """Parse numbers separated by commas."""
     try:
@@ -131,17 +158,17 @@ def numbers(text: str) -> list[float]:
         raise argparse.ArgumentTypeError(f"must be numbers separated by commas, got {text!r}") from None
 
 
-def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_LIMIT) -> None:
-    """Add the time limits of a run and of a reference, and the option ``--json``. Without ``time_limit`` (s)
-    the limit depends on the depth."""
-    default = f"{time_limit:g}" if time_limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} otherwise"
+def add_limits(parser: argparse.ArgumentParser, limit: float | None = TIME_LIMIT) -> None:
+    """Add the time limits of a run and of a reference, and the option ``--json``. Without a ``limit`` (s) of
+    a run, the limit depends on the depth."""
+    default = f"{limit:g}" if limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} otherwise"
     parser.add_argument(
         "--time-limit",
-        type=positive,
-        default=time_limit,
+        type=time_limit,
+        default=limit,
         metavar="T",
-        help="limit of a run: CPU seconds, and also seconds of waiting without computing; default: "
-        f"{default}",
+        help="limit of a run: CPU seconds, and also seconds of waiting without computing; at most "
+        f"{MOST_SECONDS:g}; default: {default}",
     )
     add_reference_time(parser)
     parser.add_argument("--json", action="store_true", help="print records as JSON on standard output")
@@ -150,14 +177,20 @@ def add_limits(parser: argparse.ArgumentParser, time_limit: float | None = TIME_
 def add_reference_time(parser: argparse.ArgumentParser) -> None:
     """Add the option for the CPU time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
-    parser.add_argument("--reference-time", type=not_negative, default=SECONDS, metavar="T", help=about)
+    parser.add_argument("--reference-time", type=seconds, default=SECONDS, metavar="T", help=about)
 
 
-def whole(text: str) -> int:
-    """Parse a positive whole number."""
-    if not text.isdecimal() or not int(text):
-        raise argparse.ArgumentTypeError(f"must be a positive whole number, got {text}")
-    return int(text)
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers from ``least`` to ``most``."""
+
+    def number(text: str) -> int:
+        # more digits than the limit has are not converted: their conversion takes long
+        is_number = text.isdecimal() and len(text) <= len(str(most))
+        if not (is_number and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}, got {text:.40}")
+        return int(text)
+
+    return number
 
 
 def digits(text: str) -> int:

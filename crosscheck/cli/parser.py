@@ -9,12 +9,17 @@ from typing import Any
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
     DIGITS,
+    MOST_MECHANISMS,
+    MOST_REPEATS,
+    MOST_SEED,
+    MOST_STARTS,
     add_depth,
     add_engines,
     add_folder,
     add_limits,
     add_reading,
     add_reference_time,
+    add_samples,
     add_selection,
     add_stored_runs,
     digits,
@@ -96,7 +101,7 @@ def _add_certify(commands: Commands) -> None:
     parser = _add(commands, "certify", about, example)
     parser.add_argument("scene", metavar="SCENE", help="a built-in name, a .toml file, or random_N")
     parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
-    parser.add_argument("--samples", type=int, default=3, metavar="N", help="from 0 to the end (default: 3)")
+    add_samples(parser, 3)
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     parser.add_argument("--out", type=output_file, metavar="FILE", help="default: standard output")
 
@@ -147,7 +152,7 @@ def _add_reference(commands: Commands) -> None:
     parser.add_argument("--out", required=True, type=output_file, metavar="FILE", help="the .csv file")
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
-    when.add_argument("--samples", type=int, default=101, metavar="N", help="equally spaced (default: 101)")
+    add_samples(when, 101)
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_reference_time(parser)
 
@@ -170,7 +175,11 @@ def _add_compare(commands: Commands) -> None:
     parser = _add(commands, "compare", about, example)
     add_selection(parser)
     parser.add_argument(
-        "--repeats", type=int, default=REPEATS, help=f"timed runs of every setting, at least {REPEATS}"
+        "--repeats",
+        type=whole(REPEATS, MOST_REPEATS),
+        default=REPEATS,
+        metavar="N",
+        help=f"timed runs of every setting ({REPEATS} to {MOST_REPEATS}; default: %(default)s)",
     )
 
 
@@ -218,9 +227,14 @@ def _add_verify(commands: Commands) -> None:
         "checks on random mechanisms instead of scenes; all runs are in this process"
     )
     drawn.add_argument(
-        "--mechanisms", type=whole, metavar="N", help="make every check on N random mechanisms"
+        "--mechanisms",
+        type=whole(1, MOST_MECHANISMS),
+        metavar="N",
+        help=f"make every check on N random mechanisms (1 to {MOST_MECHANISMS})",
     )
-    drawn.add_argument("--first-seed", type=int, default=0, metavar="S", help="default: 0")
+    drawn.add_argument(
+        "--first-seed", type=whole(0, MOST_SEED), default=0, metavar="S", help="default: %(default)s"
+    )
     drawn.add_argument("--records", type=output_file, metavar="FILE", help="store and reuse verdicts there")
     drawn.add_argument(
         "--beside",
@@ -270,7 +284,11 @@ def _add_modes(commands: Commands) -> None:
         "--engine", action="append", metavar="E", help="ask this engine only; may repeat; default: installed"
     )
     parser.add_argument(
-        "--starts", type=whole, default=16, metavar="N", help="poses to search from (default: %(default)s)"
+        "--starts",
+        type=whole(1, MOST_STARTS),
+        default=16,
+        metavar="N",
+        help=f"poses to search from (1 to {MOST_STARTS}; default: %(default)s)",
     )
     parser.add_argument("--run", action="store_true", help="measure the stored table again, or engines of it")
     parser.add_argument("--page", type=output_file, metavar="FILE", help="also write the table in Markdown")

@@ -22,6 +22,7 @@ from mbref.scene import Scene
 from mbref.scene_fields import meant
 
 SAMPLES = 101
+MOST_STATES = 5_000_000  # states of a body that all runs of a command keep: they need about 1 kB each
 
 
 def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
@@ -103,12 +104,15 @@ def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None)
 
 def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> np.ndarray:
     """Return the given sample times (k,) in s, or ``samples`` equally spaced ones over the scene's duration.
-    Raises RequestError if they are not finite, negative or not increasing."""
+    Raises RequestError if they are not finite, negative or not increasing, or too many for the scene."""
     if times is not None:
         _check_times(times)
         return np.array(times)
-    if samples < 2:
-        raise RequestError(f"--samples: must be at least 2, got {samples}")
+    most = max(MOST_STATES // len(scene.body), 2)
+    if samples > most:
+        raise RequestError(
+            f"--samples: at most {most} for the {len(scene.body)} bodies of {scene.name}, got {samples}"
+        )
     return np.linspace(0.0, scene.duration, samples)
 
 
@@ -156,10 +160,22 @@ def plan(
 ) -> list[Case]:  # fmt: skip
     """Return the runs of every scene in every engine that can simulate it, with the selected settings.
     ``times`` has one array (k,) for each scene. An engine that cannot run a scene is left out with a
-    ``notice``. Raises RequestError for families that no engine has, and with the engines' reasons if no run
-    is left."""
-    if not time_limit > 0:
-        raise RequestError(f"--time-limit: must be positive, got {time_limit:g}")
+    ``notice``. Raises RequestError for families that no engine has, with the engines' reasons if no run is
+    left, and for more than MOST_STATES states."""
+    cases = _planned(scenes, engines, chosen, times, time_limit, notice)
+    states = sum(len(case.times) * len(case.scene.body) for case in cases)
+    if states > MOST_STATES:
+        raise RequestError(
+            f"--samples: {len(cases)} runs would keep {states} states of bodies, at most {MOST_STATES} are "
+            "allowed: ask for fewer samples, engines (--engine) or settings (--setting)"
+        )
+    return cases
+
+
+def _planned(
+    scenes: Sequence[Scene], engines: Sequence[str], chosen: Choice, times: Sequence[np.ndarray],
+    time_limit: float, notice: Notice,
+) -> list[Case]:  # fmt: skip
     if chosen.setting is not None:
         return _single(scenes, engines[0], chosen.setting, times, time_limit)
     cases = _able(scenes, engines, times, time_limit, notice)

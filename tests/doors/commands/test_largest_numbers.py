@@ -1,0 +1,62 @@
+"""Numbers beyond the ends of an option are refused before anything is built, with the largest value."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.cli import main
+
+HUGE = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
+COUNTS = {
+    ("run", "four_bar", "--samples"): "from 2 to 1000000",
+    ("compare", "four_bar", "--samples"): "from 2 to 1000000",
+    ("compare", "four_bar", "--repeats"): "from 5 to 1000",
+    ("certify", "four_bar", "--samples"): "from 2 to 1000000",
+    ("reference", "four_bar", "--out", "new.csv", "--samples"): "from 2 to 1000000",
+    ("verify", "mbref", "--mechanisms"): "from 1 to 100000",
+    ("verify", "mbref", "--first-seed"): "from 0 to 1000000000000",
+    ("modes", "four_bar", "--starts"): "from 1 to 10000",
+}
+TIMES = [
+    (command, "four_bar", option)
+    for command, option in (
+        ("run", "--time-limit"),
+        ("compare", "--time-limit"),
+        ("report", "--reference-time"),
+        ("compare", "--reference-time"),
+    )
+]
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *command: str) -> str:
+    """Return the message with which a command line is refused, with exit status 2."""
+    try:
+        status: object = main(command)
+    except SystemExit as end:
+        status = end.code
+    assert status == 2, command
+    return capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", HUGE, ids=lambda text: f"{text[:6]} ({len(text)})")
+@pytest.mark.parametrize("command", COUNTS, ids=" ".join)
+def test_count_beyond_its_ends_is_refused(command: tuple[str, ...], text: str, capsys):
+    said = refusal(capsys, *command, text)
+    assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
+    assert len(said.splitlines()[-1]) < 200
+
+
+@pytest.mark.parametrize("text", ["1e30", "99999999999999999999", "1.1e7", "inf", "nan", "-1"])
+@pytest.mark.parametrize("command", TIMES, ids=" ".join)
+def test_time_beyond_what_the_system_can_wait_is_refused(command: tuple[str, ...], text: str, capsys):
+    said = refusal(capsys, *command, text)
+    assert f"{command[-1]}: must be" in said
+    if text[0].isdecimal():
+        assert "1e+07 s" in said, "the largest value is not stated"
+
+
+def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):
+    out = tmp_path / "ref.csv"
+    said = refusal(capsys, "reference", "four_bar_chain[20]", "--out", str(out), "--samples", "1000000")
+    assert "--samples: at most " in said and "bodies of" in said
+    assert not out.exists()
