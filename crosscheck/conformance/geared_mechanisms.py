@@ -51,10 +51,11 @@ def _moving(scene: Scene, rng: np.random.Generator) -> Scene | None:
     units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
     _, sizes, vt = np.linalg.svd(rows * units)
-    free = vt[rank_of(sizes) :].T
-    if not free.shape[1]:
+    free = vt[rank_of(sizes) :]
+    if not len(free):
         return None
-    twists = (units * (free @ rng.normal(size=free.shape[1]))).reshape(-1, 6)
+    # the projector is unique; a basis of the null space depends on rounding
+    twists = (units * (free.T @ (free @ rng.normal(size=len(units))))).reshape(-1, 6)
     bodies = [
         body.model_copy(update={"velocity": triple(x[:3]), "angular_velocity": triple(x[3:])})
         for body, x in zip(scene.body, twists, strict=True)

@@ -17,6 +17,7 @@ import numpy as np
 from mbref.equations.model import Model
 from mbref.equations.units import row_lengths
 from mbref.input_error import InputError
+from mbref.linear_algebra.least_norm import unique_basis
 
 SMOOTH = 1  # number of the smooth branch, which is taken unless another is requested
 MOST_BRANCHED_ROWS = 120  # constraint rows; for more, the analysis takes longer than the run
@@ -163,7 +164,8 @@ def second_order(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> Second
     first = np.column_stack([at_rest.jacobian, -at_rest.nu]) * scale / rows[:, None]
     left, values, right = np.linalg.svd(first if driven else first[:, :-1])
     rank = int(np.sum(values > RANK * values.max(initial=0.0)))
-    kernel = right[rank:].T if driven else np.vstack([right[rank:].T, np.zeros(len(right) - rank)])
+    kernel = unique_basis(right[rank:].T)  # so that the branches' order does not depend on rounding
+    kernel = kernel if driven else np.vstack([kernel, np.zeros(kernel.shape[1])])
     null = left[:, rank:].T / rows
     return SecondOrder(kernel, _independent(_forms(model, t, q, kernel * scale[:, None], null)), scale)
 
@@ -239,6 +241,8 @@ def _roots(form: np.ndarray) -> list[np.ndarray]:
     weights = (1.0, tangent) if tangent is not None else (np.sqrt(max(0.0, -values[1] / values[0])), 1.0)
     lines = [axes @ (np.array([weights[0], sign * weights[1]])) for sign in (1.0, -1.0)]
     lines = [a / np.linalg.norm(a) for a in lines]
+    # axes and their order have no fixed sign
+    lines.sort(key=lambda a: float(np.arctan2(a[1], a[0]) % np.pi))
     return lines[:1] if _angle(*lines) < SAME else lines
 
 

@@ -24,8 +24,20 @@ def least_norm_and_null_space(
 
 
 def null_space(matrix: np.ndarray, tolerance: float) -> np.ndarray:
-    """Return an orthonormal basis (n, k) of the null space of A (m, n)."""
-    return least_norm_and_null_space(matrix, np.zeros(len(matrix)), tolerance)[1]
+    """Return the orthonormal basis (n, k) of the null space of A (m, n) that ``unique_basis`` chooses."""
+    return unique_basis(least_norm_and_null_space(matrix, np.zeros(len(matrix)), tolerance)[1])
+
+
+def unique_basis(basis: np.ndarray) -> np.ndarray:
+    """Return the basis B Q (n, k) of the space of an orthonormal basis B (n, k), with Q R = Bᵀ X for fixed
+    random numbers X (n, k) and R with a positive diagonal.
+
+    Rounding turns a basis by singular vectors at will within equal singular values. This basis depends on
+    the space alone, so that numbers drawn for its coordinates mean one vector on every processor.
+    """
+    drawn = np.random.default_rng(1).normal(size=basis.shape)
+    q, r = np.linalg.qr(basis.T @ drawn)
+    return np.asarray(basis @ (q * np.copysign(1.0, np.diag(r))))
 
 
 def _pseudo_solutions(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space
+from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space, null_space
 
 TOLERANCE = 1e-5
 
@@ -63,3 +63,15 @@ def test_singular_values_are_compared_with_the_largest():
     matrix, rhs = np.diag([1e-8, 1e-9]), np.array([2e-8, 3e-9])
     assert least_norm(matrix, rhs, 0.099) == pytest.approx([2.0, 3.0])
     assert least_norm(matrix, rhs, 0.101) == pytest.approx([2.0, 0.0])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_basis_of_a_null_space_depends_on_the_space_alone(seed):
+    """Equations in another order, combined with each other, have the basis of the first ones."""
+    random = np.random.default_rng(seed)
+    matrix = random.normal(size=(4, 9))
+    basis = null_space(matrix, TOLERANCE)
+    other = null_space(random.normal(size=(6, 4)) @ matrix[::-1], TOLERANCE)
+    assert basis.shape == (9, 5) and np.abs(basis.T @ basis - np.eye(5)).max() < 1e-14
+    assert np.abs(matrix @ basis).max() < 1e-14 * np.linalg.norm(matrix)
+    assert np.abs(other - basis).max() < 1e-12

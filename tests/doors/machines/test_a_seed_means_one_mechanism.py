@@ -1,0 +1,83 @@
+"""A seed or a name means one mechanism, to 12 digits, on every processor and in every version.
+
+Verdicts are stored with the name or the seed of their mechanism.  ``mechanisms.json`` has of each mechanism a
+checksum of its words, and two sums of its numbers with fixed weights. Where mechanisms are to change, make it
+anew by ``python -m tests.doors.machines.test_a_seed_means_one_mechanism``, and then all stored verdicts, too.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from mbref.scene import Scene
+from tests.helpers.mechanisms import DRAWN, named
+from tests.machines import KERNELS, ROOT, environment, runs_here
+
+STORED = Path(__file__).with_name("mechanisms.json")
+SEEDS = range(4)
+ACCURACY = 1e-12  # of the sum of the sizes of all numbers
+STEPS = (np.sqrt(2.0), np.sqrt(3.0))  # weights are the fractional parts of their multiples, plus 1/2
+
+
+def signature(scene: Scene) -> list[float]:
+    """Return a checksum of the words, two weighted sums of the numbers, and the largest size of a sum."""
+    numbers: list[float] = []
+
+    def words(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: words(part) for name, part in value.items()}
+        if isinstance(value, list | tuple):
+            return [words(part) for part in value]
+        if type(value) not in (int, float):
+            return value
+        numbers.append(float(value))
+        return "number"
+
+    checksum = zlib.crc32(json.dumps(words(scene.to_dict())).encode())
+    array, k = np.array(numbers), np.arange(1, len(numbers) + 1)
+    sums = [float(array @ (k * step % 1.0 + 0.5)) for step in STEPS]
+    return [checksum, *sums, float(1.5 * np.abs(array).sum())]
+
+
+def table() -> dict[str, list[list[float]]]:
+    """Return the signatures of all mechanisms, by maker and seed or by kind."""
+    drawn = {name: [signature(make(seed)) for seed in SEEDS] for name, make in DRAWN.items()}
+    return drawn | {name: [signature(scene) for scene in scenes] for name, scenes in named().items()}
+
+
+def test_mechanisms_are_the_stored_ones():
+    found, wanted = table(), json.loads(STORED.read_text())
+    assert found.keys() == wanted.keys()
+    for name, signatures in found.items():
+        for k, (one, other) in enumerate(zip(signatures, wanted[name], strict=True)):
+            off = np.abs(np.subtract(one[1:], other[1:])).max()
+            assert one[0] == other[0] and off <= ACCURACY * other[-1], (
+                f"{name}, mechanism {k}: another mechanism, {off:.1e} off"
+            )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kernels", KERNELS)
+def test_mechanisms_do_not_depend_on_the_kernels_of_the_linear_algebra(kernels):
+    changes = {"OPENBLAS_CORETYPE": kernels}
+    if not runs_here(changes):
+        pytest.skip(f"this processor does not run the kernels {kernels}")
+    test = f"{__file__}::test_mechanisms_are_the_stored_ones"
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test]
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment(changes), capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stdout
+
+
+if __name__ == "__main__":
+    lines = [f" {json.dumps(name)}: {json.dumps(rows)}" for name, rows in table().items()]
+    STORED.write_text("{\n" + ",\n".join(lines) + "\n}\n")
