@@ -11,6 +11,7 @@ from mbref.equations.along_trajectory import poses
 from mbref.equations.branches import MOST_BRANCHED_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
 from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
+from mbref.equations.gaps import is_closed
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.linear_algebra.least_norm import null_space
@@ -127,8 +128,9 @@ def general_pose(model: Model, seed: int = 1) -> np.ndarray:
         if not free.size:
             return q
         step = free @ random.normal(size=free.shape[1])
-        moved, phi = solve_positions(model, 0.0, displaced(q, 0.1 * step / np.abs(step).max()))
-        if np.abs(phi).max(initial=0.0) > 1e-9:
+        change = 0.1 * model.units * step / np.abs(step).max()
+        moved, _ = solve_positions(model, 0.0, displaced(q, change))
+        if not is_closed(model, model.terms(0.0, moved)):
             return q
         q = moved
     return q

@@ -10,7 +10,8 @@ import numpy as np
 
 from mbref import rotations
 from mbref.design.placed import placed
-from mbref.equations.initial_state import CLOSED, solve_positions
+from mbref.equations.gaps import is_closed
+from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
@@ -72,7 +73,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
         elsewhere = {key: np.array(key[1]) + share * shift for key, shift in shifts.items()}
         model = Model(scene, _Reshaped(scene, elsewhere))
         q, phi = solve_positions(model, 0.0, q)
-        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, model.length):
+        if not is_closed(model, model.terms(0.0, q)):
             raise SceneError([_open(model, phi, share)])
     return _compared(scene, placed(model, q), pairs)
 

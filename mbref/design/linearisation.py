@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
-from mbref.equations.initial_state import CLOSED, solve_positions
+from mbref.equations.gaps import is_closed
+from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.equations.units import unit_rows
 from mbref.linear_algebra.least_norm import null_space
@@ -45,8 +46,7 @@ class Tangent:
         """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
         moved = displaced(self.q, self.units * (self.basis @ y))
         found, _ = solve_positions(self.model, 0.0, moved)
-        phi = self.model.terms(0.0, found).phi
-        if np.abs(phi).max(initial=0.0) > CLOSED * max(1.0, self.model.length):
+        if not is_closed(self.model, self.model.terms(0.0, found)):
             raise OffConstraints
         return found
 

@@ -7,6 +7,7 @@ import functools
 import numpy as np
 
 from mbref.design.placed import placed_with_springs
+from mbref.equations.gaps import gaps
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
 from mbref.scene import Scene, SceneError
@@ -15,7 +16,7 @@ from mbref.scene import Scene, SceneError
 # so that angles stay below half a turn and loops on their branch
 LARGEST_PART = 0.2
 MOST_PARTS = 1024  # limit of time: some seconds
-MET_OFFSET = 1e-12  # residual (rad), or over the mechanism's length (m), that rounding may leave
+MET_OFFSET = 1e-12  # gap (lengths of the mechanism, or rad) that rounding may leave
 
 
 @functools.lru_cache(maxsize=64)
@@ -30,7 +31,8 @@ def assembled(scene: Scene) -> Scene:
     for part in range(parts):
         model = Model(found)
         q, residual = solve_positions(model, 0.0, model.start(), value / parts)
-        if not np.abs(residual).max() <= MET_OFFSET * max(1.0, model.length):
+        gap = gaps(model.terms(0.0, q).less(value / parts), model.length)
+        if not gap.max(initial=0.0) <= MET_OFFSET:
             raise SceneError([_unmet(scene, model, residual, part / parts)])
         found = placed_with_springs(model, q)
     return found

@@ -21,7 +21,7 @@ RANK_TOLERANCE = 1e-10  # relative to the largest singular value of the scaled J
 # weight of a row in a left null vector above which the row takes part in a redundancy
 UNIQUE_TOLERANCE = 1e-8
 UNIQUE_SHARE = 1e-9  # limit of squared weights in large scenes, whose rounding is 1e-12
-PERTURBATION = 1e-2  # rad; rotation of the fastest body away from a singular start
+PERTURBATION = 1e-2  # rad or lengths of the mechanism; movement of the fastest body from a singular start
 MOST_DIAGNOSED_ROWS = 300  # rows; for more, a dense singular value decomposition takes more than about 0.1 s
 COMPONENTS = tuple(f"{kind} {axis}" for kind in ("force", "moment") for axis in "xyz")
 
@@ -40,8 +40,9 @@ class Diagnosis:
         Joints all of whose rows have a unique multiplier.
     smallest_singular_value : float
         Smallest nonzero singular value of Φ_q with unit rows: the distance from a singular position.
+        Displacements are relative to the mechanism's length, so that the value does not depend on its size.
     largest_singular_value : float
-        Largest singular value of Φ_q with unit rows.
+        Largest singular value of this matrix.
     determined_reactions : dict of str to tuple of str, or None
         Components of the reactions that equilibrium determines, by joint, such as ``"force x"``, along world
         axes. None for scenes of more than 300 rows.
@@ -100,12 +101,14 @@ def freedoms_left(model: Model, start: Start) -> int:
 
 
 def perturbed_state(model: Model, start: Start) -> tuple[float, np.ndarray]:
-    """Return time and coordinates (7 nb,) at which the fastest body has turned by PERTURBATION."""
+    """Return time and coordinates (7 nb,) at which the fastest body has moved by PERTURBATION."""
     q, v = start.q, start.v
     terms = model.terms(0.0, q, v)
-    acceleration = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=RANK_TOLERANCE)[0]
-    fastest = np.max(np.abs(v.reshape(-1, 6)[:, 3:]), initial=0.0)
-    t = min(1.0, PERTURBATION / fastest) if fastest > 0 else 1.0
+    jacobian = terms.jacobian * model.units
+    acceleration = model.units * np.linalg.lstsq(jacobian, terms.gamma, rcond=RANK_TOLERANCE)[0]
+    fastest = np.max(np.abs(v / model.units), initial=0.0)
+    longest = model.scene.duration
+    t = min(longest, PERTURBATION / fastest) if fastest > 0 else longest
     q, _ = solve_positions(model, t, displaced(q, t * v + 0.5 * t * t * acceleration))
     return t, q
 
@@ -171,12 +174,13 @@ def _counts(model: Model, rank: int) -> Counts:
 
 
 def _redundancy(model: Model, start: Start) -> Redundancy:
-    return Redundancy(model.structure.sparse(model.terms(0.0, start.q).blocks))
+    jacobian = model.structure.sparse(model.terms(0.0, start.q).blocks)
+    return Redundancy(jacobian.multiply(model.units).tocsr())
 
 
 def scaled_jacobian(model: Model, t: float, q: np.ndarray) -> np.ndarray:
-    """Return Φ_q (m, n) with rows of unit length."""
-    return unit_rows(model.terms(t, q).jacobian)
+    """Return Φ_q (m, n) for displacements in units of the mechanism, with rows of unit length."""
+    return unit_rows(model.terms(t, q).jacobian * model.units)
 
 
 def rank_of(matrix: np.ndarray, tolerance: float) -> int:

@@ -11,6 +11,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.branches import MOST_BRANCHED_ROWS, velocities_along
 from mbref.equations.coordinates import displace_all
+from mbref.equations.gaps import CLOSED, gaps, lengths_of_rows
 from mbref.equations.model import Model, Terms
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space
@@ -22,11 +23,13 @@ LARGE = 40  # rows; for more, dense singular values take longer than sparse fact
 GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
 # violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
 CONTRADICTED = 1e-3
-CLOSED = 1e-10  # largest |Φ| (m or rad) of positions that satisfy the constraints
+MET = 1e-14  # gap relative to the largest coordinate that is rounding
+SHORTEST_MOVE = 1e-15  # displacement of a Newton step (lengths or rad) that is rounding
+REPORTED = 1e-9  # gap, or wrong velocity / largest velocity, from which a correction is reported
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
 # weight of open velocities / weight of given velocities; number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
-MET = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
+ALONG = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
@@ -41,18 +44,20 @@ class Start:
 
     q: np.ndarray  # (7 nb,)
     v: np.ndarray  # (6 nb,)
-    position_violation: float  # largest |Φ| before the correction (m or rad)
-    velocity_violation: float  # largest |Φ_q v - ν| before the correction, if all velocities are given
+    position_violation: float  # largest gap before the correction (lengths of the mechanism or rad)
+    velocity_violation: float  # largest |Φ_q v - ν| before the correction / largest velocity, of unit rows
     given: np.ndarray  # (6 nb,) velocities that the scene gives, zero elsewhere
     follows_branch: bool = False  # True if undetermined velocities were taken from a branch
 
     def report(self) -> str:
         """Return one sentence for the user; empty if only rounding was corrected."""
         parts = []
-        if self.position_violation > 1e-9:
-            parts.append(f"positions were off the constraints by {self.position_violation:.2e}")
-        if self.velocity_violation > 1e-9:
-            parts.append(f"velocities by {self.velocity_violation:.2e}")
+        if self.position_violation > REPORTED:
+            parts.append(
+                f"positions were off the constraints by {self.position_violation:.2e} lengths or rad"
+            )
+        if self.velocity_violation > REPORTED:
+            parts.append(f"velocities by {self.velocity_violation:.2e} of the largest")
         corrected = f"initial {' and '.join(parts)}; corrected" if parts else ""
         return "; ".join(filter(None, (corrected, BRANCH if self.follows_branch else "")))
 
@@ -72,6 +77,11 @@ class Alike(NamedTuple):
     bodies: Sequence[Sequence[Body]]
     terms: Callable[[np.ndarray, np.ndarray, np.ndarray], Terms]
     model_of: Callable[[int], Model]
+
+    @property
+    def units(self) -> np.ndarray:
+        """Units (s, n) in which displacements compare: lengths of the mechanisms (m), and 1 rad."""
+        return np.tile(np.repeat(np.stack([self.length, np.ones(len(self.length))], 1), 3, 1), self.model.nb)
 
 
 def _alone(model: Model, t: float = 0.0, value: Any = 0.0) -> Alike:
@@ -156,7 +166,7 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
     """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν, otherwise the most
     accurate velocities, corrected to rounding."""
     off = [rate_violation(model, q, w) for w in along]
-    best = along[int(np.argmin(off)) if max(off) > MET else 0]
+    best = along[int(np.argmin(off)) if max(off) > ALONG else 0]
     terms = model.terms(0.0, q, best)
     jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
     return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=NEAR_SINGULAR_RANK)[0]
@@ -179,23 +189,27 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     """Return consistent coordinates near q (s, 7 nb), the largest |Φ| (s,) before the correction, errors by
     index, and the terms at the new coordinates for zero velocities."""
     faults: dict[int, SceneError] = {}
-    most = GROSS * np.maximum(1.0, scenes.length)
-    q, before, terms = _solved(scenes, q, most)
-    first, last = (np.abs(phi).max(axis=1, initial=0.0) for phi in (before, terms.phi))
+    q, before, terms = _solved(scenes, q, GROSS)
+    opened, left = gaps(before, scenes.length), gaps(terms, scenes.length)
+    first, last = (gap.max(axis=1, initial=0.0) for gap in (opened, left))
     if not (last > CLOSED).any():
         return q, first, faults, terms
-    for k in np.flatnonzero(first > most).tolist():
-        what = f"positions given to bodies violate it by {first[k]:.3g} m or rad"
-        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(before[k]))), what)
-    for k in np.flatnonzero((last > CLOSED) & (first <= most)).tolist():
-        what = f"no nearby positions satisfy it; {last[k]:.3g} m or rad remain"
-        faults[k] = _fault(scenes.model, int(np.argmax(np.abs(terms.phi[k]))), what)
+    for k in np.flatnonzero(first > GROSS).tolist():
+        row = int(np.argmax(opened[k]))
+        what = f"positions given to bodies violate it by {abs(before.phi[k, row]):.3g} m or rad"
+        faults[k] = _fault(scenes.model, row, what)
+    for k in np.flatnonzero((last > CLOSED) & (first <= GROSS)).tolist():
+        row = int(np.argmax(left[k]))
+        what = f"no nearby positions satisfy it; {abs(terms.phi[k, row]):.3g} m or rad remain"
+        faults[k] = _fault(scenes.model, row, what)
     return q, first, faults, terms
 
 
-def is_met(violation: Any, length: Any) -> Any:
-    """Return whether the largest |Φ| of a scene of a length (m) is rounding; for numbers or arrays."""
-    return violation <= 1e-14 * np.maximum(1.0, length)
+def _are_met(scenes: Alike, places: np.ndarray, q: np.ndarray, terms: Terms) -> np.ndarray:
+    """Return for scenes with indices (k,), at coordinates q (k, 7 nb), whether their gaps are rounding."""
+    length = scenes.length[places]
+    reach = np.abs(q.reshape(len(q), -1, 7)[..., :3]).max(axis=(1, 2)) / length
+    return np.asarray(gaps(terms, length).max(axis=1, initial=0.0) <= MET * np.maximum(1.0, reach))
 
 
 def solve_positions(model: Model, t: float, q: np.ndarray, value: Any = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -204,48 +218,54 @@ def solve_positions(model: Model, t: float, q: np.ndarray, value: Any = 0.0) -> 
     Newton–Raphson steps use the pseudo-inverse, so that redundant rows and a singular start are allowed; the
     change is least in the metric of M.
     """
-    found, _, terms = _solved(_alone(model, t, value), q[None], np.full(1, np.inf))
+    found, _, terms = _solved(_alone(model, t, value), q[None], np.inf)
     return found[0], terms.phi[0]
 
 
-def _solved(scenes: Alike, q: np.ndarray, most: np.ndarray) -> tuple[np.ndarray, np.ndarray, Terms]:
-    """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest |Φ| exceeds ``most``
-    (s,).
+def _solved(scenes: Alike, q: np.ndarray, most: float) -> tuple[np.ndarray, Terms, Terms]:
+    """Return ``solve_positions`` for each scene from q (s, 7 nb), unless the largest gap exceeds ``most``.
 
-    The results are the coordinates, Φ (s, m) before the correction, and the terms after it, at zero
-    velocities.
+    The results are the coordinates, and the terms before and after the correction, at zero velocities.
     """
     q, every, at_rest = q.copy(), np.arange(len(q)), np.zeros((len(q), scenes.model.n))
     first = terms = scenes.terms(every, q, at_rest)
-    off = np.abs(terms.phi).max(axis=1, initial=0.0)
-    places, open_ = every, ~is_met(off, scenes.length) & (off <= most)
+    off = gaps(terms, scenes.length).max(axis=1, initial=0.0)
+    places, open_ = every, ~_are_met(scenes, every, q, terms) & (off <= most)
     if not open_.any():
-        return q, first.phi, first
+        return q, first, first
     for _ in range(MOST_ITERATIONS):
         places = places[open_]
         x = _least_changes(scenes, places, terms.blocks[open_], -terms.phi[open_])
-        moves = np.abs(x).max(axis=1) >= 1e-15
+        moves = np.abs(x / scenes.units[places]).max(axis=1) >= SHORTEST_MOVE
         places, moved = places[moves], q[places[moves]]
         displace_all(moved, x[moves], np.zeros(q.shape[1]))
         q[places] = moved
         terms = scenes.terms(places, moved, at_rest[places])
-        open_ = ~is_met(np.abs(terms.phi).max(axis=1, initial=0.0), scenes.length[places])
+        open_ = ~_are_met(scenes, places, moved, terms)
         if not open_.any():
             break
-    return q, first.phi, scenes.terms(every, q, at_rest)
+    return q, first, scenes.terms(every, q, at_rest)
 
 
 def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: np.ndarray) -> np.ndarray:
     """Return the changes (k, n), least in the metric of M, for which Φ_q (blocks (k, m, 12)) times the change
     equals rhs (k, m)."""
-    model, mass = scenes.model, scenes.mass[places]
-    mass = np.where(mass > 0, mass, 1.0)
+    model, mass = scenes.model, _weights(scenes, places)
     if model.m > LARGE:
         rows = zip(blocks, mass, rhs, strict=True)
         return np.array([MinimumNorm(model.structure.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
     unit, rhs = _unit_rows(model.structure.dense(blocks) * inverse_root[:, None], rhs)
     return inverse_root * least_norm(unit, rhs, START_RANK_TOLERANCE)
+
+
+def _weights(scenes: Alike, places: np.ndarray) -> np.ndarray:
+    """Return M (k, n) of scenes with indices (k,); a body without mass or inertia gets the largest mass."""
+    mass = scenes.mass[places]
+    alike = (scenes.length[places, None] / scenes.units[places]) ** 2
+    if scenes.model.kinematic:
+        return alike
+    return np.where(mass > 0, mass, mass[:, ::6].max(axis=1, keepdims=True) * alike)
 
 
 def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -294,7 +314,8 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
     if open_.size:
         weight = np.sqrt(scenes.mass[k]) * scale
         x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=START_RANK_TOLERANCE)[0]
-    return x * scale, float(residual.max(initial=0.0)), bool(open_.size)
+    size = max(np.abs(x).max(), np.abs(as_given).max())
+    return x * scale, float(np.abs(unit @ as_given - rhs).max() / size), bool(open_.size)
 
 
 def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
@@ -320,7 +341,9 @@ def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray,
     if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
         what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
         raise _fault(model, int(np.argmax(residual)), what)
-    return x, float(np.max(residual, initial=0.0)), not given.all()
+    size = max(np.abs(x / scale).max(), np.abs(v / scale).max())
+    share = residual / (lengths_of_rows(blocks, scenes.length[k]) * size)
+    return x, float(np.max(share, initial=0.0)), not given.all()
 
 
 def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -125,20 +125,21 @@ def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> di
     """
     found = {joint.name: np.ones((len(q), 6), dtype=bool) for joint in model.scene.joint}
     vanishing, lengths = vanishing_combinations(model, blocks)
-    units = np.repeat([1.0, model.length], 3)
+    units = np.repeat([model.length, 1.0], 3)
     for k in range(vanishing.shape[-1]):
         for name, change in reactions(model, q, blocks, vanishing[..., k] / lengths).items():
-            found[name] &= np.abs(change / units) <= SHARE
+            found[name] &= np.abs(change * units) <= SHARE
     return found
 
 
 def vanishing_combinations(model: Model, blocks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return left null vectors (k, m, c) of the unit rows of Φ_q, and the lengths (k, m) of its rows.
 
-    The argument is Φ_q as blocks (k, m, 12). Samples with fewer null vectors than other samples have zeros in
-    place of the missing vectors.
+    Displacements are in units of the mechanism, so that its size has no influence. The argument is Φ_q as
+    blocks (k, m, 12). Samples with fewer null vectors than other samples have zeros in place of the missing
+    vectors.
     """
-    jacobian = model.structure.dense(blocks)
+    jacobian = model.structure.dense(blocks) * model.units
     lengths = row_lengths(jacobian)
     left, values, _ = np.linalg.svd(jacobian / lengths[..., None])
     rank = np.sum(values > OPEN * values.max(axis=1, initial=0.0)[:, None], axis=1)

@@ -18,6 +18,7 @@ from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.packing import Packs, row_of
 from mbref.equations.structure import Structure
+from mbref.equations.units import displacement_units
 from mbref.kernels.layout import Equations, Frames, OperationCounts, Settings, System
 from mbref.kernels.memory_pool import Pooled, acquire, copied, release
 from mbref.kernels.named_memory import allocate
@@ -61,6 +62,7 @@ class Model:
 
     ``entry_columns`` (m, 12) has the columns of the blocks' entries; columns of the fixed frame are ≥ n.
     ``to_local`` (nb + 1, 3, 3) turns world vectors at t = 0 to the principal frames of the bodies.
+    ``units`` (n,) has the displacements along (δr, δπ') by one length of the mechanism: m, or 1 rad.
     A scene without all masses is ``kinematic``: M is the identity and there are no forces.
     """
 
@@ -76,6 +78,7 @@ class Model:
         self.has_angles, self.closed_loops = self.structure.has_angles, self.structure.closed_loops
         self.mass, self.principal = packs.mass[place], packs.principal[place]
         self.length, self.orientation = float(packs.length[place]), packs.orientation[place]
+        self.units = displacement_units(self.nb, self.length)
         self.to_local = packs.to_local[place]
         self._pooled: Pooled | None = None
 

@@ -27,6 +27,11 @@ def inverse_root(mass: np.ndarray) -> np.ndarray:
     return 1.0 / np.sqrt(np.where(mass > 0.0, mass, 1.0))
 
 
+def displacement_units(bodies: int, length: float) -> np.ndarray:
+    """Return the units (6 nb,) in which displacements (δr, δπ') of bodies compare: a length (m), 1 rad."""
+    return np.tile(np.repeat([length, 1.0], 3), bodies)
+
+
 def row_lengths(matrix: np.ndarray) -> np.ndarray:
     """Return lengths (…, m) of the rows of matrices (…, m, n), 1 for a row of zeros."""
     lengths = np.sqrt((matrix * matrix).sum(axis=-1))
