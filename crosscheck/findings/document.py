@@ -12,8 +12,8 @@ HEAD = """# Findings
 
 What crosscheck found in other engines, each with a proof that runs again: `crosscheck findings` lists them,
 and `crosscheck findings --recheck` asks the installed versions which of them are still there. Scripts need
-the engine alone. Made by `python -m crosscheck.findings.document docs/findings.md` from
-`crosscheck/findings/findings.toml`.
+the engine alone. An error that ends the process is described in words, without a proof. Made by
+`python -m crosscheck.findings.document docs/findings.md` from `crosscheck/findings/findings.toml`.
 """
 
 
@@ -39,6 +39,8 @@ def _entry(found: Finding) -> Iterator[str]:
     yield f"{found.package} {found.version}. {found.does}\n"
     yield f"Right is: {found.right}\n"
     yield f"{found.cause}\n"
+    if found.crashes:
+        return
     if found.script:
         yield f"```python\n{found.script.strip()}\n```\n"
     else:

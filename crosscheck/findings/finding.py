@@ -1,7 +1,7 @@
 """A finding: an error of an engine, its proof, and whether the installed version still has it.
 
 The proof is a script that needs the engine alone, or a scene that runs at a setting and is judged by its
-truth.
+truth. An error that ends the engine's process has words alone: nothing here does harm.
 """
 
 from __future__ import annotations
@@ -54,9 +54,9 @@ class Finding:
     """``does`` is a sentence on what the engine does. ``right`` is a sentence on the right result, and on its
     source.
 
-    The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``. If
-    ``crashes`` is set, the engine has the error if a signal ends the process of ``script``.  ``measured`` was
-    the number at ``version`` of ``package``.
+    The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``.
+    ``measured`` was the number at ``version`` of ``package``. If ``crashes`` is set, the engine's process
+    ended at that version, and no proof is stored.
     """
 
     name: str
@@ -81,6 +81,8 @@ class Finding:
             version = metadata.version(self.package)
         except metadata.PackageNotFoundError:
             return Answer(Status.ABSENT, "", None, f"pip install {self.package}")
+        if self.crashes:
+            return Answer(Status.UNCLEAR, version, None, "no proof is stored: it would end the process")
         return self._of_script(version) if self.script else self._of_scene(version)
 
     def _of_script(self, version: str) -> Answer:
@@ -94,9 +96,6 @@ class Finding:
             )
         except subprocess.TimeoutExpired:
             return Answer(Status.UNCLEAR, version, None, f"no answer within {TIME_LIMIT:g} s")
-        if self.crashes:
-            found = Status.PRESENT if ended.returncode < 0 else Status.GONE
-            return Answer(found, version, None, f"the process ended with status {ended.returncode}")
         try:
             return self._of_number(version, float(ended.stdout.split()[-1]))
         except (IndexError, ValueError):
