@@ -208,7 +208,7 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
 def _are_met(scenes: Alike, places: np.ndarray, q: np.ndarray, terms: Terms) -> np.ndarray:
     """Return for scenes with indices (k,), at coordinates q (k, 7 nb), whether their gaps are rounding."""
     length = scenes.length[places]
-    reach = np.abs(q.reshape(len(q), -1, 7)[..., :3]).max(axis=(1, 2)) / length
+    reach = np.abs(q.reshape(len(q), scenes.model.nb, 7)[..., :3]).max(axis=(1, 2)) / length
     return np.asarray(gaps(terms, length).max(axis=1, initial=0.0) <= MET * np.maximum(1.0, reach))
 
 
