@@ -25,7 +25,7 @@ def gaps(terms: Terms, length: Any) -> np.ndarray:
 
 def lengths_of_rows(blocks: np.ndarray, length: Any) -> np.ndarray:
     """Return the lengths (…, m) of rows given as blocks (…, m, 12), for displacements in lengths or rad."""
-    sides = blocks.reshape(*blocks.shape[:-1], -1, 6)
+    sides = blocks.reshape(*blocks.shape[:-1], blocks.shape[-1] // 6, 6)
     squares = (sides * sides).sum(axis=-2)
     scaled = squares[..., :3].sum(axis=-1) * np.square(length)[..., None] + squares[..., 3:].sum(axis=-1)
     return np.sqrt(np.where(scaled > 0.0, scaled, 1.0))
