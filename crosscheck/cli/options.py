@@ -12,14 +12,13 @@ from crosscheck.engine import ALL, ON_REQUEST, engine_names
 from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
-from crosscheck.study.grid import TIME_LIMIT
+from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 from mbref import formats
 from mbref.command_line import output_file, output_folder
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
-MOST_SECONDS = 1e7  # s, about four months: ten times as much is still a time that the system can wait
 MOST_SAMPLES = 1_000_000  # of one run; `request.MOST_STATES` limits samples times bodies
 MOST_REPEATS = 1000
 MOST_MECHANISMS = 100_000  # their verdicts need about 20 kB each

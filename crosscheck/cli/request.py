@@ -15,7 +15,7 @@ from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.trial import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
-from crosscheck.study.grid import Case, default_cases
+from crosscheck.study.grid import MOST_SECONDS, Case, default_cases
 from crosscheck.study.scouting import of_file, scout, settings, shown_name
 from crosscheck.study.sweep import of_few_families
 from mbref.scene import Scene
@@ -109,10 +109,9 @@ def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> n
         _check_times(times)
         return np.array(times)
     most = max(MOST_STATES // len(scene.body), 2)
-    if samples > most:
-        raise RequestError(
-            f"--samples: at most {most} for the {len(scene.body)} bodies of {scene.name}, got {samples}"
-        )
+    if not 2 <= samples <= most:
+        bodies = f"the {len(scene.body)} bodies of {scene.name}"
+        raise RequestError(f"--samples: at least 2 and at most {most} for {bodies}, got {samples}")
     return np.linspace(0.0, scene.duration, samples)
 
 
@@ -162,6 +161,10 @@ def plan(
     ``times`` has one array (k,) for each scene. An engine that cannot run a scene is left out with a
     ``notice``. Raises RequestError for families that no engine has, with the engines' reasons if no run is
     left, and for more than MOST_STATES states."""
+    if not 0 < time_limit <= MOST_SECONDS:
+        raise RequestError(
+            f"--time-limit: must be positive and at most {MOST_SECONDS:g} s, got {time_limit:g}"
+        )
     cases = _planned(scenes, engines, chosen, times, time_limit, notice)
     states = sum(len(case.times) * len(case.scene.body) for case in cases)
     if states > MOST_STATES:

@@ -35,6 +35,7 @@ from mbref.trajectory import Outcome, Trajectory
 SCHEMA = 1
 SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
+MOST_SECONDS = 1e7  # s, about four months: ten times as much is still a time that the system can wait
 MEASURED = 2.0  # limit of the CPU time for the metrics, as a multiple of the time limit of the case
 
 Record = dict[str, Any]

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
+import crosscheck
 from crosscheck.cli import main
+from crosscheck.cli.request import RequestError
+from tests.helpers.still_engines import resting
 
 HUGE = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
 COUNTS = {
@@ -58,5 +63,19 @@ def test_time_beyond_what_the_system_can_wait_is_refused(command: tuple[str, ...
 def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):
     out = tmp_path / "ref.csv"
     said = refusal(capsys, "reference", "four_bar_chain[20]", "--out", str(out), "--samples", "1000000")
-    assert "--samples: at most " in said and "bodies of" in said
+    assert "--samples: at least 2 and at most " in said and "bodies of" in said
     assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "said"),
+    [
+        ({"samples": 10**20}, "at most"),
+        ({"samples": 1}, "at least 2"),
+        ({"time_limit": 1e30}, "at most 1e\\+07 s"),
+        ({"time_limit": -1.0}, "must be positive"),
+    ],
+)
+def test_function_compare_refuses_what_the_command_refuses(wanted: dict[str, Any], said: str):
+    with pytest.raises(RequestError, match=said):
+        crosscheck.compare(resting(), "tests.helpers.still_engines:LOGGED", **wanted)
