@@ -195,8 +195,8 @@ def _add_tune(commands: Commands) -> None:
         "--closure",
         type=length,
         metavar="GAP",
-        help="largest gap of any joint, such as 1mm, as the criterion in place of an error; an angle "
-        "counts as its arc over the mechanism's length",
+        help="largest distance of points that a joint holds together, such as 1mm, as the criterion in place "
+        "of an error; angles do not count",
     )
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
     add_limits(parser)

@@ -12,19 +12,20 @@ from crosscheck.judge.free_fall import falls_freely
 from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, is_completed
-from crosscheck.study.tuning import closure_gap
+from crosscheck.study.tuning import opened
 from crosscheck.study.verdict import Grade, Judged, grade
+from crosscheck.study.wording import listed
 from mbref.scene import Scene
 
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
-SHUT = 1e-12  # fraction of the scene's length; smaller gaps are rounding errors
+SHUT = 1e-12  # rad, and fraction of the scene's length; smaller openings are rounding errors
 OF_ERROR = 1e-3  # gap / error of a body's position; a smaller gap is not why the bodies are off
 OFF = "Contacts, limits, dry friction and motors are off, as in the scene."
 
 
 def as_in_file(groups: Sequence[Judged]) -> str:
-    """Return sentences on the error of each file at its own settings, with the gap of its closures in
-    millimetres; empty if no file ran."""
+    """Return sentences on the error of each file at its own settings, with the openings of its closures (mm
+    and rad); empty if no file ran."""
     found = [(group, r) for group in groups for r in group.records if r["family"] == AS_IN_FILE]
     return " ".join([*(_one(group, r) for group, r in found), *[OFF] * bool(found)])
 
@@ -37,9 +38,9 @@ def _one(group: Judged, record: Record) -> str:
         return f"{start} is {ended(record)}: {record['message']}."
     metrics, found = record["metrics"], grade(record)
     parts = [] if found is Grade.UNJUDGED else [_bodies(metrics, scene_length(scene))]
-    gap = closure_gap(record, scene)
-    if SHUT * scene_length(scene) < gap < math.inf:
-        parts.append(f"its closures open by up to {gap * 1e3:.2g} mm")
+    gap, angle = opened(record, scene)
+    if said_of_joints := _openings(gap, angle, scene_length(scene)):
+        parts.append(f"its closures open by up to {said_of_joints}")
     said = "has no known error" if found is Grade.UNJUDGED else f"is {found}"
     advice = ""
     if found in (Grade.INACCURATE, Grade.WRONG):
@@ -47,6 +48,13 @@ def _one(group: Judged, record: Record) -> str:
         finds = "a solref and a time step" if "--closure" in command else "settings"
         advice = f" `{command}` finds {finds} that are ten times better."
     return f"{start} {said}{': ' if parts else ''}{', and '.join(parts)}.{advice}"
+
+
+def _openings(gap: float, angle: float, length: float) -> str:
+    """Return a gap (m) and an angle (rad) in words, without those that are rounding errors."""
+    said = [f"{gap * 1e3:.2g} mm"] if SHUT * length < gap < math.inf else []
+    said += [f"{angle:.2g} rad"] if SHUT < angle < math.inf else []
+    return listed(said)
 
 
 def _tuning(record: Record, scene: Scene, gap: float) -> str:

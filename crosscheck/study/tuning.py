@@ -11,12 +11,14 @@ from collections.abc import Callable, Collection, Sequence
 from typing import NamedTuple
 
 from crosscheck.engine import Setting
-from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.metrics import in_scene_order
+from crosscheck.judge.openings import Opening, opening
 from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, longest_step, within, work
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.ladder import Family, families
 from crosscheck.study.record_view import error, error_bound, error_text, is_completed
 from mbref.scene import Scene
+from mbref.trajectory import Trajectory
 
 NEAR = 1.12  # ratio of the work of two settings below which no setting between them is tried
 HALVINGS = 6  # largest number of bisections in a family
@@ -43,20 +45,18 @@ def by_error(level: float) -> Criterion:
 
 
 def by_closure(gap: float, scene: Scene) -> Criterion:
-    """Return the criterion that no closed joint opens by more than a gap (m); angles are multiplied by the
-    scene's length."""
+    """Return the criterion that the points of no joint are apart by more than a gap (m)."""
 
     def measure(record: Record) -> float:
-        return closure_gap(record, scene)
+        return opened(record, scene).gap
 
     name = f"a closure gap of {gap * 1e3:g} mm"
     return Criterion(name, gap, measure, lambda record: f"{measure(record) * 1e3:.2g} mm")
 
 
-def closure_gap(record: Record, scene: Scene) -> float:
-    """Return by how much the closures of a run open (m); angles count times the scene's length."""
-    violation = record["metrics"].get("violation_position")
-    return math.inf if violation is None else scene_length(scene) * float(violation)
+def opened(record: Record, scene: Scene) -> Opening:
+    """Return by how much the joints of a recorded run open (m and rad)."""
+    return opening(scene, in_scene_order(scene, Trajectory.from_record(scene.name, record)))
 
 
 def known_error(record: Record) -> float:

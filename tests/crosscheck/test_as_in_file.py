@@ -12,7 +12,7 @@ from crosscheck.cli import request
 from crosscheck.cli.scene_request import RequestError, find_scenes, held
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.original import FAMILIES, FINER, STIFFER, STIFFER_RK4
-from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.constraints import initial_poses, scene_length
 from crosscheck.judge.free_fall import falls_freely
 from crosscheck.judge.metrics import violation_series
 from crosscheck.setting import AS_IN_FILE
@@ -25,6 +25,7 @@ from crosscheck.study.verdict import Judged
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
+from mbref.trajectory import Trajectory
 
 FOUR_BAR = """<mujoco><compiler angle="radian"/><option timestep="0.004" integrator="implicitfast"/>
 <worldbody>
@@ -165,9 +166,16 @@ def test_a_verdict_says_how_wrong_the_file_is(tmp_path):
         "error": 0.2,
         "position_error": 0.02 / scene_length(scene),
         "rotation_error": 0.03,
-        "violation_position": 0.0012 / scene_length(scene),
     }
+    places, turns = initial_poses(scene)
+    places[-1] += [0.0, 0.0012, 0.0]
+    still = np.zeros_like(places)[None]
+    run = Trajectory(
+        scene.name, "mujoco", "3", AS_IN_FILE, settings, np.array([0.0]), tuple(b.name for b in scene.body),
+        places[None], turns[None], still, still,
+    )  # fmt: skip
     record = {
+        **run.to_record(),
         "scene": scene.name,
         "engine": "mujoco",
         "family": AS_IN_FILE,
@@ -188,7 +196,7 @@ def test_a_verdict_says_how_wrong_the_file_is(tmp_path):
     assert "is right:" in right and "tune" not in right
     failed = {**record, "outcome": "NOT_FINITE", "t_end": 0.2, "message": "the state became NaN"}
     assert "is not finite at 0.2 s: the state became NaN" in as_in_file([Judged(scene, {}, [failed])])
-    unknown = {**record, "metrics": {"error": None, "violation_position": metrics["violation_position"]}}
+    unknown = {**record, "metrics": {"error": None}}
     assert "has no known error: its closures open by up to 1.2 mm." in as_in_file(
         [Judged(scene, {}, [unknown])]
     )

@@ -1,0 +1,47 @@
+"""Openings of joints: distances between points that a joint holds together, and angles by which it tilts."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from crosscheck.judge import constraints
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+
+class Opening(NamedTuple):
+    """Largest openings over all joints and samples; infinite without a sample or for numbers that are not
+    finite.
+
+    ``gap`` (m) is the distance between a joint's points, or the displacement by which a coupling is off.
+    ``angle`` (rad) is the angle by which a joint tilts or a coupling is off.
+    """
+
+    gap: float
+    angle: float
+
+
+def opening(scene: Scene, run: Trajectory) -> Opening:
+    """Return the largest openings of a run, whose bodies are in the scene's order; drivers do not count."""
+    if not len(run.times):
+        return Opening(math.inf, math.inf)
+    pose = (run.times, run.position, run.orientation)
+    with np.errstate(all="ignore"):  # states that are not finite are reported, without warnings
+        residuals = constraints.closure(scene.with_(driver=()), *pose)
+        gaps = constraints.coupling_gaps(scene, *pose, run.angular_velocity)
+        # NaN: the samples are too far apart to count the turns of a coupling
+        residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
+    are_lengths = constraints.length_rows(scene.with_(driver=()))
+    return Opening(
+        _largest([r[:, are_lengths[name]] for name, r in residuals.items()]),
+        _largest([r[:, ~are_lengths[name]] for name, r in residuals.items()]),
+    )
+
+
+def _largest(rows: list[np.ndarray]) -> float:
+    """Return the largest norm of the rows (k, n) of one joint at one sample."""
+    found = np.max([0.0, *(np.linalg.norm(r, axis=1).max() for r in rows)])
+    return float(found) if np.isfinite(found) else math.inf

@@ -1,0 +1,77 @@
+"""Openings of joints: a gap is a distance of points, and angles do not depend on the size."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.openings import opening
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Outcome, Trajectory
+
+TIMES = np.array([0.0, 1.0])
+
+
+def arms(size: float, coupled: bool = False) -> Scene:
+    """Return two arms of the length ``size`` (m) on hinges about z, geared 2 : 1 if they are coupled."""
+    return Scene(
+        name="arms",
+        body=[
+            {"name": name, "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [size, at, 0.0]}
+            for name, at in (("a", 0.0), ("b", size))
+        ],
+        joint=[
+            {
+                "name": f"hinge of {name}",
+                "type": "revolute",
+                "bodies": ["ground", name],
+                "anchor": [0.0, at, 0.0],
+                "axis": [0.0, 0.0, 1.0],
+            }
+            for name, at in (("a", 0.0), ("b", size))
+        ],
+        coupling=[{"name": "gears", "joints": ["hinge of a", "hinge of b"], "ratio": 2.0}] if coupled else [],
+    )
+
+
+def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
+    """Return a run in which the last body turns by a rotation vector (rad) about its hinge and moves (m)."""
+    position = np.array([[body.position for body in scene.body]] * 2)
+    orientation = np.tile([1.0, 0.0, 0.0, 0.0], (2, len(scene.body), 1))
+    turn = rotations.from_vector(turned)
+    anchor = np.array(scene.joint[-1].anchor)
+    position[1, -1] = anchor + rotations.to_matrix(turn) @ (position[0, -1] - anchor) + moved
+    orientation[1, -1] = turn
+    still = np.zeros_like(position)
+    names = tuple(body.name for body in scene.body)
+    return Trajectory(scene.name, "by hand", "", "", {}, TIMES, names, position, orientation, still, still)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+@pytest.mark.parametrize("seed", range(4))
+def test_gap_is_the_distance_of_points_and_angle_the_tilt(size: float, seed: int):
+    random = np.random.default_rng(seed)
+    moved, tilt = 0.01 * size * random.normal(size=3), random.uniform(0.1, 1.0)
+    found = opening(arms(size), standing(arms(size), moved, np.array([tilt, 0.0, 0.0])))
+    assert found.gap == pytest.approx(np.linalg.norm(moved), rel=1e-9)
+    assert found.angle == pytest.approx(tilt, rel=1e-9)
+
+
+def test_coupling_that_is_off_by_an_angle_opens_no_gap():
+    scene = arms(2.0, coupled=True)
+    found = opening(scene, standing(scene, np.zeros(3), np.array([0.0, 0.0, 0.3])))
+    assert found.gap < 1e-14 and found.angle == pytest.approx(0.3, rel=1e-9)
+
+
+def test_run_without_samples_or_without_numbers_has_no_finite_opening():
+    scene = arms(1.0)
+    failed = Trajectory.failed(
+        scene=scene.name, engine="by hand", version="", method="", settings={}, bodies=("a", "b"),
+        outcome=Outcome.TIMED_OUT, message="",
+    )  # fmt: skip
+    assert opening(scene, failed) == (math.inf, math.inf)
+    lost = standing(scene, np.full(3, np.nan), np.zeros(3))
+    assert opening(scene, lost).gap == math.inf
