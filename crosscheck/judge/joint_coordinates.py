@@ -86,6 +86,8 @@ def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarra
     Between samples the change nearest to the trapezoidal rule is chosen. The result is NaN from the first
     sample on at which the rates differ too much for this choice.
     """
+    if not times.size:
+        return np.zeros(0)
     before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
     expected = step * (rate + before) / 2
     change = expected + wrapped(np.diff(angle, prepend=0.0) - expected)

@@ -36,6 +36,9 @@ class Still(Engine):
     def version(self) -> str:
         return "1.0"
 
+    def cannot(self, scene: Scene) -> Cannot | None:
+        return self.refuses(scene)
+
     def settings(self, scene: Scene) -> list[Setting]:
         return [Setting("plain", {})]
 

@@ -11,30 +11,9 @@ from crosscheck.judge.openings import opening
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
+from tests.helpers.geared_arms import arms
 
 TIMES = np.array([0.0, 1.0])
-
-
-def arms(size: float, coupled: bool = False) -> Scene:
-    """Return two arms of the length ``size`` (m) on hinges about z, geared 2 : 1 if they are coupled."""
-    return Scene(
-        name="arms",
-        body=[
-            {"name": name, "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [size, at, 0.0]}
-            for name, at in (("a", 0.0), ("b", size))
-        ],
-        joint=[
-            {
-                "name": f"hinge of {name}",
-                "type": "revolute",
-                "bodies": ["ground", name],
-                "anchor": [0.0, at, 0.0],
-                "axis": [0.0, 0.0, 1.0],
-            }
-            for name, at in (("a", 0.0), ("b", size))
-        ],
-        coupling=[{"name": "gears", "joints": ["hinge of a", "hinge of b"], "ratio": 2.0}] if coupled else [],
-    )
 
 
 def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:

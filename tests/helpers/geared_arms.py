@@ -1,0 +1,27 @@
+"""Two arms on parallel hinges, with or without gears between them."""
+
+from __future__ import annotations
+
+from mbref.scene import Scene
+
+
+def arms(size: float, coupled: bool = False) -> Scene:
+    """Return two arms of the length ``size`` (m) on hinges about z, geared 2 : 1 if they are coupled."""
+    return Scene(
+        name="arms",
+        body=[
+            {"name": name, "mass": 1.0, "inertia": [1.0, 1.0, 1.0], "position": [size, at, 0.0]}
+            for name, at in (("a", 0.0), ("b", size))
+        ],
+        joint=[
+            {
+                "name": f"hinge of {name}",
+                "type": "revolute",
+                "bodies": ["ground", name],
+                "anchor": [0.0, at, 0.0],
+                "axis": [0.0, 0.0, 1.0],
+            }
+            for name, at in (("a", 0.0), ("b", size))
+        ],
+        coupling=[{"name": "gears", "joints": ["hinge of a", "hinge of b"], "ratio": 2.0}] if coupled else [],
+    )
