@@ -1,4 +1,5 @@
-"""The parser of command lines: its messages are sentences that suggest the word that was probably meant."""
+"""Programs on a command line: a parser whose messages suggest the word that was probably meant, options of
+output files, and exit statuses."""
 
 from __future__ import annotations
 
@@ -6,14 +7,20 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
+from mbref.files import free, writable
+from mbref.input_error import InputError
 from mbref.scene_fields import meant
+from mbref.scene_validation import SceneError
+from mbref.terminal import OUTPUT, discard_output, printable_streams
 
 CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")
 NUMBER_FAULT = re.compile(r"invalid (float|int) value: ")
+BAD_INPUT, INTERRUPTED = 2, 130  # exit statuses
 KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got "}
 
 
@@ -36,7 +43,12 @@ class Parser(argparse.ArgumentParser):
                 if unknown[0].startswith("-")
                 else f"unknown argument {unknown[0]!r}{_repeated(command, args or sys.argv[1:], unknown[0])}"
             )
+        _check_existing(getattr(found, "parser_of_command", self), found)
         return found
+
+    def print_help(self, file: Any = None) -> None:
+        """Print the help; raises OSError if it cannot be written, which argparse would hide."""
+        (file or sys.stdout).write(self.format_help())
 
     def error(self, message: str) -> NoReturn:
         """Print the usage and the message, or all commands if the command line names none, and exit with
@@ -61,18 +73,80 @@ class _Command(Parser):
         self.set_defaults(parser_of_command=self, action=action)
 
 
+def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
+    """Return the exit status of a program, whose faults are printed on standard error, a sentence each.
+
+    The status is that of ``action``; 2 if it raises InputError, SceneError, a ``refused`` exception or
+    OSError, or if standard output cannot be written; 130 after an interrupt. Control characters in printed
+    texts are escaped.
+    """
+    with printable_streams():
+        try:
+            try:
+                return action()
+            finally:
+                sys.stdout.flush()
+        except (InputError, SceneError, *refused) as error:
+            return _refuse(getattr(error, "faults", [str(error)]))
+        except KeyboardInterrupt:
+            return _refuse(["interrupted"], INTERRUPTED)
+        except MemoryError:
+            return _refuse(["the memory of this machine does not suffice"])
+        except OSError as error:  # a file or standard output could not be written
+            if error.filename is None:
+                raise
+            if error.filename == OUTPUT:
+                discard_output()
+            return _refuse([f"{error.filename}: {error.strerror}"])
+
+
+def _refuse(faults: Sequence[str], status: int = BAD_INPUT) -> int:
+    with suppress(OSError):  # of standard error itself
+        for fault in faults:
+            print(fault, file=sys.stderr)
+    return status
+
+
+def add_output(parser: Any, option: str = "--out", **names: Any) -> None:
+    """Add an option of an output file, and ``--force``: a file that exists is refused without it."""
+    parser.add_argument(option, type=output_file, **names)
+    add_force(parser)
+
+
+def add_force(parser: Any) -> None:
+    """Add the option ``--force``."""
+    parser.add_argument("--force", action="store_true", help="replace a file that exists")
+
+
+def _check_existing(command: argparse.ArgumentParser, found: argparse.Namespace) -> None:
+    """Raise InputError for an output file that exists, unless it is to be replaced."""
+    for action in command._actions:
+        if action.type is output_file and (path := getattr(found, action.dest)):
+            free(path, found.force)
+
+
 def output_file(text: str) -> str:
     """Return the path of a file, if the file can be written: the type of an option.
 
     Raises ``argparse.ArgumentTypeError`` with the cause, before any work is done.
     """
-    path = Path(text)
-    if path.is_dir():
-        raise argparse.ArgumentTypeError(f"{text} is a folder; name a file")
-    if not path.parent.is_dir():
-        raise argparse.ArgumentTypeError(f"there is no folder {path.parent}")
-    _check_permission(path if path.exists() else path.parent, text)
+    try:
+        if not text or Path(text).is_dir():
+            raise argparse.ArgumentTypeError(f"{text!r} is a folder; name a file")
+        if not Path(text).parent.is_dir():
+            raise argparse.ArgumentTypeError(f"there is no folder {Path(text).parent}")
+        may_write = writable(text)
+    except (OSError, ValueError) as error:  # a name that no file can have
+        raise argparse.ArgumentTypeError(f"{text!r}: {getattr(error, 'strerror', error)}") from None
+    if not may_write:
+        raise argparse.ArgumentTypeError(f"{text} cannot be written: no permission for its folder")
     return text
+
+
+def record_file(text: str) -> str:
+    """Return the path of a file to which records are added: the type of an option, with the faults of
+    ``output_file``. Records that the file has already remain."""
+    return output_file(text)
 
 
 def output_folder(text: str) -> str:
@@ -81,16 +155,15 @@ def output_folder(text: str) -> str:
     The folder and its parents may be missing. Raises ``argparse.ArgumentTypeError`` with the cause.
     """
     path = Path(text).absolute()
-    there = next(place for place in (path, *path.parents) if place.exists())
+    try:
+        there = next(place for place in (path, *path.parents) if place.exists())
+    except (OSError, ValueError) as error:
+        raise argparse.ArgumentTypeError(f"{text!r}: {getattr(error, 'strerror', error)}") from None
     if not there.is_dir():
         raise argparse.ArgumentTypeError(f"{there} is a file; name a folder")
-    _check_permission(there, text)
+    if not os.access(there, os.W_OK):
+        raise argparse.ArgumentTypeError(f"{text} cannot be written: no permission for {there}")
     return text
-
-
-def _check_permission(place: Path, wanted: str) -> None:
-    if not os.access(place, os.W_OK):
-        raise argparse.ArgumentTypeError(f"{wanted} cannot be written: no permission for {place}")
 
 
 def _repeated(command: argparse.ArgumentParser, words: Sequence[str], extra: str) -> str:

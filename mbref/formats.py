@@ -11,6 +11,7 @@ from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any, Protocol
 
+from mbref import files
 from mbref.input_error import InputError
 from mbref.scene import Scene
 
@@ -214,7 +215,7 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
         If no installed format has this suffix.
     """
     exported = _found(path, "writes").write(scene.assembled())
-    Path(path).write_text(exported.text, encoding="utf-8")
+    files.write(path, exported.text)
     return exported.left_out
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbref.error_estimate import ErrorEstimate
+from mbref.files import replaced, write
 from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
@@ -22,7 +23,7 @@ def write_json(path: str | Path, scene: Scene, record: Mapping[str, Any]) -> Non
     if Path(path).suffix.lower() != ".json":
         raise InputError(f"{path}: a motion is saved as .json; for a picture use animate or plot")
     whole = {"scene": scene.to_dict(), "record": record}
-    Path(path).write_text(strict_json(whole) + "\n", encoding="utf-8")
+    write(path, strict_json(whole) + "\n")
 
 
 def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None]:
@@ -38,7 +39,7 @@ def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None
 
 def write_csv(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
     """Write columns (k,) with all digits, below a line with their names."""
-    with open(path, "w", encoding="utf-8", newline="") as file:
+    with replaced(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(columns)
         writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))

@@ -82,10 +82,20 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
         try:
             while line:  # usually one write suffices; on a full disk the next one raises
                 line = line[file.write(line) :]
-        except BaseException:
+        except BaseException as error:
             with contextlib.suppress(OSError):  # the first failure is the reported one
                 file.truncate(before)
+            if isinstance(error, OSError):
+                error.filename = str(path)
             raise
+
+
+def read_json(path: str | Path) -> Any:
+    """Return the content of a JSON file; raises RecordsError for another file, OSError."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except (ValueError, RecursionError):
+        raise RecordsError(f"{path}: is not JSON; name another file, or remove it") from None
 
 
 def strict_json(value: Any) -> str:

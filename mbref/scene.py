@@ -15,6 +15,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
+from mbref.files import write
 from mbref.scene_bodies import Body, Driver
 from mbref.scene_fields import Name, Positive, SceneEntry, VectorValue
 from mbref.scene_functions import Factor, Sine, TimeFunction
@@ -274,7 +275,7 @@ class Scene(SceneEntry):
         path : str or path
             The file.
         """
-        Path(path).write_text(scene_text(self.to_dict()), encoding="utf-8")
+        write(path, scene_text(self.to_dict()))
 
     @staticmethod
     def from_file(path: str | Path) -> Scene:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
+from mbref.printable import checked_name
 from mbref.scene_units import angle, length, length_or_angle
 
 # limits of numbers, whose products and squares then stay within double precision
@@ -121,7 +122,7 @@ Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterVali
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
 VectorValue = Annotated[tuple[Real, Real, Real], BeforeValidator(as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], BeforeValidator(as_list)]
-Name = Annotated[str, Field(min_length=1)]
+Name = Annotated[str, Field(min_length=1), AfterValidator(checked_name)]
 Pair = tuple[Name, Name]
 VectorPair = Annotated[tuple[VectorValue, VectorValue], BeforeValidator(as_list)]
 Reals = Annotated[tuple[Real, ...], Field(min_length=1), BeforeValidator(as_list)]

@@ -10,6 +10,7 @@ from typing import Any, get_args
 import numpy as np
 from pydantic import ValidationError
 
+from mbref.printable import printable
 from mbref.scene_fields import checked_length, checked_size, field_of, is_some, meant, shown
 from mbref.scene_function_faults import Faults, factor_faults, table_faults
 from mbref.scene_joints import JOINT_TYPES, Coordinate, default_coordinates
@@ -157,6 +158,7 @@ def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
         and not name.isdigit()
         and not set(name) & set("[]")
         and len(name) < 80
+        and name.isprintable()
     )
     return name if fit else ""
 
@@ -170,7 +172,7 @@ def _path(location: Sequence[str | int]) -> str:
     text = ""
     for part in parts:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
-    return text or "scene"
+    return printable(text) or "scene"
 
 
 def _entries(data: Mapping[str, Any], key: str) -> list[Any]:

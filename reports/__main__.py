@@ -12,8 +12,8 @@ from crosscheck.cli import collection
 from crosscheck.cli.moving_picture import moving_picture
 from crosscheck.cli.options import add_depth, add_engines, add_folder, add_reference_time
 from crosscheck.cli.scene_request import RequestError, find_scenes
-from mbref.command_line import Parser, output_file
-from mbref.scene import SceneError
+from mbref.command_line import INTERRUPTED, Parser, output_file, status_of
+from mbref.files import write
 from reports.blocks import Block
 from reports.runs import Run, by_scene
 
@@ -30,9 +30,12 @@ TITLES: dict[tuple[str, ...], str] = {  # titles of pages of one section
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Write the report; returns 0, 2 for bad input or a missing package, or 130 after an interrupt."""
+    return status_of(lambda: _report(argv), RequestError)
+
+
+def _report(argv: Sequence[str] | None) -> int:
     if missing := [package for module, package in NEEDS.items() if find_spec(module) is None]:
-        _notice(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
-        return 2
+        raise RequestError(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
     from reports.sections import NAMES
 
     arguments = _parser((*NAMES, *OWN)).parse_args(argv)
@@ -44,24 +47,17 @@ def main(argv: Sequence[str] | None = None) -> int:
     names = arguments.section or (NAMES if is_quick or arguments.scene else (*NAMES, *OWN))
     given = "scenes" if arguments.scene else "engines" if arguments.engine and names != [STABILITY] else ""
     if set(names) <= set(OWN) and given:
-        _notice(f"--section {names[0]}: has {given} of its own; leave them out, or ask for another section")
-        return 2
+        raise RequestError(
+            f"--section {names[0]}: has {given} of its own; leave them out, or ask for another section"
+        )
     try:
         scenes = find_scenes(arguments.scene) if arguments.scene else None
         wanted = collection.Runs(scenes, arguments.engine, is_quick, arguments.reference_time)
+        collection.claim(out, arguments.force)
         _write(_blocks(out, wanted, names), out, names)
-    except (RequestError, SceneError) as error:
-        for fault in error.faults:
-            _notice(fault)
-        return 2
     except KeyboardInterrupt:
         _notice(f"interrupted; the finished runs are in {arguments.out}, the same command resumes from there")
-        return 130
-    except OSError as error:  # a file could not be written, as on a full disk
-        if error.filename is None:
-            raise
-        _notice(f"{error.filename}: {error.strerror}")
-        return 2
+        return INTERRUPTED
     return 0
 
 
@@ -71,7 +67,7 @@ def _picture(path: Path) -> int:
 
     found = moving_picture()
     runs = [Run(record) for record in found.records]
-    path.write_text(mechanisms.compared(found.scene, found.exact, runs, found.singular))
+    write(path, mechanisms.compared(found.scene, found.exact, runs, found.singular))
     _notice(f"written: {path}")
     return 0
 
@@ -91,9 +87,8 @@ def _render(folder: Path, names: Sequence[str]) -> int:
             blocks += closed_loops.render(collection.closed_loops())
         if PAPER in names:
             blocks += paper.render(*collection.stored_paper(folder))
-    except (FileNotFoundError, SceneError) as error:
-        _notice(str(error))
-        return 2
+    except FileNotFoundError as error:
+        raise RequestError(str(error)) from None
     _write(blocks, folder, names)
     return 0
 

@@ -13,11 +13,13 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
+from matplotlib.text import Text as Words
 from matplotlib.ticker import LogFormatterSciNotation
 
 from crosscheck.engine import engine_names
 from mbref.drawing import film
 from mbref.drawing.svg import COLOURS, GREY, INK
+from mbref.printable import printable
 from reports.runs import Curve
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
@@ -105,9 +107,11 @@ def svg(figure: Figure | str, name: str) -> str:
             axis.set_major_formatter(PlainPowers())
             axis.set_minor_formatter(PlainPowers(labelOnlyBase=False))
     with matplotlib.rc_context({**STYLE, "svg.hashsalt": name, "svg.id": name}):
+        for words in figure.findobj(Words):
+            words.set_parse_math(False)  # names are no formulas
         _lay_out(figure)
         figure.savefig(out, format="svg", metadata={"Date": None, "Creator": None})
-    text = out.getvalue()
+    text = printable(out.getvalue())  # XML has no control characters
     return text[text.index("<svg") :]
 
 

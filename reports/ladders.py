@@ -10,6 +10,7 @@ from pathlib import Path
 
 from crosscheck.study.stability import FILE
 from mbref.command_line import Parser
+from mbref.files import write
 from mbref.records import looked_at, strict_json
 
 # fields of a record that the section shows, and its origin
@@ -22,7 +23,7 @@ def keep(source: Path, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     records = sorted(looked_at(source / FILE).values(), key=lambda r: (r["scene"], r["engine"], r["family"]))
     lines = (strict_json({name: record[name] for name in (*KEPT, *ORIGIN)}) for record in records)
-    (folder / FILE).write_text("\n".join(lines) + "\n")
+    write(folder / FILE, "\n".join(lines) + "\n")
 
 
 if __name__ == "__main__":

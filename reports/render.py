@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import zlib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
+from mbref import files
 from reports import figures
 from reports.blocks import (
     Block,
@@ -29,6 +29,12 @@ from reports.blocks import (
 )
 
 CODE = re.compile("`([^`]+)`")
+# characters that Markdown would read as tags, links, emphasis, formulas or entities; an underscore within a
+# word and a bracket without an address are text
+ACTIVE = re.compile(
+    r"[\\`*<~$]|(?<![^\W_])_|_(?![^\W_])|\](?=[(\[:])|(?<=[a-z]):(?=//)|(?<=www)\.|@(?=\w)|&(?=[#\w]+;)"
+)
+AT_START = re.compile(r"^(#+|[-+>])(?=\s|$)")  # a heading, an item of a list or a quotation
 NUMBER = re.compile(r"(?:&lt; )?\d[\d.]*e[-+]?\d+|t = [\d.e-]*\d s|\d[\d.]* (?:ms|µs|s)\b|--[\w-]+")
 SHORT_WORD = 8  # letters; a column this narrow keeps the words of its cells whole
 TITLE = "Closed-loop mechanisms: engines compared with the true motion"
@@ -44,11 +50,11 @@ def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
         if isinstance(figure, Figure):
             drawing = figure.draw()
             drawn[figure.name] = figures.svg(drawing, figure.name)
-            name = file_name(figure.name)
-            (pictures / f"{name}.svg").write_text(drawn[figure.name], encoding="utf-8")
-            (pictures / f"{name}.png").write_bytes(figures.png(drawing))
-    (out / "index.html").write_text(html(blocks, drawn, title), encoding="utf-8")
-    (out / "report.md").write_text(markdown(blocks, title), encoding="utf-8")
+            name = files.file_name(figure.name)
+            files.write(pictures / f"{name}.svg", drawn[figure.name])
+            files.write(pictures / f"{name}.png", figures.png(drawing))
+    files.write(out / "index.html", html(blocks, drawn, title))
+    files.write(out / "report.md", markdown(blocks, title))
 
 
 def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> str:
@@ -72,7 +78,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> 
 
 def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
     """Return the report as Markdown that shows figures/NAME.png."""
-    return "\n\n".join([f"# {title}", *map(_markdown, blocks)]) + "\n"
+    return "\n\n".join([f"# {_words(title)}", *map(_markdown, blocks)]) + "\n"
 
 
 def _markdown(block: Block) -> str:
@@ -80,28 +86,34 @@ def _markdown(block: Block) -> str:
         case Heading():
             return f"{'#' * block.level} {_words(block.text)}"
         case Text():
-            return block.text
+            return _words(block.text)
         case Table():
-            return f"{block.caption}\n\n{_rows(block)}"
+            return f"{_words(block.caption)}\n\n{_rows(block)}"
         case Figure():
-            return f"{block.caption}\n\n![{_words(block.name)}](figures/{file_name(block.name)}.png)"
+            picture = f"![{_words(block.name)}](figures/{files.file_name(block.name)}.png)"
+            return f"{_words(block.caption)}\n\n{picture}"
         case Plot():
             return _markdown(block.figure)
         case Opening():
             answers = (f"{label}: {sentence}" for label, sentence in block.sentences.items())
             return "\n\n".join(map(_words, (block.headline, *answers)))
         case Moving():
-            return "\n\n".join([block.caption, "\n".join(f"- {_words(title)}" for title, _ in block.panels)])
+            return "\n\n".join(
+                [_words(block.caption), "\n".join(f"- {_words(title)}" for title, _ in block.panels)]
+            )
         case HeatMap():
             rows = [[name, *map(_heat, cells)] for name, cells in block.rows.items()]
-            return f"{block.caption}\n\n{_rows(Table('', [block.label, *block.columns], rows))}"
+            return f"{_words(block.caption)}\n\n{_rows(Table('', [block.label, *block.columns], rows))}"
         case Matrix():
-            return f"{block.caption}\n\n{_matrix(block)}"
+            return f"{_words(block.caption)}\n\n{_matrix(block)}"
         case Record():
-            shown = [f"{card.settings}: {card.grade}\n    {card.command}" for card in block.cards]
+            shown = [
+                f"{_words(card.settings)}: {card.grade}\n    {_code(card.command)}" for card in block.cards
+            ]
             return "\n\n".join([f"### {_words(f'{block.scene}: {block.title}')}", *(f"- {t}" for t in shown)])
         case Listing():
-            return f"```\n{block.text}\n```"
+            fence = _ticks(block.text, 3)
+            return f"{fence}\n{block.text}\n{fence}"
 
 
 def _heat(cell: Cell) -> str:
@@ -138,8 +150,25 @@ def _line(cells: Sequence[str]) -> str:
 
 
 def _words(text: str) -> str:
-    """Return the text on one line without HTML tags."""
-    return " ".join(text.replace("&", "&amp;").replace("<", "&lt;").split())
+    """Return the text on one line of Markdown that shows it as it is; `code` remains code."""
+    parts = CODE.split(" ".join(text.split()))  # in turns text and code
+    shown = [_code(part) if k % 2 else ACTIVE.sub(_escaped, part) for k, part in enumerate(parts)]
+    return AT_START.sub(lambda start: f"\\{start[0]}", "".join(shown))
+
+
+def _escaped(found: re.Match[str]) -> str:
+    return {"<": "&lt;", "&": "&amp;"}.get(found[0], f"\\{found[0]}")
+
+
+def _code(text: str) -> str:
+    """Return a span of code, between more backticks than the text has in a row."""
+    ticks = _ticks(text, 1)
+    space = " " * (text[:1] == "`" or text[-1:] == "`")
+    return f"{ticks}{space}{text}{space}{ticks}"
+
+
+def _ticks(text: str, least: int) -> str:
+    return "`" * max([least, *(len(run) + 1 for run in re.findall("`+", text))])
 
 
 def numbers(text: str) -> Markup:
@@ -158,13 +187,6 @@ def classes(cell: str, is_right: bool) -> str:
 def breakable(name: str) -> Markup:
     """Return a name for the page that may be broken after underscores and plus signs."""
     return escape(name).replace("_", Markup("_<wbr>")).replace("+", Markup("+<wbr>"))
-
-
-def file_name(name: str) -> str:
-    """Return the name of a figure as a file name; a number replaces a name that is no valid file name, such
-    as ../up."""
-    plain = re.sub(r"[^\w-]+", "-", name).strip("-")[:80]
-    return plain if plain and plain == name else f"{plain}-{zlib.crc32(name.encode()):08x}"
 
 
 def slug(text: str) -> str:

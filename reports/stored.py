@@ -3,7 +3,6 @@ run."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,10 +11,13 @@ import numpy as np
 from crosscheck.engine import engine_names
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
+from crosscheck.study.record_shape import Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
-from mbref.records import looked_at
+from mbref.records import looked_at, read_json
 from mbref.scene import Scene
 from reports.runs import SceneRuns, by_scene
+
+SHAPES = {"records": Run, "truths": Truth, "motions": Run, "branches": Run}  # of the records of each file
 
 
 def groups(folder: Path) -> list[SceneRuns]:
@@ -24,10 +26,9 @@ def groups(folder: Path) -> list[SceneRuns]:
         raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
     named = {scene.name: scene for scene in scenes}
-    times = looked_at(folder / "timings.jsonl")
+    times = {record["key"]: record for record in _read(folder / "timings.jsonl", Timing)}
     records, *more = (
-        of_scenes(list(looked_at(folder / f"{name}.jsonl").values()), scenes)
-        for name in ("records", "truths", "motions", "branches")
+        of_scenes(_read(folder / f"{name}.jsonl", shape), scenes) for name, shape in SHAPES.items()
     )
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
@@ -38,8 +39,13 @@ def verified(folder: Path) -> list[Record]:
     """Return the verdicts that `crosscheck verify ENGINE --json` wrote to ``folder``/conformance/*.json,
     crosscheck's own engines first."""
     order = list(engine_names())
-    found = [json.loads(path.read_text()) for path in sorted((folder / "conformance").glob("*.json"))]
+    paths = sorted((folder / "conformance").glob("*.json"))
+    found = [record for path in paths for record in checked(path, [read_json(path)], Verdicts)]
     return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))
+
+
+def _read(path: Path, shape: type[Run] | type[Truth] | type[Timing]) -> Sequence[Record]:
+    return checked(path, list(looked_at(path).values()), shape)
 
 
 def _is_gate(scene: Scene, record: Record) -> bool:

@@ -18,6 +18,7 @@ from crosscheck.study.record_view import ended, error_text, is_completed
 from crosscheck.study.speed_sentences import LEVEL, SAID, title
 from crosscheck.study.verdict import Grade, Judged
 from mbref.command_line import Parser
+from mbref.files import file_name
 from mbref.records import strict_json
 from mbref.trajectory import Outcome
 from reports.runs import SceneRuns, duration, plain
@@ -288,7 +289,7 @@ def keep(found: Sequence[SceneRuns], folder: Path) -> None:
     """Write scenes, truths, and the records of runs without their motions into a folder."""
     (folder / "scenes").mkdir(parents=True, exist_ok=True)
     for group in found:
-        group.scene.save(folder / "scenes" / f"{group.scene.name}.toml")
+        group.scene.save(folder / "scenes" / f"{file_name(group.scene.name)}.toml")
     records = [
         {k: v for k, v in run.record.items() if k not in MOTION} for group in found for run in group.runs
     ]

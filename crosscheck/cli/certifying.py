@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import importlib.util
 import json
-from pathlib import Path
 
 from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import RequestError
 from crosscheck.study.progress import followed
+from mbref.files import write
 
 
 def certify(arguments: argparse.Namespace) -> int:
@@ -28,7 +28,7 @@ def certify(arguments: argparse.Namespace) -> int:
         raise RequestError(str(error)) from None
     text = json.dumps(table, indent=1, ensure_ascii=False)
     if arguments.out:
-        Path(arguments.out).write_text(text + "\n")
+        write(arguments.out, text + "\n")
     else:
         print(text)
     return 0

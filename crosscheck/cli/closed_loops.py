@@ -16,6 +16,7 @@ from crosscheck.cli.running import COMPLETED, console, notice
 from crosscheck.closed_loops import document, records
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
 from crosscheck.study.progress import shown as progress_of
+from mbref.files import write
 
 LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
 
@@ -27,7 +28,7 @@ def closed_loops(arguments: argparse.Namespace) -> int:
         _measure(arguments, path)
     found = records.read(path)
     if arguments.page:
-        Path(arguments.page).write_text(document.page(found))
+        write(arguments.page, document.page(found))
         notice(f"written: {arguments.page}")
     for is_best in (True, False):
         console().print(_table(matrix(found), is_best))

@@ -16,6 +16,7 @@ from crosscheck.study import stability, sweep
 from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.progress import shown
+from crosscheck.study.record_shape import Ladder, Timing, checked
 from crosscheck.study.record_view import with_time
 from crosscheck.study.scouting import shown_name
 from crosscheck.study.timings import with_timings
@@ -25,6 +26,7 @@ from mbref.scene import Scene
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
 REPEATS = 3  # timed runs of each setting; the settings take turns
 Notice = Callable[[str], None]  # takes one sentence for the user
+RECORDS = ("records.jsonl", store.FILE, stability.FILE)  # a folder with one of them is of a report
 
 
 class Paper(NamedTuple):
@@ -43,6 +45,15 @@ class Runs(NamedTuple):
     engines: Sequence[str] | None
     is_quick: bool
     reference_time: float
+
+
+def claim(out: Path, is_forced: bool) -> None:
+    """Make the folder of a report, or continue one; raises RequestError for a folder with other files, unless
+    the user forces it."""
+    out.mkdir(parents=True, exist_ok=True)
+    if is_forced or not any(out.iterdir()) or any((out / name).exists() for name in RECORDS):
+        return
+    raise RequestError(f"{out}: has files and no records of a report; name another folder, or add --force")
 
 
 def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
@@ -76,7 +87,6 @@ def closed_loops() -> list[Record]:
 def stability_ladders(out: Path, engines: Sequence[str] | None, notice: Notice) -> list[Record]:
     """Return the records of the stability ladders, which are stored in ``out``/stability.jsonl: of mbref's
     methods, and of the named engines (None: the default ones) that have a family for them."""
-    out.mkdir(parents=True, exist_ok=True)
     return stability.run(out / stability.FILE, find_engines(engines, notice))
 
 
@@ -87,13 +97,13 @@ def stored_ladders(out: Path) -> list[Record]:
     """
     if not (out / stability.FILE).exists():
         raise FileNotFoundError(f"{out}: has no {stability.FILE} of a report")
-    return list(looked_at(out / stability.FILE).values())
+    path = out / stability.FILE
+    return list(checked(path, list(looked_at(path).values()), Ladder))
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
     """Return the records of the paper's runs, stored in ``out``/paper*: runs of the paper's tables only, or
     of all studies."""
-    out.mkdir(parents=True, exist_ok=True)
     path, timed = out / store.FILE, runs.timed()
     cases = runs.cases() | timed | (runs.studies() if is_whole else {})
     with shown("the paper's runs", len(cases)) as progress:
@@ -114,5 +124,6 @@ def stored_paper(out: Path) -> Paper:
     Raises FileNotFoundError if the folder has none.
     """
     records, times = store.indexed(out), looked_at(out / TIMINGS)
+    checked(out / TIMINGS, list(times.values()), Timing)
     timed = {label: with_time(record, times) for label, record in records.items()}
     return Paper(timed, illustration(out / ILLUSTRATION))

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import sys
 from collections.abc import Callable, Mapping, Sequence
 
 from crosscheck.cli import listing, request, tables
@@ -33,38 +31,21 @@ from crosscheck.processes.program import run_program
 from crosscheck.study.grid import Record, key
 from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
-from mbref.scene import SceneError
+from mbref.command_line import status_of
 from mbref.trajectory import Outcome
 
-BAD_INPUT, INTERRUPTED = 2, 130
 KILLED = 128  # plus the number of the signal that ended a program
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run a command line and return the exit status: 0 done, 1 not done, 2 faulty input, 130 interrupted
     (`parser.EXIT` defines "done" for each command)."""
+    return status_of(lambda: _command(argv), RequestError)
+
+
+def _command(argv: Sequence[str] | None) -> int:
     known = parser()
     arguments = known.parse_args(argv)
-    try:
-        return _command(arguments, known)
-    except (RequestError, SceneError) as error:
-        for fault in error.faults:
-            print(fault, file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        notice("interrupted")
-        return INTERRUPTED
-    except BrokenPipeError:  # the reader closed the pipe, as in `crosscheck list | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return OTHERWISE
-    except OSError as error:  # a file could not be written, as on a full disk
-        if error.filename is None:
-            raise
-        notice(f"{error.filename}: {error.strerror}")
-        return BAD_INPUT
-
-
-def _command(arguments: argparse.Namespace, known: argparse.ArgumentParser) -> int:
     if arguments.version:
         listing.show_versions(console())
         return COMPLETED
@@ -143,7 +124,7 @@ def _report(arguments: argparse.Namespace) -> int:
 
 
 def _paper(arguments: argparse.Namespace) -> int:
-    return _rendered(["--section", "paper", "--out", arguments.out, "--depth", arguments.depth])
+    return _rendered(["--section", "paper", "--depth", arguments.depth, *_folder(arguments)])
 
 
 def _rendered(options: Sequence[str]) -> int:
@@ -153,11 +134,15 @@ def _rendered(options: Sequence[str]) -> int:
 
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:
-    sections = [option for name in arguments.section or () for option in ("--section", name)]
-    engines = [option for name in arguments.engine or () for option in ("--engine", name)]
+    sections = [f"--section={name}" for name in arguments.section or ()]
+    engines = [f"--engine={name}" for name in arguments.engine or ()]
     limits = ["--depth", arguments.depth, "--reference-time", f"{arguments.reference_time:g}"]
-    limits += ["--render", arguments.render] if arguments.render else []
-    return [*arguments.scene, "--out", arguments.out, *engines, *limits, *sections]
+    limits += [f"--render={arguments.render}"] if arguments.render else []
+    return [*_folder(arguments), *engines, *limits, *sections, "--", *arguments.scene]
+
+
+def _folder(arguments: argparse.Namespace) -> list[str]:
+    return [f"--out={arguments.out}", *["--force"] * arguments.force]
 
 
 def _diff(arguments: argparse.Namespace) -> int:

@@ -10,8 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.console import Console
-
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.request import Choice
 from crosscheck.judge.reference.reference import SECONDS
@@ -23,7 +21,9 @@ from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
 from crosscheck.study.sentences import Verdict, verdict
 from crosscheck.study.verdict import Judged, grade, judged
+from mbref.files import write
 from mbref.scene import Scene
+from mbref.terminal import Console
 
 if TYPE_CHECKING:
     import pandas
@@ -121,7 +121,7 @@ class Comparison:
         """
         if Path(path).suffix.lower() != ".json":
             raise ValueError(f"{path}: a comparison is saved as .json")
-        Path(path).write_text(json.dumps(self.document(), allow_nan=False) + "\n")
+        write(path, json.dumps(self.document(), allow_nan=False) + "\n")
 
     def print(self, console: Console) -> None:
         """Print the verdict, tables and a plot.
@@ -135,7 +135,7 @@ class Comparison:
 
     def __str__(self) -> str:
         text = io.StringIO()
-        self.print(Console(file=text, width=WIDTH, markup=False, highlight=False))
+        self.print(Console(file=text, width=WIDTH))
         return text.getvalue()
 
     def __repr__(self) -> str:

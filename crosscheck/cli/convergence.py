@@ -14,6 +14,7 @@ from crosscheck.cli.running import COMPLETED, console, notice
 from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document, ladders
 from crosscheck.study.grid import Record
+from mbref.files import write
 
 
 def convergence(arguments: argparse.Namespace) -> int:
@@ -23,7 +24,7 @@ def convergence(arguments: argparse.Namespace) -> int:
         ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
     found = read(path)
     if arguments.page:
-        Path(arguments.page).write_text(document.page(found))
+        write(arguments.page, document.page(found))
         notice(f"written: {arguments.page}")
     console().print(_table(found))
     return COMPLETED

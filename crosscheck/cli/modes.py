@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 
 from rich.box import SIMPLE
 from rich.console import Console
@@ -16,6 +15,7 @@ from crosscheck.cli.scene_request import find_scenes
 from crosscheck.engine import all_engines
 from crosscheck.small_motions import document, records
 from crosscheck.small_motions.records import Record
+from mbref.files import write
 
 # engines whose accelerations at a pose are asked for, if they are installed
 ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
@@ -32,7 +32,7 @@ def modes(arguments: argparse.Namespace) -> int:
             records.write(records.merged(records.of_mechanisms(engines, notice), records.read()))
         found = records.read()
     if arguments.page:
-        Path(arguments.page).write_text(document.page(found), encoding="utf-8")
+        write(arguments.page, document.page(found))
         notice(f"written: {arguments.page}")
     if arguments.json:
         print_json([{"poses": found}])

@@ -15,7 +15,7 @@ from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 from mbref import formats
-from mbref.command_line import output_file, output_folder
+from mbref.command_line import add_force, add_output, output_folder
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
@@ -100,8 +100,9 @@ def add_folder(parser: argparse.ArgumentParser, default: str) -> None:
         type=output_folder,
         default=default,
         metavar="DIR",
-        help=f"folder to write (default: {default})",
+        help=f"folder to write (default: {default}); its records are continued",
     )
+    add_force(parser)
 
 
 def add_depth(parser: argparse.ArgumentParser) -> None:
@@ -228,9 +229,9 @@ def add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:
     parser.add_argument(
         "--records", default=str(records), metavar="FILE", help="default: the records of the package"
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--page",
-        type=output_file,
         metavar="FILE",
         help="also write the tables and the runs as a page in Markdown",
     )

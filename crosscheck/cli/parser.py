@@ -33,7 +33,7 @@ from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.timings import REPEATS
-from mbref.command_line import Parser, commands, output_file
+from mbref.command_line import Parser, add_output, commands, record_file
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
 FIRST = """\
@@ -103,7 +103,7 @@ def _add_certify(commands: Commands) -> None:
     parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
     add_samples(parser, 3)
     parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    parser.add_argument("--out", type=output_file, metavar="FILE", help="default: standard output")
+    add_output(parser, "--out", metavar="FILE", help="default: standard output")
 
 
 def _add_judge(commands: Commands) -> None:
@@ -149,7 +149,7 @@ def _add_reference(commands: Commands) -> None:
     about = "write the reference motion with the bound on its error as a table for other tools"
     parser = _add(commands, "reference", about, example)
     parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
-    parser.add_argument("--out", required=True, type=output_file, metavar="FILE", help="the .csv file")
+    add_output(parser, "--out", required=True, metavar="FILE", help="the .csv file")
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
     add_samples(when, 101)
@@ -235,7 +235,7 @@ def _add_verify(commands: Commands) -> None:
     drawn.add_argument(
         "--first-seed", type=whole(0, MOST_SEED), default=0, metavar="S", help="default: %(default)s"
     )
-    drawn.add_argument("--records", type=output_file, metavar="FILE", help="store and reuse verdicts there")
+    drawn.add_argument("--records", type=record_file, metavar="FILE", help="store and reuse verdicts there")
     drawn.add_argument(
         "--beside",
         action="append",
@@ -291,7 +291,7 @@ def _add_modes(commands: Commands) -> None:
         help=f"poses to search from (1 to {MOST_STARTS}; default: %(default)s)",
     )
     parser.add_argument("--run", action="store_true", help="measure the stored table again, or engines of it")
-    parser.add_argument("--page", type=output_file, metavar="FILE", help="also write the table in Markdown")
+    add_output(parser, "--page", metavar="FILE", help="also write the table in Markdown")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 

@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from rich.console import Console
 
 from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import Choice
@@ -25,6 +24,7 @@ from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
 from mbref.formats import import_options
 from mbref.scene import Scene
+from mbref.terminal import Console
 
 Document = dict[str, Any]
 COMPLETED, OTHERWISE = 0, 1
@@ -117,7 +117,7 @@ def standard_output_kept() -> Iterator[None]:
 
 def console(width: int = PIPED_WIDTH) -> Console:
     """Return a console on standard output; ``width`` (columns) applies if the output is no terminal."""
-    return Console(width=None if sys.stdout.isatty() else width, markup=False, highlight=False)
+    return Console(width=None if sys.stdout.isatty() else width)
 
 
 def notice(sentence: str) -> None:

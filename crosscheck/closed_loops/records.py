@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
@@ -14,6 +13,9 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import engine
 from crosscheck.study.grid import Case, Record, Unable, default_cases, key, study
 from crosscheck.study.origin import made_by
+from crosscheck.study.record_shape import Measured, Refused, checked
+from mbref import files
+from mbref.records import looked_at
 from mbref.trajectory import Outcome
 
 FILE = Path(__file__).parent / "records.jsonl"
@@ -41,15 +43,19 @@ METRICS = ("error", "error_bound", "violation_position")
 
 
 def read(path: Path = FILE) -> list[Record]:
-    """Return the records of a file in their order; no records if the file does not exist."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+    """Return the records of a file in their order; no records if the file does not exist.
+
+    Raises RecordsError.
+    """
+    found = list(looked_at(path).values())
+    for record in found:
+        checked(path, [record], Measured if record.get("outcome") in Outcome.__members__ else Refused)
+    return found
 
 
 def write(records: Sequence[Record], path: Path = FILE) -> None:
     """Replace the file; a reader sees the old file or the new one."""
-    fresh = path.with_suffix(".new")
-    fresh.write_text("".join(json.dumps(record) + "\n" for record in records))
-    os.replace(fresh, path)
+    files.write(path, "".join(json.dumps(record) + "\n" for record in records))
 
 
 def cases(

@@ -3,6 +3,7 @@ check."""
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
@@ -13,6 +14,7 @@ from crosscheck.conformance import suite
 from crosscheck.conformance.changes import replaced
 from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import Bench, Specimen, set_up
+from mbref.files import file_name
 from mbref.scene import GROUND, Joint, Load, Scene, SceneError
 
 TRIES = 60  # largest number of scenes tried to reduce a violation
@@ -54,12 +56,12 @@ def keep(scene: Scene, verdict: suite.Verdict, engine: str, folder: Path, called
     ``called`` names a scene of the suite, which the command then uses in place of the file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{engine}_{verdict.property}_{scene.name}.toml".replace(" ", "_").replace(":", "_")
+    path = folder / f"{file_name(f'{engine}_{verdict.property}_{scene.name}')}.toml"
     scene.save(path)
     numbers = "" if verdict.measured is None else f" {verdict.measured:.3g}, allowed {verdict.allowed:.3g}"
     words = [
         f"{engine}: {verdict.check()} fails{numbers} {verdict.reason}".rstrip(),
-        f"crosscheck verify {engine} --scene {repr(called) if called else path}",
+        shlex.join(["crosscheck", "verify", engine, "--scene", called or str(path)]),
     ]
     path.write_text("".join(f"# {word}\n" for word in words) + path.read_text())
     return path

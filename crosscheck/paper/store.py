@@ -10,7 +10,9 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.paper.runs import GROWTH, PEAKS, Cases, Label, Records
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown
-from mbref.records import looked_at
+from crosscheck.study.record_shape import checked
+from mbref.files import write
+from mbref.records import RecordsError, looked_at, read_json
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -75,11 +77,15 @@ def index(path: str | Path, chosen: Cases) -> None:
     """Write the keys of the cases by label next to their records, so that a page can be rendered from these
     files alone."""
     known = {json.dumps(label, ensure_ascii=False): key(case) for label, case in chosen.items()}
-    Path(path).with_name(INDEX).write_text(json.dumps(known, indent=0, ensure_ascii=False) + "\n")
+    write(Path(path).with_name(INDEX), json.dumps(known, indent=0, ensure_ascii=False) + "\n")
 
 
 def indexed(folder: Path) -> Records:
     """Return the records of a folder by label; raises FileNotFoundError if the folder has no records."""
     known = looked_at(folder / FILE)
-    keys = json.loads((folder / INDEX).read_text())
-    return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}
+    checked(folder / FILE, list(known.values()))
+    keys = read_json(folder / INDEX)
+    try:
+        return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}
+    except (AttributeError, TypeError, ValueError):
+        raise RecordsError(f"{folder / INDEX}: has no labels of the paper's runs") from None

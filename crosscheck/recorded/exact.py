@@ -14,6 +14,7 @@ from crosscheck.judge.start import started
 from crosscheck.judge.truth import NoSolution, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.recorded.columns import SI, kind_of, start_columns, values
+from mbref.files import replaced
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -81,7 +82,7 @@ def reference_table(
 def write(table: dict[str, np.ndarray], path: Path) -> None:
     """Write columns as CSV, the unit of each in its header: ``rod.position.x [m]``."""
     headers = [f"{name} [{SI['time'] if name == 'time' else SI.get(kind_of(name), '1')}]" for name in table]
-    with path.open("w", encoding="utf-8", newline="") as file:
+    with replaced(path) as fresh, fresh.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
         writer.writerow(headers)
         writer.writerows(zip(*(map(repr, column.tolist()) for column in table.values()), strict=True))

@@ -14,6 +14,7 @@ from crosscheck.engines.mbref import search
 from crosscheck.judge.small_motions.equilibria import STARTS, Steady, steady_poses
 from crosscheck.small_motions.compare import Result, distance, error, of_engine
 from crosscheck.small_motions.mechanisms import MECHANISMS
+from mbref import files
 from mbref.scene import Scene
 
 FILE = Path(__file__).parent / "records.json"
@@ -130,4 +131,4 @@ def read(path: Path = FILE) -> list[Record]:
 
 def write(records: Sequence[Record], path: Path = FILE) -> None:
     """Store records, one a line."""
-    path.write_text("[\n" + ",\n".join(json.dumps(record) for record in records) + "\n]\n")
+    files.write(path, "[\n" + ",\n".join(json.dumps(record) for record in records) + "\n]\n")

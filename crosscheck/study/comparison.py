@@ -23,13 +23,15 @@ from crosscheck.study.grid import Case, Record, default_cases, key, known, recor
 from crosscheck.study.hurried import Hurried
 from crosscheck.study.ladder import Family, beyond, families, finest, first
 from crosscheck.study.progress import counted, shown
+from crosscheck.study.record_shape import Truth, checked
 from crosscheck.study.scouting import scout, unasked
 from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
 from crosscheck.study.truths import truth_record
 from crosscheck.study.verdict import Grade, grade
-from mbref.records import append, stored
+from mbref.files import file_name
+from mbref.records import append, opened, stored
 from mbref.scene import Scene
 
 Notice = Callable[[str], None]  # a function that shows one sentence to the user
@@ -82,6 +84,8 @@ def collected(
     The truths are computed in parallel with the runs.
     """
     if wanted.out is not None:
+        wanted.out.mkdir(parents=True, exist_ok=True)
+        opened(wanted.out / "records.jsonl")  # marks the folder as one of records
         _save(scenes, wanted.out / "scenes")
     with ExitStack() as stack:
         stack.callback(end_idle)
@@ -203,7 +207,8 @@ def _engines(cases: Sequence[Case]) -> list[str]:
 def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
     """Return the record of every scene's truth at the sample times of its runs."""
     path = _file(wanted, "truths.jsonl")
-    done, found = stored(path), []
+    done, found = stored(path), list[Record]()
+    checked(path, list(done.values()), Truth)
     for scene, times in zip(scenes, wanted.times, strict=True):
         record = done.get(truth_key(scene, times))
         if record is None or record["given"] < wanted.reference_time:
@@ -230,4 +235,4 @@ def _file(wanted: Wanted, name: str) -> Path | None:
 def _save(scenes: Sequence[Scene], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for scene in scenes:
-        scene.save(folder / f"{scene.name}.toml")
+        scene.save(folder / f"{file_name(scene.name)}.toml")

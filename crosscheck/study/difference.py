@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from crosscheck.study.grid import Record
+from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
 from crosscheck.study.wording import runs
 from mbref.records import looked_at
@@ -49,13 +50,15 @@ def load(path: str | Path) -> dict[Identity, Record]:
     file = Path(path) / "records.jsonl" if Path(path).is_dir() else Path(path)
     if not file.exists():
         raise ValueError(f"{file}: no such file")
-    times = looked_at(file.parent / "timings.jsonl")
+    times, records = looked_at(file.parent / "timings.jsonl"), list(looked_at(file).values())
+    checked(file.parent / "timings.jsonl", list(times.values()), Timing)
     found: dict[Identity, Record] = {}
-    for record in _of_the_report(file, list(looked_at(file).values())):
+    for record in _of_the_report(file, records):
         if "asked" not in record:
             raise ValueError(
                 f"{file}: its records lack the field `asked` with the request of the run; run them again"
             )
+        checked(file, [record])
         timed = times.get(record["key"]) or record["cost"]
         cost = {**record["cost"], "seconds": timed["seconds"]}
         found[identity(record)] = {**record, "cost": cost, "repeated": record["key"] in times}

@@ -27,6 +27,7 @@ from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
+from crosscheck.study.record_shape import checked
 from crosscheck.study.scouting import offer, shown_name
 from mbref.records import append, stored
 from mbref.scene import Scene
@@ -163,6 +164,7 @@ def known(cases: Sequence[Case], records_path: str | Path | None) -> dict[str, R
     """Return the stored records of the cases by key; ``study`` does not repeat these runs."""
     records = stored(records_path)
     limits = {key(case): case.time_limit for case in cases}
+    checked(records_path, [records[k] for k in limits if k in records])
     return {k: records[k] for k in limits if k in records and not _worth_repeating(records[k], limits[k])}
 
 

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from rich.console import Console
 from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
@@ -23,6 +22,7 @@ from rich.text import Text
 
 from crosscheck.processes.pool import starting
 from crosscheck.study.grid import Record
+from mbref.terminal import Console
 
 PARTS = 10  # number of lines that show a progress without a terminal
 QUIET = 20.0  # seconds without a printed line, after which a line names the running work

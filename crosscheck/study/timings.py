@@ -8,6 +8,7 @@ from typing import Any
 
 from crosscheck.study.fair_timing import timed
 from crosscheck.study.grid import Case, Record
+from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import with_time
 from mbref.records import append, stored
 from mbref.trajectory import Outcome
@@ -30,6 +31,7 @@ def with_timings(
     Only completed runs of up to ``long`` s are timed again, in turns.
     """
     done, known = list(records), stored(path)
+    checked(path, list(known.values()), Timing)
     for name in dict.fromkeys(case.scene.name for case in cases):
         places = [i for i, r in enumerate(records) if r["scene"] == name and _is_short(r, long)]
         if any(records[i]["key"] not in known for i in places):

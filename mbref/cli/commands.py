@@ -18,13 +18,11 @@ from mbref.cli.run import add as add_run
 from mbref.cli.scene_files import add as add_scene_files
 from mbref.cli.statics import add as add_statics
 from mbref.cli.tables import add as add_tables
-from mbref.command_line import Parser, commands
-from mbref.input_error import InputError
+from mbref.command_line import Parser, commands, status_of
 from mbref.method import MethodError
 from mbref.scene import SceneError
 from mbref.scene_toml import with_lines
 
-BAD_INPUT, INCOMPLETE, INTERRUPTED = 2, 1, 130
 EPILOG = """\
 first steps:
   mbref new my.toml             a commented scene to start from
@@ -38,22 +36,16 @@ exit status: 0 done, 1 a run ended early, 2 bad input, 130 interrupted"""
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command line and return the exit status: 0 if the run completed, 1 if the run ended early, 2 for
-    faulty input."""
+    faulty input, 130 after an interrupt."""
+    return status_of(lambda: _command(arguments), MethodError)
+
+
+def _command(arguments: Sequence[str] | None) -> int:
     options = parser().parse_args(arguments)
     try:
         return int(options.action(options))
     except SceneError as error:
-        return _refuse(_with_lines(options, error.faults))
-    except (MethodError, InputError) as error:
-        return _refuse([str(error)])
-    except KeyboardInterrupt:
-        print("mbref: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except BrokenPipeError:  # the reader closed the pipe, as in `mbref list | head`
-        sys.stdout = None
-        return INCOMPLETE
-    except OSError as error:  # a file could not be written
-        return _refuse([f"{error.filename or options.out}: {error.strerror}"])
+        raise SceneError(_with_lines(options, error.faults)) from None
 
 
 def _with_lines(options: argparse.Namespace, faults: Sequence[str]) -> Sequence[str]:
@@ -63,12 +55,6 @@ def _with_lines(options: argparse.Namespace, faults: Sequence[str]) -> Sequence[
     if path.suffix != ".toml" or not path.is_file():
         return faults
     return with_lines(path.read_text(encoding="utf-8-sig", errors="replace"), faults)
-
-
-def _refuse(faults: Sequence[str]) -> int:
-    for fault in faults:
-        print(fault, file=sys.stderr)
-    return BAD_INPUT
 
 
 def parser() -> argparse.ArgumentParser:

@@ -12,7 +12,7 @@ import numpy as np
 
 from mbref.cli.options import add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
-from mbref.command_line import output_file
+from mbref.command_line import record_file
 from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.scene import Scene
@@ -45,7 +45,7 @@ def add(commands: Any) -> None:
     many.add_argument("--seed", type=int, default=0, help="seed of the random numbers (default 0)")
     many.add_argument("--workers", type=int, help="number of processes (default: one for each core)")
     many.add_argument(
-        "--out", type=output_file, metavar="FILE", help="append every trajectory, one JSON line each"
+        "--out", type=record_file, metavar="FILE", help="append every trajectory, one JSON line each"
     )
     add_method_options(many)
 

@@ -9,7 +9,8 @@ from typing import Any
 
 from mbref import formats
 from mbref.cli.options import add_scene
-from mbref.command_line import output_file
+from mbref.command_line import add_output
+from mbref.files import free
 from mbref.input_error import InputError
 from mbref.scenes import find_scene
 
@@ -30,9 +31,7 @@ def add(commands: Any) -> None:
         "  mbref import legs.urdf --close foot_a=foot_b:revolute:y --pose knee=0.4",
     )
     take.add_argument("file", metavar="FILE", help="the .xml, .urdf or .sdf file")
-    take.add_argument(
-        "--out", type=output_file, metavar="FILE", help="the scene file (default: the same name with .toml)"
-    )
+    add_output(take, "--out", metavar="FILE", help="the scene file (default: the same name with .toml)")
     formats.add_options(take)
 
     give = commands.add_parser(
@@ -44,11 +43,11 @@ def add(commands: Any) -> None:
         epilog="example:\n  mbref export four_bar_gravity --out four_bar.xml",
     )
     add_scene(give)
-    give.add_argument("--out", type=output_file, metavar="FILE", required=True, help="the .xml file")
+    add_output(give, "--out", metavar="FILE", required=True, help="the .xml file")
 
 
 def _import(options: argparse.Namespace) -> int:
-    out = Path(options.out or Path(options.file).with_suffix(".toml"))
+    out = free(options.out or Path(options.file).with_suffix(".toml"), options.force)
     if out.suffix != ".toml":
         raise InputError(f"--out: must end in .toml, got {str(out)!r}")
     found = formats.read(options.file, formats.import_options(options))

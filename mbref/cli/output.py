@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from rich.console import Console
 
 from mbref.outputs import UNIT_OF, quantity_of
 from mbref.scene import Scene
 from mbref.scene_slips import probable_slips
+from mbref.terminal import Console
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -38,7 +38,7 @@ SMALL_COLUMNS = ("violation", "error_estimate")
 def console() -> Console:
     """Return the console of the standard output: as wide as the terminal, 80 columns in a pipe; names are
     never markup."""
-    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH, markup=False, highlight=False)
+    return Console(width=None if sys.stdout.isatty() else PIPED_WIDTH)
 
 
 def warn(scene: Scene) -> None:

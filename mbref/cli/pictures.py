@@ -9,11 +9,12 @@ from typing import Any
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
-from mbref.command_line import output_file
+from mbref.command_line import add_output
 from mbref.drawing.film import MOVING, png, write_film
 from mbref.drawing.picture import side_by_side, still
 from mbref.drawing.view import View
 from mbref.equations.branches import SMOOTH
+from mbref.files import free, write
 from mbref.input_error import InputError
 from mbref.method import MethodError
 from mbref.motion import Motion
@@ -38,9 +39,7 @@ def add(commands: Any) -> None:
     )
     add_scene(draw)
     draw.add_argument("--view", metavar="VIEW", help=VIEW)
-    draw.add_argument(
-        "--out", type=output_file, metavar="FILE", help=".svg or .png (default: as the scene, with .svg)"
-    )
+    add_output(draw, "--out", metavar="FILE", help=".svg or .png (default: as the scene, with .svg)")
 
     animate = commands.add_parser(
         "animate",
@@ -54,9 +53,9 @@ def add(commands: Any) -> None:
     )
     add_scene(animate)
     animate.add_argument("--view", metavar="VIEW", help=VIEW)
-    animate.add_argument(
+    add_output(
+        animate,
         "--out",
-        type=output_file,
         metavar="FILE",
         help=".svg, .gif or .mp4 (default: as the scene, with -moving.svg);\n"
         ".gif and .mp4 need the extra video",
@@ -81,10 +80,7 @@ def _draw(options: argparse.Namespace) -> int:
     path = path_of(options, "", (".svg", ".png"))
     warn(scene)
     picture = still(scene, view)
-    if path.suffix == ".png":
-        path.write_bytes(png(picture))
-    else:
-        path.write_text(picture, encoding="utf-8")
+    write(path, png(picture) if path.suffix == ".png" else picture)
     print(path)
     return 0
 
@@ -99,7 +95,7 @@ def _animate(options: argparse.Namespace) -> int:
         number = chosen_crossing(motion, options.crossing)
         motions = along_branches(motion, run.method, run.limits, number)
         title = f"{scene.name}: {sentence(motion, number)}"
-        path.write_text(side_by_side(scene, motions, title, view), encoding="utf-8")
+        write(path, side_by_side(scene, motions, title, view))
     else:
         write_film(path, scene, motion, view)
     print(path)
@@ -116,12 +112,12 @@ def requested_view(options: argparse.Namespace) -> View | None:
 def path_of(options: argparse.Namespace, ending: str, suffixes: tuple[str, ...]) -> Path:
     """Return the requested file, or a file in the working directory named after the scene or its file.
 
-    Raises InputError for another kind of file.
+    Raises InputError for another kind of file, and for a file that exists, unless ``--force`` is given.
     """
     path = Path(options.out or f"{Path(options.scene).name.removesuffix('.toml')}{ending}.svg")
     if path.suffix not in suffixes:
         raise InputError(f"--out: must end in {' or '.join(suffixes)}, got {str(path)!r}")
-    return path
+    return free(path, options.force)
 
 
 def chosen_crossing(smooth: Motion, number: int | None) -> int:

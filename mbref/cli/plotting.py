@@ -8,7 +8,8 @@ from typing import Any
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
-from mbref.command_line import output_file
+from mbref.command_line import add_output
+from mbref.files import replaced
 from mbref.input_error import InputError
 from mbref.outputs import OUTPUTS
 
@@ -34,9 +35,7 @@ def add(commands: Any) -> None:
         metavar="COLUMN",
         help="a column or its beginning, such as rod.position (default: joint coordinates and energy)",
     )
-    plot.add_argument(
-        "--out", type=output_file, metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)"
-    )
+    add_output(plot, "--out", metavar="FILE", help=".svg or .png (default: as the scene, with -plot.svg)")
     add_method_options(plot, json=False)
 
 
@@ -47,6 +46,7 @@ def _plot(options: argparse.Namespace) -> int:
         figure = motion.plot(*options.columns)
     except ImportError:
         raise InputError("a plot needs matplotlib: pip install 'mbref[report]'") from None
-    figure.savefig(path, dpi=150)
+    with replaced(path) as fresh:
+        figure.savefig(fresh, dpi=150)
     print(path)
     return exit_status(motion)

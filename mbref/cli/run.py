@@ -12,7 +12,7 @@ import numpy as np
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
-from mbref.command_line import output_file
+from mbref.command_line import add_output
 from mbref.input_error import InputError
 from mbref.method import short_name
 from mbref.motion import Motion
@@ -42,9 +42,9 @@ def add(commands: Any) -> None:
     )
     add_scene(run)
     add_method_options(run)
-    run.add_argument(
+    add_output(
+        run,
         "--out",
-        type=output_file,
         metavar="FILE",
         help="write the whole motion: .csv is a table of columns, .json what\nmbref.Motion.load reads",
     )

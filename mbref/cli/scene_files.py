@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from mbref.cli.options import add_scene
-from mbref.command_line import output_file
+from mbref.command_line import add_output
+from mbref.files import write
 from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -26,9 +28,7 @@ def add(commands: Any) -> None:
         description="Write a scene file to start from: a commented slider-crank, or a copy of a scene.",
         epilog="examples:\n  mbref new my.toml\n  mbref new my.toml --like four_bar_gravity",
     )
-    new.add_argument(
-        "out", type=output_file, metavar="FILE", help="the .toml file; an existing file is not changed"
-    )
+    add_output(new, "out", metavar="FILE", help="the .toml file")
     new.add_argument("--like", metavar="SCENE", help="a built-in name, or another .toml file")
 
     assemble = commands.add_parser(
@@ -47,7 +47,7 @@ def add(commands: Any) -> None:
         metavar="A-B=LENGTH",
         help="distance of the joints A and B of a link, m; may repeat",
     )
-    assemble.add_argument("--out", type=output_file, metavar="FILE", help="write the closed scene")
+    add_output(assemble, "--out", metavar="FILE", help="write the closed scene")
 
     commands.add_parser(
         "schema",
@@ -64,13 +64,11 @@ def _new(options: argparse.Namespace) -> int:
     path = Path(options.out)
     if path.suffix != ".toml":
         raise InputError(f"FILE: must end in .toml, got {options.out!r}")
-    if path.exists():
-        raise InputError(f"{path}: exists already and was not changed; name another file")
     if options.like:
         find_scene(options.like).save(path)
     else:
-        path.write_text(template(), encoding="utf-8")
-    print(f"{path}: next, mbref draw {path}")
+        write(path, template())
+    print(f"{path}: next, {shlex.join(['mbref', 'draw', str(path)])}")
     return 0
 
 

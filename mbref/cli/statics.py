@@ -10,7 +10,7 @@ import numpy as np
 from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
-from mbref.command_line import output_file
+from mbref.command_line import add_output
 from mbref.drawing.film import MOVING, write_film
 from mbref.input_error import InputError
 from mbref.records import strict_json
@@ -37,9 +37,7 @@ def add(commands: Any) -> None:
         "  mbref equilibrium mechanism.toml --number 2 --out rest.toml",
     )
     _add_search(rest)
-    rest.add_argument(
-        "--out", type=output_file, metavar="FILE.toml", help="write the scene at an equilibrium, at rest"
-    )
+    add_output(rest, "--out", metavar="FILE.toml", help="write the scene at an equilibrium, at rest")
 
     shake = commands.add_parser(
         "modes",
@@ -54,7 +52,7 @@ def add(commands: Any) -> None:
     _add_search(shake)
     shake.add_argument("--mode", type=int, default=1, help="vibration of --out, from the slowest (default 1)")
     shake.add_argument("--view", metavar="VIEW", help=VIEW)
-    shake.add_argument("--out", type=output_file, metavar="FILE", help=".svg, .gif or .mp4 of one vibration")
+    add_output(shake, "--out", metavar="FILE", help=".svg, .gif or .mp4 of one vibration")
 
 
 def _add_search(parser: argparse.ArgumentParser) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from mbref.drawing.picture import frames, moving
 from mbref.drawing.timeline import Timeline
 from mbref.drawing.view import View
+from mbref.files import replaced
 from mbref.input_error import InputError
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
@@ -40,7 +41,8 @@ def write_film(path: Path, scene: Scene, motion: Trajectory, view: View | None =
     Raises InputError if a library is not installed or the trajectory has no sample.
     """
     writers = dict(zip(MOVING, (_write_svg, _write_gif, _write_mp4), strict=True))
-    writers[path.suffix](path, scene, motion, view)
+    with replaced(path) as fresh:
+        writers[path.suffix](fresh, scene, motion, view)
 
 
 def _write_svg(path: Path, scene: Scene, motion: Trajectory, view: View | None) -> None:

@@ -27,13 +27,15 @@ def plot(columns: Mapping[str, np.ndarray], names: Sequence[str]) -> Any:
     every = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (quantity, members) in zip(every, panels.items(), strict=True):
         for i, name in enumerate(members):
-            axes.plot(columns["time"], columns[name], color=COLOURS[i % len(COLOURS)], label=name)
+            axes.plot(columns["time"], columns[name], color=COLOURS[i % len(COLOURS)], label=str(i))
         if quantity.endswith("violation"):
             axes.set_yscale("log")
         axes.set_ylabel(f"{quantity.replace('_', ' ')}, {UNIT_OF[quantity]}".strip(", "))
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(color=GREY, alpha=0.25)
-        axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        legend = axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        for text, name in zip(legend.get_texts(), members, strict=True):
+            text.set(text=name, parse_math=False)  # a name is no formula
     every[-1].set_xlabel("time, s")
     return figure
 

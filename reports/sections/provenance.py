@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from reports.blocks import Block, Heading, Listing, Table, Text
 from reports.runs import Curve, Run, SceneRuns, plain
+from reports.sections.records import path
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:
@@ -69,7 +70,7 @@ def _settings(runs: Sequence[Run]) -> Table:
 
 
 def _commands(groups: Sequence[SceneRuns]) -> str:
-    scenes = " ".join(f"scenes/{group.scene.name}.toml" for group in groups)
+    scenes = " ".join(map(path, groups))
     return f"pip install 'mbref[engines,report]'\ncrosscheck report {scenes} --out ."
 
 

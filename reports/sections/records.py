@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 
 from crosscheck.study.command import command
 from crosscheck.study.verdict import grade
+from mbref.files import file_name
 from reports import places
 from reports.blocks import Block, Card, Heading, Record, Text
 from reports.engine_looks import SIGNS, named, tone
@@ -29,8 +31,8 @@ def render(groups: Sequence[SceneRuns]) -> list[Block]:
 
 
 def path(group: SceneRuns) -> str:
-    """Return the path of the scene's file relative to the page."""
-    return f"scenes/{group.scene.name}.toml"
+    """Return the path of the scene's file relative to the page, as a word of a shell."""
+    return shlex.quote(f"scenes/{file_name(group.scene.name)}.toml")
 
 
 def _record(group: SceneRuns, curve: tuple[str, str], runs: Sequence[Run]) -> Record:

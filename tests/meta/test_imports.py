@@ -8,13 +8,13 @@ import pytest
 from imports import ROOT, children, circles, floors, graph, imported, sources, upward
 
 DOORS = (
-    r"command_line|formats|scene|scene_fields|scene_joints|scene_toml|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
+    r"command_line|files|formats|printable|terminal|scene|scene_fields|scene_joints|scene_toml|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
     r"|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
     "reports": re.compile(
-        r"mbref(\.(command_line|scene|trajectory|rotations|records|drawing(\.\w+)?)(\.\w+)?)?"
+        r"mbref(\.(command_line|files|printable|scene|trajectory|rotations|records|drawing(\.\w+)?)(\.\w+)?)?"
     ),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
@@ -23,6 +23,9 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         [
             "input_error",
+            "files",
+            "printable",
+            "terminal",
             "rotations",
             "records",
             "lazy",

@@ -1,0 +1,20 @@
+"""Characters of texts that would act on a terminal, or that no name may have."""
+
+from __future__ import annotations
+
+import re
+
+# control characters except tab and line feed, separators of lines, directions of writing, single surrogates
+ACTING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """Return the text with an escape, such as ``\\x1b``, for each character that would act on a terminal."""
+    return ACTING.sub(lambda found: ascii(found[0])[1:-1], text)
+
+
+def checked_name(name: str) -> str:
+    """Return a name; raises ValueError for a name with a character that is not printed."""
+    if found := re.search(f"{ACTING.pattern}|[\t\n]", name):
+        raise ValueError(f"must have no control character, got {found[0]!a} in it")
+    return name

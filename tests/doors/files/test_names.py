@@ -1,0 +1,117 @@
+"""Names of scenes, bodies and joints in file names, commands, pages and pictures."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from xml.etree import ElementTree
+
+import pytest
+from markdown_it import MarkdownIt
+
+import mbref
+from mbref.cli import main
+from mbref.files import file_name
+from mbref.scene import Scene, SceneError
+from reports.blocks import Card, Figure, Heading, Listing, Record, Table, Text
+from reports.render import html, markdown
+
+NAMES = [
+    "../../other",
+    "/etc/passwd",
+    "a/b",
+    "two words",
+    'it\'s "quoted"',
+    "$(touch pwned)",
+    "`touch pwned`",
+    "<img src=x onerror=alert(1)>",
+    "[link](http://example.org)",
+    "$x_1$ {y}",
+    "--out=x",
+    "..",
+    "ü" * 100,
+    "a|b & c;d",
+]
+
+
+def named(name: str) -> Scene:
+    """Return a pendulum, all parts of which have a name."""
+    return Scene(
+        name=name,
+        gravity=(0.0, -9.81, 0.0),
+        duration=0.01,
+        body=[{"name": name, "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "position": [1.0, 0.0, 0.0]}],
+        joint=[
+            {
+                "name": f"{name}'",
+                "type": "revolute",
+                "bodies": ["ground", name],
+                "anchor": [0.0, 0.0, 0.0],
+                "axis": [0.0, 0.0, 1.0],
+            }
+        ],
+    )
+
+
+def test_file_names_are_different_and_stay_in_their_folder(tmp_path):
+    found = {file_name(name) for name in NAMES}
+    assert len(found) == len(NAMES)
+    for name in found:
+        assert ((tmp_path / f"{name}.toml").parent == tmp_path and shlex.quote(name) == name) or "ü" in name
+        assert len(name.encode()) < 100 and not name.startswith(("-", "."))
+    assert file_name("four_bar-2") == "four_bar-2"
+
+
+@pytest.mark.parametrize("name", ["../../up", "$x_1$ {y}", "<img src=x> & '", "$(touch pwned)", "_hidden"])
+def test_pictures_show_a_name_as_it_is(name, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    named(name).save("scene.toml")
+    assert main(["draw", "scene.toml"]) == 0
+    assert main(["plot", "scene.toml", "--samples", "3", "--out", "plot.svg"]) == 0
+    assert main(["animate", "scene.toml", "--samples", "3"]) == 0
+    for path in tmp_path.glob("*.svg"):
+        ElementTree.fromstring(path.read_text())
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "scene.toml",
+        "scene.svg",
+        "plot.svg",
+        "scene-moving.svg",
+    }
+    figure = mbref.simulate(named(name), times=[0.0, 0.01]).plot(f"{name}.position")
+    legend = figure.axes[0].get_legend().get_texts()
+    assert [text.get_text() for text in legend] == [f"{name}.position.{axis}" for axis in "xyz"]
+    assert not any(text.get_parse_math() for text in legend)
+
+
+@pytest.mark.parametrize("name", ["a\x1b[31m", "line\nbreak", "tab\t", "\x7f", "\u202eback", "nul\x00"])
+def test_control_characters_in_names_are_refused(name):
+    with pytest.raises(SceneError, match="must have no control character") as refused:
+        named(name)
+    assert str(refused.value).replace("\n", " ").isprintable()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_page_and_markdown_show_a_name_as_it_is(name):
+    card = Card("k-1", name, "right", "✓", {}, name, shlex.join(["crosscheck", "run", name]), name)
+    blocks = [
+        Heading(name, 2),
+        Text(name),
+        Table(name, [name], [[name]]),
+        Figure("figure", name, lambda: "<svg/>"),
+        Record("r-1", name, name, 0, [card], "c-1"),
+        Listing(f"```\n{name}"),
+    ]
+    assert "<img src=x" not in html(blocks, {"figure": "<svg/>"}, name)
+    tokens = MarkdownIt("commonmark").enable(["table", "strikethrough"]).parse(markdown(blocks, name))
+    inner = [token for block in tokens for token in (block, *(block.children or ()))]
+    acting = {"html_inline", "html_block", "link_open", "em_open", "s_open"}
+    assert not {token.type for token in inner} & acting
+    heading = next(block for block in tokens if block.type == "inline").children
+    assert "".join(token.content for token in heading) == name.replace("`", "")
+    assert [token.content for token in tokens if token.type == "fence"] == [f"```\n{name}\n"]
+
+
+def test_names_of_a_scene_are_json_strings(tmp_path, capsys):
+    named("$(touch pwned)").save(tmp_path / "scene.toml")
+    assert main(["diagnose", str(tmp_path / "scene.toml"), "--start", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scene"] == "$(touch pwned)"

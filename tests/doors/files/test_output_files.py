@@ -1,0 +1,113 @@
+"""Output files: complete or unchanged, in their folder, and never over a file that exists without a word."""
+
+from __future__ import annotations
+
+import resource
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+import mbref
+from crosscheck.cli import main as crosscheck
+from mbref.cli import main
+
+RUN = ["four_bar", "--duration", "0.01", "--samples", "3"]
+WRITERS = {  # command → words, with the file at the end
+    "new": ["new"],
+    "draw": ["draw", "four_bar", "--out"],
+    "animate": ["animate", *RUN, "--out"],
+    "run": ["run", *RUN, "--estimate", "no", "--out"],
+    "plot": ["plot", *RUN, "--out"],
+    "assemble": ["assemble", "four_bar", "--out"],
+    "equilibrium": ["equilibrium", "four_bar_gravity", "--starts", "1", "--out"],
+    "modes": ["modes", "four_bar_gravity", "--starts", "1", "--out"],
+}
+SUFFIX = {"draw": ".png", "animate": ".svg", "run": ".csv", "plot": ".svg", "modes": ".svg"}
+
+
+@contextmanager
+def full_disk(size: int) -> Iterator[None]:
+    """Let each file have at most that many bytes, as on a full disk."""
+    before, handler = resource.getrlimit(resource.RLIMIT_FSIZE), signal.getsignal(signal.SIGXFSZ)
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, handler)
+
+
+@pytest.mark.parametrize("command", ["new", "draw", "run", "plot", "assemble"])
+def test_file_that_exists_is_replaced_only_by_force(command, tmp_path, capsys):
+    out = tmp_path / f"out{SUFFIX.get(command, '.toml')}"
+    out.write_text("my own")
+    assert main([*WRITERS[command], str(out)]) == 2
+    assert out.read_text() == "my own"
+    said = capsys.readouterr().err
+    assert str(out) in said and "--force" in said and said.count("\n") == 1
+    assert main([*WRITERS[command], str(out), "--force"]) == 0
+    assert out.read_bytes() != b"my own" and [*tmp_path.iterdir()] == [out]
+
+
+@pytest.mark.parametrize("command", ["draw", "run", "assemble"])
+def test_full_disk_leaves_no_part_of_a_file(command, tmp_path, capsys):
+    out = tmp_path / f"out{SUFFIX.get(command, '.toml')}"
+    with full_disk(100):
+        assert main([*WRITERS[command], str(out)]) == 2
+    said = capsys.readouterr().err
+    assert str(out) in said and "Traceback" not in said and not [*tmp_path.iterdir()]
+    out.write_text("my own")
+    with full_disk(100):
+        assert main([*WRITERS[command], str(out), "--force"]) == 2
+    assert out.read_text() == "my own" and [*tmp_path.iterdir()] == [out]
+
+
+def test_reference_table_on_a_full_disk_is_not_cut(tmp_path, capsys):
+    out = tmp_path / "table.csv"
+    with full_disk(500):
+        words = ["reference", "four_bar", "--samples", "20", "--out", str(out)]
+        assert crosscheck(words) == 2
+    assert str(out) in capsys.readouterr().err and not [*tmp_path.iterdir()]
+
+
+def test_link_to_a_file_stays_a_link_and_permissions_stay(tmp_path):
+    target, link = tmp_path / "kept.csv", tmp_path / "link.csv"
+    target.write_text("old")
+    target.chmod(0o640)
+    link.symlink_to(target)
+    mbref.simulate("four_bar", times=[0.0, 0.01]).to_csv(link)
+    assert link.is_symlink() and target.read_text().startswith("time,")
+    assert target.stat().st_mode & 0o777 == 0o640
+
+
+def test_default_file_of_a_picture_is_replaced_only_by_force(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["draw", "four_bar"]) == 0
+    assert main(["draw", "four_bar"]) == 2
+    assert "four_bar.svg: exists already" in capsys.readouterr().err
+    assert main(["draw", "four_bar", "--force"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["four_bar.svg"]
+
+
+def test_folder_with_other_files_becomes_no_report_unless_forced(tmp_path, capsys):
+    from reports.__main__ import main as report
+
+    mine = tmp_path / "scenes" / "four_bar.toml"
+    mine.parent.mkdir()
+    mine.write_text("# my own")
+    assert report(["four_bar", "--out", str(tmp_path)]) == 2
+    assert mine.read_text() == "# my own"
+    assert "--force" in capsys.readouterr().err and [*tmp_path.iterdir()] == [mine.parent]
+
+
+@pytest.mark.parametrize("path", ["no/such/folder/out.svg", "", ".", "x" * 300 + ".svg", "a\nb/c.svg"])
+def test_path_that_cannot_be_written_is_refused_before_any_work(path, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(["draw", "four_bar", "--out", path])
+    assert ended.value.code == 2 and "--out" in capsys.readouterr().err
+    assert not [*Path().iterdir()]
