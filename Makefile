@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
+.PHONY: help check test lint deep shuffle fuzz kills mutants machines coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -39,8 +39,12 @@ kills: $(VENV)/ready ## processes of studies and ensembles killed at random mome
 
 SEED := 1
 
-mutants: $(VENV)/ready ## plant 300 random defects (make mutants SEED=2) and report which the tests detect
-	$(BIN)/python -m tests.mutants --seed $(SEED) --count 300
+mutants: $(VENV)/ready ## plant 50 random defects (make mutants SEED=2) and print which the tests in tests/doors see
+	$(BIN)/python -m tests.mutants --seed $(SEED) --count 50
+
+machines: $(VENV)/ready ## the tests as on other processors: OpenBLAS' and numba's code for them, and motions compared
+	$(BIN)/python -m tests.machines --motions
+	$(BIN)/python -m tests.machines
 
 coverage: $(VENV)/ready ## coverage of mbref, its kernels run as plain Python
 	NUMBA_DISABLE_JIT=1 $(BIN)/coverage run --source=mbref -m pytest -q tests/properties \

@@ -2,26 +2,27 @@
 
 from __future__ import annotations
 
-import functools
 import random
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
+from importlib.util import find_spec
+from pathlib import Path
 
-from crosscheck import engine as crosscheck_engine
 from tests.mutants.operators import Mutant, mutants
-from tests.mutants.tree import PACKAGES, ROOT
 
-ADAPTERS = "crosscheck/engines/"
+PACKAGES = ("mbref", "crosscheck", "reports")
 
 
-def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
-    """Return ``count`` mutants, or all where there are fewer, of the files whose path begins with ``only``.
+def drawn(root: Path, seed: int, count: int, only: Sequence[str] = ()) -> list[Mutant]:
+    """Return ``count`` mutants, or all where there are fewer, of the files whose paths begin with one of
+    ``only``.
 
     Half of them are drawn by file and then by place, the others by place alone, so that small files are seen,
     too.
     """
-    files = {name: mutants(name, (ROOT / name).read_text()) for name in _files(only)}
+    files = {name: mutants(name, (root / name).read_text()) for name in _files(root, only)}
     files = {name: found for name, found in files.items() if found}
-    draw = random.Random(f"{seed} {only}")
+    draw = random.Random(seed)
     places = [mutant for found in files.values() for mutant in found]
     chosen: dict[Mutant, None] = {}
     while len(chosen) < min(count, len(places)):
@@ -30,26 +31,19 @@ def drawn(seed: int, count: int, only: str = "") -> list[Mutant]:
     return list(chosen)
 
 
-def _files(only: str) -> Iterator[str]:
+def _files(root: Path, only: Sequence[str]) -> Iterator[str]:
+    """Yield the files of the packages, without adapters of engines that are not installed."""
+    absent = tuple(f"{path.parent.relative_to(root).as_posix()}/" for path in _adapters(root))
     for package in PACKAGES:
-        for path in sorted((ROOT / package).rglob("*.py")):
-            name = path.relative_to(ROOT).as_posix()
-            if name.startswith(only) and not _is_absent(name):
+        for path in sorted((root / package).rglob("*.py")):
+            name = path.relative_to(root).as_posix()
+            if name.startswith(tuple(only) or "") and not name.startswith(absent):
                 yield name
 
 
-@functools.cache
-def installed(engine: str) -> bool:
-    """Return whether an engine is installed."""
-    return crosscheck_engine.installed(engine)
-
-
-def _is_absent(file: str) -> bool:
-    """Return whether a file belongs to the adapter of an engine that is not installed."""
-    folder = file.removeprefix(ADAPTERS).partition("/")[0]
-    return file.startswith(ADAPTERS) and folder in engines() and not installed(folder)
-
-
-def engines() -> list[str]:
-    """Return the names of the engines whose adapter is a folder."""
-    return sorted(path.parent.name for path in (ROOT / ADAPTERS).glob("*/adapter.py"))
+def _adapters(root: Path) -> Iterator[Path]:
+    """Yield the adapters in folders of their own whose engines cannot be imported."""
+    for path in sorted((root / "crosscheck" / "engines").glob("*/adapter.py")):
+        named = re.search(r'^ +modules[^=]* = \("(\w+)', path.read_text(), re.MULTILINE)
+        if named and find_spec(named[1]) is None:
+            yield path

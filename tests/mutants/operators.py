@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import ast
+import difflib
 from collections.abc import Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 SIGNS = {ast.Add: "-", ast.Sub: "+"}
@@ -60,6 +62,15 @@ class Mutant(NamedTuple):
     start: int
     end: int
 
+    def difference(self, root: Path) -> Iterator[str]:
+        """Yield the lines of the source before and after the change, as ``diff`` shows them."""
+        source = (root / self.file).read_text()
+        for line in difflib.unified_diff(
+            source.splitlines(), self.planted(source).splitlines(), n=0, lineterm=""
+        ):
+            if not line.startswith(("---", "+++", "@@")):
+                yield line
+
     def planted(self, source: str) -> str:
         """Return the source with the mutant."""
         data = source.encode()
@@ -83,6 +94,18 @@ def mutants(file: str, source: str) -> list[Mutant]:
             old = source.encode()[start:end].decode()
             found.append(Mutant(file, part.lineno, kind, old, new, start, end))  # type: ignore[attr-defined]
     return sorted(set(found), key=lambda m: (m.start, m.end, m.new))
+
+
+def statement(source: str, line: int) -> range:
+    """Return the lines of the innermost statement at a line, without the statements that it contains."""
+    found = [node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.stmt)]
+    around = [node for node in found if node.lineno <= line <= (node.end_lineno or 0)]
+    innermost = max(around, key=lambda node: node.lineno)
+    inner = [
+        node.lineno for node in ast.walk(innermost) if isinstance(node, ast.stmt) and node is not innermost
+    ]
+    end = max(innermost.lineno, min(inner) - 1) if inner else innermost.end_lineno or 0
+    return range(innermost.lineno, end + 1)
 
 
 def _nodes(node: ast.AST) -> Iterator[ast.AST]:
