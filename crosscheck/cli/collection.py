@@ -14,6 +14,7 @@ from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability, sweep
 from crosscheck.study.comparison import Collection, Wanted, collected
+from crosscheck.study.dead_positions import followed
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.progress import shown
 from crosscheck.study.record_shape import Ladder, Timing, checked
@@ -65,8 +66,10 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
     if scenes is None:
         scenes = sweep.quick_scenes() if is_quick else sweep.whole_scenes()
     samples = sweep.QUICK_SAMPLES if is_quick else sweep.SAMPLES
-    times = [np.linspace(0.0, scene.duration, samples) for scene in scenes]
-    chosen = list(scenes)
+    given = [np.linspace(0.0, scene.duration, samples) for scene in scenes]
+    there = [followed(*pair, wanted.reference_time) for pair in zip(scenes, given, strict=True)]
+    chosen, times = [f.scene for f in there], [f.times for f in there]
+    dead = [f.dead for f in there]
 
     def plan() -> list[Case]:
         cases, unable = (sweep.quick if is_quick else sweep.whole)(chosen, engines)
@@ -76,7 +79,9 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
             raise RequestError("no engine can run these scenes")
         return cases
 
-    return collected(chosen, engines, Wanted(times, wanted.reference_time, is_quick, out), plan, notice)
+    return collected(
+        chosen, engines, Wanted(times, wanted.reference_time, is_quick, out, dead=dead), plan, notice
+    )
 
 
 def closed_loops() -> list[Record]:

@@ -15,6 +15,7 @@ from crosscheck.engine import engine
 from crosscheck.study import sweep
 from crosscheck.study.command import command
 from crosscheck.study.comparison import Wanted, collected, scouted
+from crosscheck.study.dead_positions import followed
 from crosscheck.study.grid import study
 from crosscheck.study.ladder import families
 from crosscheck.study.progress import counted
@@ -28,6 +29,11 @@ def compare(arguments: argparse.Namespace) -> int:
     """Print a verdict, tables and a plot for each scene, or the records with the verdict as JSON; returns 1
     if engines simulate different mechanisms."""
     asked = asked_of(arguments, sweep.QUICK_SAMPLES)
+    there = [
+        followed(scene, times, arguments.reference_time)
+        for scene, times in zip(asked.scenes, asked.times, strict=True)
+    ]
+    asked = asked._replace(scenes=[f.scene for f in there], times=[f.times for f in there])
     wanted = Wanted(
         asked.times,
         arguments.reference_time,
@@ -35,6 +41,7 @@ def compare(arguments: argparse.Namespace) -> int:
         None,
         arguments.repeats,
         asked.chosen.is_named,
+        [f.dead for f in there],
     )
     found = collected(asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice)
     words = import_options(arguments).words()

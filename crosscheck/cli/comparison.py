@@ -16,6 +16,7 @@ from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.study import sweep
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
+from crosscheck.study.dead_positions import followed
 from crosscheck.study.fair_timing import force_differences, model_differences
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
@@ -96,7 +97,8 @@ class Comparison:
         dict
             Scene, records, verdict, truth, and differences between the engines' mechanisms.
         """
-        truth = {name: self.judged.truth[name] for name in TRUTH}
+        known = self.judged.truth
+        truth = {**{name: known[name] for name in TRUTH}, "dead": known.get("dead")}
         return {
             "scene": self.judged.scene.name,
             "records": [public(r) for r in self.records],
@@ -198,13 +200,21 @@ def compare(
     given = started(scene) if isinstance(scene, Scene) else scene_request.find_scenes([str(scene)])[0]
     lasting = request.lasting(given, None, duration)
     names = request.find_engines(_several(engines), tell)
-    times = [request.sample_times(lasting, None, samples)]
+    lasting, when, dead = followed(lasting, request.sample_times(lasting, None, samples), reference_time)
+    times = [when]
     limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
     chosen = Choice(_several(families), is_quick=is_quick)
     found = collected(
         [lasting],
         names,
-        Wanted(times, reference_time, is_quick, None if out is None else Path(out), is_named=chosen.is_named),
+        Wanted(
+            times,
+            reference_time,
+            is_quick,
+            None if out is None else Path(out),
+            is_named=chosen.is_named,
+            dead=[dead],
+        ),
         lambda: request.plan([lasting], names, chosen, times, limit, tell),
         tell,
     )

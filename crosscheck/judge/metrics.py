@@ -221,8 +221,8 @@ def reaction_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | Non
     if not scene.joint or not scene.has_mass() or len(scene.body) > MANY:
         return None
     chosen = np.unique(np.linspace(0, len(exact.times) - 1, SAMPLES).round().astype(int))
-    true = _exact_reactions(scene, _at(exact, chosen))
-    found = compare(scene, true, _at(trajectory, chosen))
+    true = _exact_reactions(scene, at_samples(exact, chosen))
+    found = compare(scene, true, at_samples(trajectory, chosen))
     worst = max([found.resultant, *(joint.unique for joint in found.joints.values())])
     return worst if math.isfinite(worst) else math.inf
 
@@ -241,10 +241,10 @@ def _exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
 def _known(trajectory: Trajectory, exact: Trajectory) -> Trajectory:
     """Return the trajectory at the samples of the truth."""
     count = len(exact.times)
-    return trajectory if count == len(trajectory.times) else _at(trajectory, np.arange(count))
+    return trajectory if count == len(trajectory.times) else at_samples(trajectory, np.arange(count))
 
 
-def _at(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
+def at_samples(trajectory: Trajectory, chosen: np.ndarray) -> Trajectory:
     """Return the trajectory at some of its samples (n,)."""
     arrays: dict[str, Any] = {k: None if (a := getattr(trajectory, k)) is None else a[chosen] for k in STATES}
     reactions = trajectory.reactions and {name: w[chosen] for name, w in trajectory.reactions.items()}

@@ -60,7 +60,8 @@ class Wanted(NamedTuple):
     for records.
 
     Further fields choose few settings (`study.ladder`), the timing of short runs only, and whether the user
-    named families. Named families that cannot run a scene are not replaced by other families.
+    named families. Named families that cannot run a scene are not replaced by other families. ``dead`` has
+    the time (s) of a dead position (`study.dead_positions`) of each scene, or None.
     """
 
     times: Sequence[np.ndarray]
@@ -69,6 +70,7 @@ class Wanted(NamedTuple):
     out: Path | None = None
     repeats: int = REPEATS
     is_named: bool = False
+    dead: Sequence[float | None] = ()
 
 
 def collected(
@@ -209,10 +211,10 @@ def _truths(scenes: Sequence[Scene], wanted: Wanted) -> list[Record]:
     path = _file(wanted, "truths.jsonl")
     done, found = stored(path), list[Record]()
     checked(path, list(done.values()), Truth)
-    for scene, times in zip(scenes, wanted.times, strict=True):
+    for scene, times, dead in zip(scenes, wanted.times, wanted.dead or [None] * len(scenes), strict=True):
         record = done.get(truth_key(scene, times))
         if record is None or record["given"] < wanted.reference_time:
-            record = truth_record(scene, times, wanted.reference_time)
+            record = truth_record(scene, times, wanted.reference_time, dead)
             append(path, record)
         found.append(record)
     return found

@@ -7,7 +7,10 @@ import math
 from collections.abc import Callable, Sequence
 from statistics import median
 
+import numpy as np
+
 from crosscheck.engine import Setting, engine
+from crosscheck.judge.metrics import at_samples
 from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
@@ -92,7 +95,7 @@ def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]
         if grade(least.best) is not Grade.WRONG:
             continue
         wrong = [r for r in least.records if grade(r) is Grade.WRONG]
-        differing = [along(scene, _motion(scene, r)) for r in wrong]
+        differing = [along(scene, _known_part(scene, r)) for r in wrong]
         if all(differing):
             found[least.engine] = str(min(filter(None, differing), key=lambda difference: difference.by))
     return found
@@ -100,6 +103,12 @@ def force_differences(scene: Scene, records: Sequence[Record]) -> dict[str, str]
 
 def _motion(scene: Scene, record: Record) -> Trajectory:
     return Trajectory.from_record(scene.name, record)
+
+
+def _known_part(scene: Scene, record: Record) -> Trajectory:
+    """Return a recorded motion up to the end of the truth."""
+    run = _motion(scene, record)
+    return at_samples(run, np.flatnonzero(run.times <= record["metrics"]["error_until"]))
 
 
 def timed(

@@ -79,7 +79,7 @@ def headline(groups: Sequence[Judged]) -> str:
     )
     far = up_to(reported)
     if far:
-        first = f"{far}, as far as the motion is known, {uncapitalised(first)}"
+        first = f"{far}, {uncapitalised(first)}"
     end = f"; {others}" if others else ""
     return f"{first}{_where_known(groups, reported, good)}; {_defaults_in_short(reported)}{end}."
 
@@ -133,17 +133,18 @@ def right(groups: Sequence[Judged]) -> str:
 
 
 def breaks(groups: Sequence[Judged]) -> str:
-    """Return sentences on defaults that fail or are wrong, with the scenes."""
-    failed, wrong = (_where(groups, bad) for bad in (Grade.FAILED, Grade.WRONG))
+    """Return sentences on defaults that fail, are wrong or inaccurate, with the scenes."""
+    failed = _where(groups, Grade.FAILED)
     sentences = [_failed(groups, name, scenes) for name, scenes in _merged(failed).items()]
-    sentences += [_wrong(name, scenes, groups) for name, scenes in wrong.items()]
+    for bad in (Grade.WRONG, Grade.INACCURATE):
+        sentences += [_off(name, scenes, groups, bad) for name, scenes in _where(groups, bad).items()]
     if not sentences:
         sentences = [_no_bad_defaults(groups)]
     return " ".join(sentences) + _other_failures(groups)
 
 
 def _no_bad_defaults(groups: Sequence[Judged]) -> str:
-    """Return the sentence on the defaults if none is known to fail or to be wrong."""
+    """Return the sentence on the defaults if none is known to fail, to be wrong or inaccurate."""
     found = _worst(groups, Judged.defaults)
     if not found:
         return "No run used a library's default settings."
@@ -151,7 +152,7 @@ def _no_bad_defaults(groups: Sequence[Judged]) -> str:
     if unjudged:
         owners = listed(map(title, unjudged))
         return f"The defaults of {owners} complete; without a truth it is unknown whether they are right."
-    return "No engine's defaults fail or are wrong."
+    return f"The defaults of {listed(map(title, found))} are right."
 
 
 def _agreement(group: Judged) -> str:
@@ -224,11 +225,14 @@ def _failed(groups: Sequence[Judged], names: Sequence[str], scenes: Sequence[Jud
     return f"The defaults of {listed(map(title, names))} {when}{where}{cause}."
 
 
-def _wrong(name: str, scenes: Sequence[Judged], groups: Sequence[Judged]) -> str:
+def _off(name: str, scenes: Sequence[Judged], groups: Sequence[Judged], bad: Grade) -> str:
+    """Return the sentence on an engine whose defaults have a grade by their error: wrong or inaccurate."""
     errors = [error(group.defaults()[name]) for group in scenes]
     off = f"{errors[0]:.2g}" if len(errors) == 1 else f"{min(errors):.2g} to {max(errors):.2g}"
     where = _place(scenes, groups)
-    return f"{title(name)}'s defaults complete{where}, but with an error of {off} at best."
+    if bad is Grade.WRONG:
+        return f"{title(name)}'s defaults complete{where}, but with an error of {off} at best."
+    return f"{title(name)}'s defaults are inaccurate{where}, with an error of {off} at best."
 
 
 def _other_failures(groups: Sequence[Judged]) -> str:

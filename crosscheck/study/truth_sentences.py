@@ -27,6 +27,12 @@ def truth(groups: Sequence[Judged]) -> str:
             if g.truth["reason"]
         ]
     parts += [_reference(group) for group in groups if group not in closed]
+    parts += [
+        f"The drivers of {g.scene.name} come to a dead position at t = {g.truth['dead']:.4g} s, beyond which "
+        f"no motion exists: engines are compared up to t = {g.scene.duration:.4g} s."
+        for g in groups
+        if "dead" in g.truth
+    ]
     return " ".join(parts)
 
 
@@ -61,10 +67,16 @@ def _until(scene: Scene, known: Mapping[str, Any]) -> str:
 
 
 def up_to(groups: Sequence[Judged]) -> str:
-    """Return the beginning of a sentence on the time up to which the motions are known; empty if all motions
-    are known to their ends."""
+    """Return the beginning of a sentence on the time up to which the motions exist or are known; empty if all
+    motions are known to their ends."""
     ends = [group.truth["until"] for group in groups if group.truth["reason"]]
-    return f"Up to t = {min(ends):.4g} s" if ends else ""
+    if ends:
+        return f"Up to t = {min(ends):.4g} s, as far as the motion is known"
+    dead = [group for group in groups if "dead" in group.truth]
+    if len(groups) == len(dead) == 1:
+        at = f"t = {dead[0].truth['dead']:.4g} s"
+        return f"Up to t = {dead[0].scene.duration:.4g} s, before the dead position of the drivers at {at}"
+    return ""
 
 
 def names(groups: Sequence[Judged]) -> str:

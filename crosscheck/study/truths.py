@@ -25,19 +25,25 @@ FRAMES = 90  # largest number of frames of the animated motion
 TURN = 0.35  # rad; largest angle by which a body turns between two frames
 
 
-def truth_record(scene: Scene, times: np.ndarray, reference_time: float) -> Record:
+def evaluated(scene: Scene, times: np.ndarray) -> np.ndarray:
+    """Return the times at which the truth of a comparison with samples at times (k,) is evaluated."""
+    dense = np.linspace(0.0, scene.duration, DENSE + 1)
+    return np.unique(np.concatenate([times, gate_times(scene), dense]))
+
+
+def truth_record(scene: Scene, times: np.ndarray, reference_time: float, dead: float | None = None) -> Record:
     """Return the record of a scene's true motion at times (k,), and at the times of animation frames.
 
     ``kind`` is the family of the closed form, "reference", or "" if there is no truth. ``bound`` limits the
     error. ``until`` (s) is the time up to which the motion is known, with the ``reason`` for its end.
+    ``dead`` (s) is the time of a dead position of the drivers, before which the comparison ends.
     """
-    dense = np.linspace(0.0, scene.duration, DENSE + 1)
-    wanted = np.unique(np.concatenate([times, gate_times(scene), dense]))
+    wanted = evaluated(scene, times)
     start = time.process_time()
     found = known_at(scene, wanted, reference_time)
     found.setdefault("seconds", time.process_time() - start)
     asked = {"key": key(scene, times), "scene": scene.name, "mechanism": mechanism(scene)}
-    return {**asked, "given": reference_time, **found}
+    return {**asked, "given": reference_time, **found, **({} if dead is None else {"dead": dead})}
 
 
 def known_at(scene: Scene, times: np.ndarray, reference_time: float) -> Record:

@@ -181,6 +181,7 @@ def breaks(text: str, records: Records) -> None:
             r"The defaults of ([^.]*?) (?:end at t = \S+ s|do not .*?)( on [^.]*?)?(?:, where [^.]*)?\.",
         ),
         ("wrong", r"(\S+(?: IDA)?)'s defaults complete( on .*?)?, but with an error of "),
+        ("inaccurate", r"(\S+(?: IDA)?)'s defaults are inaccurate( on .*?)?, with an error of "),
     ):
         true = {
             (name, scene)

@@ -187,7 +187,10 @@ def test_other_results_and_other_sentences():
     assert headline([group(good)]) == (
         "Both engines are right at their best settings; so are the libraries' defaults of MuJoCo and Exudyn."
     )
-    assert breaks([group(good)]) == "No engine's defaults fail or are wrong."
+    assert breaks([group(good)]) == "The defaults of MuJoCo and Exudyn are right."
+    near = [record("mujoco", "tuned", 1e-10), record("mujoco", "defaults", 1e-5)]
+    assert headline([group(near)]).endswith("with its library's defaults MuJoCo is not.")
+    assert breaks([group(near)]) == "MuJoCo's defaults are inaccurate, with an error of 1e-05 at best."
     assert "No engine reaches an error of 1e-6" in fast([group([record("mujoco", "tuned", 1e-3)])])
     compiled = record("mujoco", "forward, compiled", 1e-9, 0.1)
     assert fast([group([compiled])]) == (

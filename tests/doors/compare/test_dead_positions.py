@@ -1,0 +1,63 @@
+"""Drivers that come to a dead position: its time, and a comparison that ends before it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import crosscheck
+from crosscheck.judge.constraints import initial_poses
+from crosscheck.judge.dead_position import Pose, dead_position
+from crosscheck.study.dead_positions import followed
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+from tests.helpers.dead_positions import pushed, turned
+
+SECONDS = 20.0  # CPU seconds of a reference
+
+
+def end_of(scene: Scene, end: float | None = None) -> float | None:
+    """Return the time of the dead position of a scene, from its start."""
+    return dead_position(scene, Pose(*initial_poses(scene)), 0.0, end or scene.duration)
+
+
+@pytest.mark.parametrize(
+    ("crank", "rod", "angle", "size"), [(0.2, 0.5, 1.0, 1.0), (0.4, 0.3, 0.5, 1e-3), (0.1, 1.0, -1.4, 1e3)]
+)
+def test_time_of_a_dead_position_is_when_crank_and_rod_are_in_line(crank, rod, angle, size):
+    scene, time = pushed(crank, rod, angle, 0.7, size)
+    assert end_of(scene) == pytest.approx(time, rel=1e-4)
+
+
+def test_motions_that_follow_their_drivers_have_no_dead_position():
+    scene, time = pushed(0.2, 0.5, 1.0, 0.7)
+    assert end_of(scene, 0.95 * time) is None
+    scene, time = turned(0.5, 0.4, 0.3, 4.0)
+    assert end_of(scene) == pytest.approx(time, rel=1e-4) and end_of(scene, 0.95 * time) is None
+    quarter_turn = 0.5 * np.pi / 124.8
+    assert end_of(SCENES["four_bar"](), 4.2 * quarter_turn) is None, "singular positions are no dead ones"
+
+
+@pytest.mark.slow  # a reference of 2 CPU s
+@pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
+def test_comparison_ends_before_the_dead_position(made):
+    scene, time = made()
+    times = np.linspace(0.0, scene.duration, 41)
+    shorter = followed(scene, times, SECONDS)
+    assert shorter.dead == pytest.approx(time, rel=1e-4)
+    assert 0.95 * time < shorter.scene.duration == shorter.times[-1] < time and len(shorter.times) == 41
+    uneven = followed(scene, np.array([0.1 * time, 0.5 * time, 2.0 * time]), SECONDS)
+    assert np.array_equal(uneven.times, [0.1 * time, 0.5 * time])
+    late = np.array([2.0 * time, 3.0 * time])
+    assert followed(scene, late, SECONDS).dead is None, "no sample is before the dead position"
+
+
+@pytest.mark.slow  # runs of an engine and a reference: 5 CPU s
+def test_engines_are_judged_up_to_the_dead_position():
+    scene, time = pushed(0.2, 0.5, 1.0, 0.7)
+    found = crosscheck.compare(scene, "ondsel", reference_time=SECONDS)
+    assert found.difference is None and found.judged.differences == {}
+    assert "right at its best settings" in found.verdict.headline, found.verdict
+    assert f"dead position of the drivers at t = {time:.4g} s" in found.verdict.headline
+    assert "come to a dead position" in found.verdict.truth
+    assert found.document()["truth"]["dead"] == pytest.approx(time, rel=1e-4)

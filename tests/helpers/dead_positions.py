@@ -1,0 +1,69 @@
+"""Slider-cranks whose drivers come to a dead position, with its time in closed form."""
+
+from __future__ import annotations
+
+import math
+
+from mbref.scene import Scene
+
+
+def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1.0) -> tuple[Scene, float]:
+    """Return a slider-crank whose slider is driven outwards, and the time (s) of crank and rod in line.
+
+    ``crank`` and ``rod`` are lengths and ``speed`` a length per second in units of ``size`` (m); ``angle``
+    (rad) is the crank's at the start.
+    """
+    a, b = crank * size, rod * size
+    tilt = -math.asin(crank * math.sin(angle) / rod)
+    pin = (a * math.cos(angle), a * math.sin(angle), 0.0)
+    slider = (pin[0] + b * math.cos(tilt), 0.0, 0.0)
+    scene = Scene(
+        name="pushed",
+        duration=4.0 * (a + b - slider[0]) / (speed * size),
+        body=[
+            _link("crank", (0.0, 0.0, 0.0), pin, angle, size),
+            _link("rod", pin, slider, tilt, size),
+            _link("slider", slider, slider, 0.0, size),
+        ],
+        joint=[
+            _hinge("O", "ground", "crank", (0.0, 0.0, 0.0)),
+            _hinge("P", "crank", "rod", pin),
+            _hinge("Q", "rod", "slider", slider),
+            {
+                "name": "S",
+                "type": "translational",
+                "bodies": ["ground", "slider"],
+                "anchor": list(slider),
+                "axis": [1.0, 0.0, 0.0],
+            },
+        ],
+        driver=[{"joint": "S", "polynomial": [0.0, speed * size]}],
+    )
+    return scene, (a + b - slider[0]) / (speed * size)
+
+
+def turned(crank: float, rod: float, angle: float, speed: float) -> tuple[Scene, float]:
+    """Return a slider-crank whose crank is driven and longer than its rod, and its dead time (s).
+
+    The rod is then perpendicular to the slider's line. Units are m, rad and rad/s.
+    """
+    scene, _ = pushed(crank, rod, angle, 1.0)
+    time = (math.asin(rod / crank) - angle) / speed
+    return scene.with_(driver=[{"joint": "O", "polynomial": [0.0, speed]}], duration=3.0 * time), time
+
+
+def _hinge(name: str, first: str, second: str, anchor: tuple[float, ...]) -> dict[str, object]:
+    axis = [0.0, 0.0, 1.0]
+    return {"name": name, "type": "revolute", "bodies": [first, second], "anchor": list(anchor), "axis": axis}
+
+
+def _link(
+    name: str, begin: tuple[float, ...], end: tuple[float, ...], angle: float, size: float
+) -> dict[str, object]:
+    return {
+        "name": name,
+        "mass": 1.0,
+        "inertia": [0.01 * size**2] * 3,
+        "position": [(p + q) / 2 for p, q in zip(begin, end, strict=True)],
+        "orientation": [math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)],
+    }
