@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium
 
 PUSHING = ("moment", "force", "joint_torque", "joint_force")  # loads that do not change with the pose
+SINGULAR = "at a singular position, where the number of freedoms, stability and reactions are not defined"
+ROUNDED = 1e-9  # part of the largest number below which a number is printed as zero
 LIMITS = "Other equilibria may exist: the search begins at the scene's pose and follows the constraints."
 
 
@@ -104,25 +106,35 @@ def _equilibrium(options: argparse.Namespace) -> int:
 
 def _lines(number: int, each: Equilibrium) -> list[str]:
     lines = [_title(number, each)]
+    places = [body.position for body in each.scene.body]
+    places += [end for joint in each.scene.joint for end in joint.anchor_pair]
+    reach, length = float(np.abs(places).max()), float(np.ptp(places, axis=0).max())
+    wrenches = list(each.reactions.values())
+    force, moment = (
+        max((float(np.abs(wrench[part]).max()) for wrench in wrenches), default=0.0)
+        for part in (slice(0, 3), slice(3, 6))
+    )
+    size = force + (moment / length if length > 0.0 else 0.0)
     for body in each.scene.body:
-        turned = to_vector(np.array([body.orientation]))[0]
-        lines.append(
-            f"  {body.name:12} position {_three(body.position)} m, rotation vector {_three(turned)} rad"
-        )
+        place, turned = _three(body.position, reach), to_vector(np.array([body.orientation]))[0]
+        lines.append(f"  {body.name:12} position {place} m, rotation vector {_three(turned, 1.0)} rad")
     for name, wrench in each.reactions.items():
-        lines.append(f"  joint {name:6} force {_three(wrench[:3])} N, moment {_three(wrench[3:])} N m")
+        pushed, twisted = _three(wrench[:3], size), _three(wrench[3:], size * length or moment)
+        lines.append(f"  joint {name:6} force {pushed} N, moment {twisted} N m")
     return lines
 
 
 def _title(number: int, each: Equilibrium) -> str:
     """Return the heading of an equilibrium, or of a steady motion with its rate."""
+    kind = SINGULAR if each.is_singular else each.stability
     if each.rate:
-        return f"steady motion {number}: {each.stability}, turns at {each.rate:.9g} rad/s"
-    return f"equilibrium {number}: {each.stability}"
+        return f"steady motion {number}: {kind}, turns at {each.rate:.9g} rad/s"
+    return f"equilibrium {number}: {kind}"
 
 
-def _three(vector: Any) -> str:
-    return "(" + ", ".join(f"{x:.6g}" for x in np.round(vector, 9) + 0.0) + ")"
+def _three(vector: Any, size: float) -> str:
+    """Return three numbers, where numbers that are rounding of a size are zero."""
+    return "(" + ", ".join(f"{x if abs(x) > ROUNDED * size else 0.0:.6g}" for x in vector) + ")"
 
 
 def _record(each: Equilibrium) -> dict[str, Any]:
@@ -131,6 +143,7 @@ def _record(each: Equilibrium) -> dict[str, Any]:
         "rate": each.rate,
         "scene": each.scene.to_dict(),
         "eigenvalues": [[float(s.real), float(s.imag)] for s in each.eigenvalues],
+        "bounds": each.bounds.tolist(),
         "frequencies": each.frequencies.tolist(),
         "damping_ratios": each.damping_ratios.tolist(),
         "reactions": {name: wrench.tolist() for name, wrench in each.reactions.items()},
@@ -142,9 +155,12 @@ def _modes(options: argparse.Namespace) -> int:
 
     path = path_of(options, "-mode", MOVING) if options.out else None
     found = _found(options)
-    stable = [k for k, each in enumerate(found, 1) if each.stability == "stable"]
-    number = options.number or (stable or [1])[0]
+    kinds = [each.stability for each in found]
+    wanted = next((kind for kind in ("stable", "indifferent", "unstable") if kind in kinds), kinds[0])
+    number = options.number or kinds.index(wanted) + 1
     each = found[number - 1]
+    if each.is_singular:
+        raise InputError(f"{each.scene.name}: {_title(number, each)}; --number chooses another equilibrium")
     if path is not None:
         write_film(path, each.scene, motion_of_mode(each, options.mode), requested_view(options))
     if options.json:
@@ -158,7 +174,7 @@ def _modes(options: argparse.Namespace) -> int:
 
 def _mode_lines(number: int, each: Equilibrium) -> list[str]:
     lines = [_title(number, each), "  eigenvalues, 1/s"]
-    lines += [f"    {s.real:+.12g} {s.imag:+.12g} i" for s in np.round(each.eigenvalues, 12) + 0.0]
+    lines += [f"    {s.real:+.12g} {s.imag:+.12g} i" for s in each.eigenvalues]
     pairs = enumerate(zip(each.frequencies, each.damping_ratios, strict=True), 1)
     lines += [f"  vibration {k}: {hertz:.9g} Hz, damping ratio {ratio:.6g}" for k, (hertz, ratio) in pairs]
     return lines

@@ -2,34 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from mbref import rotations
-from mbref.design.linearisation import OffConstraints, Tangent, multipliers, unsteady
+from mbref.design.balance import SAME, Newton, are_one, balanced, starts_from
+from mbref.design.joint_angles import slots, spring_angles
+from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.placed import placed_with_springs
+from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.turning import Turning, turning
+from mbref.design.winding import wound
 from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
-from mbref.equations.model import Model, displaced, displacement
+from mbref.equations.model import Model, displaced
 from mbref.input_error import InputError
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 
 STARTS = 24  # number of poses from which an equilibrium is searched
-STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism
-LONGEST_STEP = 0.3  # largest step towards an equilibrium / length of the mechanism
-MOST_NEWTON_STEPS = 60  # largest number of Newton steps from a start
-BALANCED = 1e-11  # largest acceleration at an equilibrium / scale of accelerations
-SAME_EQUILIBRIUM = 1e-6  # distance / length of the mechanism, or rad, below which two poses count as equal
-STILL_EIGENVALUE = 1e-6  # real part or eigenvalue / largest |s| below which it counts as zero
-# acceleration × duration² / length of the mechanism below which a mechanism counts as free of forces
-FORCE_FREE = 1e-9
+# smallest singular value / its largest value at the starts, below which a pose is a singular position
+SINGULAR = 1e-5
+# distance, lengths or rad, of random displacements that show the number of freedoms; their number
+ASIDE, TRIALS = 0.02, 4
 # displayed vibration: largest displacement / length of the mechanism, and number of samples
 AMPLITUDE, MODE_SAMPLES = 0.1, 49
 
@@ -44,7 +43,8 @@ class Equilibrium:
         The scene with its bodies at this pose, at rest or turning; springs, joints and loads are carried
         along.
     eigenvalues : ndarray, shape (2f,), complex
-        Exponents s of small motions exp(s t), 1/s, of the f degrees of freedom.
+        Exponents s of small motions exp(s t), 1/s, of the f degrees of freedom. None at a singular position.
+        Real and imaginary parts within the bound are zero.
     shapes : ndarray, shape (2f, nb, 6), complex
         Motion of each body for each eigenvalue: displacement of the centre of mass (m) and rotation vector
         (rad), world frame, relative to the turning mechanism. The largest is one length of the mechanism, or
@@ -53,6 +53,8 @@ class Equilibrium:
         Force (N) and moment (N m) on the second body of each joint at its anchor, world frame.
     rate : float
         Angular speed with which the mechanism turns, rad/s; zero at a static equilibrium.
+    bounds : ndarray, shape (2f,)
+        Largest error of each eigenvalue, 1/s: by its condition and the errors of the linearised equations.
     """
 
     scene: Scene
@@ -60,14 +62,25 @@ class Equilibrium:
     shapes: np.ndarray
     reactions: dict[str, np.ndarray]
     rate: float = 0.0
+    bounds: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def is_singular(self) -> bool:
+        """True at a singular position, where the number of freedoms is not defined."""
+        return len(self.eigenvalues) == 0
 
     @property
     def stability(self) -> str:
-        """``stable``, ``unstable`` or ``indifferent``, by the largest real part of the eigenvalues."""
-        size = float(np.abs(self.eigenvalues).max(initial=0.0))
-        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL_EIGENVALUE * size:
-            return "indifferent"
-        return "unstable" if self.eigenvalues.real.max() > STILL_EIGENVALUE * size else "stable"
+        """``stable``, ``unstable``, ``indifferent`` or ``singular``.
+
+        An eigenvalue with a positive real part makes the pose unstable, otherwise a zero eigenvalue makes it
+        indifferent.
+        """
+        if self.is_singular:
+            return "singular"
+        if (self.eigenvalues.real > 0.0).any():
+            return "unstable"
+        return "indifferent" if (self.eigenvalues == 0.0).any() else "stable"
 
     @property
     def frequencies(self) -> np.ndarray:
@@ -84,8 +97,7 @@ class Equilibrium:
     def oscillating(self) -> np.ndarray:
         """Numbers (indices from 0) of the eigenvalues with positive imaginary part, slowest vibration
         first."""
-        size = float(np.abs(self.eigenvalues).max(initial=0.0))
-        return np.flatnonzero(self.eigenvalues.imag > STILL_EIGENVALUE * size)
+        return np.flatnonzero(self.eigenvalues.imag > 0.0)
 
     def __repr__(self) -> str:
         listed = ", ".join(f"{f:.6g} Hz" for f in self.frequencies)
@@ -99,8 +111,8 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     The starts are the scene's pose and poses that are reached from it along the constraints. There is no
     guarantee that all equilibria are found. Drivers must stand still. One driver may turn a body relative to
     the ground at a constant rate about an axis parallel to gravity: then the result has the steady motions
-    in which the whole mechanism turns with it. From each start Levenberg's method (Quarterly of Applied
-    Mathematics 2, 1944) reduces the accelerations to zero.
+    in which the whole mechanism turns with it. From each start Newton's method looks for a pose at which
+    nothing accelerates. Equilibria that are connected by equilibria are one.
 
     Parameters
     ----------
@@ -121,19 +133,53 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     """
     scene = find_scene(scene).assembled()
     frame, model = _frame(scene), Model(scene)
-    first = Tangent(model, consistent_start(model).q, frame)
+    first = Tangent(model, consistent_start(model).q, frame, np.zeros(slots(model)))
     if reason := unsteady(first):
         raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
-    poses = list(_starts(first, starts))
-    scale = _scale(poses)
-    if scale <= FORCE_FREE * model.length / scene.duration**2:
-        return [_equilibrium(poses[0])]
-    found: list[Tangent] = []
+    freedoms = _freedoms(first)
+    poses = _poses(first, freedoms, starts)
+    regular = max(each.conditioning for each in poses)
+    found: list[Newton] = []
     for tangent in poses:
-        settled = _balanced(tangent, scale)
-        if settled is not None and not any(_is_same(settled, other) for other in found):
+        settled = _settled(tangent, freedoms)
+        if settled is not None and not any(_is_known(settled, other) for other in found):
             found.append(settled)
-    return [_equilibrium(tangent) for tangent in found]
+    return [_equilibrium(each, each.tangent.conditioning < SINGULAR * regular, freedoms) for each in found]
+
+
+def _freedoms(first: Tangent) -> int:
+    """Return the number of freedoms near a pose, which a singular position exceeds."""
+    rng, found = np.random.default_rng(2), first.freedoms
+    for _ in range(TRIALS):
+        direction = rng.standard_normal(first.freedoms)
+        aside = first.moved(ASIDE * direction / np.linalg.norm(first.basis @ direction))
+        if aside is not None:
+            found = min(found, aside.freedoms)
+    return found
+
+
+def _poses(first: Tangent, freedoms: int, count: int) -> list[Tangent]:
+    """Return the poses from which equilibria are searched; half of them where torsion springs are relaxed, if
+    they are twisted by more than half a turn."""
+    relaxed = wound(first)
+    if relaxed is first:
+        return list(starts_from(first, freedoms, count))
+    return [*starts_from(first, freedoms, (count + 1) // 2), *starts_from(relaxed, freedoms, count // 2)]
+
+
+def _settled(tangent: Tangent, freedoms: int) -> Newton | None:
+    """Return the equilibrium that is reached from a start; None if there is none."""
+    if tangent.freedoms == freedoms:
+        return balanced(tangent, freedoms)
+    here = Newton(tangent)
+    return here if here.is_balanced else None
+
+
+def _is_known(settled: Newton, other: Newton) -> bool:
+    """Return whether two equilibria are one, or of one family."""
+    if settled.tangent.freedoms != other.tangent.freedoms:
+        return bool(np.abs(settled.tangent.to(other.tangent)).max() < np.sqrt(SAME))
+    return are_one(other, settled)
 
 
 def motion_of_mode(equilibrium: Equilibrium, number: int, amplitude: float = AMPLITUDE) -> Motion:
@@ -196,111 +242,35 @@ def _frame(scene: Scene) -> Turning:
     return frame
 
 
-def _scale(poses: list[Tangent]) -> float:
-    """Return the scale of accelerations, m/s²: the largest acceleration at some poses, or the acceleration
-    for a displacement by the mechanism's length."""
-    by_place = float(np.linalg.norm(poses[0].slope())) * poses[0].model.length
-    return max(by_place, *(float(np.linalg.norm(each.accelerations(*_rest(each)))) for each in poses))
-
-
-def _rest(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
-    return np.zeros(tangent.freedoms), np.zeros(tangent.freedoms)
-
-
-def _starts(first: Tangent, count: int) -> Iterator[Tangent]:
-    """Yield the first pose, and further poses along the constraints in random directions with a fixed
-    seed."""
-    rng, freedoms = np.random.default_rng(1), first.freedoms
-    yield first
-    there = back = first
-    direction = rotations.unit(rng.standard_normal(freedoms))
-    for k in range(1, count):
-        forth = k % 2 == 1
-        tangent = there if forth else back
-        ahead = tangent.basis.T @ first.basis @ direction
-        sign = 1.0 if forth else -1.0
-        moved = _moved(tangent, sign * STRIDE * first.model.length * rotations.unit(ahead))
-        if moved is None or moved.freedoms != freedoms:
-            direction = rotations.unit(rng.standard_normal(freedoms))
-            continue
-        there, back = (moved, back) if forth else (there, moved)
-        direction = (
-            rotations.unit(direction + 0.3 * rng.standard_normal(freedoms)) if freedoms > 1 else direction
-        )
-        yield moved
-
-
-def _balanced(tangent: Tangent, scale: float) -> Tangent | None:
-    """Return the pose near a start without accelerations, by Levenberg's method; None if no such pose is
-    found."""
-    freedoms, damping = tangent.freedoms, 0.0
-    off = tangent.accelerations(*_rest(tangent))
-    for _ in range(MOST_NEWTON_STEPS):
-        if np.linalg.norm(off) <= BALANCED * scale:
-            return _refined(tangent, off)
-        try:
-            slope = tangent.slope()
-        except OffConstraints:
-            return None
-        weight = damping * float(np.linalg.norm(slope)) ** 2 + 1e-300
-        step = -np.linalg.lstsq(slope.T @ slope + weight * np.eye(freedoms), slope.T @ off, rcond=None)[0]
-        size = float(np.linalg.norm(step)) / (LONGEST_STEP * tangent.model.length)
-        moved = _moved(tangent, step / max(1.0, size))
-        after = off if moved is None else moved.accelerations(*_rest(moved))
-        if moved is None or moved.freedoms != freedoms or np.linalg.norm(after) >= np.linalg.norm(off):
-            damping = max(10 * damping, 1e-3)
-            if damping > 1e6:
-                return None
-            continue
-        tangent, off, damping = moved, after, damping / 10
-    return None
-
-
-def _refined(tangent: Tangent, off: np.ndarray) -> Tangent:
-    """Return the pose after one more Newton step, if that is better: exponents near each other need it."""
-    try:
-        slope = tangent.slope()
-    except OffConstraints:
-        return tangent
-    moved = _moved(tangent, -np.linalg.lstsq(slope, off, rcond=None)[0])
-    if moved is None or moved.freedoms != tangent.freedoms:
-        return tangent
-    return moved if np.linalg.norm(moved.accelerations(*_rest(moved))) < np.linalg.norm(off) else tangent
-
-
-def _moved(tangent: Tangent, y: np.ndarray) -> Tangent | None:
-    try:
-        return Tangent(tangent.model, tangent.pose(y), tangent.frame)
-    except OffConstraints:
-        return None
-
-
-def _is_same(first: Tangent, second: Tangent) -> bool:
-    apart = displacement(first.q, second.q) / first.units
-    return bool(np.abs(apart).max(initial=0.0) < SAME_EQUILIBRIUM * first.model.length)
-
-
-def _equilibrium(tangent: Tangent) -> Equilibrium:
-    model, freedoms = tangent.model, tangent.freedoms
-    by_place, by_rate = tangent.linear_part()
-    first_order = np.block([[np.zeros((freedoms, freedoms)), np.eye(freedoms)], [by_place, by_rate]])
-    values, vectors = np.linalg.eig(first_order)
-    order = np.lexsort((-values.imag, np.abs(values).round(12)))
-    shapes = (tangent.units[:, None] * (tangent.basis @ vectors[:freedoms, order])).T
-    shapes = shapes.astype(complex).reshape(len(order), model.nb, 6)[:, : len(model.scene.body)]
-    turned = tangent.q.reshape(model.nb, 7)[: len(model.scene.body), 3:]
-    for part in (shapes.real, shapes.imag):
-        part[..., 3:] = rotations.rotate(turned, part[..., 3:])
-    in_units = (shapes / np.repeat([model.length, 1.0], 3)).reshape(len(order), -1)
-    # the shape is scaled such that this entry becomes 1
-    largest = in_units[np.arange(len(order)), np.abs(in_units).argmax(axis=1)]
+def _equilibrium(found: Newton, singular: bool, freedoms: int) -> Equilibrium:
+    tangent = found.tangent.along(found.directions)
+    model, count = tangent.model, len(tangent.model.scene.body)
     q = tangent.q.reshape(1, model.nb, 7)
+    scene = placed_with_springs(model, tangent.q, spring_angles(model, tangent.angles))
+    placed = scene.with_(body=tangent.frame.bodies(scene))
+    if singular or tangent.freedoms != freedoms:
+        none = np.zeros(0, dtype=complex)
+        return Equilibrium(placed, none, np.zeros((0, count, 6), dtype=complex), {}, tangent.frame.rate)
+    eigenvalues = eigenvalues_of(linear_at(tangent, found.directions.T @ found.away()))
     forces = reactions(model, q, model.terms(np.zeros(1), q).blocks, multipliers(tangent)[None])
-    scene = placed_with_springs(model, tangent.q)
     return Equilibrium(
-        scene.with_(body=tangent.frame.bodies(scene)),
-        values[order],
-        shapes / largest[:, None, None],
+        placed,
+        eigenvalues.values,
+        _shapes(tangent, eigenvalues.shapes),
         {name: wrench[0] for name, wrench in forces.items()},
         tangent.frame.rate,
+        eigenvalues.bounds,
     )
+
+
+def _shapes(tangent: Tangent, vectors: np.ndarray) -> np.ndarray:
+    """Return the motions (2f, nb, 6) of the bodies for eigenvectors y (f, 2f), scaled such that the largest
+    entry is one length of the mechanism, or one radian."""
+    model, count = tangent.model, len(tangent.model.scene.body)
+    moved = (tangent.basis @ vectors).T.astype(complex)
+    largest = moved[np.arange(len(moved)), np.abs(moved[:, : 6 * count]).argmax(axis=1)]
+    shapes = (model.units * moved / largest[:, None]).reshape(len(moved), model.nb, 6)[:, :count]
+    turned = tangent.q.reshape(model.nb, 7)[:count, 3:]
+    for part in (shapes.real, shapes.imag):
+        part[..., 3:] = rotations.rotate(turned, part[..., 3:])
+    return shapes

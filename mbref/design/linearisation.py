@@ -1,27 +1,36 @@
 """Equations of motion about a pose at rest, in coordinates along the constraints' tangent.
 
-With x = (δr, δπ') the displacements of the bodies from a pose q0, S = diag(1 m, 1/L rad) and an orthonormal
-basis Z of the null space of Φ_q S, a pose has the coordinates y: q(y) is q0 ⊕ S Z y put onto the constraints.
-About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ S⁻¹ q''. In a steady
-motion the pose is at rest in a frame that turns with the driver (turning.py), and q'' is relative to it.
+With x the displacements of the bodies in units S of the mechanism (its length, and 1 rad), the tangent of the
+constraints at a pose q0 is x = Z y with Φ_q S Z = 0 and Zᵀ M Z = m.  M is the mass matrix for x, m its
+largest value along the tangent.  A pose has the coordinates y: q(y) is q0 ⊕ S Z y put onto the constraints.
+About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ M x'' / m.  A is
+symmetric for forces with a potential, so that stiff directions do not round soft ones.  In a steady motion the
+pose is at rest in a frame that turns with the driver (turning.py), and x'' is relative to it.
 """
 
 from __future__ import annotations
 
+import copy
+from collections.abc import Callable
+
 import numpy as np
 
+from mbref.design.joint_angles import angles_at, counted_from
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
-from mbref.equations.gaps import is_closed
+from mbref.equations.gaps import gaps, is_closed
 from mbref.equations.initial_state import solve_positions
-from mbref.equations.model import Model, displaced
-from mbref.equations.units import unit_rows
-from mbref.linear_algebra.least_norm import null_space
+from mbref.equations.model import Model, displaced, displacement
+from mbref.equations.units import row_lengths, unit_rows
+from mbref.linear_algebra.least_norm import least_norm_and_null_space
+from mbref.scene import SceneError
 
 TANGENT_RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
 DIFFERENCE_STEP = 0.005
 SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
 CENTRAL = (4 / 5, -1 / 5, 4 / 105, -1 / 280)  # weights of central differences of order 8
+WEIGHTLESS = 1e-20  # mass along a tangent / largest mass, below which no mass resists the forces
+EPSILON = float(np.finfo(float).eps)
 
 
 class OffConstraints(Exception):
@@ -29,74 +38,148 @@ class OffConstraints(Exception):
 
 
 class Tangent:
-    """Coordinates y (f,), m, of poses near a pose q0 (7 nb,) at rest in a frame."""
+    """Coordinates y (f,) of poses near a pose q0 (7 nb,) at rest in a frame; Zy is in lengths or rad.
 
-    def __init__(self, model: Model, q: np.ndarray, frame: Turning):
+    ``conditioning`` is the smallest nonzero singular value of Φ_q S, rows of unit length, over the largest:
+    it falls to zero towards a singular position.  ``angles`` (k,) of torsion springs and couplings are at q0.
+    """
+
+    def __init__(self, model: Model, q: np.ndarray, frame: Turning, angles: np.ndarray):
         self.model, self.q, self.frame = model, q, frame
-        self.units = np.tile(np.repeat([1.0, 1.0 / model.length], 3), model.nb)
-        self.step = DIFFERENCE_STEP * model.length
-        self.basis = _null_space(model.terms(0.0, q).jacobian * self.units)
+        self.angles = angles_at(model, q, angles)
+        with counted_from(model, self.angles):
+            terms = model.terms(0.0, q, frame.velocities(model, q))
+        _, values, right = np.linalg.svd(unit_rows(terms.jacobian * model.units))
+        rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
+        self.conditioning = float(values[rank - 1] / values[0]) if rank else 1.0
+        free, self.weight = right[rank:].T, terms.mass * model.units**2
+        squares, axes = np.linalg.eigh(free.T @ (self.weight[:, None] * free))
+        self.mass = float(squares.max(initial=0.0))
+        if squares.size and not squares.min() > WEIGHTLESS * self.mass:
+            raise SceneError(["body: no mass resists a motion that the joints allow, so it has no vibration"])
+        self.basis = free @ (axes * np.sqrt(self.mass / squares))
+        inwards = frame.relative(model, q, np.zeros(model.n), np.zeros(model.n)) / model.units
+        self._forces = _by_body(terms.force * model.units) + _by_body(self.weight * inwards)
 
     @property
     def freedoms(self) -> int:
         """Number of coordinates y."""
         return int(self.basis.shape[1])
 
-    def pose(self, y: np.ndarray) -> np.ndarray:
-        """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
-        moved = displaced(self.q, self.units * (self.basis @ y))
-        found, _ = solve_positions(self.model, 0.0, moved)
-        if not is_closed(self.model, self.model.terms(0.0, found)):
-            raise OffConstraints
+    @property
+    def sizes(self) -> np.ndarray:
+        """Largest displacement (f,) of a body, lengths or rad, for each unit coordinate."""
+        return np.asarray(np.linalg.norm(self.basis, axis=0))
+
+    @property
+    def pushes(self) -> np.ndarray:
+        """Scale (f,) of the accelerations y'': what the forces on the bodies give without cancelling."""
+        return np.asarray(_by_body(self.basis).T @ self._forces / self.mass)
+
+    def along(self, axes: np.ndarray) -> Tangent:
+        """Return the tangent with coordinates along orthonormal directions (f, f) of y."""
+        found = copy.copy(self)
+        found.basis = self.basis @ axes
         return found
 
-    def accelerations(self, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
-        """Return y'' (f,), m/s², at y and y' (f,)."""
+    def coordinates(self, x: np.ndarray) -> np.ndarray:
+        """Return y (f,) of displacements or accelerations x (n,), lengths or rad."""
+        return np.asarray(self.basis.T @ (self.weight * x) / self.mass)
+
+    def pose(self, y: np.ndarray) -> np.ndarray:
+        """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
+        moved = displaced(self.q, self.model.units * (self.basis @ y))
+        with counted_from(self.model, self.angles):
+            found, _ = solve_positions(self.model, 0.0, moved)
+            if not is_closed(self.model, self.model.terms(0.0, found)):
+                raise OffConstraints
+        return found
+
+    def to(self, other: Tangent) -> np.ndarray:
+        """Return the small displacements (n,), lengths or rad, to the pose of another tangent."""
+        return np.asarray(displacement(self.q, other.q) / self.model.units)
+
+    def moved(self, y: np.ndarray) -> Tangent | None:
+        """Return the tangent at q(y); None if no pose on the constraints is found."""
+        try:
+            return Tangent(self.model, self.pose(y), self.frame, self.angles)
+        except OffConstraints:
+            return None
+
+    def relative_accelerations(self, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return x'' (n,), lengths or rad over s², at y and y' (f,)."""
+        model, frame = self.model, self.frame
         q = self.pose(y) if y.any() else self.q
-        v = self.units * (self.basis @ rate)
-        found = accelerations(self.model, 0.0, q, self.frame.velocities(self.model, q) + v)
-        return np.asarray(self.basis.T @ (self.frame.relative(self.model, q, v, found) / self.units))
+        v = model.units * (self.basis @ rate)
+        with counted_from(model, self.angles):
+            found = accelerations(model, 0.0, q, frame.velocities(model, q) + v)
+        return frame.relative(model, q, v, found) / model.units
 
-    def slope(self) -> np.ndarray:
-        """Return A = ∂y''/∂y (f, f) by differences of second order, for Newton's method."""
-        zero, moves = np.zeros(self.freedoms), SHORT * self.step * np.eye(self.freedoms)
-        pairs = [(self.accelerations(move, zero), self.accelerations(-move, zero)) for move in moves]
-        return np.array([after - before for after, before in pairs]).T / (2 * SHORT * self.step)
+    def accelerations(self, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
+        """Return y'' (f,), 1/s², at y and y' (f,)."""
+        return self.coordinates(self.relative_accelerations(y, rate))
 
-    def linear_part(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8."""
-        zero, directions = np.zeros(self.freedoms), np.eye(self.freedoms)
-        by_place = [self._derivative(lambda y: self.accelerations(y, zero), d) for d in directions]
-        by_rate = [self._derivative(lambda y: self.accelerations(zero, y), d) for d in directions]
-        return np.array(by_place).T, np.array(by_rate).T
+    def off_balance(self) -> np.ndarray:
+        """Return x'' (n,) at the pose at rest: zero at an equilibrium."""
+        return self.relative_accelerations(*np.zeros((2, self.freedoms)))
 
-    def _derivative(self, function, direction: np.ndarray) -> np.ndarray:  # type: ignore[no-untyped-def]
-        h = self.step
-        parts = [
-            w * (function(k * h * direction) - function(-k * h * direction)) for k, w in enumerate(CENTRAL, 1)
+    def slope(self, at: np.ndarray | None = None) -> np.ndarray:
+        """Return A = ∂y''/∂y (f, f) at y, by default at the pose, by differences of second order."""
+        zero, h = np.zeros(self.freedoms), SHORT * DIFFERENCE_STEP / self.sizes
+        place = zero if at is None else at
+        pairs = [
+            (self.accelerations(place + move, zero), self.accelerations(place - move, zero))
+            for move in np.diag(h)
         ]
-        return np.asarray(np.sum(parts, axis=0) / h)
+        return np.array([after - before for after, before in pairs]).T / (2 * h)
+
+    def linear_part(self, share: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+        """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
+        zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes
+        by_place = [_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
+        place, fast = np.array(by_place).T / steps, steps * self.rate_scale
+        by_rate = [_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
+        return place, np.array(by_rate).T / fast
+
+    @property
+    def rate_scale(self) -> float:
+        """Rate, 1/s, of motions by the forces over one length of the mechanism; 1 without forces."""
+        return float(np.sqrt((self.pushes / self.sizes).max(initial=0.0))) or 1.0
+
+
+def _derivative(function: Callable[[np.ndarray], np.ndarray], h: np.ndarray) -> np.ndarray:
+    """Return the change of a function along a vector h, to first order."""
+    parts = [w * (function(k * h) - function(-k * h)) for k, w in enumerate(CENTRAL, 1)]
+    return np.asarray(np.sum(parts, axis=0))
+
+
+def _by_body(x: np.ndarray) -> np.ndarray:
+    """Return the lengths (2 nb, …) of the translational and rotational parts of x (6 nb, …)."""
+    return np.asarray(np.linalg.norm(x.reshape(-1, 3, *x.shape[1:]), axis=1))
 
 
 def accelerations(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return q'' (n,) at time t (s): of all that the rows allow, the one of Gauss's principle."""
     terms = model.terms(t, q, v)
-    free = _null_space(terms.jacobian)
-    bound = np.zeros(model.n)
-    if model.m:
-        bound = np.linalg.lstsq(terms.jacobian, terms.gamma, rcond=TANGENT_RANK)[0]
-    mass = free.T @ (terms.mass[:, None] * free)
-    push = free.T @ (terms.force - terms.mass * bound)
-    return np.asarray(bound + free @ np.linalg.solve(mass, push))
+    rows = terms.jacobian * model.units
+    lengths = row_lengths(rows)
+    bound, free = least_norm_and_null_space(rows / lengths[:, None], terms.gamma / lengths, TANGENT_RANK)
+    weight = terms.mass * model.units**2
+    mass = free.T @ (weight[:, None] * free)
+    push = free.T @ (terms.force * model.units - weight * bound)
+    return np.asarray(model.units * (bound + free @ np.linalg.solve(mass, push)))
 
 
 def multipliers(tangent: Tangent) -> np.ndarray:
     """Return λ (m,) of least norm of a pose at rest in its frame, with M q'' + Φ_qᵀ λ = g."""
     model, q = tangent.model, tangent.q
     v = tangent.frame.velocities(model, q)
-    terms = model.terms(0.0, q, v)
-    left = terms.force - terms.mass * accelerations(model, 0.0, q, v)
-    return np.asarray(np.linalg.lstsq(terms.jacobian.T, left, rcond=TANGENT_RANK)[0])
+    with counted_from(model, tangent.angles):
+        terms = model.terms(0.0, q, v)
+        left = (terms.force - terms.mass * accelerations(model, 0.0, q, v)) * model.units
+    rows = terms.jacobian * model.units
+    lengths = row_lengths(rows)
+    return np.asarray(np.linalg.lstsq((rows / lengths[:, None]).T, left, rcond=TANGENT_RANK)[0] / lengths)
 
 
 def unsteady(tangent: Tangent) -> str:
@@ -108,20 +191,18 @@ def unsteady(tangent: Tangent) -> str:
     if not frame.rate or not tangent.freedoms:
         return ""
     try:
-        q = tangent.pose(np.full(tangent.freedoms, tangent.step))
+        q = tangent.pose(DIFFERENCE_STEP / tangent.sizes)
     except OffConstraints:
         q = tangent.q
     now = frame.velocities(model, q)
     later, rates = frame.turned(model, q, TURNED_BY), frame.turned_rates(model, now, TURNED_BY)
     t = TURNED_BY / frame.rate
-    phi = np.abs(model.terms(t, later, rates).phi)
-    if phi.max(initial=0.0) > UNCHANGED * max(1.0, model.length):
-        return f"joint {model.row_joint[int(phi.argmax())]!r} does not turn with it"
-    before, after = accelerations(model, 0.0, q, now), accelerations(model, t, later, rates)
-    change = np.abs(frame.turned_rates(model, before, TURNED_BY) - after).max()
-    return "the loads change while it turns" if change > UNCHANGED * np.abs(before).max() else ""
-
-
-def _null_space(jacobian: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis (n, f) of the displacements that unit rows allow."""
-    return null_space(unit_rows(jacobian), TANGENT_RANK)
+    with counted_from(model, tangent.angles):
+        gap = gaps(model.terms(t, later, rates), model.length)
+        if gap.max(initial=0.0) > UNCHANGED:
+            return f"joint {model.row_joint[int(gap.argmax())]!r} does not turn with it"
+        before, after = accelerations(model, 0.0, q, now), accelerations(model, t, later, rates)
+    change = np.abs((frame.turned_rates(model, before, TURNED_BY) - after) / model.units).max()
+    return (
+        "the loads change while it turns" if change > UNCHANGED * np.abs(before / model.units).max() else ""
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -23,7 +25,7 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     scene, zeros = model.scene, np.zeros((1, model.nb, 6))
     motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
     bodies = [
-        body.model_copy(update={"position": _three(r), "orientation": tuple(p.tolist())})
+        body.model_copy(update={"position": _three(r, model.length), "orientation": tuple(p.tolist())})
         for body, r, p in zip(scene.body, motion["position"][0], motion["orientation"][0], strict=True)
     ]
     joints = [joint.model_copy(update=_carried(model, joint, q)) for joint in scene.joint]
@@ -31,20 +33,26 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     return scene.with_(body=bodies, joint=joints, load=loads)
 
 
-def placed_with_springs(model: Model, q: np.ndarray) -> Scene:
+def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[int, float] | None = None) -> Scene:
     """Return ``placed`` with springs of joints as long or as twisted as before: their natural angles and
-    displacements count from the new poses."""
-    found = placed(model, q)
+    displacements count from the new poses.
+
+    ``angles`` (rad) of torsion springs, by their number in the scene, may be more than half a turn.
+    """
+    found, turned = placed(model, q), angles or {}
     pose = at_rest(found)
-    return found.with_(load=[_with_natural(model.scene, pose, load) for load in found.load])
+    return found.with_(
+        load=[_with_natural(model.scene, pose, load, turned.get(k)) for k, load in enumerate(found.load)]
+    )
 
 
-def _with_natural(scene: Scene, pose: Trajectory, load: Load) -> Load:
+def _with_natural(scene: Scene, pose: Trajectory, load: Load, angle: float | None) -> Load:
     """Return a load whose natural angle or displacement counts from a pose of the scene."""
     if not isinstance(load, TorsionSpring | SlideSpring):
         return load
-    moved = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
-    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - moved})
+    if isinstance(load, SlideSpring) or angle is None:
+        angle = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
+    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - angle})
 
 
 def _carried(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
@@ -68,9 +76,9 @@ def place(model: Model, body: str, point: tuple[float, float, float], q: np.ndar
     """Return the world position at coordinates q of a body-fixed point (world, t = 0)."""
     b, local = model.index(body), model.point(body, point)
     if b == model.nb:
-        return _three(local)
+        return _three(local, model.length)
     r, p = np.split(q.reshape(model.nb, 7)[b], [3])
-    return _three(r + rotations.rotate(p, local))
+    return _three(r + rotations.rotate(p, local), model.length)
 
 
 def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
@@ -78,6 +86,6 @@ def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.
     return _three(local if b == model.nb else rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
 
 
-def _three(vector: np.ndarray) -> tuple[float, ...]:
-    """Return three numbers in which rounding errors of zeros are zero."""
-    return tuple((np.round(vector, 15) + 0.0).tolist())
+def _three(vector: np.ndarray, size: float = 1.0) -> tuple[float, ...]:
+    """Return three numbers in which rounding errors of zeros are zero, for numbers of a size."""
+    return tuple((np.round(vector, 15 - round(math.log10(size))) + 0.0).tolist())

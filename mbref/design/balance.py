@@ -1,0 +1,195 @@
+"""Search for poses at which nothing accelerates: Newton's method, scaled by the tangent stiffness.
+
+With the singular values σ and vectors u, v of A = ∂y''/∂y, a Newton step moves -uᵀ y'' / σ along v.  Steps
+are compared by these displacements instead of accelerations, so that stiff springs do not hide soft motions
+(the natural level function of P. Deuflhard, Newton Methods for Nonlinear Problems, 2004).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mbref import rotations
+from mbref.design.linearisation import EPSILON, OffConstraints, Tangent
+
+STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism, or rad
+LONGEST_STEP = 0.3  # largest step towards an equilibrium / length of the mechanism, or rad
+MOST_NEWTON_STEPS = 60  # largest number of Newton steps from a start
+SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a Newton step that are tried
+# largest acceleration at an equilibrium / acceleration that the forces on the bodies give without cancelling
+BALANCED = 1e-11
+ROUNDED = 1e-15  # the same for accelerations that are rounding alone
+PLACED = 64.0 * EPSILON  # rounding of a pose / length: stiff springs accelerate by it
+LEAST_GAIN = 0.01  # least relative decrease of the displacement by a whole step, which may be a limited one
+BETTER = 0.9  # largest ratio of displacements of successive refinements
+STIFF = 100.0  # stiffness / softest or load's stiffness, above which starts do not displace a spring
+UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
+SAME = 1e-6  # distance / length, or rad, below which two poses are one
+LINKS = 40  # largest number of steps between two poses of one family
+
+
+class Newton:
+    """The Newton step at a pose: directions v and sizes of the tangent stiffness, and what is unbalanced."""
+
+    def __init__(self, tangent: Tangent):
+        self.tangent, self.off = tangent, tangent.off_balance()
+        self.left, self.stiffness, right = np.linalg.svd(tangent.slope())
+        self.directions = right.T
+        self.sizes = np.linalg.norm(tangent.basis @ self.directions, axis=0)
+        forces = np.abs(self.left.T) @ tangent.pushes
+        placed = PLACED * self.stiffness / self.sizes
+        self.bound, self.rounding = BALANCED * forces + placed, ROUNDED * forces + placed / 16
+
+    def parts(self, off: np.ndarray) -> np.ndarray:
+        """Return the accelerations (f,) along u of x'' (n,)."""
+        return np.asarray(self.left.T @ self.tangent.coordinates(off))
+
+    @property
+    def is_balanced(self) -> bool:
+        """True at an equilibrium."""
+        return bool((np.abs(self.parts(self.off)) <= self.bound).all())
+
+    def displacements(self, off: np.ndarray, longest: float) -> np.ndarray:
+        """Return the displacements (f,) along v that balance x'' (n,), each shorter than a length or rad."""
+        parts, most = self.parts(off), longest / self.sizes
+        return np.asarray(
+            np.sign(parts) * np.minimum(np.abs(parts) / np.maximum(self._held(most), 1e-300), most)
+        )
+
+    def _held(self, most: np.ndarray) -> np.ndarray:
+        """Return σ (f,), not less than the accelerations at the pose over the largest displacements."""
+        return np.maximum(self.stiffness, np.abs(self.parts(self.off)) / most)
+
+    def step(self) -> np.ndarray:
+        """Return the Newton step y (f,): at most LONGEST_STEP along each direction."""
+        parts = self.parts(self.off)
+        moves = -self.displacements(self.off, LONGEST_STEP)
+        return np.asarray(self.directions @ np.where(np.abs(parts) <= self.rounding, 0.0, moves))
+
+    def level(self, off: np.ndarray) -> float:
+        """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
+        held = self._held(LONGEST_STEP / self.sizes)
+        parts = np.abs(self.parts(off))
+        return float(np.linalg.norm(parts / np.maximum(held, 1e-300) * self.sizes))
+
+    def away(self) -> np.ndarray:
+        """Return a displacement y (f,) as far as the equilibrium may be from the pose."""
+        parts = np.maximum(np.abs(self.parts(self.off)), self.rounding)
+        moves = np.minimum(parts / np.maximum(self.stiffness, 1e-300), UNDECIDED / self.sizes)
+        return np.asarray(self.directions @ np.where(moves * self.sizes > SAME**1.5, moves, 0.0))
+
+    @property
+    def is_isolated(self) -> bool:
+        """True if every displacement by UNDECIDED leaves the balance."""
+        return bool((self.stiffness * UNDECIDED / self.sizes > self.bound).all())
+
+
+def balanced(tangent: Tangent, freedoms: int) -> Newton | None:
+    """Return the equilibrium that Newton's method reaches from a pose, refined; None if there is none."""
+    try:
+        here = Newton(tangent)
+        for _ in range(MOST_NEWTON_STEPS):
+            if here.is_balanced:
+                return _refined(here, freedoms)
+            ahead = _ahead(here, freedoms)
+            if ahead is None:
+                return None
+            if ahead.freedoms != freedoms:  # a singular position
+                found = Newton(ahead)
+                return found if found.is_balanced else None
+            here = Newton(ahead)
+    except OffConstraints:
+        pass
+    return None
+
+
+def _ahead(here: Newton, freedoms: int) -> Tangent | None:
+    """Return the pose after a share of the Newton step that brings the balance nearer."""
+    step, level = here.step(), here.level(here.off)
+    for share in SHARES:
+        moved = here.tangent.moved(share * step)
+        if moved is not None and here.level(moved.off_balance()) < (1 - LEAST_GAIN * share) * level:
+            return moved
+    return None
+
+
+def _refined(here: Newton, freedoms: int) -> Newton:
+    """Return the equilibrium after Newton steps that still bring it nearer."""
+    for _ in range(MOST_NEWTON_STEPS):
+        moved = here.tangent.moved(here.step())
+        if moved is None or moved.freedoms != freedoms:
+            return here
+        if not here.level(moved.off_balance()) < BETTER * here.level(here.off):
+            return here
+        try:
+            here = Newton(moved)
+        except OffConstraints:
+            return here
+    return here
+
+
+def are_one(first: Newton, second: Newton) -> bool:
+    """Return whether poses between two equilibria are equilibria too, so that both belong to one family."""
+    if np.abs(first.tangent.angles - second.tangent.angles).max(initial=0.0) > np.pi:
+        return False
+    here, target, before = first.tangent, second.tangent, np.inf
+    for _ in range(LINKS):
+        apart = here.to(target)
+        distance = float(np.abs(apart).max(initial=0.0))
+        if distance < SAME:
+            return True
+        if first.is_isolated or not distance < before:
+            return False
+        y = here.coordinates(apart)
+        size = float(np.linalg.norm(here.basis @ y)) or 1.0
+        moved = here.moved(min(1.0, STRIDE / size) * y)
+        if moved is None or moved.freedoms != here.freedoms or not _is_still(moved, first):
+            return False
+        here, before = moved, distance
+    return False
+
+
+def _is_still(tangent: Tangent, near: Newton) -> bool:
+    """Return whether nothing accelerates at a pose, by the bounds of an equilibrium."""
+    parts = np.abs(tangent.coordinates(tangent.off_balance()))
+    return bool((parts <= BALANCED * tangent.pushes + near.bound.max(initial=0.0)).all())
+
+
+def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
+    """Yield the first pose, and further poses along the constraints in random directions with a fixed seed.
+
+    Starts displace soft springs rather than stiff ones.
+    """
+    rng = np.random.default_rng(1)
+    yield first
+    ends = [first, first]
+    directions: list[np.ndarray | None] = [None, None]
+    for k in range(1, count):
+        side = (k + 1) % 2
+        tangent, old = ends[side], directions[side]
+        drawn = rng.standard_normal(tangent.model.n)
+        wish = drawn if old is None else old + 0.3 * rotations.unit(drawn)
+        if old is None and side and directions[0] is not None:
+            wish = -directions[0]
+        ahead = _soft(tangent, tangent.basis.T @ wish)
+        moved = tangent.moved(STRIDE * ahead)
+        if moved is None or moved.freedoms != freedoms:
+            directions[side] = None
+            continue
+        directions[side] = rotations.unit(tangent.basis @ ahead)
+        ends[side] = moved
+        yield moved
+
+
+def _soft(tangent: Tangent, y: np.ndarray) -> np.ndarray:
+    """Return the direction y (f,) of unit length, less along stiff directions."""
+    try:
+        _, stiffness, right = np.linalg.svd(tangent.slope())
+    except OffConstraints:
+        return y / (np.linalg.norm(tangent.basis @ y) or 1.0)
+    soft = max(float(tangent.pushes.max() * tangent.sizes.max()), float(stiffness.min()))
+    parts = (right @ y) / (1.0 + np.where(stiffness > STIFF * soft, stiffness / (soft or 1.0), 0.0))
+    found = right.T @ parts
+    return found / (np.linalg.norm(tangent.basis @ found) or 1.0)
