@@ -198,12 +198,16 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
 
 def _driver_lines(scene: Scene) -> list[str]:
     """Return a line if the scene has more drivers than degrees of freedom: constraint rows are then redundant
-    whatever the joints are."""
+    whatever the joints are. A second line names drivers that contradict each other."""
+    from mbref.equations.driver_conflicts import conflict_of_drivers
+
+    conflict = conflict_of_drivers(scene)
     freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
     sentence = (
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
     )
-    return [sentence] * (len(scene.driver) > freedoms)
+    lines = [sentence] * (len(scene.driver) > freedoms)
+    return [*lines, *([f"  {conflict.sentence}"] if conflict else [])]
 
 
 def _unique(found: Diagnosis) -> str:

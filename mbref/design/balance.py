@@ -24,7 +24,6 @@ ROUNDED = 1e-15  # the same for accelerations that are rounding alone
 PLACED = 64.0 * EPSILON  # rounding of a pose / length: stiff springs accelerate by it
 LEAST_GAIN = 0.01  # least relative decrease of the displacement by a whole step, which may be a limited one
 BETTER = 0.9  # largest ratio of displacements of successive refinements
-STIFF = 100.0  # stiffness / softest or load's stiffness, above which starts do not displace a spring
 UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
 SAME = 1e-6  # distance / length, or rad, below which two poses are one
 LINKS = 40  # largest number of steps between two poses of one family
@@ -173,7 +172,7 @@ def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
         wish = drawn if old is None else old + 0.3 * rotations.unit(drawn)
         if old is None and side and directions[0] is not None:
             wish = -directions[0]
-        ahead = _soft(tangent, tangent.basis.T @ wish)
+        ahead = _soft(tangent, tangent.basis.T @ wish, first.forces)
         moved = tangent.moved(STRIDE * ahead)
         if moved is None or moved.freedoms != freedoms:
             directions[side] = None
@@ -183,13 +182,17 @@ def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
         yield moved
 
 
-def _soft(tangent: Tangent, y: np.ndarray) -> np.ndarray:
-    """Return the direction y (f,) of unit length, less along stiff directions."""
+def _soft(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Return the direction y (f,) of unit length, with less of each direction that a spring holds.
+
+    Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.
+    """
     try:
-        _, stiffness, right = np.linalg.svd(tangent.slope())
+        left, stiffness, right = np.linalg.svd(tangent.slope())
     except OffConstraints:
         return y / (np.linalg.norm(tangent.basis @ y) or 1.0)
-    soft = max(float(tangent.pushes.max() * tangent.sizes.max()), float(stiffness.min()))
-    parts = (right @ y) / (1.0 + np.where(stiffness > STIFF * soft, stiffness / (soft or 1.0), 0.0))
-    found = right.T @ parts
-    return found / (np.linalg.norm(tangent.basis @ found) or 1.0)
+    pushes = (np.abs(left.T) @ tangent.pushes_of(forces)) * np.linalg.norm(tangent.basis @ right.T, axis=0)
+    free = np.maximum(pushes / STRIDE, stiffness.min())
+    share = np.minimum(1.0, np.where(stiffness > free, free / np.maximum(stiffness, 1e-300), 1.0))
+    found = right.T @ (share * (right @ y))
+    return np.asarray(found / (np.linalg.norm(tangent.basis @ found) or 1.0))

@@ -16,6 +16,7 @@ from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.turning import Turning, turning
 from mbref.design.winding import wound
 from mbref.equations.along_trajectory import without_armatures
+from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced
@@ -132,6 +133,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
         If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
     """
     scene = find_scene(scene).assembled()
+    refuse_conflict(scene)
     frame, model = _frame(scene), Model(scene)
     first = Tangent(model, consistent_start(model).q, frame, np.zeros(slots(model)))
     if reason := unsteady(first):
@@ -151,7 +153,7 @@ def _freedoms(first: Tangent) -> int:
     """Return the number of freedoms near a pose, which a singular position exceeds."""
     rng, found = np.random.default_rng(2), first.freedoms
     for _ in range(TRIALS):
-        direction = rng.standard_normal(first.freedoms)
+        direction = first.basis.T @ rng.standard_normal(first.model.n)
         aside = first.moved(ASIDE * direction / np.linalg.norm(first.basis @ direction))
         if aside is not None:
             found = min(found, aside.freedoms)

@@ -4,8 +4,8 @@ With x the displacements of the bodies in units S of the mechanism (its length, 
 constraints at a pose q0 is x = Z y with Φ_q S Z = 0 and Zᵀ M Z = m.  M is the mass matrix for x, m its
 largest value along the tangent.  A pose has the coordinates y: q(y) is q0 ⊕ S Z y put onto the constraints.
 About an equilibrium, y'' = A y + B y' to first order, with A = ∂/∂y and B = ∂/∂y' of Zᵀ M x'' / m.  A is
-symmetric for forces with a potential, so that stiff directions do not round soft ones.  In a steady motion the
-pose is at rest in a frame that turns with the driver (turning.py), and x'' is relative to it.
+symmetric for forces with a potential, so that stiff directions do not round soft ones.  In a steady motion
+the pose is at rest in a frame that turns with the driver (turning.py), and x'' is relative to it.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Tangent:
             raise SceneError(["body: no mass resists a motion that the joints allow, so it has no vibration"])
         self.basis = free @ (axes * np.sqrt(self.mass / squares))
         inwards = frame.relative(model, q, np.zeros(model.n), np.zeros(model.n)) / model.units
-        self._forces = _by_body(terms.force * model.units) + _by_body(self.weight * inwards)
+        self.forces = _by_body(terms.force * model.units) + _by_body(self.weight * inwards)
 
     @property
     def freedoms(self) -> int:
@@ -74,7 +74,11 @@ class Tangent:
     @property
     def pushes(self) -> np.ndarray:
         """Scale (f,) of the accelerations y'': what the forces on the bodies give without cancelling."""
-        return np.asarray(_by_body(self.basis).T @ self._forces / self.mass)
+        return self.pushes_of(self.forces)
+
+    def pushes_of(self, forces: np.ndarray) -> np.ndarray:
+        """Return ``pushes`` for the sizes (2 nb,) of forces on the bodies."""
+        return np.asarray(_by_body(self.basis).T @ forces / self.mass)
 
     def along(self, axes: np.ndarray) -> Tangent:
         """Return the tangent with coordinates along orthonormal directions (f, f) of y."""

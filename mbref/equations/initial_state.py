@@ -11,6 +11,7 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.branches import MOST_BRANCHED_ROWS, velocities_along
 from mbref.equations.coordinates import displace_all
+from mbref.equations.driver_conflicts import conflict_of_drivers
 from mbref.equations.gaps import CLOSED, gaps, lengths_of_rows
 from mbref.equations.model import Model, Terms
 from mbref.equations.units import row_lengths
@@ -179,6 +180,8 @@ def _fault(model: Model, row: int, what: str) -> SceneError:
 def _contradiction(model: Model, row: int) -> SceneError:
     """Return the fault of drivers whose velocities at t = 0 are impossible; ``row`` has the largest
     residual."""
+    if (conflict := conflict_of_drivers(model.scene)) is not None:
+        return SceneError([conflict.fault])
     names = [driver.joint for driver in model.scene.driver]
     who = f"the drivers of {', '.join(names)} contradict" if len(names) > 1 else "contradicts"
     where = f"at t = 0, most of all at joint {model.row_joint[row]!r}"

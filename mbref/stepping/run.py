@@ -11,6 +11,7 @@ import numpy as np
 from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
 from mbref.equations.diagnosis import freedoms_left
+from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
 from mbref.equations.reduction import Reduction, reduction_of
@@ -89,6 +90,7 @@ class Run:
         None stands for all equations. Raises SceneError if bodies lack a mass and drivers leave a degree of
         freedom.
         """
+        refuse_conflict(self.scene, float(self.times[-1]))
         model = Model(self.scene)
         start = consistent_start(model)
         if model.kinematic and freedoms_left(model, start) > 0:

@@ -1,0 +1,140 @@
+"""Equilibria of mechanisms that are singular, marginal, stiff, or wound by many turns / closed forms."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from mbref import Scene, equilibria
+from mbref.cli.commands import main
+from tests.helpers.statics import DOWN, G, hinge, parallelogram, pendulum, rod, slide
+
+MASS, INERTIA, ARM = 2.0, 0.3, 0.7
+ABOUT_HINGE = INERTIA + MASS * ARM**2
+TORQUE = MASS * G * ARM
+
+
+def spring(stiffness: float, **fields) -> dict:
+    return {"type": "torsion_spring", "joint": "A", "stiffness": stiffness, **fields}
+
+
+def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
+    """A pendulum near its upright pose beside a body of small mass on a stiff or damped slide."""
+    beside = pendulum((ARM * np.sin(0.2), ARM * np.cos(0.2), 0.0))
+    load = {"type": "slide_spring", "joint": "T", "stiffness": stiffness, "damping": damping}
+    return beside.with_(
+        body=(*beside.body, rod("block", (1.0, 0.0, 0.0), mass, 0.01)),
+        joint=(*beside.joint, slide("T", "block", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
+        load=(load,),
+    )
+
+
+def test_a_flat_parallelogram_rests_at_a_singular_position(tmp_path, capsys):
+    flat = parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0))
+    found = equilibria(flat, starts=2)
+    assert [each.stability for each in found][:1] == ["singular"] and len(found[0].eigenvalues) == 0
+    path = str(tmp_path / "flat.toml")
+    flat.save(path)
+    assert main(["equilibrium", path, "--starts", "1"]) == 0
+    assert "equilibrium 1: at a singular position" in capsys.readouterr().out
+    assert main(["modes", path, "--starts", "1"]) == 2
+    assert "at a singular position" in capsys.readouterr().err
+
+
+def test_a_parallelogram_that_is_not_flat_keeps_its_eigenvalues():
+    """Three equal links: I = 2 J + 2 m l²/4 + m l², and a weight of 2 m g at the crank's end."""
+    found = equilibria(parallelogram(-0.96, 0.28), starts=1)
+    inertia = 2 * INERTIA + 2 * MASS / 4 + MASS
+    rate = np.sqrt(2 * MASS * np.hypot(G, 0.5) / inertia)
+    assert [each.stability for each in found] == ["stable"]
+    assert np.allclose(found[0].eigenvalues, [1j * rate, -1j * rate], rtol=1e-10, atol=0.0)
+
+
+def test_a_spring_that_just_holds_an_inverted_pendulum_is_indifferent():
+    """k = m g l: the stiffness vanishes at the upright pose, the only equilibrium."""
+    found = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE)]), starts=8)
+    assert [each.stability for each in found] == ["indifferent"]
+    assert not found[0].eigenvalues.any()
+
+
+@pytest.mark.parametrize("share", [-1e-6, 1e-6])
+def test_a_spring_beside_the_critical_one_is_judged_by_its_sign(share):
+    """s² = -(k - m g l) / I, also for a millionth of m g l."""
+    each = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE * (1 + share))]), starts=1)[0]
+    assert each.stability == ("stable" if share > 0 else "unstable")
+    assert np.allclose(each.eigenvalues**2, -share * TORQUE / ABOUT_HINGE, rtol=1e-4)
+
+
+def test_a_slow_fall_beside_a_fast_damper_is_unstable():
+    fast = with_slide(100.0, 1000.0, 1e-4)
+    rate = np.sqrt(TORQUE / ABOUT_HINGE)
+    [upright] = equilibria(fast, starts=1)
+    assert upright.stability == "unstable"
+    assert np.abs(upright.eigenvalues - rate).min() < 1e-8 * rate
+    assert np.abs(upright.eigenvalues.real).max() == pytest.approx(1e7, rel=1e-6)
+
+
+@pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e9])
+def test_stiff_springs_hide_no_equilibrium(stiffness):
+    found = equilibria(with_slide(stiffness, 0.0, 0.01))
+    assert sorted(each.stability for each in found) == ["stable", "unstable"]
+    heights = sorted(each.scene.body[0].position[1] for each in found)
+    assert np.allclose(heights, [-ARM, ARM], atol=1e-10)
+    slow = [np.sort(np.abs(each.eigenvalues))[:2] for each in found]
+    assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=1e-9)
+
+
+def test_a_tackle_in_balance_is_indifferent_at_every_height():
+    """Weights of 2 and 1 that move by 1 and 2: exactly zero, and one family of equilibria."""
+    bodies = [rod("load", (0.0, -1.0, 0.0), 2.0), rod("weight", (0.5, -0.3, 0.0), 1.0)]
+    joints = [
+        slide("L", "load", (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)),
+        slide("W", "weight", (0.5, -0.3, 0.0), (0.0, 1.0, 0.0)),
+    ]
+    rope = {"name": "rope", "joints": ["L", "W"], "ratio": -2.0}
+    scene = Scene(name="tackle", gravity=DOWN, body=bodies, joint=joints, coupling=[rope])
+    [each] = equilibria(scene, starts=6)
+    assert each.stability == "indifferent" and not each.eigenvalues.any() and not len(each.frequencies)
+
+
+@pytest.mark.parametrize("turns", [-40, 3, 25])
+def test_a_spring_wound_by_many_turns_unwinds_to_its_own_angle(turns):
+    """k (φ - φ₀) = -m g l cos φ near φ₀; the scene at rest keeps the remaining twist."""
+    stiffness, natural = 60.0, 2 * np.pi * turns + 0.4
+    [each] = equilibria(pendulum(load=[spring(stiffness, damping=0.5, natural_angle=natural)]), starts=3)
+    angle = brentq(
+        lambda a: TORQUE * np.cos(a) + stiffness * (a - natural), natural - 1, natural + 1, xtol=1e-14
+    )
+    place = each.scene.body[0].position
+    assert np.allclose(place[:2], (ARM * np.cos(angle), ARM * np.sin(angle)), atol=1e-9)
+    assert each.scene.load[0].natural_angle == pytest.approx(natural - angle, abs=1e-9)
+    squares = (stiffness - TORQUE * np.sin(angle)) / ABOUT_HINGE
+    assert np.allclose(np.abs(each.eigenvalues) ** 2, squares, rtol=1e-8) and each.stability == "stable"
+
+
+def test_two_equilibria_under_one_soft_spring_differ_by_a_turn():
+    """A weak spring leaves the hanging poses of several turns in balance: each is an equilibrium."""
+    found = equilibria(pendulum(load=[spring(0.2, natural_angle=2 * np.pi * 2.5)]), starts=12)
+    twists = {round(each.scene.load[0].natural_angle / (2 * np.pi)) for each in found}
+    assert len(found) >= 2 and len(twists) >= 2
+
+
+@pytest.mark.parametrize("angle", [0.0, 1.0])
+def test_a_wheel_that_no_force_turns_is_one_equilibrium(angle):
+    bodies = [rod("rod", (0.0, -ARM, 0.0)), rod("wheel", (0.0, -2 * ARM, 0.0), 1.0)]
+    joints = [hinge("A", ("ground", "rod")), hinge("W", ("rod", "wheel"), (0.0, -2 * ARM, 0.0))]
+    found = equilibria(Scene(name="wheel", gravity=DOWN, body=bodies, joint=joints), starts=5)
+    assert [each.stability for each in found if each.scene.body[0].position[1] < 0] == ["indifferent"]
+
+
+def test_bounds_hold_for_the_closed_form_and_are_printed_in_json(tmp_path, capsys):
+    path = str(tmp_path / "pendulum.toml")
+    pendulum((0.0, -ARM, 0.0)).save(path)
+    assert main(["modes", path, "--starts", "1", "--json"]) == 0
+    shown = json.loads(capsys.readouterr().out)
+    rate = np.sqrt(TORQUE / ABOUT_HINGE)
+    errors = np.abs(np.array([imaginary for _, imaginary in shown["eigenvalues"]]) - [rate, -rate])
+    assert (errors <= shown["bounds"]).all() and max(shown["bounds"]) < 1e-9 * rate

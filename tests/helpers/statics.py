@@ -1,0 +1,61 @@
+"""Mechanisms whose equilibria have closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from mbref import Scene
+
+G = 9.81
+DOWN = (0.0, -G, 0.0)
+ORIGIN = (0.0, 0.0, 0.0)
+
+
+def rod(name: str, place: Any, mass: float = 2.0, inertia: float = 0.3) -> dict[str, Any]:
+    """Return a body with three equal moments of inertia."""
+    return {"name": name, "mass": mass, "inertia": [inertia] * 3, "position": list(place)}
+
+
+def hinge(name: str, bodies: Any, anchor: Any = ORIGIN, axis: Any = (0.0, 0.0, 1.0)) -> dict[str, Any]:
+    """Return a hinge, by default about the z axis through the origin."""
+    return {
+        "name": name,
+        "type": "revolute",
+        "bodies": list(bodies),
+        "anchor": list(anchor),
+        "axis": list(axis),
+    }
+
+
+def slide(name: str, body: str, anchor: Any, axis: Any) -> dict[str, Any]:
+    """Return a slide of a body on the ground."""
+    return {
+        "name": name,
+        "type": "translational",
+        "bodies": ["ground", body],
+        "anchor": list(anchor),
+        "axis": list(axis),
+    }
+
+
+def pendulum(place: Any = (0.7, 0.0, 0.0), **fields: Any) -> Scene:
+    """Return a body of 2 kg, 0.3 kg m², on a hinge at the origin, under gravity."""
+    given = {"gravity": DOWN, "body": [rod("rod", place)], "joint": [hinge("A", ("ground", "rod"))]}
+    return Scene(name="pendulum", **given | fields)
+
+
+def parallelogram(angle_sine: float, angle_cosine: float) -> Scene:
+    """Return a parallelogram of three links of 1 m on pivots 1 m apart, with its crank at an angle."""
+    x, y = angle_cosine, angle_sine
+    bodies = [
+        rod("crank", (x / 2, y / 2, 0.0)),
+        rod("coupler", (x + 0.5, y, 0.0)),
+        rod("rocker", (1.0 + x / 2, y / 2, 0.0)),
+    ]
+    joints = [
+        hinge("A", ("ground", "crank")),
+        hinge("B", ("crank", "coupler"), (x, y, 0.0)),
+        hinge("C", ("coupler", "rocker"), (1.0 + x, y, 0.0)),
+        hinge("D", ("ground", "rocker"), (1.0, 0.0, 0.0)),
+    ]
+    return Scene(name="parallelogram", gravity=(0.5, -G, 0.0), body=bodies, joint=joints)
