@@ -20,7 +20,7 @@ from mbref.scene import Scene
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
 SHUT = 1e-12  # rad, and fraction of the scene's length; smaller openings are rounding errors
 OF_ERROR = 1e-3  # gap / error of a body's position; a smaller gap is not why the bodies are off
-OFF = "Contacts, limits, dry friction and motors are off, as in the scene."
+OFF = "Contacts, limits and dry friction are off, as in the scene."
 
 
 def as_in_file(groups: Sequence[Judged]) -> str:

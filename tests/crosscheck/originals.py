@@ -10,7 +10,7 @@ from crosscheck.engines.mujoco.importing.reading import Source
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import rotations
 
-OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "REFSAFE", "ACTUATION")
+OFF = ("CONTACT", "LIMIT", "FRICTIONLOSS", "REFSAFE")
 NO_SOFTNESS = -1e-300  # stiffness and damping of closures: reference accelerations are those of exact joints
 RTOL, RANK = 1e-13, 1e-9  # of the integrations; of the rank of rows
 ROUNDED = 1e-10  # m or rad: a shorter row is of two points on one body, or on bodies fixed together
@@ -22,7 +22,7 @@ def own_motion(model, found: Source, times, key: int = -1) -> np.ndarray:
 
     ``key`` is the keyframe whose control values act.
     """
-    for name in OFF if key < 0 else OFF[:-1]:
+    for name in OFF:
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     model.opt.jacobian, model.eq_solref[:] = mujoco.mjtJacobian.mjJAC_DENSE, NO_SOFTNESS
     data, groups = mujoco.MjData(model), found.groups

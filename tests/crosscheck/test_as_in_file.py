@@ -45,7 +45,7 @@ DOG = """<mujoco><compiler angle="radian"/><worldbody><frame pos="0 0 0.1">
 <body name="leg" pos="0.2 0 0"><joint name="hip" axis="0 1 0"/>
 <geom type="capsule" fromto="0 0 0 0.05 0 -.2" size=".02" mass="0.5"/></body></body></frame></worldbody>
 <keyframe><key name="high" qpos="1 0 2 1 0 0 0 0.3" qvel="0 0 0 0 0 0 2"/></keyframe></mujoco>"""
-TILTED = ImportOptions(keyframe="tilted")
+TILTED = ImportOptions(keyframe="tilted", without=["limits"])
 
 
 def found(tmp_path, text: str, options: ImportOptions | None = None):
@@ -60,7 +60,7 @@ def setting_of(scene, family: str) -> Setting:
 
 def own_loop(model, start, times) -> np.ndarray:
     """(k, nq) of MuJoCo's steps with the parts off that a scene does not have."""
-    for name in ("CONTACT", "LIMIT", "ACTUATION"):
+    for name in ("CONTACT", "LIMIT"):
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     data = mujoco.MjData(model)
     data.qpos[:], steps, reached = start, 0, []
@@ -152,9 +152,9 @@ def test_the_command_of_a_run_reads_the_file_again(tmp_path):
     scene = found(tmp_path, FOUR_BAR, TILTED)
     times = np.linspace(0, scene.duration, 3)
     record = run_here(Case(scene, times, "mujoco", setting_of(scene, AS_IN_FILE), 5.0, 0.0))
-    said = command(record, "robot.xml --keyframe tilted")
+    said = command(record, "robot.xml --without limits --keyframe tilted")
     assert said.startswith(
-        "crosscheck run robot.xml --keyframe tilted --engine mujoco --setting 'as in file'"
+        "crosscheck run robot.xml --without limits --keyframe tilted --engine mujoco --setting 'as in file'"
     )
     assert "solref=" in said and "file=" not in said
 
@@ -190,7 +190,7 @@ def test_a_verdict_says_how_wrong_the_file_is(tmp_path):
         "robot at its own settings (time step 0.004 s, Euler, solref 0.03 1) is wrong: bodies are off by "
         "up to 20 mm and 0.03 rad, and its closures open by up to 1.2 mm. `crosscheck tune mujoco "
         f"{settings['file']} --closure 0.1mm` finds a solref and a time step that are ten times better. "
-        "Contacts, limits, dry friction and motors are off, as in the scene."
+        "Contacts, limits and dry friction are off, as in the scene."
     )
     right = as_in_file([Judged(scene, {}, [{**record, "metrics": {**metrics, "error": 1e-9}}])])
     assert "is right:" in right and "tune" not in right
@@ -245,7 +245,7 @@ def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path
     path = tmp_path / "robot.xml"
     path.write_text(FOUR_BAR)
     find_scenes([str(path)], TILTED, said.append)
-    assert any("left out: 1 actuator (1 servo):" in sentence for sentence in said)
+    assert any("left out: limit of joint 'A', which acts at the start" in sentence for sentence in said)
     assert any("closure 'C' was open by" in sentence for sentence in said)
     path.write_text(FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"'))
     with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):

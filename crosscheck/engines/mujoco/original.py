@@ -1,7 +1,8 @@
 """The model of an MJCF file itself, at its own settings, at smaller time steps and with stiffer closures.
 
-Contacts, limits, dry friction and motors are off, as in the scene that was read from the file.  The run keeps
-the file's time step: a sample between two steps is reached by one shorter step from the last step.
+Contacts, limits and dry friction are off, and controls are constant, as in the scene that was read from the
+file.  The run keeps the file's time step: a sample between two steps is reached by one shorter step from
+the last step.
 """
 
 from __future__ import annotations
@@ -17,8 +18,6 @@ import numpy as np
 
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
-from crosscheck.engines.mujoco.importing.left_out import checked
-from crosscheck.engines.mujoco.importing.loads import controlled, motor_force
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
@@ -27,7 +26,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 FINER, STIFFER, STIFFER_RK4 = "as in file, finer", "as in file, stiffer", "as in file, stiffer, RK4"
-OFF = "contacts, limits, dry friction and motors are off"
+OFF = "contacts, limits and dry friction are off"
 FAMILIES = {
     AS_IN_FILE: f"the file's own model, time step, integrator, solver, solref and solimp; {OFF}",
     FINER: "as in file, with smaller time steps",
@@ -150,10 +149,8 @@ class _Original:
         read = source(path, options)
         self.mujoco, self.model, self.counts = mujoco, read.original, Counts()
         self.groups = read.groups
-        key = mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, options.keyframe)
-        motors = [] if "motors" in checked(options.without) else controlled(mujoco, self.model, key)
         bits = mujoco.mjtDisableBit
-        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "ACTUATION", "AUTORESET"):
+        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
             self.model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
         _change(mujoco, self.model, setting.options)
         self.step = float(self.model.opt.timestep)
@@ -164,9 +161,7 @@ class _Original:
         self.settings = own_settings(self.model) | dict(setting.options)
         self.data, self.between = mujoco.MjData(self.model), mujoco.MjData(self.model)
         self.data.qpos[:], self.data.qvel[:] = read.qpos, read.qvel
-        for a in motors:  # the scene has their forces, along their joints
-            velocity = self.model.jnt_dofadr[self.model.actuator_trnid[a, 0]]
-            self.data.qfrc_applied[velocity] += motor_force(self.model, key, a)
+        read.actuators.prepare(self.data)
 
     def advance(self, t0: float, t1: float) -> None:
         """Step to the last step before t1, and from a copy of it to t1; raises Failed."""

@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import joint_name
 from crosscheck.engines.mujoco.importing.posing import Poses
+from crosscheck.engines.mujoco.importing.wrenches import pushes
 from crosscheck.judge.constraints import closure, inertia_matrices, jacobian
 from crosscheck.judge.joint_coordinates import reflected
 from mbref import rotations
@@ -22,9 +23,11 @@ from mbref.scene import Scene, SceneError
 
 AGREE = 1e-8  # largest difference / largest entry; rounding of inertias and poses leaves less than 1e-10
 RANK = 1e-8  # fraction of the largest singular value of rows of length one
+BLURRED = 1e3  # factor on RANK within which a singular value may be rounding of the axes in the file
+SHORT = 1e-2  # of rad and of the extent: shorter rows, which may be rounding, are not made length one
 RANDOM_POSES = 2
 TRIES = 12  # random poses tried for each comparison, since not every pose can be closed
-REACH = 0.25  # rad, and fraction of the extent: largest change of a coordinate in a random pose
+REACH = 0.25  # rad, or fraction of the extent: largest change of a coordinate in a random pose
 
 
 class Agreement:
@@ -34,7 +37,6 @@ class Agreement:
         self.mujoco, self.model, self.groups, self.poses = mujoco, model, groups, poses
         bits = mujoco.mjtDisableBit
         model.opt.disableflags |= bits.mjDSBL_CONTACT | bits.mjDSBL_LIMIT | bits.mjDSBL_FRICTIONLOSS
-        model.opt.disableflags |= bits.mjDSBL_ACTUATION
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
 
     def check(self, scene: Scene, tree: Sequence[str]) -> None:
@@ -49,7 +51,7 @@ class Agreement:
 
     def _random_pose(self, start: np.ndarray, random: np.random.Generator) -> bool:
         """Move to a random closed pose near the start; returns False if none was found."""
-        data, reach = self.poses.data, REACH * min(1.0, self.poses.extent)
+        data, reach = self.poses.data, REACH * self.poses.scale
         for k in range(TRIES):
             data.qpos[:] = start
             step = random.uniform(-reach, reach, self.model.nv) * 0.7**k
@@ -67,7 +69,9 @@ class Agreement:
         data.qvel[:] = random.uniform(-1.0, 1.0, self.model.nv)
         self.mujoco.mj_tendon(self.model, data)
         self.mujoco.mj_makeConstraint(self.model, data)
+        self.mujoco.mj_transmission(self.model, data)
         self.mujoco.mj_fwdVelocity(self.model, data)
+        self.mujoco.mj_fwdActuation(self.model, data)
         placed = [self.groups.placed(data, g) for g in self.groups.pieces]
         pose = np.array([p.position for p in placed]), np.array([p.orientation for p in placed])
         twists = np.vstack([p.jacobian for p in placed])
@@ -92,10 +96,11 @@ class Agreement:
         drift, armatures = self._drift(), reflected(scene, *pose, motion[:, :3], motion[:, 3:])
         mass = _masses(scene, pose[1])
         inertial = _inertial(mass, motion, drift) + armatures.mass @ drift - armatures.force
-        forces = inertial - _pushes(scene, pose, motion)
+        forces = inertial - pushes(scene, pose, motion)
         parts = np.abs(forces) + _gyroscopic(mass, motion)
         largest = (np.abs(twists).T @ parts).max()  # of parts that may cancel
-        self._same(twists.T @ forces, data.qfrc_bias - data.qfrc_passive, "bias forces", largest)
+        theirs = data.qfrc_bias - data.qfrc_passive - data.qfrc_actuator
+        self._same(twists.T @ forces, theirs, "bias forces", largest)
 
     def _drift(self) -> np.ndarray:
         """Return the accelerations (6 nb,) of the bodies' twists at constant joint velocities: Ḃ q̇."""
@@ -128,7 +133,9 @@ class Agreement:
         moved = np.abs(rows @ twists).max(axis=1, initial=0.0)
         if moved.max(initial=0.0) > AGREE * max(1.0, self.poses.extent):
             raise SceneError(["the scene's joints forbid motion that the file's joints allow"])
-        free, own = rows.shape[1] - rank(rows), rank(twists)
+        sizes = np.tile(np.repeat([self.poses.extent, 1.0], 3), len(scene.body))
+        rows, moves = rows * sizes, twists / sizes[:, None] * self.poses.scale
+        free, own = rows.shape[1] - rank(_unit(rows, 0.0)), rank(moves)
         if free != own:
             raise SceneError([f"the scene's joints allow {free} motions without loops, the file's {own}"])
 
@@ -137,11 +144,11 @@ class Agreement:
     ) -> None:
         """Check that rows of loops and of locked coordinates have the row space of the file's rows, in joint
         coordinates."""
-        ours = jacobian(scene, 0.0, *pose)[0] @ twists
-        theirs = np.vstack([self._equalities(), self.poses.jacobian()])
-        least = RANK * min(1.0, self.poses.extent)
-        ours, theirs = _unit(ours, least), _unit(theirs, least)
-        ranks = rank(ours), rank(theirs), rank(np.vstack([ours, theirs]))
+        scale = self.poses.scale
+        least = SHORT * min(1.0, self.poses.extent)
+        ours = _unit(jacobian(scene, 0.0, *pose)[0] @ twists * scale, least)
+        theirs = _unit(np.vstack([self._equalities(), self.poses.jacobian()]) * scale, least)
+        ranks = _ranks(ours, theirs)
         if len(set(ranks)) > 1:
             raise SceneError(
                 [f"loops: the scene's rows have rank {ranks[0]}, the file's {ranks[1]}, together {ranks[2]}"]
@@ -163,9 +170,27 @@ def rank(rows: np.ndarray) -> int:
 
 
 def _unit(rows: np.ndarray, least: float) -> np.ndarray:
-    """Return rows of length one, without rows that are not longer than ``least``."""
-    sizes = np.linalg.norm(rows, axis=1)
-    return np.asarray(rows[sizes > least] / sizes[sizes > least, None])
+    """Return rows over their length, or over ``least`` if they are shorter."""
+    return np.asarray(rows / np.maximum(np.linalg.norm(rows, axis=1), least)[:, None])
+
+
+def _ranks(ours: np.ndarray, theirs: np.ndarray) -> tuple[int, int, int]:
+    """Return the ranks of both sets of rows, of length one at most, and of all rows together.
+
+    Axes that are parallel but for rounding leave singular values of the size of the rounding, which differ
+    between both sets. Therefore one limit serves all three ranks: the middle of the widest gap between the
+    singular values near RANK.
+    """
+    values = [np.linalg.svd(m, compute_uv=False) if m.size else np.zeros(0) for m in (ours, theirs)]
+    both = np.vstack([ours, theirs])
+    values.append(np.linalg.svd(both, compute_uv=False) if both.size else np.zeros(0))
+    low, high = RANK / BLURRED, RANK * BLURRED
+    near = [float(v) for v in np.concatenate(values) if low < v < high]
+    marks = np.log(sorted([low, *near, high]))
+    widest = int(np.argmax(np.diff(marks)))
+    limit = float(np.exp((marks[widest] + marks[widest + 1]) / 2))
+    first, second, third = (int(np.sum(v > limit)) for v in values)
+    return first, second, third
 
 
 def _masses(scene: Scene, orientation: np.ndarray) -> np.ndarray:
@@ -199,85 +224,3 @@ def _inertial(mass: np.ndarray, motion: np.ndarray, drift: np.ndarray) -> np.nda
         inertia = mass[6 * k + 3 : 6 * k + 6, 6 * k + 3 : 6 * k + 6]
         found[k, 3:] += np.cross(twist[3:], inertia @ twist[3:])
     return found.reshape(-1)
-
-
-def _pushes(scene: Scene, pose: tuple[np.ndarray, np.ndarray], motion: np.ndarray) -> np.ndarray:
-    """Return weight and forces of the scene's springs (6 nb,); actuators are off in the comparison."""
-    found = np.zeros((len(scene.body) + 1, 6))  # the last entry is the ground's
-    found[:-1, :3] = np.outer(_body_masses(scene), np.array(scene.gravity))
-    actions = {"spring": _spring, "torsion_spring": _torsion, "slide_spring": _slide}
-    for load in scene.load:
-        if action := actions.get(load.type):
-            for body, wrench in action(scene, load, pose, motion):
-                found[body] += wrench
-    return found[:-1].reshape(-1)
-
-
-def _spring(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    bodies = [scene.body_index(name) for name in load.bodies]
-    places, rates = _points(scene, pose, motion, bodies, load.points)
-    apart = places[1] - places[0]
-    length = np.linalg.norm(apart)
-    along = apart / length
-    pull = load.stiffness * (length - load.natural_length) + load.damping * along @ (rates[1] - rates[0])
-    return _wrenches(pose, bodies, places, pull * along)
-
-
-def _points(scene: Scene, pose: Any, motion: np.ndarray, bodies: Sequence[int], points: Any) -> Any:
-    """Return positions and velocities, world, of a point of each body, given at the scene's pose."""
-    places, rates = [], []
-    for b, point in zip(bodies, np.array(points), strict=True):
-        if b < 0:
-            places.append(point)
-            rates.append(np.zeros(3))
-            continue
-        arm = _turn(scene, pose, b) @ (point - scene.body[b].position)
-        places.append(pose[0][b] + arm)
-        rates.append(motion[b, :3] + np.cross(motion[b, 3:], arm))
-    return places, rates
-
-
-def _wrenches(
-    pose: Any, bodies: Sequence[int], places: Sequence[np.ndarray], force: np.ndarray
-) -> list[tuple[int, np.ndarray]]:
-    """Return the wrenches about the bodies' centres of a force on the first body and its opposite on the
-    second one."""
-    centres = np.vstack([pose[0], np.zeros(3)])  # the last one is the ground's
-    return [
-        (b, np.concatenate([sign * force, np.cross(place - centres[b], sign * force)]))
-        for b, place, sign in zip(bodies, places, (1, -1), strict=True)
-    ]
-
-
-def _torsion(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    joint = scene.joint_named(load.joint)
-    bodies = [scene.body_index(name) for name in joint.bodies]
-    turns = [np.eye(3) if b < 0 else _turn(scene, pose, b) for b in bodies]
-    start = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
-    axis = turns[0] @ start
-    q = rotations.from_matrix(turns[0].T @ turns[1])
-    angle = 2 * np.arctan2(q[1:] @ start, q[0])
-    rates = [np.zeros(3) if b < 0 else motion[b, 3:] for b in bodies]
-    moment = load.stiffness * (angle - load.natural_angle) + load.damping * axis @ (rates[1] - rates[0])
-    return [
-        (b, np.concatenate([np.zeros(3), sign * moment * axis]))
-        for b, sign in zip(bodies, (1, -1), strict=True)
-    ]
-
-
-def _slide(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tuple[int, np.ndarray]]:
-    joint = scene.joint_named(load.joint)
-    bodies = [scene.body_index(name) for name in joint.bodies]
-    turn = np.eye(3) if bodies[0] < 0 else _turn(scene, pose, bodies[0])
-    axis = turn @ np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
-    places, rates = _points(scene, pose, motion, bodies, joint.anchor_pair)
-    apart, spin = places[1] - places[0], np.zeros(3) if bodies[0] < 0 else motion[bodies[0], 3:]
-    rate = axis @ (rates[1] - rates[0]) + np.cross(spin, axis) @ apart
-    push = (load.stiffness * (axis @ apart - load.natural_displacement) + load.damping * rate) * axis
-    return _wrenches(pose, bodies, [places[1]] * 2, push)
-
-
-def _turn(scene: Scene, pose: Any, b: int) -> np.ndarray:
-    """Return the rotation (3, 3) of a body since the scene's pose."""
-    start = rotations.to_matrix(np.array(scene.body[b].orientation))
-    return np.asarray(rotations.to_matrix(pose[1][b]) @ start.T)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.groups import WORLD, Groups, Piece
 from mbref.scene import (
     Cylindrical,
@@ -107,7 +108,8 @@ def joints_of(chain: Chain, groups: Groups, extent: float) -> list[Joint] | None
     name = next((n for n in own if n), f"{pair[1]} joint")
     found: list[Joint] = []
     for kind, places in made:
-        found.append(kind.at(name if not found else f"{name} {kind.__name__.lower()}", pair, **places))
+        label = name if not found else f"{name} {kind.__name__.lower()}"
+        found.append(entry(f"joint {label!r}", kind.at, label, pair, **places))
     return found
 
 

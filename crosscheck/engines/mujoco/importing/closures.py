@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.groups import Groups
 from mbref import rotations
 from mbref.scene import Cylindrical, Fixed, Joint, Revolute, SceneError, Spherical, Translational
@@ -69,6 +70,11 @@ class Closure:
         return np.concatenate([apart[self._lengths], twist[self._angles]])
 
     @property
+    def are_lengths(self) -> np.ndarray:
+        """Whether each residual (rows,) is a length."""
+        return np.repeat([True, False], [len(self._lengths), len(self._angles)])
+
+    @property
     def _lengths(self) -> list[int]:
         return list(self.type.facts.forbidden_translations)
 
@@ -82,7 +88,8 @@ class Closure:
         if first == second:
             raise SceneError([f"closure {self.name!r}: both sides are on {first!r}, or fixed to it"])
         at, axis = self.frames[1].place(data).tolist(), self.frames[0].turn(data)[:, 2].tolist()
-        made: Joint = self.type.at(self.name, (first, second), anchor=at, axis=axis)
+        where = f"closure {self.name!r}"
+        made: Joint = entry(where, self.type.at, self.name, (first, second), anchor=at, axis=axis)
         return made
 
 

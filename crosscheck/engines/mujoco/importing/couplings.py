@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.importing.left_out import Part
+from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
 from crosscheck.engines.mujoco.importing.posing import JointRow
 
 ROUNDED = 1e-12  # coefficient of a tendon / largest one; smaller ones are rounding
 
 
-def of_equalities(mujoco: Any, model: Any, without: frozenset[str]) -> Iterator[JointRow | Part | str]:
+def of_equalities(mujoco: Any, model: Any) -> Iterator[JointRow | Part | str]:
     """Return a row for each active equality that locks or couples hinges and slides linearly.
 
     Other active equalities, except connects and welds, are parts to be left out, and are made inactive in the
@@ -27,12 +27,21 @@ def of_equalities(mujoco: Any, model: Any, without: frozenset[str]) -> Iterator[
             yield f"equality {name!r} is not active: it is not part of the scene"
         elif kind not in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
             found = _row(mujoco, model, e, name)
-            couples = isinstance(found, Part) or found.joints[1] >= 0
-            if couples and "couplings" in without:
-                found = Part("couplings", f"equality {name!r} of type {_word(kind)}")
             if isinstance(found, Part):
                 model.eq_active0[e] = 0
             yield found
+
+
+def removed(mujoco: Any, model: Any, row: JointRow) -> Part:
+    """Return the part for a row of coordinates that no scene has, and make its equality inactive."""
+    names = " and ".join(joint_name(model, j) for j in row.joints if j >= 0)
+    e = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, row.name))
+    e = int(row.name.rpartition(" ")[2]) if e < 0 and row.name.startswith("equality ") else e
+    if e >= 0:  # a row of a URDF is no equality of the model
+        model.eq_active0[e] = 0
+    return Part(
+        "couplings", f"equality {row.name!r} of {names}, which is no single hinge or slide of the scene"
+    )
 
 
 def _word(kind: Any) -> str:

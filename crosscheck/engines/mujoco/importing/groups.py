@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.entries import entry
 from mbref import rotations
 from mbref.scene import GROUND, Body
 
@@ -167,7 +168,9 @@ class Groups:
         inertia = turn.T @ self._inertia(data, group, at.position) @ turn if mass else np.zeros((3, 3))
         inertia = (inertia + inertia.T) / 2
         plain = np.abs(inertia - np.diag(np.diag(inertia))).max() <= PLAIN * np.abs(inertia).max()
-        return Body(
+        return entry(
+            f"body {self.name(piece)!r}",
+            Body,
             name=self.name(piece),
             mass=mass,
             inertia=(np.diag(inertia) if plain else inertia).tolist(),

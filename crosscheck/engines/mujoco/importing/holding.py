@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.importing import keyframes
 from crosscheck.engines.mujoco.importing.meshes import without_missing
 from mbref.scene import SceneError
 
@@ -57,7 +58,7 @@ def _held(mujoco: Any, spec: Any, hold: Sequence[str], keyframe: str) -> Any:
 
 def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:
     """Return a model whose motion-capture bodies stand where a keyframe has them."""
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
+    key = keyframes.number_of(mujoco, model, keyframe)
     for b in np.flatnonzero(model.body_mocapid >= 0) if key >= 0 else ():
         k = int(model.body_mocapid[b])
         model.body_pos[b] = model.key_mpos[key].reshape(-1, 3)[k]
@@ -66,10 +67,9 @@ def _with_placed_mocaps(mujoco: Any, model: Any, keyframe: str) -> Any:
 
 
 def _placed(mujoco: Any, model: Any, keyframe: str) -> Any:
-    """Return the data of a model at a keyframe, or at the reference if the model has no keyframe of that
-    name."""
+    """Return the data of a model at a keyframe, or at the reference without keyframe."""
     data = mujoco.MjData(model)
-    key = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe)
+    key = keyframes.number_of(mujoco, model, keyframe)
     if key >= 0:
         mujoco.mj_resetDataKeyframe(model, data, key)
     mujoco.mj_kinematics(model, data)

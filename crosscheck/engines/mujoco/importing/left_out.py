@@ -98,11 +98,12 @@ def _listed(names: list[str], most: int = 6) -> str:
     return ", ".join(names[:most]) + more
 
 
-def notes(mujoco: Any, model: Any, keyframe: str) -> Iterator[str]:
+def notes(mujoco: Any, model: Any, keyframe: str, idle: int) -> Iterator[str]:
     """Return sentences about parts that a scene cannot describe and that do not change the motion, which
-    begins at a keyframe if one is named."""
+    begins at a keyframe if one is named; ``idle`` actuators exert no force."""
     touching = int(np.sum((model.geom_contype != 0) | (model.geom_conaffinity != 0)))
-    servos = int(np.sum(np.any(model.actuator_biasprm != 0, axis=1)))
+    light = (model.tendon_stiffness == 0) & (model.tendon_damping == 0) & (model.tendon_limited == 0)
+    dead = int(np.sum(light)) - len(_used_tendons(mujoco, model))
     counts = (
         (model.npair, "contact pair", "contact pairs"),
         (model.nplugin, "plugin", "plugins"),
@@ -117,16 +118,28 @@ def notes(mujoco: Any, model: Any, keyframe: str) -> Iterator[str]:
         (int(np.sum(model.tendon_limited != 0)), "limit of a tendon", "limits of tendons"),
         (int(np.sum(model.jnt_limited != 0)), "limit of a joint", "limits of joints"),
     )
-    if model.nu:
-        among = f" ({numbered(servos, 'servo', 'servos')})" if servos else ""
-        kinds = numbered(model.nu, "actuator", "actuators") + among
-        yield f"{kinds}: only motors with a control value in the keyframe act"
+    if idle:
+        yield f"{numbered(idle, 'actuator', 'actuators')} without a control value: no force"
+    if dead > 0:
+        yield f"{numbered(dead, 'tendon', 'tendons')} without spring, damper and limit: no force"
     yield from (numbered(*count) for count in counts if count[0])
     if model.neq:
         yield "the softness of equalities (solref, solimp): a scene's joints are exact"
     if model.nkey and not keyframe:
         keyframes = numbered(model.nkey, "keyframe", "keyframes")
         yield f"{keyframes}: --keyframe NAME begins the motion at a keyframe"
+
+
+def _used_tendons(mujoco: Any, model: Any) -> set[int]:
+    """Return the tendons of actuators and equalities."""
+    ends = model.eq_type == int(mujoco.mjtEq.mjEQ_TENDON)
+    moved = model.actuator_trntype == int(mujoco.mjtTrn.mjTRN_TENDON)
+    found = {*model.eq_obj1id[ends], *model.eq_obj2id[ends], *model.actuator_trnid[moved, 0]} - {-1}
+    return {
+        k
+        for k in found
+        if not (model.tendon_stiffness[k] or model.tendon_damping[k] or model.tendon_limited[k])
+    }
 
 
 def _holding_sites(mujoco: Any, model: Any) -> set[int]:

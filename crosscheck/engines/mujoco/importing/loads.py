@@ -1,4 +1,4 @@
-"""Springs and dampers of joints and tendons as loads of a scene, and the springs and dampers that no load can
+"""Springs, dampers and actuators of joints and tendons as loads of a scene, and parts that no load can
 describe."""
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.entries import entry
+from crosscheck.engines.mujoco.importing.actuators import Actuators
 from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
@@ -36,58 +38,42 @@ def of_joints(mujoco: Any, model: Any, data: Any, joint_of: Mapping[int, Joint])
             model.dof_damping[_dofs(model, j)] = 0
             continue
         rest = float(model.qpos_spring[q] - data.qpos[q]) if stiffness else 0.0
-        numbers: dict[str, Any] = {"joint": joint.name, "stiffness": stiffness, "damping": damping}
-        if coordinate == ANGLE:
-            yield TorsionSpring(**numbers, natural_angle=rest)
-        else:
-            yield SlideSpring(**numbers, natural_displacement=rest)
+        yield _spring(joint.name, coordinate, stiffness, damping, rest)
     yield from _polynomials(model)
 
 
-def of_motors(mujoco: Any, model: Any, key: int, joint_of: Mapping[int, Joint]) -> Iterator[Load | Part]:
-    """Return a torque or force for every motor of a joint with a control value in a keyframe.
-
-    Servos, other transmissions and activation dynamics with a control value are parts to be left out.
-    """
-    for a in controlled(mujoco, model, key):
-        j, name = int(model.actuator_trnid[a, 0]), model.actuator(a).name or f"actuator {a}"
-        joint = joint_of.get(j) if is_motor(mujoco, model, a) else None
-        coordinate = None if joint is None else COORDINATES.get(kind_of(mujoco, model, j))
+def of_actuators(
+    mujoco: Any, model: Any, data: Any, actuators: Actuators, joint_of: Mapping[int, Joint]
+) -> Iterator[Load | Part]:
+    """Return the loads of the actuators of each hinge and slide; actuators of another joint are a part to be
+    left out."""
+    for j in dict.fromkeys(law.joint for law in actuators.laws):
+        joint, coordinate = joint_of.get(j), COORDINATES.get(kind_of(mujoco, model, j))
         if joint is None or coordinate not in joint.facts.loaded:
-            yield Part("motors", f"control value of {name!r} in the keyframe, no motor of a joint")
-        elif coordinate == ANGLE:
-            yield JointTorque(joint=joint.name, torque=motor_force(model, key, a))
-        else:
-            yield JointForce(joint=joint.name, force=motor_force(model, key, a))
+            yield actuators.leave_out(j, joint_name(model, j))
+            continue
+        laws = [law for law in actuators.laws if law.joint == j]
+        stiffness, damping = sum(law.stiffness for law in laws), sum(law.damping for law in laws)
+        force = sum(law.constant for law in laws)
+        if stiffness or damping:
+            start = float(data.qpos[model.jnt_qposadr[j]])
+            rest = force / stiffness - start if stiffness else 0.0
+            yield _spring(joint.name, coordinate, stiffness, damping, rest)
+        if force and not stiffness:
+            where = f"actuators of joint {joint_name(model, j)}"
+            if coordinate == ANGLE:
+                yield entry(where, JointTorque, joint=joint.name, torque=force)
+            else:
+                yield entry(where, JointForce, joint=joint.name, force=force)
 
 
-def controlled(mujoco: Any, model: Any, key: int) -> list[int]:
-    """Return the actuators with a control value in a keyframe; none if the file disables actuators."""
-    is_off = bool(model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_ACTUATION)
-    return [] if key < 0 or is_off else np.flatnonzero(model.key_ctrl[key]).tolist()
-
-
-def motor_force(model: Any, key: int, a: int) -> float:
-    """Return the force or torque along its joint of a motor with the control value of a keyframe."""
-    control = _within(model.key_ctrl[key, a], model.actuator_ctrllimited[a], model.actuator_ctrlrange[a])
-    force = float(model.actuator_gainprm[a, 0]) * control
-    force = _within(force, model.actuator_forcelimited[a], model.actuator_forcerange[a])
-    return float(model.actuator_gear[a, 0]) * force
-
-
-def is_motor(mujoco: Any, model: Any, a: int) -> bool:
-    """Return whether an actuator exerts gain times control along a joint."""
-    kinds = (
-        (model.actuator_trntype, mujoco.mjtTrn.mjTRN_JOINT),
-        (model.actuator_gaintype, mujoco.mjtGain.mjGAIN_FIXED),
-        (model.actuator_biastype, mujoco.mjtBias.mjBIAS_NONE),
-        (model.actuator_dyntype, mujoco.mjtDyn.mjDYN_NONE),
-    )
-    return all(int(found[a]) == int(wanted) for found, wanted in kinds)
-
-
-def _within(number: float, is_limited: Any, limits: np.ndarray) -> float:
-    return float(np.clip(number, *limits)) if is_limited else float(number)
+def _spring(joint: str, coordinate: Coordinate, stiffness: float, damping: float, rest: float) -> Load:
+    """Return a spring and damper along a coordinate, whose force vanishes ``rest`` from the start."""
+    numbers: dict[str, Any] = {"joint": joint, "stiffness": stiffness, "damping": damping}
+    where = f"springs of joint {joint!r}"
+    if coordinate == ANGLE:
+        return entry(where, TorsionSpring, **numbers, natural_angle=rest)
+    return entry(where, SlideSpring, **numbers, natural_displacement=rest)
 
 
 def _springs(mujoco: Any, model: Any, j: int) -> tuple[float, float]:
@@ -161,7 +147,9 @@ def of_tendons(mujoco: Any, model: Any, data: Any, groups: Groups) -> Iterator[L
             continue
         sites = [int(model.wrap_objid[w]) for w in wraps]
         bodies: Any = tuple(groups.name_of(int(model.site_bodyid[s])) for s in sites)
-        yield Spring(
+        yield entry(
+            f"tendon {name!r}",
+            Spring,
             bodies=bodies,
             points=tuple(data.site_xpos[s].tolist() for s in sites),
             natural_length=float(low),

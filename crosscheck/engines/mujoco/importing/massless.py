@@ -11,10 +11,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, cast
 
 from crosscheck.engines.mujoco.importing import chains
+from crosscheck.engines.mujoco.importing.actuators import Law
 from crosscheck.engines.mujoco.importing.chains import Chain, joints_of
 from crosscheck.engines.mujoco.importing.closures import Closure
 from crosscheck.engines.mujoco.importing.groups import Groups
-from crosscheck.engines.mujoco.importing.loads import controlled
 from crosscheck.engines.mujoco.importing.posing import JointRow
 from mbref.scene import Joint, SceneError
 
@@ -23,17 +23,17 @@ OF_CYLINDRICAL = {"hinge": {ARMATURE, LOAD, COUPLING}, "slide": {LOAD, COUPLING}
 Needs = Mapping[int, set[str]]  # MuJoCo's joint → what acts along its coordinate
 
 
-def needs(mujoco: Any, model: Any, rows: Sequence[JointRow], key: int, without: frozenset[str]) -> Needs:
-    """Return what acts along each hinge and slide: ARMATURE, LOAD of springs and motors, COUPLING, LOCK."""
+def needs(model: Any, rows: Sequence[JointRow], laws: Sequence[Law]) -> Needs:
+    """Return what acts along each hinge and slide: armatures, loads, couplings, locks."""
     found: dict[int, set[str]] = defaultdict(set)
     for j in range(model.njnt):
         v = int(model.jnt_dofadr[j])
-        if model.dof_armature[v] and "armature" not in without:
+        if model.dof_armature[v]:
             found[j].add(ARMATURE)
         if model.jnt_stiffness[j] or model.dof_damping[v]:
             found[j].add(LOAD)
-    for a in controlled(mujoco, model, key):
-        found[int(model.actuator_trnid[a, 0])].add(LOAD)
+    for law in laws:
+        found[law.joint].add(LOAD)
     for row in rows:
         for j in row.joints:
             found[j].add(COUPLING if row.joints[1] >= 0 else LOCK)

@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.mujoco.importing import keyframes
 from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure
 from mbref.scene import SceneError
 
-CLOSED = 1e-12  # smaller gaps, relative to the model's extent or in rad, count as closed
+CLOSED = 1e-12  # fraction of the model's extent, or rad; smaller gaps count as closed
 ROUNDED = 1e-9  # limit like CLOSED near singular positions, where Newton's method is less accurate
 ITERATIONS = 200
 LONGEST = 0.2  # rad, or fraction of the model's extent: largest change of a coordinate in one iteration
@@ -40,22 +41,34 @@ class Poses:
     ):
         self.mujoco, self.model, self.data = mujoco, model, mujoco.MjData(model)
         self.closures, self.joint_rows, self.extent = closures, rows, extent
+        self.scale = _scale(mujoco, model, extent)
         self.held: list[int] = []  # indices of the velocities whose coordinates the user gives
 
     def start(self, keyframe: str, pose: Mapping[str, float]) -> None:
         """Set the start: a keyframe or the reference, with given joint coordinates; raises SceneError."""
         model, data = self.model, self.data
         data.qpos[:] = model.qpos0
-        if keyframe:
-            k = _found(self.mujoco, model, self.mujoco.mjtObj.mjOBJ_KEY, "keyframe", keyframe, model.nkey)
+        if (k := keyframes.number_of(self.mujoco, model, keyframe)) >= 0:
             data.qpos[:], data.qvel[:] = model.key_qpos[k], model.key_qvel[k]
         for name, value in pose.items():
-            j = _found(self.mujoco, model, self.mujoco.mjtObj.mjOBJ_JOINT, "joint", name, model.njnt)
+            j = self._joint(name)
             if kind_of(self.mujoco, model, j) not in ("hinge", "slide"):
                 raise SceneError([f"--pose {name}: has several coordinates; only hinges and slides have one"])
             data.qpos[model.jnt_qposadr[j]] = value
             self.held.append(int(model.jnt_dofadr[j]))
         self.place()
+
+    def _joint(self, name: str) -> int:
+        """Return the number of a joint; raises SceneError that lists the names."""
+        kind = self.mujoco.mjtObj.mjOBJ_JOINT
+        number = int(self.mujoco.mj_name2id(self.model, kind, name))
+        if number < 0:
+            known = [str(self.mujoco.mj_id2name(self.model, kind, k) or "") for k in range(self.model.njnt)]
+            near = difflib.get_close_matches(name, known)
+            meant = f"; did you mean {near[0]!r}?" if near else ""
+            listed = ", ".join(filter(None, known)) or "none"
+            raise SceneError([f"--pose: no joint {name!r}; known: {listed}{meant}"])
+        return number
 
     def place(self) -> None:
         """Compute positions of bodies and joints at the data's coordinates."""
@@ -90,36 +103,60 @@ class Poses:
             ]
         )
 
+    def allowed(self, velocities: np.ndarray) -> np.ndarray:
+        """Return the nearest joint velocities (nv,) that the closed loops allow."""
+        rows, given = self.unit_free(self.jacobian()), velocities / self.scale
+        change = np.linalg.pinv(rows, rcond=RANK) @ (rows @ given) if len(rows) else 0.0
+        return np.asarray(self.scale * (given - change))
+
+    def unit_free(self, rows: np.ndarray) -> np.ndarray:
+        """Return the Jacobian (rows, nv) of the residuals with lengths as fractions of the model's extent."""
+        return self._scaled(rows) * self.scale
+
     def _fall(self) -> np.ndarray:
-        """Return the direction (nv,) of the accelerations from rest without closures, of length ``FALL``."""
+        """Return the direction (nv,) of the accelerations from rest without closures, of size ``FALL``."""
         mujoco, model, fallen = self.mujoco, self.model, self.mujoco.MjData(self.model)
         fallen.qpos[:] = self.data.qpos
         for stage in (mujoco.mj_kinematics, mujoco.mj_comPos, mujoco.mj_tendon, mujoco.mj_fwdVelocity):
             stage(model, fallen)
         force, mass = fallen.qfrc_passive - fallen.qfrc_bias, self.mass()
-        found = np.linalg.lstsq(mass, force, rcond=RANK)[0]
+        weights = np.outer(self.scale, self.scale)
+        found = np.linalg.lstsq(mass * weights, force * self.scale, rcond=RANK)[0]
         found[self.held] = 0.0
         size = np.abs(found).max()
-        return found * (FALL * min(1.0, self.extent) / size if size > 0 else 0.0)
+        return self.scale * found * (FALL / size if size > 0 else 0.0)
 
     def _newton(self, held: list[int]) -> bool:
         for _ in range(ITERATIONS):
-            r, rows = self.residuals(), self.jacobian()
-            if not np.abs(r).max(initial=0.0) > CLOSED * max(self.extent, 1.0):
+            r, rows = self._scaled(self.residuals()), self.unit_free(self.jacobian())
+            if not np.abs(r).max(initial=0.0) > CLOSED:
                 return True
             step = self._step(r, rows, held)
             size = np.abs(step).max()
             if not size > 0.0:
                 break
-            step *= min(1.0, LONGEST * min(1.0, self.extent) / size)
+            step *= self.scale * min(1.0, LONGEST / size)
             self.mujoco.mj_integratePos(self.model, self.data.qpos, step, 1.0)
             self.place()
-        return bool(np.abs(self.residuals()).max() <= ROUNDED * max(self.extent, 1.0))
+        return bool(np.abs(self._scaled(self.residuals())).max() <= ROUNDED)
+
+    def _scaled(self, rows: np.ndarray) -> np.ndarray:
+        """Return residuals or their Jacobian with lengths as fractions of the model's extent."""
+        lengths = [c.are_lengths for c in self.closures]
+        of_rows = [self._is_slide(row.joints[0]) for row in self.joint_rows]
+        are_lengths = np.concatenate([np.zeros(0, bool), *lengths, np.array(of_rows, bool)])
+        return (rows.T / np.where(are_lengths, self.extent, 1.0)).T
+
+    def _is_slide(self, joint: int) -> bool:
+        return kind_of(self.mujoco, self.model, joint) == "slide"
 
     def _step(self, r: np.ndarray, rows: np.ndarray, held: list[int]) -> np.ndarray:
-        """Return the least change (nv,), weighted with the masses, that closes the linearised loops."""
+        """Return the least change (nv,), weighted with the masses, that closes the linearised loops.
+
+        Lengths are fractions of the model's extent, in the arguments and in the result.
+        """
         free = [k for k in range(self.model.nv) if k not in held]
-        mass = self.mass()[np.ix_(free, free)]
+        mass = (self.mass() * np.outer(self.scale, self.scale))[np.ix_(free, free)]
         root = np.linalg.cholesky(mass + 1e-9 * np.trace(mass) / self.model.nv * np.eye(len(free)))
         weighted = np.linalg.solve(root, rows[:, free].T).T
         step = np.zeros(self.model.nv)
@@ -160,13 +197,12 @@ class Poses:
         return float(self.data.qpos[address] - self.model.qpos0[address])
 
 
-def _found(mujoco: Any, model: Any, kind: Any, what: str, name: str, count: int) -> int:
-    """Return the number of a named object; raises SceneError that lists the names."""
-    number = int(mujoco.mj_name2id(model, kind, name))
-    if number < 0:
-        known = [str(mujoco.mj_id2name(model, kind, k) or "") for k in range(count)]
-        near = difflib.get_close_matches(name, known)
-        meant = f"; did you mean {near[0]!r}?" if near else ""
-        listed = ", ".join(filter(None, known)) or "none"
-        raise SceneError([f"--{what.replace('joint', 'pose')}: no {what} {name!r}; known: {listed}{meant}"])
-    return number
+def _scale(mujoco: Any, model: Any, extent: float) -> np.ndarray:
+    """Return the size (nv,) of a large change of each coordinate: the model's extent of a displacement, 1 of
+    an angle."""
+    found = np.ones(model.nv)
+    for j in range(model.njnt):
+        first = int(model.jnt_dofadr[j])
+        if (kind := kind_of(mujoco, model, j)) in ("slide", "free"):
+            found[first : first + (3 if kind == "free" else 1)] = extent
+    return found

@@ -15,17 +15,28 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.mujoco.importing import actuators, couplings, left_out, loads, massless, urdf
+from crosscheck.engines.entries import entry
+from crosscheck.engines.mujoco.importing import (
+    couplings,
+    keyframes,
+    left_out,
+    limits,
+    loads,
+    massless,
+    urdf,
+    values,
+)
+from crosscheck.engines.mujoco.importing.actuators import Actuators
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
 from crosscheck.engines.mujoco.importing.chains import Chain, branching, kind_of
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
+from crosscheck.engines.mujoco.importing.compiling import compiled, extent_of, root_link
 from crosscheck.engines.mujoco.importing.groups import Groups
-from crosscheck.engines.mujoco.importing.holding import compiled
 from crosscheck.engines.mujoco.importing.left_out import Part
-from crosscheck.engines.mujoco.importing.posing import RANK, JointRow, Poses
+from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from mbref.formats import Imported, ImportOptions
-from mbref.scene import GROUND, Body, Coupling, Driver, Joint, Scene, SceneError
+from mbref.scene import Body, Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 
 OPEN = 1e-6  # gap / extent of the model; a wider gap at the start is reported
@@ -43,6 +54,7 @@ class Source:
     model: Any
     original: Any
     groups: Groups
+    actuators: Actuators
     qpos: np.ndarray
     qvel: np.ndarray
 
@@ -56,7 +68,8 @@ def source(path: Path, options: ImportOptions) -> Source:
     import mujoco
 
     without = left_out.checked(options.without)
-    model, text, notes = _compiled(mujoco, path, options)
+    model, text, notes = compiled(mujoco, path, options)
+    values.check(mujoco, model)
     if model.nbody < 2:  # the first body is the world
         raise SceneError([f"{path}: has no body"])
     reader = _Reader(mujoco, model, text, options, without, notes=notes)
@@ -69,27 +82,15 @@ def source(path: Path, options: ImportOptions) -> Source:
     state = data.qpos.copy(), data.qvel.copy()
     left_out.stripped(model, reader.kept)
     original = copy.copy(model)
+    reader.actuators.prepare(data)
     Agreement(mujoco, model, reader.groups, reader.poses).check(scene, reader.tree)
     wanted = tuple(f"{part.sentence} (--without {part.kind})" for part in reader.parts)
     imported = Imported(
-        scene, (*wanted, *left_out.notes(mujoco, model, options.keyframe)), tuple(reader.notes)
+        scene,
+        (*wanted, *reader.unread, *left_out.notes(mujoco, model, options.keyframe, reader.actuators.idle)),
+        tuple(reader.notes),
     )
-    return Source(imported, model, original, reader.groups, *state)
-
-
-def _compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None, list[str]]:
-    """Return the compiled model, the text of a URDF, and notes."""
-    try:
-        if path.suffix != ".urdf":
-            path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
-            model, notes = compiled(mujoco, path, options.hold, options.keyframe)
-            return model, None, notes
-        text = urdf.prepared(path.read_text(encoding="utf-8"), options.hold)
-        model = mujoco.MjModel.from_xml_string(text.text)
-    except ValueError as error:
-        raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
-    text.take_back(mujoco, model)
-    return model, text, []
+    return Source(imported, model, original, reader.groups, reader.actuators, *state)
 
 
 def _renamed(joints: list[Joint]) -> Iterator[Joint]:
@@ -123,21 +124,26 @@ class _Reader:
 
     def __post_init__(self) -> None:
         self.groups = Groups(self.mujoco, self.model)
+        self.unread: tuple[str, ...] = ()
         self.kept: list[int] = []  # indices of joint velocities whose armature is in the scene
 
     def read(self) -> None:
         """Read everything, at a pose with closed loops."""
         mujoco, model = self.mujoco, self.model
-        self.parts += actuators.moved_to_joints(mujoco, model)
+        key = keyframes.number_of(mujoco, model, self.options.keyframe)
+        self.actuators = Actuators(mujoco, model, key)
+        self.parts += self.actuators.parts
         closures = self._closures()
-        self.poses = Poses(mujoco, model, closures, self.rows, _extent(mujoco, model))
+        self.poses = Poses(mujoco, model, closures, self.rows, extent_of(mujoco, model))
         self.poses.start(self.options.keyframe, self.options.pose)
         self._close()
         self._read_joints(closures)
         self._read_loads()
         self.parts += left_out.of_model(model, self.kept)
+        self.parts += limits.acting(mujoco, model, self.poses.data, self.actuators)
         if self.text is not None:
             self.parts += urdf.couplings(self.text.root)
+            self.unread = tuple(urdf.unread(self.text.root))
         self.notes += unclosed(self.groups, self.poses.data, closures, self.poses.extent)
 
     def scene(self, name: str) -> Scene:
@@ -163,13 +169,12 @@ class _Reader:
         """Return the closures of the file and of the user; joint rows are stored separately."""
         reference = self.mujoco.MjData(self.model)
         self.mujoco.mj_kinematics(self.model, reference)
-        root = _root_link(self.text)
+        root = root_link(self.text)
         self.frames = Frames(self.mujoco, self.model, root)
         found = [] if self._disabled("EQUALITY") else list(of_equalities(self.mujoco, self.model))
         if self.text is not None:
             found += urdf.loops(self.text.root, lambda name: self.frames.find(name).body, reference)
-            if "couplings" not in self.without:
-                self.rows += urdf.mimics(self.text.root, self._joint_number)
+            self.rows += urdf.mimics(self.text.root, self._joint_number)
         found += asked(self.options.close, self.frames)
         if not self._disabled("EQUALITY"):
             self._read_equalities()
@@ -191,7 +196,7 @@ class _Reader:
 
     def _read_equalities(self) -> None:
         """Read equalities of joints and tendons: rows of coordinates, parts to be left out and notes."""
-        for found in couplings.of_equalities(self.mujoco, self.model, self.without):
+        for found in couplings.of_equalities(self.mujoco, self.model):
             if isinstance(found, Part):
                 self.parts.append(found)
             elif isinstance(found, JointRow):
@@ -207,14 +212,8 @@ class _Reader:
             self.notes.append(
                 f"closure {name!r} was open by {gap:.3g} m or rad; the joints moved to close it"
             )
-        self._keep_velocities()
-
-    def _keep_velocities(self) -> None:
-        """Return the velocities of a keyframe without the parts that the closures forbid."""
         data = self.poses.data
-        if np.any(data.qvel):
-            rows = self.poses.jacobian()
-            data.qvel[:] -= np.linalg.pinv(rows, rcond=RANK) @ (rows @ data.qvel) if len(rows) else 0.0
+        data.qvel[:] = self.poses.allowed(data.qvel) if np.any(data.qvel) else data.qvel
 
     def _read_joints(self, closures: list[Closure]) -> None:
         data, extent = self.poses.data, self.poses.extent
@@ -222,7 +221,7 @@ class _Reader:
         held = massless.held(self.model, self.groups, closures)
         self.notes += massless.idle(self.groups, held)
         self.groups.keep(branching(self.groups, held), ())
-        wanted = massless.needs(self.mujoco, self.model, self.rows, self._key(), self.without)
+        wanted = massless.needs(self.model, self.rows, self.actuators.laws)
         found: list[Joint] = []
         whole: dict[int, int] = {}
         for chain, joints in massless.read(self.mujoco, self.groups, data, wanted, extent):
@@ -242,7 +241,7 @@ class _Reader:
         wanted = {"hinge": ANGLE, "slide": DISPLACEMENT}
         kinds = [wanted.get(kind) for kind in chain.kinds]
         own = [j for j, kind in zip(chain.joints, kinds, strict=True) if driven and kind == driven]
-        if len(own) != 1 or "armature" in self.without:
+        if len(own) != 1:
             return joints
         dof = int(self.model.jnt_dofadr[own[0]])
         if not (armature := float(self.model.dof_armature[dof])):
@@ -260,13 +259,14 @@ class _Reader:
 
     def _couple(self) -> None:
         """Add a coupling for a coordinate that follows another coordinate, and a constant driver for a locked
-        coordinate.
-
-        Raises SceneError if a scene has no such coordinate.
-        """
+        coordinate; rows of coordinates that no scene has are parts to be left out."""
         taken = {joint.name for joint in self.joints}
-        for row in self.rows:
+        for row in list(self.rows):
             ends = [self._coordinate(row, j) for j in row.joints if j >= 0]
+            if None in ends:
+                self.parts.append(couplings.removed(self.mujoco, self.model, row))
+                self.rows.remove(row)
+                continue
             if len(ends) == 1:
                 self.drivers.append(Driver(joint=ends[0][0].name))
                 continue
@@ -278,46 +278,24 @@ class _Reader:
             is_plain = (of_first, of_second) == (first.facts.driven, second.facts.driven)
             kinds = None if is_plain and first.name != second.name else (of_first, of_second)
             pair = first.name, second.name
-            self.couplings.append(Coupling(name=name, joints=pair, ratio=row.ratio, coordinates=kinds))
+            where = f"equality {row.name!r}"
+            self.couplings.append(
+                entry(where, Coupling, name=name, joints=pair, ratio=row.ratio, coordinates=kinds)
+            )
 
-    def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate]:
-        """Return the scene's joint of a hinge or slide in the file, and its coordinate; raises SceneError if
-        there is none."""
+    def _coordinate(self, row: JointRow, j: int) -> tuple[Joint, Coordinate] | None:
+        """Return the scene's joint of a hinge or slide in the file, and its coordinate; None without one."""
         joint, couples = self.joint_of.get(j), row.joints[1] >= 0
-        if joint is not None and joint.facts.driven and (couples or joint.type != "cylindrical"):
-            is_hinge = kind_of(self.mujoco, self.model, j) == "hinge"
-            return joint, ANGLE if is_hinge else DISPLACEMENT
-        name, what = left_out.joint_name(self.model, j), "couples" if couples else "locks"
-        raise SceneError([f"equality {row.name!r}: {what} {name}, which is not a single hinge or slide"])
-
-    def _key(self) -> int:
-        """Return MuJoCo's number of the keyframe at which the motion begins; -1 if there is none."""
-        kinds = self.mujoco.mjtObj
-        return int(self.mujoco.mj_name2id(self.model, kinds.mjOBJ_KEY, self.options.keyframe))
+        if joint is None or not joint.facts.driven or (joint.type == "cylindrical" and not couples):
+            return None
+        return joint, ANGLE if kind_of(self.mujoco, self.model, j) == "hinge" else DISPLACEMENT
 
     def _read_loads(self) -> None:
         mujoco, model, data = self.mujoco, self.model, self.poses.data
-        motors = (
-            () if "motors" in self.without else loads.of_motors(mujoco, model, self._key(), self.joint_of)
-        )
-        both = [
+        found = [
             *loads.of_joints(mujoco, model, data, self.joint_of),
-            *motors,
+            *loads.of_actuators(mujoco, model, data, self.actuators, self.joint_of),
             *loads.of_tendons(mujoco, model, data, self.groups),
         ]
-        self.parts += [part for part in both if isinstance(part, Part)]
-        self.loads += [load for load in both if not isinstance(load, Part)]
-
-
-def _root_link(text: urdf.Text | None) -> str:
-    """Return the link of a URDF that no joint carries, which MuJoCo fixes to the world."""
-    if text is None:
-        return GROUND
-    return urdf.urdf_faults.base(text.root) or GROUND
-
-
-def _extent(mujoco: Any, model: Any) -> float:
-    """Return the largest distance along an axis between centres of mass at the reference position (m)."""
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    return max(float(np.ptp(data.xipos, axis=0).max()), 1e-3)
+        self.parts += [part for part in found if isinstance(part, Part)]
+        self.loads += [load for load in found if not isinstance(load, Part)]

@@ -3,6 +3,7 @@ here."""
 
 from __future__ import annotations
 
+import copy
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator, Sequence
@@ -11,23 +12,25 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines import xml_files
 from crosscheck.engines.mujoco.importing import urdf_faults
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow
 from mbref.scene import SceneError
 
-PARTS = (
-    "visual",
-    "collision",
-    "loop",
-    "coupling",
-    "transmission",
-    "gazebo",
-    "ros2_control",
-    "mimic",
-    "mujoco",
-)
+KNOWN = {  # outer elements → inner elements that are read, or that change no motion
+    "robot": ("link", "joint", "material", "loop", "constraint", "loop_joint", "coupling"),
+    "link": ("inertial", "visual", "collision"),
+    "inertial": ("origin", "mass", "inertia"),
+    "joint": ("origin", "parent", "child", "axis", "dynamics", "limit", "mimic", "calibration"),
+}
+FOR_MUJOCO = {  # inner elements that MuJoCo is given
+    "robot": ("link", "joint"),
+    "link": ("inertial",),
+    "joint": ("origin", "parent", "child", "axis", "dynamics", "limit"),
+}
+CLOSURES = ("constraint", "loop_joint")  # loops that name parent and child, each with an origin
 LEAST = 1e-12  # kg and kg m²; MuJoCo refuses moving bodies with smaller values
 BodyOf = Callable[[str], int]
 
@@ -53,20 +56,18 @@ class Text:
             model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
 
 
-def prepared(text: str, hold: Sequence[str] = ()) -> Text:
-    """Return the URDF without shapes, loops and actuators; links are not merged.
+def prepared(text: str | bytes, hold: Sequence[str] = ()) -> Text:
+    """Return the URDF with links and joints alone; links are not merged.
 
     The joints of the links ``hold`` become fixed joints. Raises SceneError if the text is no tree of links.
     """
-    try:
-        root, whole = ET.fromstring(text), ET.fromstring(text)
-    except ET.ParseError as error:
-        raise SceneError([f"URDF: is no XML: {error}"]) from None
+    root = xml_files.parsed_bytes(text.encode() if isinstance(text, str) else text, "URDF")
     urdf_faults.check(root)
+    whole = copy.deepcopy(root)
     urdf_faults.hold(root, hold)
     _name_base_of_floating_joints(root)
-    for parent in list(root.iter()):
-        for child in [c for c in parent if c.tag in PARTS]:
+    for parent in (part for tag in FOR_MUJOCO for part in root.iter(tag)):
+        for child in [c for c in parent if c.tag not in FOR_MUJOCO[parent.tag]]:
             parent.remove(child)
     added = {str(link.get("name")): _enough(link) for link in root.iter("link")}
     options = ET.SubElement(ET.SubElement(root, "mujoco"), "compiler")
@@ -101,7 +102,9 @@ def _enough(link: ET.Element) -> tuple[float, float]:
     moments = np.linalg.eigvalsh(matrix)
     heavy = float(mass.get("value") or "0")
     more = 1.0 if heavy < LEAST else 0.0
-    moment = (float(moments[-1]) or 1.0) if moments[0] < max(LEAST, 1e-9 * moments[-1]) else 0.0
+    is_flat = moments[2] > moments[0] + moments[1]  # by rounding, which MuJoCo refuses
+    is_slender = moments[0] < max(LEAST, 1e-9 * moments[-1])
+    moment = (float(moments[-1]) or 1.0) if is_slender or is_flat else 0.0
     mass.set("value", repr(heavy + more))
     for k, key in enumerate((x, y, z)):
         inertia.set(key, repr(float(matrix[k, k]) + moment))
@@ -131,7 +134,43 @@ def couplings(root: ET.Element) -> Iterator[Part]:
         yield Part("couplings", f"coupling {coupling.get('name', '')!r}")
 
 
+def unread(root: ET.Element) -> Iterator[str]:
+    """Return a sentence for each kind of element that neither this reader nor MuJoCo knows."""
+    return xml_files.unread(root, KNOWN)
+
+
 def loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
+    """Return the closures of all loops: of ``<loop>`` elements, and of elements with parent and child."""
+    yield from _predecessor_loops(root, body_of, data)
+    for tag in CLOSURES:
+        for element in root.iter(tag):
+            yield _constraint(element, body_of)
+
+
+def _constraint(element: ET.Element, body_of: BodyOf) -> Closure:
+    """Return the closure of ``<constraint name type>`` with the elements parent, child, parent_origin,
+    child_origin, parent_axis and child_axis; the axes are in the frames of the origins.
+
+    Raises SceneError for an unknown type or a missing link.
+    """
+    name, kind = element.get("name", element.tag), element.get("type", "")
+    if kind not in TYPES:
+        raise SceneError([f"{element.tag} {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
+    frames = []
+    for side in ("parent", "child"):
+        link = element.find(side)
+        if link is None or not link.get("link"):
+            raise SceneError([f"{element.tag} {name!r}: names no {side} link"])
+        origin = element.find(f"{side}_origin")
+        axis = element.find(f"{side}_axis")
+        axis = element.find("axis") if axis is None else axis
+        turn = _roll_pitch_yaw(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
+        turn = turn @ along(_numbers(axis, "xyz", (1.0, 0.0, 0.0)))
+        frames.append(Frame(body_of(str(link.get("link"))), _numbers(origin, "xyz", (0.0, 0.0, 0.0)), turn))
+    return Closure(name, TYPES[kind], (frames[0], frames[1]))
+
+
+def _predecessor_loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator[Closure]:
     """Return the closures of the loops, at the origins of their predecessors, as the reference position has
     them.
 

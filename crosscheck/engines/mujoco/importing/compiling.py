@@ -1,0 +1,48 @@
+"""The model that MuJoCo compiles from an MJCF file or a URDF, its base and its extent."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.mujoco.importing import holding, urdf
+from mbref.formats import ImportOptions
+from mbref.scene import GROUND, SceneError
+
+SMALLEST = 1e-9  # m; extent of a model that is a rounding error
+
+
+def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None, list[str]]:
+    """Return the compiled model, the text of a URDF, and notes; warnings of MuJoCo write no log file."""
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        if path.suffix != ".urdf":
+            path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
+            model, notes = holding.compiled(mujoco, path, options.hold, options.keyframe)
+            return model, None, notes
+        text = urdf.prepared(path.read_bytes(), options.hold)
+        model = mujoco.MjModel.from_xml_string(text.text)
+    except ValueError as error:
+        raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
+    finally:
+        mujoco.set_mju_user_warning(None)
+    text.take_back(mujoco, model)
+    return model, text, []
+
+
+def root_link(text: urdf.Text | None) -> str:
+    """Return the link of a URDF that no joint carries, which MuJoCo fixes to the world."""
+    if text is None:
+        return GROUND
+    return urdf.urdf_faults.base(text.root) or GROUND
+
+
+def extent_of(mujoco: Any, model: Any) -> float:
+    """Return the largest distance along an axis between centres of mass and joints at the reference position
+    (m); 1 m where all of them are at one place."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    found = float(np.ptp(np.vstack([data.xipos, data.xanchor]), axis=0).max())
+    return found if found > SMALLEST else 1.0

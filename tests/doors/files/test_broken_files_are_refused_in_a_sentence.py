@@ -1,0 +1,133 @@
+"""Broken, binary, deep and impossible files: sentences and exit status 2, never a traceback."""
+
+from __future__ import annotations
+
+import pytest
+
+BODY = """<mujoco><worldbody><body name="a">
+<joint name="j" axis="0 1 0" stiffness="1" damping="1" armature="1"/>
+<inertial pos="0 0 1" mass="1" diaginertia="2 2 2"/></body></worldbody><option gravity="0 0 -9"/>
+<keyframe><key name="k" qpos="3"/></keyframe></mujoco>"""
+ROBOT = """<robot name="m"><link name="base"/><link name="a"><inertial><mass value="1"/>
+<inertia ixx="2" ixy="0" ixz="0" iyy="2" iyz="0" izz="2"/></inertial></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/>
+<origin xyz="0 0 7"/><axis xyz="0 1 0"/><dynamics damping="3"/></joint></robot>"""
+MODEL = """<sdf version="1.9"><model name="m"><link name="a"><pose>0 0 7 0 0 0</pose>
+<inertial><mass>1</mass><inertia><ixx>2</ixx><iyy>2</iyy><izz>2</izz></inertia></inertial></link>
+<joint name="j" type="revolute"><parent>world</parent><child>a</child>
+<axis><xyz>0 1 0</xyz><dynamics><damping>3</damping></dynamics></axis></joint></model></sdf>"""
+PLACES = [
+    (BODY, "a.xml", 'mass="1"', 'mass="{}"', "body 'a'"),
+    (BODY, "a.xml", 'diaginertia="2 2 2"', 'diaginertia="{0} {0} {0}"', "a"),
+    (BODY, "a.xml", "0 0 1", "0 0 {}", "body 'a'"),
+    (BODY, "a.xml", "0 1 0", "0 {} 0", "joint 'j'"),
+    (BODY, "a.xml", 'stiffness="1"', 'stiffness="{}"', "joint 'j'"),
+    (BODY, "a.xml", 'damping="1"', 'damping="{}"', "joint 'j'"),
+    (BODY, "a.xml", 'armature="1"', 'armature="{}"', "joint 'j'"),
+    (BODY, "a.xml", "0 0 -9", "0 0 {}", "gravity"),
+    (BODY, "a.xml", 'qpos="3"', 'qpos="{}"', "keyframe 'k'"),
+    (ROBOT, "a.urdf", 'mass value="1"', 'mass value="{}"', "link 'a'"),
+    (ROBOT, "a.urdf", 'izz="2"', 'izz="{}"', "link 'a'"),
+    (ROBOT, "a.urdf", "0 0 7", "0 0 {}", "joint 'j'"),
+    (ROBOT, "a.urdf", "0 1 0", "0 {} 0", "joint 'j'"),
+    (ROBOT, "a.urdf", 'damping="3"', 'damping="{}"', "joint 'j'"),
+    (MODEL, "a.sdf", "<mass>1", "<mass>{}", "link 'a'"),
+    (MODEL, "a.sdf", "<izz>2", "<izz>{}", "link 'a'"),
+    (MODEL, "a.sdf", "0 0 7", "0 0 {}", "link 'a'"),
+    (MODEL, "a.sdf", "0 1 0", "0 {} 0", "joint 'j'"),
+    (MODEL, "a.sdf", "<damping>3", "<damping>{}", "joint 'j'"),
+]
+
+
+@pytest.mark.parametrize("number", ["1e300", "inf", "-inf", "nan"])
+@pytest.mark.parametrize(("text", "name", "old", "new", "part"), PLACES)
+def test_a_number_that_no_scene_has_is_named(files, text, name, old, new, part, number):
+    said = files.refusal(text.replace(old, new.format(number)), name)
+    assert part in said or "MuJoCo cannot read it" in said, said
+
+
+@pytest.mark.parametrize("name", ["a.xml", "a.urdf", "a.sdf"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        b"",
+        b"\xff\xfe\x00<",
+        bytes(range(256)),
+        b"<robot",
+        b"<sdf version='1.9'><model",
+        b"<mujoco/>",
+        b"[1, 2]",
+    ],
+)
+def test_files_that_are_no_robots_are_refused(files, name, text):
+    files.refusal(text, name)
+
+
+@pytest.mark.parametrize("name", ["a.urdf", "a.sdf"])
+def test_an_unknown_encoding_is_refused(files, name):
+    text = {"a.urdf": ROBOT, "a.sdf": MODEL}[name]
+    assert "encoding" in files.refusal(f'<?xml version="1.0" encoding="none-such"?>{text}', name)
+
+
+def test_a_file_in_another_encoding_is_read(files):
+    text = '<?xml version="1.0" encoding="utf-16"?>' + MODEL.replace('name="a"', 'name="é"')
+    text = text.replace("<child>a", "<child>é")
+    status, _, errors = files.run(text.encode("utf-16"), "a.sdf")
+    assert status == 0, errors
+
+
+@pytest.mark.parametrize("deep", [300, 5000])
+def test_elements_in_each_other_are_counted(files, deep):
+    urdf = ROBOT.replace("</robot>", f"{'<more>' * deep}{'</more>' * deep}</robot>")
+    assert f"nested {deep + 1} deep; at most" in files.refusal(urdf, "a.urdf")
+    models = "".join(f"<model name='m{k}'><link name='l'/>" for k in range(deep)) + "</model>" * deep
+    assert f"nested {deep + 2} deep; at most" in files.refusal(f"<sdf version='1.9'>{models}</sdf>", "a.sdf")
+
+
+def test_links_in_a_row_are_counted(files):
+    many = 300
+    links = "".join(f'<link name="l{k}"/>' for k in range(many + 1))
+    joints = "".join(
+        f'<joint name="j{k}" type="continuous"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
+        for k in range(many)
+    )
+    said = files.refusal(f'<robot name="r">{links}{joints}</robot>', "a.urdf")
+    assert f"links carry each other {many} deep; at most" in said
+    bodies = "<body><joint/><geom size='1'/>" * many + "</body>" * many
+    said = files.refusal(f"<mujoco><worldbody>{bodies}</worldbody></mujoco>", "a.xml")
+    assert f"bodies carry each other {many} deep; at most" in said
+
+
+@pytest.mark.parametrize(
+    ("configuration", "says"),
+    [
+        (b"<model><sdf", "is no XML"),
+        (bytes(range(256)), "is no XML"),
+        (b"", "is no XML"),
+        (b"<model><sdf version='new'>model.sdf</sdf></model>", "version 'new': is no version of SDF"),
+        (b"<model><sdf version='1.5'/></model>", "<sdf> names no file"),
+    ],
+)
+def test_a_broken_configuration_of_an_included_model_is_named(files, configuration, says):
+    place = files.folder / "arm"
+    place.mkdir()
+    (place / "model.config").write_bytes(configuration)
+    (place / "model.sdf").write_text(MODEL)
+    world = "<sdf version='1.9'><world name='w'><include><uri>model://arm</uri></include></world></sdf>"
+    said = files.refusal(world, "w.sdf")
+    assert says in said and "model.config" in said
+
+
+def test_models_that_include_each_other_a_thousand_deep_are_refused(files):
+    for k in range(400):
+        include = f"<include><uri>m{k + 1}.sdf</uri></include>"
+        (files.folder / f"m{k}.sdf").write_text(
+            f"<sdf version='1.9'><model name='m{k}'>{include}<link name='l'/></model></sdf>"
+        )
+    text = "<sdf version='1.9'><model name='m'><include><uri>m0.sdf</uri></include></model></sdf>"
+    assert "nested more than" in files.refusal(text, "m.sdf")
+
+
+@pytest.mark.parametrize("version", ["abc", "", "1.x", "1..6"])
+def test_a_version_that_is_none_is_refused(files, version):
+    assert "is no version of SDF" in files.refusal(MODEL.replace("1.9", version), "a.sdf")

@@ -1,0 +1,91 @@
+"""MJCF: limits that act at the start, couplings and armature that a scene has, loops of any size."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+LIMITED = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="bob" pos="0 0 1"><joint name="s" type="slide" axis="0 0 1" {joint}/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><site name="eye"/></body>
+<site name="hook" pos="0 0 1.5"/></worldbody>
+<tendon><spatial name="rope" {tendon}><site site="hook"/><site site="eye"/></spatial></tendon>
+<keyframe><key name="up" qvel="1"/><key name="down" qvel="-1"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("joint", "tendon", "key", "name"),
+    [
+        ("", "range='0 0.5'", "", "tendon 'rope'"),
+        ("", "range='0 0.5'", "down", "tendon 'rope'"),
+        ("", "range='0 0.5'", "up", ""),
+        ("", "range='0 0.6'", "", ""),
+        ("", "range='0 0.4'", "up", "tendon 'rope'"),
+        ("range='0 1'", "", "", "joint 's'"),
+        ("range='0 1'", "", "up", ""),
+        ("range='-1 0'", "", "", ""),
+        ("range='-1 0'", "", "up", "joint 's'"),
+        ("range='0.1 1'", "", "up", "joint 's'"),
+        ("range='0 1' limited='false'", "", "", ""),
+    ],
+)
+def test_a_limit_acts_where_the_motion_meets_it(files, joint, tendon, key, name):
+    text, words = LIMITED.format(joint=joint, tendon=tendon), ("--keyframe", key) if key else ()
+    if name:
+        said = files.refusal(text, "a.xml", *words)
+        assert f"limit of {name}, which acts at the start" in said and "--without limits" in said
+        words = (*words, "--without", "limits")
+    _, out = files.scene(text, "a.xml", *words)
+    assert ("(--without limits)" in out) == bool(name)
+    is_idle = not joint and not tendon
+    assert ("tendon without spring, damper and limit: no force" in out) == (is_idle or not tendon)
+
+
+COUPLED = """<mujoco><compiler angle="radian"/><worldbody>
+<body name="a"><joint name="ja" axis="0 1 0" armature="0.2"/><geom size=".1" mass="1" pos=".3 0 0"/></body>
+<body name="b" pos="1 0 0"><joint name="jb" axis="0 1 0"/><geom size=".1" mass="2" pos=".3 0 0"/></body>
+<body name="c" pos="2 0 0"><joint name="jc" axis="0 1 0"/><geom size=".1" mass="1" pos=".3 0 0"/></body>
+<body name="d" pos="3 0 0"><joint name="jd" type="ball" armature="0.3"/>
+<geom size=".1" mass="1" pos=".3 0 0"/></body>
+</worldbody><equality><joint name="line" joint1="jb" joint2="ja" polycoef="0 -3 0 0 0"/>
+<joint name="curve" joint1="jc" joint2="ja" polycoef="0 1 2 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize("kinds", ["couplings,armature", "everything"])
+def test_only_what_a_scene_cannot_have_is_left_out(files, kinds):
+    scene, out = files.scene(COUPLED, "a.xml", "--without", kinds)
+    assert [(c.name, c.ratio) for c in scene.coupling] == [("line", -3.0)]
+    assert {joint.name: joint.reflected_inertia for joint in scene.joint}["ja"] == 0.2
+    left = [line for line in out.splitlines() if "--without" in line]
+    assert len(left) == 2 and "'curve'" in "".join(left) and "'jd'" in "".join(left)
+
+
+def two_cranks(size: float, tilt: float = 0.0, rod: float = 1.1) -> str:
+    """Two cranks of a length (m), joined by a rod, all about z but for a tilt (rad) of the rod's hinge."""
+    s, inertia = size, size * size * 0.01
+    mass = f"mass='1' diaginertia='{inertia} {inertia} {inertia}'"
+    return f"""<mujoco><compiler angle="radian"/><worldbody>
+<body name="a"><joint name="ja" axis="0 0 1"/><inertial pos="0 {s / 2} 0" {mass}/>
+<body name="c" pos="0 {s} 0" euler="{tilt} 0 0"><joint name="jc" axis="0 0 1"/>
+<inertial pos="{s / 2} 0 0" {mass}/>
+<site name="ec" pos="{rod * s} 0 0"/></body></body>
+<body name="b" pos="{s} 0 0"><joint name="jb" axis="0 0 1"/><inertial pos="0 {s / 2} 0" {mass}/>
+<site name="eb" pos="0 {s} 0"/></body></worldbody>
+<equality><connect name="tie" site1="ec" site2="eb"/></equality></mujoco>"""
+
+
+def test_closing_a_loop_does_not_depend_on_its_size(files):
+    found = []
+    for size in (1e-4, 1e-2, 1.0, 1e2, 1e5):
+        scene, out = files.scene(two_cranks(size), "a.xml", "--pose", "ja=0.6")
+        assert "closure 'tie' was open by" in out
+        found.append([np.array(body.position) / size for body in scene.body])
+        assert scene.counts().degrees_of_freedom == 1
+        assert found[-1][0] == pytest.approx([-np.sin(0.6) / 2, np.cos(0.6) / 2, 0], abs=1e-9)
+    assert np.abs(np.array(found) - found[2]).max() < 1e-8
+
+
+@pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -3))])
+def test_axes_that_are_parallel_but_for_rounding_are_read(files, tilt):
+    scene, _ = files.scene(two_cranks(0.3, tilt, rod=1.0), "a.xml")
+    assert len(scene.joint) == 4

@@ -1,0 +1,94 @@
+"""URDF: loops of further elements, elements that nobody reads, and inertias that no body has."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+MASS = '<inertial><origin xyz="0.15 0 0"/><mass value="0.3"/><inertia {}/></inertial>'
+MOMENTS = 'ixx="1e-4" ixy="0" ixz="0" iyy="2e-3" iyz="0" izz="2e-3"'
+
+
+def hinge(name: str, parent: str, child: str, at: str, turn: float = 0.0, more: str = "") -> str:
+    return (
+        f'<joint name="{name}" type="continuous"><parent link="{parent}"/><child link="{child}"/>'
+        f'<origin xyz="{at}" rpy="0 {turn} 0"/><axis xyz="0 1 0"/>{more}</joint>'
+    )
+
+
+def robot(*parts: str) -> str:
+    links = "".join(f'<link name="{name}">{MASS.format(MOMENTS)}</link>' for name in "abc")
+    return f'<robot name="r"><link name="base"/>{links}{"".join(parts)}</robot>'
+
+
+CRANKS = (
+    hinge("ja", "base", "a", "0 0 0", -1.2),
+    hinge("jb", "a", "b", "0.3 0 0", 1.2),
+    hinge("jc", "base", "c", "0.3 0 0", -1.2),
+)
+PLACES = """<parent link="b"/><parent_origin xyz="0.3 0 0"/><child link="c"/><child_origin xyz="0.3 0 0"/>"""
+
+
+@pytest.mark.parametrize("tag", ["constraint", "loop_joint"])
+@pytest.mark.parametrize(
+    ("kind", "axes", "freedoms"),
+    [
+        ("revolute", '<parent_axis xyz="0 1 0"/><child_axis xyz="0 1 0"/>', 1),
+        ("revolute", '<axis xyz="0 1 0"/>', 1),
+        ("spherical", "", 1),
+        ("fixed", "", 0),
+    ],
+)
+def test_a_loop_of_parent_and_child_is_a_joint(files, tag, kind, axes, freedoms):
+    turn = ' rpy="0 -1.2 0"' if kind == "fixed" else ""
+    places = PLACES.replace('<parent_origin xyz="0.3 0 0"', f'<parent_origin xyz="0.3 0 0"{turn}')
+    loop = f'<{tag} name="tip" type="{kind}">{places}{axes}</{tag}>'
+    scene, out = files.scene(robot(*CRANKS, loop), "r.urdf")
+    assert scene.joint_named("tip").bodies == ("b", "c")
+    assert scene.counts().degrees_of_freedom == freedoms
+    assert "is not read" not in out
+    tip = scene.joint_named("tip").anchor
+    expected = [0.3 + 0.3 * np.cos(1.2), 0.0, 0.3 * np.sin(1.2)]
+    assert tip == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("loop", "says"),
+    [
+        (f'<constraint name="t" type="gear">{PLACES}</constraint>', "constraint 't': type 'gear' is none of"),
+        ('<constraint name="t" type="fixed"><parent link="b"/></constraint>', "'t': names no child link"),
+        (f'<constraint name="t" type="fixed">{PLACES.replace("0.3", "x")}</constraint>', "must be 3 numbers"),
+        (
+            f'<constraint name="t" type="fixed">{PLACES.replace(chr(34) + "c", chr(34) + "q")}</constraint>',
+            "'q'",
+        ),
+    ],
+)
+def test_a_faulty_loop_is_named(files, loop, says):
+    assert says in files.refusal(robot(*CRANKS, loop), "r.urdf")
+
+
+def test_elements_that_nobody_reads_are_listed(files):
+    parts = (
+        hinge("ja", "base", "a", "0 0 0", more="<safety_controller k_velocity='1'/>"),
+        hinge("jb", "a", "b", "0.3 0 0", more="<springy/>"),
+        hinge("jc", "base", "c", "0.3 0 0", more="<springy/>"),
+        "<gazebo reference='a'><mu1>1</mu1></gazebo><sensor name='s'/>",
+    )
+    _, out = files.scene(robot(*parts), "r.urdf")
+    assert "left out: <springy> of joint 'jb', joint 'jc': is not read" in out
+    for tag in ("safety_controller", "gazebo", "sensor"):
+        assert f"left out: <{tag}> of " in out
+
+
+def test_an_impossible_inertia_is_named_with_its_moments(files):
+    text = robot(*CRANKS).replace(MOMENTS, 'ixx="0.1" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.2"', 1)
+    said = files.refusal(text, "r.urdf")
+    assert "link 'a'" in said and "0.1, 0.2, 0.5 kg m²" in said and "balanceinertia" not in said
+
+
+@pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
+def test_a_flat_link_is_read_as_rounded(files, excess):
+    moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
+    scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
+    assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), rel=1e-8, abs=1e-8)
