@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,10 +14,12 @@ from rich.table import Table
 from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console
+from crosscheck.recorded.column_errors import ColumnError
 from crosscheck.recorded.columns import SI, kind_of
 from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import Judgement, judge_motion
 from crosscheck.recorded.reading import read
+from crosscheck.recorded.search import SECONDS as SEARCHED
 
 SHOWN = 6  # number of headers that are printed of the columns that were not read
 
@@ -32,12 +35,16 @@ def judge(arguments: argparse.Namespace) -> int:
         recording = read(Path(arguments.table), scene, columns, arguments.unit, arguments.quaternion)
     except OSError as error:
         raise RequestError(f"{arguments.table}: {error.strerror}") from None
-    found = judge_motion(scene, recording, arguments.reference_time, arguments.tolerance)
+    found = judge_motion(scene, recording, arguments.reference_time, arguments.tolerance, _said)
     if arguments.json:
         print(json.dumps({**found.to_record(), "ignored": list(recording.ignored)}, allow_nan=False))
     else:
         _show(found, recording.ignored)
     return COMPLETED if found.is_right else OTHERWISE
+
+
+def _said(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
 
 
 def _assigned(text: str) -> tuple[str, str]:
@@ -51,20 +58,35 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     table = Table("column", "largest error", "bound", "", "begins at", title="against the reference")
     for c in found.columns:
         begins = "" if c.begins is None else f"{c.begins:.4g} s"
-        within = "right within the bound on the reference" if c.largest <= c.bound else "right"
-        verdict = within if c.is_right else "off"
         unit = SI[kind_of(c.name)]
-        table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", verdict, begins)
+        table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", _verdict(c), begins)
     console().print(table)
+    if found.left:
+        console().print(f"not determined by the mechanism: {', '.join(found.left)}", soft_wrap=True)
     if found.reason:
         console().print(f"The reference ends at t = {found.until:.6g} s: {found.reason}", soft_wrap=True)
-    if not found.is_right and not found.explanations:
-        console().print("None of the tested explanations removes half of the difference.")
+    if any(c.largest > c.allowed for c in found.columns) and not found.explanations:
+        console().print(f"{_nothing(found)}.")
     for e in found.explanations:
         console().print(f"{e.sentence}: {100 * e.remains:.2g} % of the difference remains", soft_wrap=True)
     if ignored:
         rest = f" and {len(ignored) - SHOWN} more" if len(ignored) > SHOWN else ""
         console().print(f"not read: {', '.join(ignored[:SHOWN])}{rest}", soft_wrap=True)
+
+
+def _nothing(found: Judgement) -> str:
+    if found.is_complete:
+        return "No single change explains the difference"
+    return (
+        f"No single change was found that explains the difference; the search ended after {SEARCHED:g} CPU s"
+    )
+
+
+def _verdict(column: ColumnError) -> str:
+    digits = f"rounded to {column.rounded_to} digit{'s' * (column.rounded_to != 1)}"
+    if column.is_right:
+        return "right" if column.rounded_to is None else f"right, {digits}"
+    return f"too coarse, {digits}" if column.largest <= column.allowed else "off"
 
 
 def write_reference(arguments: argparse.Namespace) -> int:

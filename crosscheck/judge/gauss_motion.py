@@ -18,6 +18,7 @@ from crosscheck.judge.constraints import (
     initial_twists,
     jacobian,
 )
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.energy import kinetic_energy
 from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.joint_coordinates import reflected
@@ -40,7 +41,8 @@ State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 def gauss_motion(scene: Scene, times: tuple[float, ...], rtol: float = RTOL) -> Trajectory:
     """Return poses, velocities and accelerations at increasing times (s).
 
-    Raises RuntimeError if the integration ends early, as at a singular position.
+    Raises RuntimeError if the integration ends early, as at a singular position, and TimeIsUp after the
+    limit of CPU time.
     """
     velocity, spin = initial_twists(scene)
     position = np.array([body.position for body in scene.body])
@@ -214,6 +216,7 @@ def _state(scene: Scene, y: np.ndarray) -> State:
 
 
 def _rates(t: float, y: np.ndarray, scene: Scene, rank: int, since: float) -> np.ndarray:
+    ask()
     state = _state(scene, y)
     _, orientation, velocity, spin, _ = state
     second = accelerations(scene, t, state, rank, since)

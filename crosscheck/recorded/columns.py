@@ -2,46 +2,65 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
+
 import numpy as np
 
-from crosscheck.judge.constraints import joint_coordinates, scene_length
+from crosscheck.judge.constraints import joint_coordinates, joint_rates, scene_length
 from crosscheck.judge.joint_coordinates import COORDINATES
 from crosscheck.judge.start import start_coordinates, started
-from mbref.scene import Scene
+from crosscheck.recorded.actions import action_names, actions
+from mbref.scene import JointLoad, Scene
+from mbref.scene_joints import ANGLE, DISPLACEMENT
 from mbref.trajectory import Trajectory
 
-UNITS = {  # name → factor to SI
-    "s": 1.0,
-    "ms": 1e-3,
-    "min": 60.0,
-    "m": 1.0,
-    "mm": 1e-3,
-    "cm": 1e-2,
-    "um": 1e-6,
-    "in": 0.0254,
-    "ft": 0.3048,
-    "rad": 1.0,
-    "deg": np.pi / 180,
-    "rev": 2 * np.pi,
-    "m/s": 1.0,
-    "mm/s": 1e-3,
-    "cm/s": 1e-2,
-    "rad/s": 1.0,
-    "deg/s": np.pi / 180,
-    "rpm": np.pi / 30,
-    "1": 1.0,
-    "": 1.0,
+# SI unit → its other units with their factors to SI
+KNOWN_UNITS: dict[str, dict[str, float]] = {
+    "s": {"ms": 1e-3, "min": 60.0},
+    "m": {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "um": 1e-6, "in": 0.0254, "ft": 0.3048},
+    "rad": {"deg": np.pi / 180, "rev": 2 * np.pi},
+    "m/s": {"mm/s": 1e-3, "cm/s": 1e-2},
+    "rad/s": {"deg/s": np.pi / 180, "rpm": np.pi / 30},
+    "m/s²": {"m/s2": 1.0, "m/s^2": 1.0, "mm/s²": 1e-3, "mm/s2": 1e-3, "mm/s^2": 1e-3},
+    "rad/s²": {"rad/s2": 1.0, "rad/s^2": 1.0, "deg/s²": np.pi / 180, "deg/s2": np.pi / 180},
+    "N": {"kN": 1e3, "mN": 1e-3},
+    "N m": {"Nm": 1.0, "N*m": 1.0, "N mm": 1e-3, "Nmm": 1e-3, "N*mm": 1e-3},
+    "W": {"mW": 1e-3, "kW": 1e3},
+    "J": {"mJ": 1e-3, "kJ": 1e3},
+    "1": {},
 }
+UNITS = {"": 1.0} | {u: f for si, others in KNOWN_UNITS.items() for u, f in {si: 1.0, **others}.items()}
+DIMENSIONS = {unit: si for si, others in KNOWN_UNITS.items() for unit in (si, *others)}
 SI = {
     "time": "s",
     "position": "m",
     "orientation": "1",
     "velocity": "m/s",
     "angular_velocity": "rad/s",
+    "acceleration": "m/s²",
+    "angular_acceleration": "rad/s²",
     "angle": "rad",
     "displacement": "m",
+    "rate": "rad/s",
+    "displacement_rate": "m/s",
+    "length": "m",
+    "length_rate": "m/s",
+    "force": "N",
+    "torque": "N m",
+    "power": "W",
+    "kinetic_energy": "J",
+    "potential_energy": "J",
+    "energy": "J",
 }
-VECTORS = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "angular_velocity": "xyz"}
+VECTORS = {
+    "position": "xyz",
+    "orientation": "wxyz",
+    "velocity": "xyz",
+    "angular_velocity": "xyz",
+    "acceleration": "xyz",
+    "angular_acceleration": "xyz",
+}
+RATES = {ANGLE: "rate", DISPLACEMENT: "displacement_rate"}
 
 
 def kind_of(column: str) -> str:
@@ -55,23 +74,32 @@ def names(scene: Scene) -> list[str]:
     found = [
         f"{body.name}.{kind}.{axis}" for body in scene.body for kind, axes in VECTORS.items() for axis in axes
     ]
-    driven = [joint.name for joint in scene.joint if joint.facts.driven]
-    return found + [f"{joint}.{kind}" for joint in driven for kind in ("angle", "displacement")]
+    moving = [joint for joint in scene.joint if joint.facts.coordinates]
+    found += [f"{joint.name}.{kind}" for joint in moving for kind in COORDINATES]
+    found += [f"{joint.name}.{RATES[kind]}" for joint in moving for kind in joint.facts.coordinates]
+    return found + action_names(scene)
 
 
-def values(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
-    """Return every column (k,) of a motion, in SI units."""
+def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = None) -> dict[str, np.ndarray]:
+    """Return columns (k,) of a motion, in SI units: all columns, or at least the ``wanted`` ones."""
     found: dict[str, np.ndarray] = {}
     for b, body in enumerate(scene.body):
         for kind, axes in VECTORS.items():
-            array = getattr(motion, kind)[:, b]
-            array = _continuous(array) if kind == "orientation" else array
-            found.update({f"{body.name}.{kind}.{axis}": array[:, i] for i, axis in enumerate(axes)})
-    coordinates = joint_coordinates(
-        scene, motion.times, motion.position, motion.orientation, motion.angular_velocity
-    )
-    for joint, both in coordinates.items():
-        found[f"{joint}.angle"], found[f"{joint}.displacement"] = both[:, 0], both[:, 1]
+            array = getattr(motion, kind)
+            if array is not None:
+                array = _continuous(array[:, b]) if kind == "orientation" else array[:, b]
+                found.update({f"{body.name}.{kind}.{axis}": array[:, i] for i, axis in enumerate(axes)})
+    pose = motion.position, motion.orientation
+    coordinates = joint_coordinates(scene, motion.times, *pose, motion.angular_velocity)
+    rates = joint_rates(scene, *pose, motion.velocity, motion.angular_velocity)
+    for joint in scene.joint:
+        if joint.facts.coordinates:
+            for i, kind in enumerate(COORDINATES):
+                found[f"{joint.name}.{kind}"] = coordinates[joint.name][:, i]
+                if kind in joint.facts.coordinates:
+                    found[f"{joint.name}.{RATES[kind]}"] = rates[joint.name][:, i]
+    if wanted is None or not set(wanted) <= set(found):
+        found.update(actions(scene, motion, found))
     return found
 
 
@@ -80,10 +108,16 @@ def start_columns(scene: Scene) -> dict[str, float]:
     have offsets; an empty result without offsets."""
     if started(scene) is scene:
         return {}
-    pairs = start_coordinates(scene).items()
-    return {
-        f"{name}.{kind}": float(x) for name, both in pairs for kind, x in zip(COORDINATES, both, strict=True)
+    start = start_coordinates(scene)
+    found = {
+        f"{name}.{kind}": float(x)
+        for name, both in start.items()
+        for kind, x in zip(COORDINATES, both, strict=True)
     }
+    for place, load in enumerate(scene.load):
+        if isinstance(load, JointLoad):
+            found[f"load({place}).{load.coordinate}"] = found[f"{load.joint}.{load.coordinate}"]
+    return found
 
 
 def _continuous(quaternions: np.ndarray) -> np.ndarray:
@@ -93,18 +127,24 @@ def _continuous(quaternions: np.ndarray) -> np.ndarray:
     return np.concatenate([quaternions[:1], signs[:, None] * quaternions[1:]])
 
 
-def scales(scene: Scene, motion: Trajectory) -> dict[str, float]:
+def scales(scene: Scene, motion: Trajectory, columns: Mapping[str, np.ndarray]) -> dict[str, float]:
     """Return the size of each quantity in the motion, by which errors of different quantities are
-    compared."""
-    length = scene_length(scene)
+    compared.
+
+    Lengths and angles have the mechanism's length and 1 rad. Other quantities have the largest value in the
+    ``columns``, at least what the mechanism's mass, length, gravity and the scene's duration give.
+    """
+    length, duration = scene_length(scene), scene.duration
     speed = float(np.linalg.norm(motion.velocity, axis=2).max(initial=0.0))
     turning = float(np.linalg.norm(motion.angular_velocity, axis=2).max(initial=0.0))
-    least = length / scene.duration
-    return {
-        "position": length,
-        "displacement": length,
-        "orientation": 1.0,
-        "angle": 1.0,
-        "velocity": max(speed, least),
-        "angular_velocity": max(turning, least / length),
-    }
+    acceleration = float(np.linalg.norm(scene.gravity)) + length / duration**2
+    weight = sum(body.mass or 0.0 for body in scene.body) * acceleration
+    found = {kind: {"m": length}.get(unit, 1.0) for kind, unit in SI.items()}
+    least = {"m/s": max(speed, length / duration), "rad/s": max(turning, 1 / duration)}
+    least |= {"m/s²": acceleration, "rad/s²": acceleration / length}
+    least |= {"N": weight, "N m": weight * length, "J": weight * length, "W": weight * length / duration}
+    for unit, size in least.items():
+        kinds = [kind for kind, si in SI.items() if si == unit]
+        whole = [np.abs(c).max(initial=0.0) for n, c in columns.items() if kind_of(n) in kinds]
+        found.update(dict.fromkeys(kinds, max([size, *whole]) or 1.0))
+    return found

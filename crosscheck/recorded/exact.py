@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +17,9 @@ from crosscheck.recorded.columns import SI, kind_of, start_columns, values
 from mbref.files import replaced
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
+
+DENSE = 400  # least number of further times at which the exact motion is computed
+FINEST = 16  # multiple of DENSE at which the search for full turns between samples ends
 
 
 @dataclass(frozen=True)
@@ -48,6 +51,33 @@ def exact(scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SE
     return Exact(trajectory(scene, part), part.bound, getattr(found, "reason", ""))
 
 
+def dense_exact(
+    scene: Scene, times: np.ndarray, seconds: float = SECONDS, wanted: Collection[str] | None = None
+) -> tuple[Exact, dict[str, np.ndarray]]:
+    """Return the exact motion at the times (k,) and at further times from 0 on, and its columns.
+
+    The further times are so dense that full turns of joints are counted, whatever the given times are.
+    ``wanted`` are the columns that are needed, by default all.
+    """
+    dense = DENSE
+    while True:
+        found = exact(scene, with_dense(times, dense), seconds)
+        columns = values(scene, found.motion, wanted)
+        turns = (c for n, c in columns.items() if kind_of(n) == "angle")
+        if dense >= FINEST * DENSE or all(np.isfinite(c).all() for c in turns):
+            return found, columns
+        dense *= 4
+
+
+def with_dense(times: np.ndarray, dense: int) -> np.ndarray:
+    """Return times (k,) and further times from 0 to their end. A further time has at least a tenth of a step
+    to a given time."""
+    more = np.linspace(0.0, times[-1], dense + 1)
+    after = np.minimum(np.searchsorted(times, more), len(times) - 1)
+    nearest = np.minimum(np.abs(times[after] - more), np.abs(times[np.maximum(after - 1, 0)] - more))
+    return np.union1d(times, more[nearest > 0.1 * times[-1] / dense])
+
+
 def reference_table(
     scene: Scene, times: Sequence[float] | np.ndarray, seconds: float = SECONDS
 ) -> dict[str, np.ndarray]:
@@ -74,9 +104,11 @@ def reference_table(
         If the scene's velocities contradict its joints.
     """
     assembled, start = started(scene), start_columns(scene)
-    found = exact(assembled, times, seconds)
-    columns = {name: x + start.get(name, 0.0) for name, x in values(assembled, found.motion).items()}
-    return {"time": found.motion.times, "bound": found.bound, **columns}
+    times = np.asarray(times, dtype=float)
+    found, columns = dense_exact(assembled, times, seconds)
+    there = np.isin(found.motion.times, times)
+    shifted = {name: column[there] + start.get(name, 0.0) for name, column in columns.items()}
+    return {"time": found.motion.times[there], "bound": found.bound[there], **shifted}
 
 
 def write(table: dict[str, np.ndarray], path: Path) -> None:

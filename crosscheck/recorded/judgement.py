@@ -3,48 +3,27 @@ begins, and likely causes."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, make_interp_spline
 
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
-from crosscheck.recorded.changed_scenes import changed
-from crosscheck.recorded.columns import kind_of, scales, start_columns, values
-from crosscheck.recorded.exact import Exact, exact
-from crosscheck.recorded.explanations import Difference, Explanation, ranked, simple, with_signs
-from crosscheck.recorded.pairs_of_explanations import pairs
+from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, aligned
+from crosscheck.recorded.columns import kind_of, names, scales, start_columns
+from crosscheck.recorded.exact import Exact, dense_exact
+from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.reading import Recording, read
+from crosscheck.recorded.search import SECONDS as SEARCHED
+from crosscheck.recorded.search import Search, search
 from mbref.scene import Scene, SceneError
 
-BEGINS = 0.01  # fraction of the largest error at which an error is said to begin
-DENSE = 400  # number of further times at which the exact motion is computed, for shifts in time
-TRIED = 20.0  # CPU seconds for the simulation of changed scenes, and for pairs of causes
-EXACT = 1e-5  # fraction of the difference: changed scenes are tried if simpler causes leave more
-EXPLAINED = 1e-3  # fraction of the difference: pairs of causes are tried if single causes leave more
-
-
-@dataclass(frozen=True)
-class ColumnError:
-    """Largest error of a column, the bound below which an error means nothing, the largest error that counts
-    as right, and the time (s) at which the error first exceeds the part BEGINS of the largest error (None for
-    a right column)."""
-
-    name: str
-    largest: float
-    bound: float  # of the reference, plus the last digit of the table
-    allowed: float  # the bound, or the tolerance times the size of the quantity if that is larger
-    begins: float | None
-
-    @property
-    def is_right(self) -> bool:
-        """Return whether the error is within the bound or within the tolerance."""
-        return self.largest <= self.allowed
+DEGREE = 5  # degree of the splines through the exact motion
 
 
 @dataclass(frozen=True)
@@ -55,11 +34,13 @@ class Judgement:
     explanations: tuple[Explanation, ...]
     until: float
     reason: str
+    left: tuple[str, ...] = ()  # columns that the judge cannot determine
+    is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
 
     @property
     def is_right(self) -> bool:
-        """Return whether every column is right."""
-        return all(column.is_right for column in self.columns)
+        """Return whether every column is judged and right."""
+        return bool(self.columns) and all(column.is_right for column in self.columns)
 
     def to_record(self) -> dict[str, Any]:
         """Return the judgement as numbers, lists and text, for JSON."""
@@ -67,6 +48,8 @@ class Judgement:
             "right": self.is_right,
             "until": self.until,
             "reason": self.reason,
+            "not judged": list(self.left),
+            "searched": self.is_complete,
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
             "explanations": [vars(e) for e in self.explanations],
         }
@@ -77,6 +60,7 @@ def judge_motion(
     motion: str | Path | Mapping[str, np.ndarray] | Recording,
     seconds: float = SECONDS,
     tolerance: float = FLOOR,
+    progress: Callable[[str], None] | None = None,
 ) -> Judgement:
     """Return the errors of a recorded motion and their possible explanations.
 
@@ -91,6 +75,8 @@ def judge_motion(
     tolerance : float
         Largest error of a right column, relative to the size of its quantity: the mechanism's length, 1 rad,
         the largest velocity or angular velocity of a body. 0 judges by the bound of the reference alone.
+    progress : callable, optional
+        Called with a sentence before long work.
 
     Raises
     ------
@@ -99,29 +85,36 @@ def judge_motion(
     """
     recording = _from_start(scene, _as_recording(scene, motion))
     scene = started(scene)
-    found = exact(scene, _with_dense(recording.times), seconds)
-    if not len(found.motion.times):
+    found, columns = dense_exact(scene, recording.times, seconds, recording.columns)
+    if not (found.motion.times >= recording.times[0]).any():
         raise SceneError([f"{scene.name}: has no reference: {found.reason}"])
-    return _judged(scene, recording, found, tolerance)
-
-
-def _with_dense(times: np.ndarray) -> np.ndarray:
-    """Return times (k,) and further times from 0 to their end. A further time has at least a tenth of a step
-    to a given time."""
-    dense = np.linspace(0.0, times[-1], DENSE + 1)
-    after = np.minimum(np.searchsorted(times, dense), len(times) - 1)
-    nearest = np.minimum(np.abs(times[after] - dense), np.abs(times[np.maximum(after - 1, 0)] - dense))
-    return np.union1d(times, dense[nearest > 0.1 * times[-1] / DENSE])
+    return _judged(scene, recording, found, columns, tolerance, progress)
 
 
 def _as_recording(scene: Scene, motion: Any) -> Recording:
     if isinstance(motion, Recording):
         return motion
     if isinstance(motion, Mapping):
-        columns = {name: np.asarray(column, dtype=float) for name, column in motion.items()}
-        times = columns.pop("time")
-        return Recording(times, {n: c for n, c in columns.items() if kind_of(n)})
+        return _of_columns(scene, {name: np.asarray(column, dtype=float) for name, column in motion.items()})
     return read(Path(motion), scene, {})
+
+
+def _of_columns(scene: Scene, columns: dict[str, np.ndarray]) -> Recording:
+    """Return columns as a recording; raises SceneError if a column is missing, too short or not finite."""
+    if "time" not in columns:
+        raise SceneError(["the motion has no column time"])
+    times, known = columns.pop("time"), names(scene)
+    found = {name: column for name, column in columns.items() if name in known}
+    if not found:
+        raise SceneError([f"the motion has no column of the scene, such as {known[0]}"])
+    for name, column in {"time": times, **found}.items():
+        if column.shape != times.shape or column.ndim != 1 or not len(column):
+            raise SceneError([f"column {name}: must have one number for each time"])
+        if not np.isfinite(column).all():
+            raise SceneError([f"column {name}: is not finite"])
+    if times[0] < 0 or np.any(np.diff(times) <= 0):
+        raise SceneError(["column time: times must not be negative and must increase"])
+    return Recording(times, found)
 
 
 def _from_start(scene: Scene, recording: Recording) -> Recording:
@@ -131,52 +124,51 @@ def _from_start(scene: Scene, recording: Recording) -> Recording:
     return replace(recording, columns=columns)
 
 
-def _judged(scene: Scene, recording: Recording, found: Exact, tolerance: float) -> Judgement:
+def _judged(
+    scene: Scene,
+    recording: Recording,
+    found: Exact,
+    columns: Columns,
+    tolerance: float,
+    progress: Callable[[str], None] | None,
+) -> Judgement:
     known = recording.times <= found.motion.times[-1]
     times = recording.times[known]
     places = np.searchsorted(found.motion.times, times)
-    size = scales(scene, found.motion)
-    whole = {n: c for n, c in values(scene, found.motion).items() if np.isfinite(c).all()}
-    recorded = {n: c[known] for n, c in recording.columns.items() if n in whole}
-    right = with_signs(recorded, {n: whole[n][places] for n in whole})
-    scale = {n: size[kind_of(n)] for n in recorded}
-    known_to, digit = float(found.bound[places].max()), recording.resolution
-    errors = tuple(
-        _column(
-            n, recorded[n] - right[n], times, scale[n] * known_to + digit.get(n, 0.0), tolerance * scale[n]
-        )
-        for n in recorded
+    whole = {n: c for n, c in columns.items() if np.isfinite(c).all()}
+    judged = [n for n in recording.columns if n in whole]
+    size = scales(scene, found.motion, whole)
+    scale = {n: size[kind_of(n)] for n in judged}
+    recorded = {n: recording.columns[n][known] for n in judged}
+    rounding = {n: recording.rounding[n][known] if n in recording.rounding else 0 * times for n in judged}
+    error = float(found.bound[places].max())
+    later = {n: _spline(found.motion.times, c) for n, c in whole.items()}
+    compared = Compared(
+        times,
+        recorded,
+        with_signs(recorded, {n: whole[n][places] for n in judged}),
+        {n: scale[n] * error + rounding[n] for n in judged},
+        {n: tolerance * scale[n] for n in judged},
+        rounding,
+        recording.digits,
+        scale,
     )
-    explanations: list[Explanation] = []
-    if not all(e.is_right for e in errors):
-        later = _splines(found.motion.times, whole)
-        exact_columns = {n: right[n] for n in recorded}
-        difference = Difference(times, recorded, exact_columns, scale, later)
-        noise = float(np.sqrt(np.mean([(e.bound / scale[e.name]) ** 2 for e in errors])))
-        explanations = _explanations(scene, difference, noise)
-    return Judgement(errors, tuple(explanations), float(times[-1]), found.reason)
+    if "time" in recording.rounding:
+        compared = aligned(compared, recording.rounding["time"][known], later)
+    errors, found_causes = compared.errors(), Search(())
+    if any(e.largest > e.allowed for e in errors):
+        if progress is not None:
+            progress(f"searching for an explanation, at most {SEARCHED:g} CPU s")
+        found_causes = search(scene, compared, later, float(found.motion.times[-1]))
+    left = tuple(n for n in recording.columns if n not in whole)
+    return Judgement(
+        errors, found_causes.explanations, float(times[-1]), found.reason, left, found_causes.is_complete
+    )
 
 
-def _explanations(scene: Scene, difference: Difference, noise: float) -> list[Explanation]:
-    """Return the best explanations: changed scenes and pairs of causes are tried if simpler causes leave too
-    much."""
-    causes, noisy = list(simple(difference)), 3 * noise / difference.size({})
-    found = ranked(difference, causes, noise)
-    if not found or found[0].remains > max(EXACT, noisy):
-        causes += changed(scene, difference, TRIED)
-        found = ranked(difference, causes, noise)
-    if not found or found[0].remains > max(EXPLAINED, noisy):
-        found = ranked(difference, [*causes, *pairs(difference, causes, TRIED)], noise)
-    return found
-
-
-def _column(name: str, error: np.ndarray, times: np.ndarray, bound: float, allowed: float) -> ColumnError:
-    size = np.abs(error)
-    largest, allowed = float(size.max()), max(bound, allowed)
-    begins = float(times[int(np.argmax(size > BEGINS * largest))]) if largest > allowed else None
-    return ColumnError(name, largest, bound, allowed, begins)
-
-
-def _splines(times: np.ndarray, whole: Mapping[str, np.ndarray]) -> Any:
-    splines = {name: CubicSpline(times, column) for name, column in whole.items()}
-    return lambda t: {name: spline(t) for name, spline in splines.items()}
+def _spline(times: np.ndarray, column: np.ndarray) -> BSpline:
+    """Return the spline of degree DEGREE, or less if there are few samples, through a column (k,)."""
+    if len(times) == 1:
+        return BSpline([0.0, 1.0], column, 0)
+    degree = min(DEGREE, len(times) - 1)
+    return make_interp_spline(times, column, degree - 1 + degree % 2)

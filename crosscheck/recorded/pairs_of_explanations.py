@@ -2,42 +2,48 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from crosscheck.recorded.explanations import Columns, Difference, simple, vector_names
+from crosscheck.judge.deadline import ask
+from crosscheck.recorded.explanations import Cause, Columns, Difference, vector_names
+from crosscheck.recorded.simple_causes import simple
 
 FIRST = 6  # single explanations that are completed by a second one: the best by the difference that remains
 MOST = 0.9  # fraction of the difference: an explanation that leaves more explains nothing
-Found = tuple[str, int, Columns]
 
 
-def pairs(difference: Difference, singles: Sequence[Found], seconds: float) -> Iterator[Found]:
-    """Return (sentence, number of fitted parameters, predicted columns) for pairs of explanations.
+def pairs(difference: Difference, singles: Iterable[Cause]) -> Iterator[Cause]:
+    """Return pairs of causes: the best of the single causes, each completed by a cause of what it leaves.
 
-    ``singles`` are the explanations by one cause. The search ends after CPU time (s).
+    Asks for the deadline before each cause.
     """
-    before, end = difference.size({}), time.process_time() + seconds
-    sized = [(difference.size(columns) / before, n) for n, (_, _, columns) in enumerate(singles)]
-    for _, n in sorted(entry for entry in sized if entry[0] < MOST)[:FIRST]:
-        sentence, complexity, columns = singles[n]
+    before, sized = difference.size({}), []
+    for n, cause in enumerate(singles):
+        ask()
+        sized.append((difference.size(cause[2]) / before, n, cause))
+        sized = sorted(entry for entry in sized if entry[0] < MOST)[:FIRST]
+    for _, _, (sentence, complexity, columns) in sized:
         explained = {**difference.exact, **columns}
-        later = _explained(difference, explained)
-        left = replace(difference, exact=explained, later=later, begin=float(difference.times[0]))
+        left = replace(
+            difference,
+            exact=explained,
+            later=_explained(difference, explained),
+            begin=float(difference.times[0]),
+            end=float(difference.times[-1]),
+            every=None,
+        )
         for second, more, predicted in simple(left):
-            if time.process_time() > end:
-                return
             yield f"{sentence}; and {second}", complexity + more + 1, {**columns, **predicted}
 
 
-def _explained(difference: Difference, columns: Columns) -> Callable[[np.ndarray], Columns]:
+def _explained(difference: Difference, columns: Columns) -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     """Return the explained columns at any time, and all other columns of the exact motion."""
     splines = {n: CubicSpline(difference.times, column) for n, column in _continuous(columns).items()}
-    return lambda t: {**difference.later(t), **{name: spline(t) for name, spline in splines.items()}}
+    return {**difference.later, **splines}
 
 
 def _continuous(columns: Columns) -> Columns:

@@ -3,16 +3,19 @@ quaternions."""
 
 from __future__ import annotations
 
+import codecs
 import csv
 import difflib
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from crosscheck.recorded.columns import SI, UNITS, kind_of, names
+from crosscheck.recorded.columns import DIMENSIONS, SI, UNITS, kind_of, names
+from crosscheck.recorded.number_formats import half_units, number
 from mbref.scene import Scene, SceneError
 
 SHORT = {  # last part of a header → column of the scene
@@ -21,8 +24,9 @@ SHORT = {  # last part of a header → column of the scene
     **{f"w{a}": f"angular_velocity.{a}" for a in "xyz"},
     **{f"q{a}": f"orientation.{a}" for a in "wxyz"},
 }
+INFINITE = ("inf", "infinity")
 ORDERS = ("wxyz", "xyzw")
-WHOLE = 15  # number of significant digits of a column from which on the table has all digits
+LONGEST = 1000  # characters of a cell; the longest decimal number of double precision has 770 digits
 LATE = 50.0  # multiples of the scene's duration: later times are probably in another unit
 
 
@@ -30,13 +34,15 @@ LATE = 50.0  # multiples of the scene's duration: later times are probably in an
 class Recording:
     """Columns (k,) of a recorded motion at times (k,), SI units.
 
-    ``resolution`` is the last printed digit of each column, in its SI unit. ``ignored`` lists headers that
-    are no column of the scene.
+    ``rounding`` (k,) is half a unit of the last digit of each cell, in SI units, of columns and of ``time``;
+    columns without rounding are exact. ``digits`` is the number of significant digits of the largest cell of
+    each column. ``ignored`` lists headers that are no column of the scene.
     """
 
     times: np.ndarray
     columns: Mapping[str, np.ndarray]
-    resolution: Mapping[str, float] = field(default_factory=dict)
+    rounding: Mapping[str, np.ndarray] = field(default_factory=dict)
+    digits: Mapping[str, int] = field(default_factory=dict)
     ignored: Sequence[str] = ()
 
 
@@ -53,39 +59,52 @@ def read(
     chosen, given = _chosen(scene, headers, columns, path)
     table = _numbers(cells, len(headers), path)
     factors = {name: _factor(name, given.get(name, ""), units) for name in chosen}
-    found = {name: table[:, k] * factors[name] for name, k in chosen.items()}
-    written = {name: [row[k] for row in cells] for name, k in chosen.items()}
-    whole = any(_digits(column) >= WHOLE for name, column in written.items() if name != "time")
-    last = {
-        name: factors[name] * _last_digit(written[name], table[:, k], whole) for name, k in chosen.items()
-    }
+    with np.errstate(over="ignore"):
+        found = {name: table[:, k] * factors[name] for name, k in chosen.items()}
+    for name, column in found.items():
+        if not np.isfinite(column).all():
+            raise SceneError([f"{path}: column {name}: numbers are too large for its unit"])
+    halves = half_units({name: [row[k] for row in cells] for name, k in chosen.items()})
+    digits = {name: _digits(table[:, k], halves[name]) for name, k in chosen.items()}
+    rounding = {name: half * factors[name] for name, half in halves.items()}
     times = _checked_times(found.pop("time"), scene, path)
     if order != "wxyz":
-        found = _reordered(found, order)
+        found, rounding, digits = (_reordered(of, order) for of in (found, rounding, digits))
     ignored = [h for k, h in enumerate(headers) if k not in chosen.values()]
-    return Recording(times, found, last, ignored)
+    return Recording(times, found, rounding, digits, ignored)
+
+
+def _digits(numbers: np.ndarray, halves: np.ndarray) -> int:
+    """Return the number of significant digits of the largest number (k,), rounded to ``halves`` (k,)."""
+    k = int(np.argmax(np.abs(numbers)))
+    size, unit = abs(float(numbers[k])), 2 * float(halves[k])
+    return int(np.floor(np.log10(size)) - np.round(np.log10(unit))) + 1 if size > unit > 0 else 1
 
 
 def _cells(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return headers and cells of a table; the first line that begins with a number is the first row."""
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    data = path.read_bytes()
+    is_wide = data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+    text = data.decode("utf-16" if is_wide else "utf-8-sig", errors="replace")
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    first = next((k for k, line in enumerate(lines) if re.match(r"[-+.]?\d", line)), len(lines))
+    first = next((k for k, line in enumerate(lines) if re.match(r"[\"']?[-+.]?\d", line)), len(lines))
     head = lines[first - 1].lstrip("#%! ") if first else ""
     if first == len(lines):
         raise SceneError([f"{path}: has no row of numbers"])
     separator = next((s for s in (";", "\t", ",") if s in lines[first]), None)
-    rows = [_split(line, separator) for line in lines[first:]]
+    try:
+        headers, *rows = [_split(line, separator) for line in (head, *lines[first:])]
+    except csv.Error as error:
+        raise SceneError([f"{path}: {error}"]) from None
     if separator == ";":
         rows = [[cell.replace(",", ".") for cell in row] for row in rows]
-    headers = _split(head, separator) if head else []
     count = len(rows[0])
     return (headers if len(headers) == count else [f"column {k + 1}" for k in range(count)]), rows
 
 
 def _split(line: str, separator: str | None) -> list[str]:
     """Return the cells of a line without quotes; cells are separated by blanks if there is no separator."""
-    cells = next(csv.reader([line], delimiter=separator)) if separator else line.split()
+    cells = next(csv.reader([line], delimiter=separator), []) if separator else line.split()
     return [cell.strip().strip("\"'") for cell in cells]
 
 
@@ -97,7 +116,12 @@ def _chosen(
     known, chosen, units = ["time", *names(scene)], {}, {}
     for k, header in enumerate(headers):
         name, unit = _recognised(header, known)
-        if name and name not in chosen:
+        if name in chosen and name not in columns:
+            twice = f"{chosen[name] + 1} and {k + 1}"
+            raise SceneError(
+                [f"{path}: columns {twice} are both {name}; --column {name}={k + 1} chooses the second"]
+            )
+        if name:
             chosen[name], units[name] = k, unit
     for name, place in columns.items():
         if name not in known:
@@ -117,7 +141,7 @@ def _chosen(
 def _recognised(header: str, known: Sequence[str]) -> tuple[str, str]:
     """Return column and unit of a header such as ``rod.position.x [mm]`` or ``rod.x``; empty if the header
     names no column of the scene."""
-    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/]*)\s*[\])]?)?\s*", header)
+    match = re.fullmatch(r"\s*(.*?)\s*(?:[\[(/]\s*([\w/ *^]*?)\s*[\])]?)?\s*", header)
     text, unit = (match[1], match[2] or "") if match else (header, "")
     if text.lower() in ("t", "time"):
         return "time", unit
@@ -151,49 +175,30 @@ def _factor(name: str, own: str, units: Sequence[str]) -> float:
 
 def _dimension(unit: str) -> str:
     """Return the SI unit of a unit's quantity."""
-    for si, known in (
-        ("s", ("s", "ms", "min")),
-        ("m", ("m", "mm", "cm", "um", "in", "ft")),
-        ("rad", ("rad", "deg", "rev")),
-        ("m/s", ("m/s", "mm/s", "cm/s")),
-        ("rad/s", ("rad/s", "deg/s", "rpm")),
-        ("1", ("1",)),
-    ):
-        if unit in known:
-            return si
-    raise SceneError([f"unknown unit {unit!r}; known: {', '.join(filter(None, UNITS))}"])
+    if unit not in DIMENSIONS:
+        raise SceneError([f"unknown unit {unit!r}; known: {', '.join(filter(None, UNITS))}"])
+    return DIMENSIONS[unit]
 
 
 def _numbers(rows: Sequence[Sequence[str]], count: int, path: Path) -> np.ndarray:
-    found = np.empty((len(rows), count))
     for i, row in enumerate(rows):
-        try:
-            numbers = [float(cell) for cell in row]
-        except ValueError:
-            numbers = []
-        if len(numbers) != count:
+        if len(row) != count:
             raise SceneError([f"{path}: row {i + 1} of numbers is not {count} numbers"])
-        found[i] = numbers
+        for k, cell in enumerate(row):
+            if len(cell) > LONGEST:
+                size = f"{len(cell)} characters; a number has at most {LONGEST}"
+                raise SceneError([f"{path}: column {k + 1} of row {i + 1} has {size}"])
+    found = np.array([[_number(cell) for cell in row] for row in rows])
+    for i, k in np.argwhere(np.isnan(found))[:1]:
+        if rows[i][k].lower().lstrip("+-") != "nan":
+            raise SceneError([f"{path}: row {i + 1} of numbers is not {count} numbers: {rows[i][k]!r}"])
     if not np.isfinite(found).all():
         raise SceneError([f"{path}: row {int(np.argwhere(~np.isfinite(found))[0, 0]) + 1} is not finite"])
     return found
 
 
-def _digits(cells: Sequence[str]) -> int:
-    """Return the largest number of significant digits in a column."""
-    return max(len(re.sub(r"[eE].*", "", cell).replace(".", "").lstrip("+-0")) for cell in cells)
-
-
-def _last_digit(cells: Sequence[str], numbers: np.ndarray, whole: bool) -> float:
-    """Return the coarsest last digit of a column. Numbers of a table that is written with all digits
-    (``whole``) are rounded by the arithmetic alone: a column with 1.5 in each row has the number 1.5.
-    """
-    size = float(np.abs(numbers).max(initial=0.0))
-    if whole or not size:
-        return float(np.finfo(float).eps * size)
-    point = [len(re.sub(r"[eE].*", "", c).partition(".")[2]) for c in cells]
-    powers = [int((re.search(r"[eE]([-+]?\d+)", c) or ["", "0"])[1]) for c in cells]
-    return float(max(10.0 ** (power - p) for power, p in zip(powers, point, strict=True)))
+def _number(cell: str) -> float:
+    return float(cell) if cell.lower().lstrip("+-") in INFINITE else number(cell)
 
 
 def _checked_times(times: np.ndarray, scene: Scene, path: Path) -> np.ndarray:
@@ -209,7 +214,7 @@ def _checked_times(times: np.ndarray, scene: Scene, path: Path) -> np.ndarray:
     return times
 
 
-def _reordered(columns: dict[str, np.ndarray], order: str) -> dict[str, np.ndarray]:
+def _reordered(columns: dict[str, Any], order: str) -> dict[str, Any]:
     """Return columns in which the quaternion components are named by their place in the table's order."""
     if order not in ORDERS:
         raise SceneError([f"--quaternion: must be one of {', '.join(ORDERS)}, got {order!r}"])

@@ -1,0 +1,53 @@
+"""Forces and torques that drivers need for a motion (inverse dynamics), by the judge's own equations.
+
+Let v be the twists of all bodies, J the constraint rows, I the armatures of coordinates q with the rows Jq,
+and f the applied forces. The multipliers λ solve Jᵀ λ = M v' + Jqᵀ I q'' - f. A driver's row is the rate of
+its coordinate. So its multiplier is the force along, or the torque about, the axis on the second body.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.judge.constraints import jacobian, length_rows
+from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.reaction_balance import demanded
+from crosscheck.judge.tolerances import RANK
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
+# smallest share of a row that the other rows do not span; a redundant row has a share of at most 1/2
+DETERMINED = 1 - 1e-6
+
+
+def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
+    """Return the force (N) or torque (N m) (k,) of each driver, by its joint.
+
+    The torque accelerates the armature of the joint too, and contains what couplings transmit. It is NaN at
+    samples at which redundant constraints do not determine it.
+
+    Raises ValueError if the motion has no accelerations.
+    """
+    rows_of = {name: len(mask) for name, mask in length_rows(scene).items()}
+    ends = dict(zip(rows_of, np.cumsum(list(rows_of.values())), strict=True))
+    last = [int(ends[driver.joint]) - 1 for driver in scene.driver]
+    wanted = demanded(scene, exact).reshape(len(exact.times), -1)
+    found = np.array([_multipliers(scene, exact, k, push)[last] for k, push in enumerate(wanted)])
+    return {driver.joint: found[:, i] for i, driver in enumerate(scene.driver)}
+
+
+def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> np.ndarray:
+    """Return the multipliers (rows,) at a sample, for the forces (6 nb,) that act on bodies without
+    armatures."""
+    assert exact.acceleration is not None
+    assert exact.angular_acceleration is not None
+    state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]
+    twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
+    rotors = reflected(scene, *state)
+    total = push + rotors.mass @ twist_rates - rotors.force
+    rows, _ = jacobian(scene, float(exact.times[k]), *state[:2])
+    u, s, vt = np.linalg.svd(rows, full_matrices=False)
+    rank = int((s > RANK * s[0]).sum())
+    u = u[:, :rank]
+    found = u @ (vt[:rank] @ total / s[:rank])
+    return np.where(np.sum(u**2, axis=1) >= DETERMINED, found, np.nan)

@@ -1,0 +1,151 @@
+"""Errors of the columns of a table: each cell is compared within the rounding that its format gives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from crosscheck.recorded.number_formats import WHOLE
+
+BEGINS = 0.01  # fraction of the largest error at which an error is said to begin
+SHARE = 1e-3  # fraction of a column's range; a coarser rounding is stated beside "right"
+# fraction of a quantity's size, or of the column's range; numbers rounded more coarsely are not judged
+COARSEST = 0.1
+FINE = 1e-12  # fraction of a quantity's size; a finer rounding is not stated, also of constant columns
+CLOSE = 1 - 1e-9  # fraction of the bound: smaller errors do not move a sample; the rest is for rounding
+EVEN = 1e-3  # fraction of half a unit, by which evenly spaced times may differ in double precision
+SEARCH = 60  # steps of the search for a time within its rounding; each leaves two thirds of the interval
+Columns = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class ColumnError:
+    """Error of a column.
+
+    Attributes
+    ----------
+    name : str
+        The column.
+    largest : float
+        Largest error; if the column is off, of the samples at which it is off. SI units.
+    bound : float
+        Error that means nothing: of the reference, plus half a unit of the last digit. It is the bound at the
+        sample of the largest error if the column is off, otherwise the largest bound.
+    allowed : float
+        The bound, or the tolerance times the size of the quantity if that is larger.
+    begins : float or None
+        Time (s) at which the error first exceeds the part BEGINS of the largest error; None if right.
+    rounded_to : int or None
+        Number of significant digits of the column's largest number, if the rounding of numbers or times
+        exceeds the part SHARE of the column's range.
+    is_coarse : bool
+        True if the rounding exceeds the part COARSEST of the quantity's size: the column cannot be judged.
+    """
+
+    name: str
+    largest: float
+    bound: float
+    allowed: float
+    begins: float | None
+    rounded_to: int | None = None
+    is_coarse: bool = False
+
+    @property
+    def is_right(self) -> bool:
+        """Return whether the error is within the bound or the tolerance, and the digits can show it."""
+        return self.largest <= self.allowed and not self.is_coarse
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Recorded and exact columns (k,) at times (k,), with the bound (k,) of each cell and the tolerance of
+    each column.
+
+    ``rounding`` (k,) is half a unit of the last digit of each cell, ``digits`` the number of significant
+    digits of each column, ``scale`` the size of each column's quantity.
+    """
+
+    times: np.ndarray
+    recorded: Columns
+    exact: Columns
+    bound: Columns
+    tolerance: Mapping[str, float]
+    rounding: Columns
+    digits: Mapping[str, int]
+    scale: Mapping[str, float]
+
+    def allowed(self, name: str) -> np.ndarray:
+        """Return the error (k,) that counts as right at each sample."""
+        return np.maximum(self.bound[name], self.tolerance[name])
+
+    def errors(self) -> tuple[ColumnError, ...]:
+        """Return the error of every column."""
+        return tuple(self._error(name) for name in self.recorded)
+
+    def _error(self, name: str) -> ColumnError:
+        size, allowed = np.abs(self.recorded[name] - self.exact[name]), self.allowed(name)
+        off = size > allowed
+        half, digits = float(self.rounding[name].max()), self.digits.get(name, WHOLE)
+        extent = float(np.ptp(self.exact[name]))
+        rounded = digits if half > max(SHARE * extent, FINE * self.scale[name]) else None
+        coarse = half > COARSEST * max(extent, self.scale[name])
+        if not off.any():
+            return ColumnError(
+                name,
+                float(size.max()),
+                float(self.bound[name].max()),
+                float(allowed.max()),
+                None,
+                rounded,
+                coarse,
+            )
+        k = int(np.argmax(np.where(off, size, -1.0)))
+        largest, begins = float(size[k]), off & (size > BEGINS * size[k])
+        at = float(self.times[int(np.argmax(begins))])
+        return ColumnError(name, largest, float(self.bound[name][k]), float(allowed[k]), at, rounded, coarse)
+
+
+def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, BSpline]) -> Compared:
+    """Return the comparison at times within the rounding ``half`` (k,) of the written times.
+
+    Evenly spaced times stay evenly spaced: only the last one is moved within its rounding. Other times are
+    moved one by one. All columns of a sample are compared at one time. The sum of the parts of errors that
+    exceed their bounds, relative to the bounds, is least. The motion near a sample is a parabola, by the
+    derivatives of the splines ``later``.
+    """
+    times, names = compared.times, list(compared.recorded)
+    if (half <= 8 * np.finfo(float).eps * times[-1]).all() or not names or not times[-1]:
+        return compared
+    bound = np.array([compared.allowed(n) for n in names])
+    left = np.array([compared.recorded[n] - compared.exact[n] for n in names])
+    rate, curve = (np.array([later[n](times, order) for n in names]) for order in (1, 2))
+    is_even = bool((np.abs(times - np.linspace(times[0], times[-1], len(times))) <= EVEN * half).all())
+    parts = times / times[-1] if is_even else np.ones_like(times)
+    low, high = np.where(times > half, -half, 0.0), half.copy()
+    if is_even:
+        low, high = low[-1:], high[-1:]
+
+    def moved(shift: np.ndarray) -> np.ndarray:
+        return rate * (parts * shift) + curve * (parts * shift) ** 2 / 2
+
+    def excess(shift: np.ndarray) -> np.ndarray:
+        found = np.maximum(np.abs(left - moved(shift)) / bound - CLOSE, 0.0).sum(axis=0)
+        return found.sum(keepdims=True) if is_even else found
+
+    shift = np.zeros_like(high)
+    if excess(shift).any():
+        for _ in range(SEARCH):
+            third = (high - low) / 3
+            is_left = excess(low + third) <= excess(high - third)
+            low, high = np.where(is_left, low, low + third), np.where(is_left, high - third, high)
+        shift = (low + high) / 2
+    change = dict(zip(names, moved(shift), strict=True))
+    free = dict(zip(names, np.abs(rate) * (np.abs(parts * shift) if is_even else half), strict=True))
+    return replace(
+        compared,
+        exact={n: compared.exact[n] + change[n] for n in names},
+        rounding={n: np.maximum(compared.rounding[n], free[n]) for n in names},
+    )

@@ -1,0 +1,341 @@
+"""Causes of a difference that need no further simulation: units, signs, axes, quaternions, turns, times,
+frames, points and interpolation."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from crosscheck.judge.deadline import ask
+from crosscheck.recorded.columns import KNOWN_UNITS, SI, VECTORS, kind_of
+from crosscheck.recorded.explanations import Cause, Columns, Difference, vector_names
+from mbref import rotations
+
+WORDS = {
+    "in": "inches",
+    "ft": "feet",
+    "deg": "degrees",
+    "rev": "revolutions",
+    "deg/s": "degrees/s",
+    "rpm": "revolutions a minute",
+    "deg/s²": "degrees/s²",
+}
+# scopes of units: a whole table in mm has velocities in mm/s
+FAMILIES = {
+    "all lengths and their rates": ("m", "m/s", "m/s²"),
+    "all angles and their rates": ("rad", "rad/s", "rad/s²"),
+}
+# fractions of the duration: shifts in time from which the best is refined
+SHIFTS = np.linspace(-0.1, 0.1, 41)
+FASTER = 0.1  # largest relative error of a clock that is tried
+NEAR = 1e-3  # rad; rounding by which a wrapped angle may exceed its interval
+REFINED = 3  # intervals in which a fitted number is refined, each a thousandth of the former
+INSIDE = 0.8  # least fraction of the samples at which a shifted motion is known
+
+
+def simple(difference: Difference) -> Iterator[Cause]:
+    """Return (sentence, number of fitted parameters, predicted columns) for explanations that need no further
+    simulation."""
+    for family in FAMILIES_OF_CAUSES:
+        yield from family(difference)
+
+
+def _scopes(d: Difference) -> Iterator[tuple[str, list[str]]]:
+    """Return named sets of columns: of a quantity, of a quantity of a body, and single columns; each set
+    once."""
+    seen: set[tuple[str, ...]] = set()
+    names = list(d.recorded)
+    scopes = [(f"all columns of {k}", [n for n in names if kind_of(n) == k]) for k in map(kind_of, names)]
+    scopes += [(title, [n for n in names if SI[kind_of(n)] in units]) for title, units in FAMILIES.items()]
+    owners = dict.fromkeys(n.rpartition("." + kind_of(n))[0] for n in names)
+    scopes += [(f"all columns of {o}", [n for n in names if o and n.startswith(f"{o}.")]) for o in owners]
+    for body in d.bodies:
+        for kind in VECTORS:
+            scopes.append((f"{body}.{kind}", [n for n in names if n.startswith(f"{body}.{kind}.")]))
+    for title, columns in [*scopes, *((n, [n]) for n in names)]:
+        if columns and tuple(columns) not in seen:
+            seen.add(tuple(columns))
+            yield title if len(columns) > 1 else columns[0], columns
+
+
+def _units(d: Difference) -> Iterator[Cause]:
+    """Return columns in another unit, or of opposite sign."""
+    for title, columns in _scopes(d):
+        yield f"{title}: of opposite sign (factor -1)", 1, {n: -d.exact[n] for n in columns}
+        units = {SI[kind_of(n)] for n in columns}
+        first = min(units, key=len)
+        if len(units) > 1 and title not in FAMILIES:
+            continue
+        for other, factor in KNOWN_UNITS[first].items():
+            unit = WORDS.get(other, other)
+            if factor != 1.0:
+                scaled = {n: d.exact[n] / factor for n in columns}
+                yield f"{title}: in {unit}, not {first} (factor {1 / factor:.6g})", 1, scaled
+                scaled = {n: d.exact[n] * factor for n in columns}
+                yield f"{title}: in {first}, read as {unit} (factor {factor:.6g})", 1, scaled
+
+
+def _factors(d: Difference) -> Iterator[Cause]:
+    for title, columns in _scopes(d):
+        top = sum(float(d.recorded[n] @ d.exact[n]) for n in columns)
+        below = sum(float(d.exact[n] @ d.exact[n]) for n in columns)
+        if below:
+            factor = top / below
+            yield f"{title}: a factor of {factor:.9g}", 2, {n: factor * d.exact[n] for n in columns}
+
+
+def _offsets(d: Difference) -> Iterator[Cause]:
+    for title, columns in _scopes(d):
+        moved = {n: float(np.mean(d.recorded[n] - d.exact[n])) for n in columns}
+        listed = ", ".join(f"{v:.6g}" for v in moved.values())
+        yield (
+            f"{title}: an offset of {listed}",
+            1 + len(columns),
+            {n: d.exact[n] + v for n, v in moved.items()},
+        )
+
+
+def _turns(d: Difference) -> Iterator[Cause]:
+    """Return angles that differ by full turns."""
+    angles = [n for n in d.recorded if kind_of(n) == "angle"]
+    for columns in [angles, *([n] for n in angles)] if len(angles) > 1 else [angles]:
+        turns = {n: np.round((d.recorded[n] - d.exact[n]) / (2 * np.pi)) for n in columns}
+        if not any(t.any() for t in turns.values()):
+            continue
+        title = ", ".join(n for n in columns if turns[n].any())
+        low, high = (f([f(d.recorded[n]) for n in columns if turns[n].any()]) for f in (np.min, np.max))
+        says = "full turns are counted otherwise"
+        for begin, end, interval in ((-np.pi, np.pi, "-π and π"), (0.0, 2 * np.pi, "0 and 2 π")):
+            if begin - NEAR <= low and high <= end + NEAR:
+                says = f"full turns are not counted (angles between {interval})"
+        yield f"{title}: {says}", 1, {n: d.exact[n] + 2 * np.pi * turns[n] for n in columns}
+
+
+def _shifts(d: Difference) -> Iterator[Cause]:
+    """Return all columns shifted by a time, at the samples that the exact motion then has."""
+    size = float(d.times[-1] - d.times[0])
+
+    def later(shift: float) -> Columns | None:
+        return _at(d, d.times - shift)
+
+    if size > 0 and (shift := _best(d, later, size * SHIFTS)) and (columns := later(shift)):
+        yield f"all columns: later by {shift:.6g} s", 2, columns
+
+
+def _clocks(d: Difference) -> Iterator[Cause]:
+    """Return the motion at times that a clock shows which goes fast or slow."""
+
+    def faster(rate: float) -> Columns | None:
+        return _at(d, d.times / (1 + rate))
+
+    rates = FASTER * np.linspace(-1, 1, 41)
+    if len(d.times) > 1 and (rate := _best(d, faster, rates)) and (columns := faster(rate)):
+        word = "fast" if rate > 0 else "slow"
+        yield f"all columns: the clock of the table is {word} by {abs(rate):.6g} of the time", 2, columns
+
+
+def _best(d: Difference, predict: Callable[[float], Columns | None], tried: np.ndarray) -> float | None:
+    """Return the number for which the predicted columns leave least; the best of some numbers is refined."""
+    from scipy.optimize import minimize_scalar
+
+    nothing = 10 * d.size({})  # more than any prediction that is worth a refinement leaves
+
+    def size(number: float) -> float:
+        ask()
+        columns = predict(number)
+        return nothing if columns is None else d.size(columns)
+
+    best, step = float(tried[int(np.argmin([size(x) for x in tried]))]), float(tried[1] - tried[0])
+    for _ in range(
+        REFINED
+    ):  # the least size of a smooth square is found to its rounding in several intervals
+        found = minimize_scalar(
+            size, bounds=(best - step, best + step), method="bounded", options={"xatol": 1e-6 * step}
+        )
+        best, step = (float(found.x) if found.fun <= size(best) else best), 1e-3 * step
+    return best if size(best) < nothing else None
+
+
+def _at(d: Difference, times: np.ndarray) -> Columns | None:
+    """Return the exact columns at other times (k,), where they are known; None if many are not."""
+    inside = (times >= d.begin) & (times <= d.end)
+    if inside.sum() < INSIDE * len(times):
+        return None
+    known = np.clip(times, d.begin, d.end)
+    return {n: np.where(inside, d.later[n](known), d.recorded[n]) for n in d.recorded}
+
+
+def _axes(d: Difference) -> Iterator[Cause]:
+    """Return columns with components exchanged or reversed: of one quantity of a body, of a body, or of all
+    bodies."""
+    vectors = [
+        (b, k)
+        for b in d.bodies
+        for k in VECTORS
+        if k != "orientation" and d.vector(b, k, d.exact) is not None
+    ]
+    scopes = [("all bodies", vectors)] + [(b, [v for v in vectors if v[0] == b]) for b in d.bodies]
+    scopes += [(f"all columns of {k}", [v for v in vectors if v[1] == k]) for k in VECTORS]
+    scopes += [(f"{b}.{k}", [(b, k)]) for b, k in vectors]
+    for title, chosen in scopes:
+        for order in itertools.permutations(range(3)) if chosen else ():
+            for signs in itertools.product((1, -1), repeat=3):
+                if order == (0, 1, 2) and signs.count(-1) != 2:
+                    continue  # single components and equal signs are covered by the factors
+                read = ", ".join(
+                    f"{'-' if s < 0 else ''}{'xyz'[o]}" for s, o in zip(signs, order, strict=True)
+                )
+                columns: dict[str, np.ndarray] = {}
+                for body, kind in chosen:
+                    exact = d.vector(body, kind, d.exact)
+                    names = vector_names(body, kind)
+                    if exact is not None:
+                        columns |= {n: s * exact[:, o] for n, s, o in zip(names, signs, order, strict=True)}
+                yield f"{title}: x, y, z hold {read} of the exact motion", 2 + signs.count(-1), columns
+
+
+def _quaternions(d: Difference) -> Iterator[Cause]:
+    turning = {b: q for b in d.bodies if (q := d.vector(b, "orientation", d.exact)) is not None}
+    changes: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "quaternions in the order x, y, z, w": lambda q: q[:, [1, 2, 3, 0]],
+        "quaternions in the order w, x, y, z, read as x, y, z, w": lambda q: q[:, [3, 0, 1, 2]],
+        "quaternions of the opposite rotation, world to body": rotations.conjugate,
+        "rotation vectors, not quaternions (w is the angle)": lambda q: _rotation_vectors(q, 1.0),
+        "rotation vectors, not quaternions (w is 0)": lambda q: _rotation_vectors(q, 0.0),
+    }
+    scopes = [("all columns of orientation", list(turning)), *((f"{b}.orientation", [b]) for b in turning)]
+    for title, bodies in scopes[: len(scopes) if len(turning) > 1 else 1]:
+        for meaning, change in changes.items():
+            columns: dict[str, np.ndarray] = {}
+            for body in bodies:
+                columns |= dict(zip(vector_names(body, "orientation"), change(turning[body]).T, strict=True))
+            if columns:
+                yield f"{title}: {meaning}", 1, columns
+
+
+def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
+    """Return rotation vectors (k, 3) of quaternions (k, 4), rad, behind ``first`` times their length."""
+    q = np.where(q[:, :1] < 0, -q, q)
+    size = np.linalg.norm(q[:, 1:], axis=1, keepdims=True)
+    angle = 2 * np.arctan2(size, q[:, :1])
+    vectors = q[:, 1:] * np.where(size > 0, angle / np.where(size > 0, size, 1.0), 2.0)
+    return np.hstack([first * angle, vectors])
+
+
+def _frames(d: Difference) -> Iterator[Cause]:
+    """Return the columns for another world frame: the rotation and translation that fit the positions
+    best."""
+    pairs = [(d.vector(b, "position", d.recorded), d.vector(b, "position", d.exact)) for b in d.bodies]
+    known = [(r, e) for r, e in pairs if r is not None and e is not None]
+    if not known:
+        return
+    recorded, exact = (np.vstack(side) for side in zip(*known, strict=True))
+    middle = recorded.mean(axis=0), exact.mean(axis=0)
+    u, _, vt = np.linalg.svd((recorded - middle[0]).T @ (exact - middle[1]))
+    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    move, q = middle[0] - turn @ middle[1], rotations.from_matrix(turn)
+    angle = np.degrees(2 * np.arctan2(np.linalg.norm(q[1:]), abs(q[0])))
+    columns: dict[str, np.ndarray] = {}
+    for body in d.bodies:
+        for kind in VECTORS:
+            vector = d.vector(body, kind, d.exact)
+            if vector is not None:
+                moved = rotations.multiply(q, vector) if kind == "orientation" else vector @ turn.T
+                moved = moved + move if kind == "position" else moved
+                columns |= dict(zip(vector_names(body, kind), moved.T, strict=True))
+    where = ", ".join(f"{x:.6g}" for x in move)
+    yield f"all bodies: another world frame, turned by {angle:.6g} degrees, origin at ({where}) m", 6, columns
+
+
+def _points(d: Difference) -> Iterator[Cause]:
+    """Return the columns for another body-fixed point than the centre of mass, and for other body axes, of
+    every body."""
+    for body in d.bodies:
+        yield from _other_axes(d, body)
+        q = np.array([d.whole[n] for n in vector_names(body, "orientation")]).T
+        w = np.array([d.whole[n] for n in vector_names(body, "angular_velocity")]).T
+        known = [k for k in ("position", "velocity") if d.vector(body, k, d.recorded) is not None]
+        for chosen in [known, *([k] for k in known)] if len(known) > 1 else [known]:
+            columns, arm = _another_point(d, body, chosen, (q, w))
+            where = ", ".join(f"{x:.6g}" for x in arm)
+            only = "" if "position" in chosen else ": velocities"
+            if columns:
+                yield (
+                    f"{body}{only}: a point at ({where}) m in the body's frame, not the centre of mass",
+                    4,
+                    columns,
+                )
+
+
+def _another_point(
+    d: Difference, body: str, kinds: list[str], turning: tuple[np.ndarray, np.ndarray]
+) -> tuple[Columns, np.ndarray]:
+    """Return positions, velocities or both of a point, and the point's arm (3,) m in the body's frame."""
+    q, w = turning
+    axes = np.stack([rotations.rotate(q, unit) for unit in np.eye(3)], axis=2)  # (k, 3, 3)
+    rates = np.stack([np.cross(w, axes[:, :, i]) for i in range(3)], axis=2)
+    left, rows = [], []
+    for kind in kinds:
+        exact, recorded = (d.vector(body, kind, of) for of in (d.exact, d.recorded))
+        assert exact is not None
+        assert recorded is not None
+        size = d.scale[vector_names(body, kind)[0]]
+        left.append((recorded - exact).ravel() / size)
+        rows.append((axes if kind == "position" else rates).reshape(-1, 3) / size)
+    if not kinds:
+        return {}, np.zeros(3)
+    arm = np.linalg.lstsq(np.vstack(rows), np.concatenate(left), rcond=1e-9)[0]
+    columns: dict[str, np.ndarray] = {}
+    for kind in kinds:
+        moved = np.array([d.exact[n] for n in vector_names(body, kind)]).T
+        moved = moved + (axes if kind == "position" else rates) @ arm
+        columns |= dict(zip(vector_names(body, kind), moved.T, strict=True))
+    return columns, arm
+
+
+def _other_axes(d: Difference, body: str) -> Iterator[Cause]:
+    exact, recorded = (d.vector(body, "orientation", of) for of in (d.exact, d.recorded))
+    if exact is None or recorded is None:
+        return
+    turned = rotations.multiply(rotations.conjugate(exact), recorded)
+    turned = turned * np.where(turned @ turned[0] < 0, -1.0, 1.0)[:, None]
+    mean = turned.mean(axis=0)
+    if (size := float(np.linalg.norm(mean))) > 0:
+        columns = dict(
+            zip(vector_names(body, "orientation"), rotations.multiply(exact, mean / size).T, strict=True)
+        )
+        yield f"{body}: other body axes, turned by a constant rotation", 4, columns
+
+
+def _interpolations(d: Difference) -> Iterator[Cause]:
+    """Return all columns interpolated from every m-th row of the table, linearly or by the previous value."""
+    times, exact = d.every or (d.times, d.exact)
+    rows = np.searchsorted(times, d.times)
+    for m in range(2, max(2, min(50, len(times) // 3))):
+        ask()
+        nodes = np.arange(0, len(times), m)
+        if nodes[-1] != len(times) - 1:
+            nodes = np.append(nodes, len(times) - 1)
+        spacing = times[m] - times[0]
+        lines = {n: np.interp(d.times, times[nodes], exact[n][nodes]) for n in d.recorded}
+        yield f"all columns: straight lines between samples {spacing:.6g} s apart", 2, lines
+        before = nodes[np.searchsorted(nodes, rows, side="right") - 1]
+        steps = {n: exact[n][before] for n in d.recorded}
+        yield f"all columns: each value is repeated for {spacing:.6g} s", 2, steps
+
+
+FAMILIES_OF_CAUSES = (
+    _quaternions,
+    _turns,
+    _units,
+    _factors,
+    _offsets,
+    _shifts,
+    _clocks,
+    _frames,
+    _points,
+    _interpolations,
+    _axes,
+)

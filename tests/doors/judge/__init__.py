@@ -1,0 +1,1 @@
+"""Verdicts of `crosscheck judge` on tables of exact and of changed motions."""

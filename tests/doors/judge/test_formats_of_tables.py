@@ -1,0 +1,111 @@
+"""A table of the exact motion is right in every format of numbers; with an error of ten units it is off."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import crosscheck
+from mbref.scene import Scene
+from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, write_table
+
+SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
+GATE, DEEP = 15, 200  # number of random tables
+SHARE = 1e-3  # fraction of a column's range, above which the bound beside "right" is stated as rounding
+TOLERANCE = 1e-8  # the judge's default tolerance, relative to the size of a quantity
+seeds = pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=[pytest.mark.slow] * (k >= GATE)) for k in range(DEEP)]
+)
+
+
+@functools.cache
+def exact(name: str) -> Table:
+    """Return the reference motion of a scene at 41 times, 0.01 s or 0.025 s apart."""
+    scene = SCENES[name]()
+    found = crosscheck.reference_table(scene, np.linspace(0.0, scene.duration, 41))
+    return {n: c for n, c in found.items() if n != "bound"}
+
+
+def drawn(seed: int) -> tuple[np.random.Generator, Scene, Table, str]:
+    """Return a scene, some columns of its exact motion at some samples, and a format."""
+    rng = np.random.default_rng(seed)
+    name = str(rng.choice(list(SCENES)))
+    table = exact(name)
+    columns = rng.permutation([n for n in table if n != "time" and np.ptp(table[n]) > 0.01])[
+        : rng.integers(2, 9)
+    ]
+    start, count = int(rng.integers(0, 20)), int(rng.integers(12, 22))
+    part = {n: table[n][start : start + count] for n in ("time", *sorted(columns))}
+    return rng, SCENES[name](), part, str(rng.choice(list(FORMATS)))
+
+
+def unit(values: np.ndarray, form: str) -> float:
+    """Return the unit of the last digit of the largest number of a column in a format."""
+    digits = {"repr": 16, "single precision": 7}.get(form)
+    if digits is None and (form.endswith("f") or "decimals" in form):
+        return 10.0 ** -int("".join(c for c in form if c.isdigit()))
+    if digits is None:
+        digits = int(form[2:-1]) + form.endswith("e")
+    return float(10.0 ** (np.floor(np.log10(np.abs(values).max())) - digits + 1))
+
+
+@seeds
+def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> None:
+    """The bound exceeds a thousandth of the column's range only where the verdict states the rounding."""
+    _, scene, table, form = drawn(seed)
+    found = crosscheck.judge_motion(scene, write_table(table, tmp_path / "run.csv", FORMATS[form]))
+    assert found.is_right, (form, [c for c in found.columns if not c.is_right])
+    for column in found.columns:
+        extent = np.ptp(table[column.name])
+        assert column.bound <= SHARE * extent or column.rounded_to is not None, (form, column)
+
+
+@seeds
+def test_an_error_of_ten_units_is_off(seed: int, tmp_path: Path) -> None:
+    """The error is in one cell of one column, and larger than the tolerance."""
+    rng, scene, table, form = drawn(seed)
+    name = str(rng.choice([n for n in table if n != "time"]))
+    size = 10 * unit(table[name], form) + 100 * TOLERANCE * max(1.0, np.abs(table[name]).max())
+    table[name] = table[name].copy()
+    table[name][rng.integers(len(table["time"]))] += size * rng.choice([-1, 1])
+    found = crosscheck.judge_motion(scene, write_table(table, tmp_path / "run.csv", FORMATS[form]))
+    assert name in [c.name for c in found.columns if not c.is_right], form
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        ["0,0", "0.1,-0.2", "0.2,0.3", "0.3,-0.9"],
+        ["0,0.5", "0.1,0.51", "0.2,0.54", "0.3,0.6"],
+        ["0,1e308", "0.1,1e308", "0.2,1e308", "0.3,1e308"],
+        ["0.0,0.0", "0.1,1.0", "0.2,2.0", "0.3,3.0"],
+    ],
+)
+def test_invented_numbers_are_off(rows: list[str], tmp_path: Path) -> None:
+    """A short cell is an exact number, not the resolution of its column."""
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["time,A.angle", *rows]), encoding="utf-8")
+    assert not crosscheck.judge_motion(double_pendulum(), path).is_right
+
+
+def test_a_column_of_one_digit_is_too_coarse(tmp_path: Path) -> None:
+    """Integers do not show a motion of less than a unit, whatever they are."""
+    path = tmp_path / "run.csv"
+    path.write_text("time,A.angle\n0,0\n0.1,0\n0.2,0\n0.3,0\n", encoding="utf-8")
+    (column,) = crosscheck.judge_motion(double_pendulum(), path).columns
+    assert column.is_coarse and not column.is_right
+
+
+@pytest.mark.parametrize("form", ["%.3f", "%.4g", "%.6g", "spreadsheet with 3 decimals", "single precision"])
+def test_times_that_are_rounded_are_compared_within_their_rounding(form: str, tmp_path: Path) -> None:
+    """Times that are multiples of 1/77 s are written with few digits; one cell that is off stays off."""
+    scene = double_pendulum()
+    table = crosscheck.reference_table(scene, np.arange(31) / 77)
+    part = {n: table[n] for n in ("time", "lower.position.x", "lower.velocity.y", "A.angle", "B.rate")}
+    path = tmp_path / "run.csv"
+    assert crosscheck.judge_motion(scene, write_table(part, path, FORMATS[form])).is_right
+    part["A.angle"] = part["A.angle"] + 0.05 * (np.arange(31) == 20)
+    assert not crosscheck.judge_motion(scene, write_table(part, path, FORMATS[form])).is_right
