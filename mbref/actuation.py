@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref import rotations
-from mbref.joint_motion import along, joint_motion, position_of, turned_since_start, velocity_of
-from mbref.scene import JointLoad, Scene, Spring
+from mbref.driving_forces import driving_forces
+from mbref.joint_motion import along, angular_velocity_of, joint_motion, position_of, velocity_of
+from mbref.scene import Force, JointLoad, Load, Moment, Scene, SlideSpring, Spring, TorsionSpring
 from mbref.scene_joints import ANGLE
-from mbref.trajectory import Trajectory
+from mbref.trajectory import DRIVER, Trajectory
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,9 @@ class DriverMotion:
     """Force or torque, and power, that a driver supplies at k sample times (inverse dynamics).
 
     The driver acts on the second body of its joint and with the opposite sign on the first. A positive
-    torque turns the second body about the joint's axis, a positive force pushes it along the axis. It is the
-    component of the joint's reaction about or along the axis, on the second body. Springs at the joint act in
-    addition. A motor must also accelerate its armature, and a coupling at the joint transmits a part of it.
+    torque turns the second body about the joint's axis, a positive force pushes it along the axis. It
+    accelerates the armature of the joint and drives the couplings of the joint; springs at the joint act in
+    addition. Powers of all drivers and loads are the rate of energy (docs/outputs.md).
 
     Attributes
     ----------
@@ -32,21 +32,25 @@ class DriverMotion:
         Torque about the axis, N m, of a revolute or cylindrical joint.
     power : ndarray, shape (k,), or None
         Power into the mechanism, W: torque times rate of the angle, or force times rate of the displacement.
+    open : ndarray, shape (k,), or None
+        1 where equilibrium does not determine the force or torque, because another driver or constraint can
+        replace the driver; otherwise 0. None if the engine does not give it.
 
-    All are None without masses.
+    Force, torque and power are None without masses, and without reactions or accelerations that they need.
     """
 
     joint: str
     force: np.ndarray | None
     torque: np.ndarray | None
     power: np.ndarray | None
+    open: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class LoadMotion:
-    """Length, angle or displacement, rate, force or torque, and power of a load at k sample times.
+    """Length, angle or displacement, rate, force or torque, power and energy of a load at k sample times.
 
-    Numbers that a load of this type does not have are None; forces and moments on bodies have none.
+    Numbers that a load of this type does not have are None; forces and moments on bodies have power only.
 
     Attributes
     ----------
@@ -64,8 +68,12 @@ class LoadMotion:
     torque : ndarray, shape (k,), or None
         Torque on the second body about the joint's axis, N m.
     power : ndarray, shape (k,), or None
-        Power into the bodies, W: -force times length rate of a spring between points; otherwise torque times
-        rate, or force times rate of the displacement.
+        Power into the bodies, W: -force times length rate of a spring between points; torque times rate, or
+        force times rate of the displacement, of a load of a joint; force times velocity of its point, or
+        moment times angular velocity, of a force or moment on a body.
+    energy : ndarray, shape (k,), or None
+        Energy that a spring stores, J: stiffness times the square of its stretch, over 2. It is a part of the
+        potential energy.
     """
 
     place: int
@@ -78,6 +86,7 @@ class LoadMotion:
     displacement_rate: np.ndarray | None = None
     torque: np.ndarray | None = None
     power: np.ndarray | None = None
+    energy: np.ndarray | None = None
 
 
 def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
@@ -85,15 +94,14 @@ def driver_motion(scene: Scene, motion: Trajectory, name: str) -> DriverMotion:
     driven = [driver.joint for driver in scene.driver]
     if name not in driven:
         raise KeyError(f"no driver of a joint {name!r}; driven joints: {', '.join(driven) or 'none'}")
-    joint, found = scene.joint_named(name), joint_motion(scene, motion, name)
-    coordinate = joint.facts.driven
-    if found.force is None or found.moment is None or coordinate is None:
-        return DriverMotion(name, None, None, None)
-    first = turned_since_start(scene, motion, joint.bodies[0])
-    axis = rotations.rotate(first, rotations.unit(joint.directions[0])[None])
-    turns, rate = coordinate == ANGLE, along(found, coordinate)[1]
-    size = np.einsum("ki,ki->k", found.moment if turns else found.force, axis)
-    return DriverMotion(name, None if turns else size, size if turns else None, size * rate)
+    joint = scene.joint_named(name)
+    coordinate = joint.facts.driven or ANGLE
+    marks = (motion.open_reactions or {}).get(DRIVER.format(name))
+    size = driving_forces(scene, motion).get(name)
+    if size is None:
+        return DriverMotion(name, None, None, None, marks)
+    turns, rate = coordinate == ANGLE, along(joint_motion(scene, motion, name), coordinate)[1]
+    return DriverMotion(name, None if turns else size, size if turns else None, size * rate, marks)
 
 
 def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
@@ -102,19 +110,37 @@ def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
     if not 0 <= place < len(scene.load):
         raise IndexError(f"no load {place}; the scene has {len(scene.load)} loads, counted from 0")
     load = scene.load[place]
-    if load.type == "spring":
+    if isinstance(load, Spring):
         return _spring(scene, motion, place, load)
-    return _of_joint(scene, motion, place, load) if isinstance(load, JointLoad) else LoadMotion(place)
+    if isinstance(load, JointLoad):
+        return _of_joint(scene, motion, place, load)
+    return LoadMotion(place, power=factor_of(load, motion) * _power_of_constant(scene, motion, load))
+
+
+def factor_of(load: Load, motion: Trajectory) -> np.ndarray:
+    """Return the factor (k,) of a load over time; ones for a load without a factor."""
+    values = np.ones(len(motion.times)) if load.over_time is None else load.over_time.values(motion.times)
+    return np.asarray(values)
+
+
+def _power_of_constant(scene: Scene, motion: Trajectory, load: Force | Moment) -> np.ndarray:
+    """Return the power (k,) of a force or moment on a body, before its factor: F · v of its point, or
+    M · ω."""
+    if isinstance(load, Force):
+        return velocity_of(scene, motion, load.body, load.point) @ np.array(load.force)
+    return angular_velocity_of(scene, motion, load.body) @ np.array(load.moment)
 
 
 def _of_joint(scene: Scene, motion: Trajectory, place: int, load: JointLoad) -> LoadMotion:
     found, action = joint_motion(scene, motion, load.joint), load.action
     moved, rate = along(found, load.coordinate)
-    factor = 1.0 if load.over_time is None else load.over_time.values(motion.times)
-    size = action.amount * factor - action.stiffness * (moved - action.natural) - action.damping * rate
+    stretch = moved - action.natural
+    size = action.amount * factor_of(load, motion) - action.stiffness * stretch - action.damping * rate
+    energy = action.stiffness * stretch**2 / 2 if isinstance(load, TorsionSpring | SlideSpring) else None
+    numbers = {"power": size * rate, "energy": energy}
     if load.coordinate == ANGLE:
-        return LoadMotion(place, angle=moved, rate=rate, torque=size, power=size * rate)
-    return LoadMotion(place, force=size, displacement=moved, displacement_rate=rate, power=size * rate)
+        return LoadMotion(place, angle=moved, rate=rate, torque=size, **numbers)
+    return LoadMotion(place, force=size, displacement=moved, displacement_rate=rate, **numbers)
 
 
 def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadMotion:
@@ -124,8 +150,9 @@ def _spring(scene: Scene, motion: Trajectory, place: int, load: Spring) -> LoadM
     length = np.linalg.norm(stop - start, axis=1)
     direction = (stop - start) / np.where(length > 0, length, 1.0)[:, None]
     rate = np.einsum("ki,ki->k", stop_rate - start_rate, direction)
-    force = load.stiffness * (length - load.natural_length) + load.damping * rate
-    return LoadMotion(place, length, rate, force, power=-force * rate)
+    stretch = length - load.natural_length
+    force = load.stiffness * stretch + load.damping * rate
+    return LoadMotion(place, length, rate, force, power=-force * rate, energy=load.stiffness * stretch**2 / 2)
 
 
 def largest_force(trajectory: Trajectory) -> np.ndarray | None:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from mbref import rotations
+from mbref.actuation import load_motion
 from mbref.input_error import InputError
-from mbref.joint_motion import along, joint_motion, position_of
-from mbref.scene import JointLoad, Scene
+from mbref.joint_motion import along, joint_motion
+from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 
@@ -41,14 +42,9 @@ def potential(scene: Scene, motion: Trajectory) -> np.ndarray:
     _need_masses(scene)
     mass = np.array([body.mass for body in scene.body])
     total = -np.einsum("b,kbi,i->k", mass, motion.position, np.array(scene.gravity))
-    for load in scene.load:
-        if load.type == "spring":
-            ends = [position_of(scene, motion, b, p) for b, p in zip(load.bodies, load.points, strict=True)]
-            stretch = np.linalg.norm(ends[1] - ends[0], axis=1) - load.natural_length
-            total = total + load.stiffness * stretch**2 / 2
-        elif isinstance(load, JointLoad) and load.action.stiffness:
-            moved, _ = along(joint_motion(scene, motion, load.joint), load.coordinate)
-            total = total + load.action.stiffness * (moved - load.action.natural) ** 2 / 2
+    for place in range(len(scene.load)):
+        energy = load_motion(scene, motion, place).energy
+        total = total if energy is None else total + energy
     return np.asarray(total)
 
 

@@ -124,7 +124,7 @@ def _angle(
     """Return the angle about the axis, with full turns counted by the mean rate between samples, and its
     rate."""
     axis = rotations.unit(joint.directions[0])
-    spins = [_angular_velocity(scene, motion, name) for name in joint.bodies]
+    spins = [angular_velocity_of(scene, motion, name) for name in joint.bodies]
     rate = np.einsum("ki,ki->k", spins[1] - spins[0], rotations.rotate(first, axis[None]))
     wrapped = 2 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0])
     expected = (rate[1:] + rate[:-1]) / 2 * np.diff(motion.times)
@@ -133,9 +133,31 @@ def _angle(
     return wrapped + start + 2 * np.pi * np.concatenate([np.zeros(len(wrapped[:1])), np.cumsum(turns)]), rate
 
 
-def _angular_velocity(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+def angular_velocity_of(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    """Return the angular velocity (k, 3) of a body, rad/s, world axes; zero for the ground."""
     b = scene.body_index(name)
     return np.zeros((len(motion.times), 3)) if b < 0 else motion.angular_velocity[:, b]
+
+
+def angular_acceleration_of(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:
+    """Return the angular acceleration (k, 3) of a body, rad/s², world axes; zero for the ground. The motion
+    has accelerations."""
+    b = scene.body_index(name)
+    return np.zeros((len(motion.times), 3)) if b < 0 else np.asarray(motion.angular_acceleration)[:, b]
+
+
+def acceleration_of(
+    scene: Scene, motion: Trajectory, name: str, point: tuple[float, float, float]
+) -> np.ndarray:
+    """Return world accelerations (k, 3), m/s², of a point (world, t = 0) that moves with a body, or is fixed
+    to the ground. The motion has accelerations."""
+    b = scene.body_index(name)
+    if b < 0:
+        return np.zeros((len(motion.times), 3))
+    arm, spin = position_of(scene, motion, name, point) - motion.position[:, b], motion.angular_velocity[:, b]
+    turning = rotations.cross(angular_acceleration_of(scene, motion, name), arm)
+    inwards = rotations.cross(spin, rotations.cross(spin, arm))
+    return np.asarray(np.asarray(motion.acceleration)[:, b] + turning + inwards)
 
 
 def _displacement(
@@ -146,7 +168,7 @@ def _displacement(
     places = [position_of(scene, motion, *end) for end in ends]
     speeds = [velocity_of(scene, motion, *end) for end in ends]
     axis = rotations.rotate(first, rotations.unit(joint.directions[0])[None])
-    turning = rotations.cross(_angular_velocity(scene, motion, joint.bodies[0]), axis)
+    turning = rotations.cross(angular_velocity_of(scene, motion, joint.bodies[0]), axis)
     apart = places[1] - places[0]
     rate = np.einsum("ki,ki->k", speeds[1] - speeds[0], axis) + np.einsum("ki,ki->k", apart, turning)
     return np.einsum("ki,ki->k", apart, axis), rate

@@ -12,12 +12,13 @@ import numpy as np
 
 from mbref.input_error import InputError
 from mbref.scene_fields import meant
+from mbref.trajectory import DRIVER
 
 Owner = Literal["body", "joint", "driver", "load", "mechanism"]
 PREFIXES: dict[Owner, str] = {  # prefix of a column, by its owner
     "body": "{}.",
     "joint": "{}.",
-    "driver": "driver({}).",
+    "driver": f"{DRIVER}.",
     "load": "load({}).",
     "mechanism": "",
 }
@@ -101,6 +102,14 @@ OUTPUTS = (
     Output(
         "driver", "power", "W", "", "power into the mechanism: torque times rate, or force times rate", MASSES
     ),
+    Output(
+        "driver",
+        "open",
+        "",
+        "",
+        "1 where equilibrium does not determine the force or torque, else 0",
+        MASSES,
+    ),
     Output("load", "length", "m", "", "length of a spring", "a spring"),
     Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
     Output("load", "force", "N", "", "pull of a spring; force on the second body along an axis", PULLING),
@@ -109,7 +118,8 @@ OUTPUTS = (
     Output("load", "displacement", "m", "", "displacement of its joint since t = 0", LOAD_ALONG_AXIS),
     Output("load", "displacement_rate", "m/s", "", "rate of the displacement of its joint", LOAD_ALONG_AXIS),
     Output("load", "torque", "N m", "", "torque on the second body about the axis", LOAD_ABOUT_AXIS),
-    Output("load", "power", "W", "", "power into the bodies", "a spring or a load of a joint"),
+    Output("load", "power", "W", "", "power into the bodies"),
+    Output("load", "energy", "J", "", "energy that a spring stores", "a spring"),
     Output("mechanism", "position_violation", "m or rad", "", "largest violation of a constraint row"),
     Output("mechanism", "velocity_violation", "m/s or rad/s", "", "largest violation at velocity level"),
     Output(

@@ -12,6 +12,8 @@ import numpy as np
 
 from mbref.crossing import Crossing
 
+DRIVER = "driver({})"  # name of the driver of a joint in columns and records
+
 
 class Outcome(enum.Enum):
     """Outcome of a run.
@@ -126,7 +128,8 @@ class Trajectory:
         By joint: force (N) and moment (N m) on the second body at its anchor, including the driver's.
     open_reactions : mapping of str to ndarray, shape (k,), or None
         By joint: number of reaction components that equilibrium does not determine, because of redundant
-        constraint rows or at a singular position.
+        constraint rows or at a singular position. By ``driver(A)``: 1 where it does not determine the force
+        or torque of a driver.
     crossings : sequence of Crossing, or None
         Singular positions that the run crossed, or the one at which it ended. None if the method or engine
         does not look for them.

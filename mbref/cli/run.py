@@ -19,6 +19,7 @@ from mbref.motion import Motion
 from mbref.outputs import UNIT_OF
 from mbref.records import strict_json
 from mbref.scene import Scene
+from mbref.trajectory import DRIVER
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
@@ -138,12 +139,26 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
     out.print("\n".join(_largest(trajectory)))
     if columns:
         out.print(column_table(trajectory.columns(*columns)))
+        for sentence in _undetermined(trajectory, columns):
+            out.print(sentence)
         return
 
     def numbers(b: int, field: str) -> list[str]:
         return [f"{x:.5g}" for x in rounded(getattr(trajectory, field)[-1, b])]
 
     out.print(body_table(f"state at t = {trajectory.times[-1]:g} s", trajectory.bodies, numbers))
+
+
+def _undetermined(motion: Motion, columns: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence for each driver among the columns whose force or torque equilibrium does not
+    determine."""
+    for driver in motion.mechanism.driver:
+        name, marks = DRIVER.format(driver.joint), motion.driver(driver.joint).open
+        if marks is not None and marks.any() and any(column.startswith(name) for column in columns):
+            yield (
+                f"{name}: equilibrium does not determine its force or torque at {int(marks.sum())} of "
+                f"{len(marks)} samples; another driver or constraint can take its place"
+            )
 
 
 def _largest(motion: Motion) -> Iterator[str]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import COUPLED_ANGLE
 from mbref.lazy import LazyMapping
 from mbref.scene import Scene
+from mbref.trajectory import DRIVER
 
 MOST_OPEN_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
 OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes
@@ -26,7 +28,8 @@ SHARE = 1e-6  # weight of a joint in such a combination below which it does not 
 
 
 def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray) -> dict[str, Any]:
-    """Return ``reactions`` and ``open_reactions`` of a Motion, by joint, without those that are not computed.
+    """Return ``reactions`` by joint, and ``open_reactions`` by joint and driver, of a Motion, without those
+    that are not computed.
 
     Arguments are times (k,) in s, q (k, nb, 7) and λ (k, m).
     """
@@ -35,7 +38,8 @@ def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: 
     names = tuple(joint.name for joint in scene.joint)
     found = {"reactions": LazyMapping(names, _reactions, scene, times, q, multipliers)}
     if multipliers.shape[1] <= MOST_OPEN_ROWS:
-        found["open_reactions"] = LazyMapping(names, _open_dimensions, scene, times, q)
+        drivers = tuple(DRIVER.format(driver.joint) for driver in scene.driver)
+        found["open_reactions"] = LazyMapping(names + drivers, _open_dimensions, scene, times, q)
     return found
 
 
@@ -100,7 +104,7 @@ def _add_coupled(
 
 def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     """Return for each joint the number (k,) of reaction components that equilibrium does not determine at
-    each sample.
+    each sample, and for ``driver(A)`` 1 where it does not determine the force or torque of the driver.
 
     Redundant rows leave reactions undetermined at all times, a singular position only when the motion passes
     it. At a singular position a linear combination of rows vanishes, a left null vector of Φ_q (Wojtyra, J.
@@ -109,11 +113,11 @@ def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
     vanishing, _ = vanishing_combinations(model, blocks)
     names = tuple(joint.name for joint in model.scene.joint)
     _, _, of, starts = _places(model.structure, names)
-    ends = [*starts, of.size][1:]
-    return {
-        name: np.sum(_singular_values(vanishing[:, first:end]) > SHARE, axis=1)
-        for name, first, end in zip(names, starts, ends, strict=True)
-    }
+    rows = {name: slice(*pair) for name, pair in zip(names, pairwise([*starts, of.size]), strict=True)}
+    for d, driver in enumerate(model.scene.driver):
+        row = int(model.structure.row[model.structure.driver == d][0])
+        rows[DRIVER.format(driver.joint)] = slice(row, row + 1)
+    return {name: np.sum(_singular_values(vanishing[:, own]) > SHARE, axis=1) for name, own in rows.items()}
 
 
 def determined_components(model: Model, q: np.ndarray, blocks: np.ndarray) -> dict[str, np.ndarray]:

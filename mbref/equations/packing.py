@@ -83,8 +83,10 @@ class Packs:
         primitives, loads = self._fixed_in_bodies(
             self._in_order([rows for _, rows in of_joints], of_couplings)
         )
+        # gravity acts on the bodies of the scene, not on rotors or a modelled ground
+        has_weight = np.arange(self.nb)[:, None] < (0 if self.kinematic else len(scenes[0].body))
         self.data = SceneData(
-            gravity=self._gravity(),
+            gravity=np.where(has_weight, np.array([[scene.gravity] for scene in scenes], dtype=float), 0.0),
             lengths=lengths,
             metric_root=inverse_root(metric(self.mass, lengths)),
             bodies=bodies,
@@ -164,15 +166,6 @@ class Packs:
     def _rows(self, rows: Iterable[Any], width: int) -> np.ndarray:
         """Return rows of numbers (s, …, width) of entries, scene after scene."""
         return np.array([*rows], dtype=float).reshape(len(self.scenes), -1, width)
-
-    def _gravity(self) -> np.ndarray:
-        """Return the acceleration of gravity (s, nb, 3) of each body. A rotor and a modelled ground have no
-        weight: their masses are not masses of the scene."""
-        found = np.zeros((len(self.scenes), self.nb, 3))
-        if not self.kinematic:
-            for k, scene in enumerate(self.scenes):
-                found[k, : len(scene.body)] = scene.gravity
-        return found
 
     def _bodies(self) -> Bodies:
         """Return masses and moments, positions and frames of the bodies, with the fixed frame last."""

@@ -100,7 +100,8 @@ def _title(record: Record) -> str:
 def _open_reactions(run: Run) -> Iterator[str]:
     """Return a sentence on the samples at which equilibrium determines fewer components of the reactions than
     at other samples."""
-    marks = {joint: np.array(row) for joint, row in (run.record.get("open_reactions") or {}).items()}
+    marks = {part: np.array(row) for part, row in (run.record.get("open_reactions") or {}).items()}
+    marks = {joint: marks[joint] for joint in run.record["reactions"] if joint in marks}
     if not marks:
         return
     more = {joint: row > row.min() for joint, row in marks.items() if row.size}

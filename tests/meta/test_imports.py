@@ -48,7 +48,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
             "scene_validation",
         ],
         ["command_line", "formats", "scenes", "scene_slips", "variation", "outputs"],
-        ["joint_motion", "actuation", "energy"],
+        ["joint_motion", "driving_forces", "actuation", "energy"],
         ["drawing"],
         ["motion", "motion_files"],
         ["kernels"],

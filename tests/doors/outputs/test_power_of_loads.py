@@ -1,0 +1,51 @@
+"""Power of every load, and the energy that springs store."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbref import Motion, Scene, simulate
+from tests.helpers.parts import Z, hinge
+
+TIMES = np.linspace(0.0, 1.0, 7)
+RATE = 2.0 + 3.0 * TIMES
+ANGLE = 2.0 * TIMES + 1.5 * TIMES**2
+FACTOR = {"polynomial": [1.0, -0.5]}
+VALUES = 1.0 - 0.5 * TIMES
+CLOSE = 1e-11
+
+
+def swung(*load) -> Motion:
+    """Return the motion of an arm of 2 m that a driver turns about z."""
+    body = {"name": "arm", "mass": 1.0, "inertia": [0.1, 0.2, 0.3], "position": [0.8, 0.0, 0.0]}
+    driver = [{"joint": "A", "polynomial": [0.0, 2.0, 1.5]}]
+    joints = [hinge("A", "ground", "arm", (0.0, 0.0, 0.0), Z)]
+    return simulate(Scene(name="arm", body=[body], joint=joints, driver=driver, load=load), times=TIMES)
+
+
+@pytest.mark.parametrize(("factor", "values"), [({}, np.ones(TIMES.size)), ({"factor": FACTOR}, VALUES)])
+def test_force_and_moment_on_a_body_have_power(factor, values):
+    force = {"type": "force", "body": "arm", "point": [2.0, 0.0, 0.0], "force": [3.0, -1.0, 4.0], **factor}
+    moment = {"type": "moment", "body": "arm", "moment": [5.0, 6.0, -7.0], **factor}
+    motion = swung(force, moment)
+    tip = 2.0 * RATE * np.array([-np.sin(ANGLE), np.cos(ANGLE)])
+    assert np.allclose(motion.load_at(0).power, values * (3.0 * tip[0] - tip[1]), atol=CLOSE * 100)
+    assert np.allclose(motion.load_at(1).power, -7.0 * values * RATE, atol=CLOSE * 100)
+    assert list(motion.columns("load(1)")) == ["time", "load(1).power"]
+
+
+def test_springs_store_energy_and_loads_without_stiffness_do_not():
+    ends = {"bodies": ["ground", "arm"], "points": [[0.0, 3.0, 0.0], [2.0, 0.0, 0.0]]}
+    motion = swung(
+        {"type": "spring", **ends, "stiffness": 8.0, "damping": 0.3, "natural_length": 1.5},
+        {"type": "torsion_spring", "joint": "A", "stiffness": 4.0, "damping": 0.2, "natural_angle": -20.0},
+        {"type": "joint_torque", "joint": "A", "torque": 2.0, "factor": FACTOR},
+    )
+    length = np.sqrt(13.0 - 12.0 * np.sin(ANGLE))
+    stored = 4.0 * (length - 1.5) ** 2, 2.0 * (ANGLE + 20.0) ** 2
+    assert np.allclose(motion.load_at(0).energy, stored[0], rtol=CLOSE)
+    assert np.allclose(motion.load_at(1).energy, stored[1], rtol=CLOSE)
+    assert np.allclose(motion.potential_energy, sum(stored), rtol=CLOSE)
+    assert motion.load_at(2).energy is None
+    assert np.allclose(motion.load_at(2).power, 2.0 * VALUES * RATE, rtol=CLOSE)

@@ -1,0 +1,198 @@
+"""Torque and force of a driver: what a motor delivers at its joint for bodies, armature and couplings."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from crosscheck.engine import engine, installed
+from mbref import Motion, Scene, simulate
+from mbref.cli.commands import main
+from tests.helpers.parts import Entry, Point, X, Z, hinge, joint, slide
+
+TIMES = np.linspace(0.0, 0.8, 9)
+G = 9.81
+TURN = {"polynomial": [0.0, 0.4, 1.5], "sine": {"amplitude": 0.3, "frequency": 4.0}}
+ANGLE = 0.4 * TIMES + 1.5 * TIMES**2 + 0.3 * np.sin(4 * TIMES)
+RATE = 0.4 + 3.0 * TIMES + 1.2 * np.cos(4 * TIMES)
+SECOND = 3.0 - 4.8 * np.sin(4 * TIMES)
+CLOSE = 1e-11  # relative to the largest torque or power
+
+
+def ball(name: str, position: Point, mass: float, inertia: float) -> Entry:
+    """Return a body of equal moments of inertia."""
+    return {"name": name, "mass": mass, "inertia": [inertia] * 3, "position": list(position)}
+
+
+def moved(bodies: list[Entry], joints: list[Entry], method: str | None = None, **parts) -> Motion:
+    parts = {"driver": [{"joint": "A", **TURN}], **parts}
+    scene = Scene(**{"name": "driven", "body": bodies, "joint": joints, **parts})
+    motion = simulate(scene, method, TIMES)
+    assert motion.outcome.name == "COMPLETED", motion.message
+    return motion
+
+
+def agree(found: np.ndarray | None, exact: np.ndarray) -> None:
+    assert found is not None
+    assert np.abs(found - exact).max() <= CLOSE * np.abs(exact).max()
+
+
+def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tuple[list[Entry], list[Entry]]:
+    """Return wheels of 0.1, 0.2, … kg m² on the ground, on joints A, B, … with armatures."""
+    made = [ball(f"w{k}", (0.5 * k, 0.0, 0.0), 1.0 + k, 0.1 * (k + 1)) for k in range(len(armatures))]
+    names = "ABC"[: len(armatures)]
+    return made, [
+        hinge(name, *(b.format(k) for b in bodies), (0.5 * k, 0.0, 0.0), axis, armature=armature)
+        for k, (name, armature) in enumerate(zip(names, armatures, strict=True))
+    ]
+
+
+@pytest.mark.parametrize("method", ["taylor", "alf-dual+projection", "lm1+projection"])
+@pytest.mark.parametrize(("bodies", "axis"), [(("ground", "w{}"), Z), (("w{}", "ground"), (0.0, -3.0, 4.0))])
+def test_motor_accelerates_its_armature(bodies, axis, method):
+    found = moved(*wheels(2.3, bodies=bodies, axis=axis), method).driver("A")
+    agree(found.torque, (0.1 + 2.3) * SECOND)
+    agree(found.power, (0.1 + 2.3) * SECOND * RATE)
+    assert found.force is None
+
+
+@pytest.mark.parametrize("kind", ["first", "second"])
+def test_motor_drives_the_wheel_that_meshes_with_its_own(kind):
+    """The reduced inertia is J + I + n² (J' + I') with n turns of the second wheel per turn of the first."""
+    turns = -3.0
+    pair, ratio = (["A", "B"], turns) if kind == "first" else (["B", "A"], 1 / turns)
+    mesh = [{"name": "mesh", "joints": pair, "ratio": ratio}]
+    found = moved(*wheels(0.4, 0.7), coupling=mesh).driver("A")
+    agree(found.torque, (0.1 + 0.4 + turns**2 * (0.2 + 0.7)) * SECOND)
+
+
+def test_motor_drives_a_train_of_wheels():
+    ratios = {"AB": -2.0, "BC": 0.5}
+    train = [{"name": f"{a}{b}", "joints": [a, b], "ratio": ratios[a + b]} for a, b in pairwise("ABC")]
+    found = moved(*wheels(0.0, 0.3, 0.2), coupling=train).driver("A")
+    agree(found.torque, (0.1 + 4.0 * (0.2 + 0.3) + 1.0 * (0.3 + 0.2)) * SECOND)
+
+
+def test_two_motors_share_a_differential():
+    """Wheels A and B turn independently, and each drives its own wheel of a further pair."""
+    bodies, joints = wheels(0.2, 0.5, 0.0)
+    mesh = [{"name": "mesh", "joints": ["B", "C"], "ratio": 2.0}]
+    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, 2.0]}]
+    motion = moved(bodies, joints, coupling=mesh, driver=motors)
+    agree(motion.driver("A").torque, (0.1 + 0.2) * SECOND)
+    agree(motion.driver("B").torque, np.full(TIMES.size, (0.2 + 0.5 + 4.0 * 0.3) * 4.0))
+
+
+def test_motor_lifts_a_nut_by_its_screw():
+    """The angle of a cylindrical joint is driven; the thread moves the nut along the axis against gravity."""
+    mass, inertia, armature, pitch = 1.4, 0.05, 0.3, 0.2
+    screw = joint("A", "cylindrical", "ground", "nut", axis=list(Z), armature=armature)
+    thread = [{"name": "thread", "joints": ["A", "A"], "ratio": pitch}]
+    nut = [ball("nut", (0.0, 0.0, 0.1), mass, inertia)]
+    found = moved(nut, [screw], coupling=thread, gravity=[0.0, 0.0, -G]).driver("A")
+    agree(found.torque, (inertia + armature + pitch**2 * mass) * SECOND + mass * G * pitch)
+    agree(found.power, found.torque * RATE)
+
+
+def test_driven_rack_turns_its_pinion():
+    """The driver moves the rack, with its own reflected mass, and the pinion with the rotor on its shaft."""
+    radius, mass, armature, inertia, rotor = 0.25, 2.0, 1.1, 0.06, 0.04
+    bodies = [ball("rack", (0.0, 0.4, 0.0), mass, 0.1), ball("pinion", (0.0, 0.0, 0.0), 1.0, inertia)]
+    joints = [
+        slide("A", "ground", "rack", (0.0, 0.4, 0.0), X, armature=armature),
+        hinge("B", "ground", "pinion", (0.0, 0.0, 0.0), armature=rotor),
+    ]
+    teeth = [{"name": "teeth", "joints": ["B", "A"], "ratio": radius}]
+    found = moved(bodies, joints, coupling=teeth, gravity=[3.0, -G, 0.0]).driver("A")
+    agree(found.force, (mass + armature + (inertia + rotor) / radius**2) * SECOND - 3.0 * mass)
+    agree(found.power, found.force * RATE)
+    assert found.torque is None
+
+
+def test_slide_with_armature_on_a_turning_arm():
+    """The rotor does not turn with the arm: its mass meets r'', without the centripetal acceleration."""
+    mass, inertia, armature, start = 0.9, 0.02, 1.6, 0.5
+    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, 0.3), ball("cart", (start, 0.0, 0.0), mass, inertia)]
+    joints = [
+        hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
+        slide("B", "arm", "cart", (start, 0.0, 0.0), X, armature=armature),
+    ]
+    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.2, -0.3]}]
+    motion = moved(bodies, joints, driver=motors)
+    place, speed = start + 0.2 * TIMES - 0.3 * TIMES**2, 0.2 - 0.6 * TIMES
+    agree(motion.driver("B").force, (mass + armature) * -0.6 - mass * place * RATE**2)
+    turning = (0.3 + inertia + mass * place**2) * SECOND + 2 * mass * place * speed * RATE
+    agree(motion.driver("A").torque, turning)
+
+
+def test_hinge_with_armature_between_turning_links_has_the_relative_acceleration():
+    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, 0.3), ball("hand", (0.0, 0.4, 0.0), 1.0, 0.2)]
+    joints = [
+        hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
+        hinge("B", "arm", "hand", (0.0, 0.4, 0.0), armature=0.7),
+    ]
+    motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, -1.0]}]
+    motion = moved(bodies, joints, driver=motors)
+    agree(motion.driver("B").torque, 0.2 * (SECOND - 2.0) + 0.7 * -2.0)
+    agree(motion.driver("A").torque, (0.3 + 0.16) * SECOND + 0.2 * (SECOND - 2.0))
+
+
+def test_spring_and_motor_of_known_torque_act_beside_the_driver():
+    loads = [
+        {"type": "torsion_spring", "joint": "A", "stiffness": 5.0, "damping": 0.6, "natural_angle": 40.0},
+        {"type": "joint_torque", "joint": "A", "torque": 1.5},
+    ]
+    motion = moved(*wheels(0.5), load=loads)
+    spring = -5.0 * (ANGLE - 40.0) - 0.6 * RATE
+    agree(motion.load_at(0).torque, spring)
+    agree(motion.driver("A").torque, (0.1 + 0.5) * SECOND - spring - 1.5)
+
+
+def contradicted() -> Scene:
+    """Return two wheels that mesh and are both driven, as their ratio demands."""
+    bodies, joints = wheels(0.4, 0.7)
+    mesh = [{"name": "mesh", "joints": ["A", "B"], "ratio": -2.0}]
+    motors = [{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}, {"joint": "B", "polynomial": [0.0, 0.0, -2.0]}]
+    return Scene(name="shared", body=bodies, joint=joints, coupling=mesh, driver=motors)
+
+
+@pytest.mark.parametrize("method", ["taylor", "alf-dual+projection"])
+def test_drivers_that_can_replace_each_other_are_marked_and_balance_together(method):
+    motion = simulate(contradicted(), method, TIMES)
+    first, second = motion.driver("A"), motion.driver("B")
+    agree(first.power + second.power, (0.1 + 0.4 + 4.0 * (0.2 + 0.7)) * 2.0 * 2.0 * TIMES)
+    assert first.open.tolist() == second.open.tolist() == [1] * TIMES.size
+    alone = simulate(contradicted().with_(driver=contradicted().driver[:1]), method, TIMES)
+    assert alone.driver("A").open.tolist() == [0] * TIMES.size
+
+
+def test_commands_say_which_torque_is_not_determined(tmp_path, capsys):
+    path = str(tmp_path / "shared.toml")
+    contradicted().save(path)
+    asked = ["run", path, "--samples", "3", "--estimate", "no", "--columns"]
+    assert main([*asked, "driver(B).torque"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "driver(B): equilibrium does not determine its force or torque at 3 of 3 samples" in shown
+    assert "driver(A): equilibrium" not in shown
+    assert main([*asked, "energy"]) == 0
+    assert "does not determine" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("name", [n for n in ("mujoco", "pinocchio") if installed(n)])
+def test_motion_of_an_engine_has_the_torque_of_its_motor(name):
+    bodies, joints = wheels(0.4)
+    scene = Scene(name="driven", body=bodies, joint=joints, driver=[{"joint": "A", **TURN}])
+    simulator = engine(name)
+    run = simulator.run(scene, TIMES, simulator.best_settings(scene)[-1])
+    found = Motion.of(scene, run).driver("A").torque
+    assert found is not None
+    assert np.abs(found - 0.5 * SECOND).max() < 1e-6 * np.abs(SECOND).max()
+
+
+def test_torque_needs_masses_and_reactions():
+    bodies, joints = wheels(0.4)
+    bare = [{key: body[key] for key in ("name", "position")} for body in bodies]
+    found = moved(bare, joints).driver("A")
+    assert found.torque is None and found.power is None
