@@ -20,7 +20,9 @@ from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import record
-from mbref.scene_fields import meant
+from mbref.rotations import Vector3
+from mbref.scene_fields import COINCIDENT, meant
+from mbref.scene_loads import Spring
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
@@ -45,10 +47,29 @@ Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 def default_method(scene: Scene) -> str:
     """Return the name of the default method for a scene.
 
-    The default is ``taylor``, which crosses singular positions. For more than MOST_BODIES bodies the default
-    is the sparse method ``alf-dual+projection/dop853``, which ends at a singular position.
+    The default is ``taylor``, which crosses singular positions. For more than MOST_BODIES bodies, and with
+    bushings, the default is the sparse method ``alf-dual+projection/dop853``, which ends at a singular
+    position.
     """
-    return SERIES_METHOD if len(scene.body) <= MOST_BODIES else SPARSE_METHOD
+    return SERIES_METHOD if len(scene.body) <= MOST_BODIES and not bushings(scene) else SPARSE_METHOD
+
+
+def bushings(scene: Scene) -> list[int]:
+    """Return the numbers of the damped springs whose ends coincide at the start.
+
+    The direction of the damping force is not defined there, so that `taylor` has no series of it.
+    """
+    return [
+        k
+        for k, load in enumerate(scene.load)
+        if isinstance(load, Spring) and load.damping > 0.0 and _coincide(*load.points)
+    ]
+
+
+def _coincide(first: Vector3, second: Vector3) -> bool:
+    """Return whether two points are equal up to rounding of their coordinates."""
+    size = max(map(abs, (*first, *second)))
+    return max(abs(a - b) for a, b in zip(first, second, strict=True)) <= COINCIDENT * size
 
 
 def short_name(name: str) -> str:

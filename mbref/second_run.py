@@ -16,7 +16,7 @@ import numpy as np
 
 from mbref.error_estimate import ErrorEstimate, distances
 from mbref.input_error import InputError
-from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, default_method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, bushings, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import checked_run, finish_run
@@ -113,7 +113,7 @@ def perturbed(scene: Scene) -> Scene:
 
 def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits]:
     """Return method and limits of the more accurate second run, from which the error is estimated."""
-    if method.is_series or len(scene.body) <= MOST_BODIES:
+    if method.is_series or (len(scene.body) <= MOST_BODIES and not bushings(scene)):
         by = Method.parse(f"{SERIES_METHOD}[order={ORDER}]")
     elif method.integrator.adaptive and method.stabilisation.projects:
         by = method

@@ -101,9 +101,12 @@ class Mbref(Engine):
 
     def serves(self, scene: Scene, family: str) -> bool:
         from mbref.equations.diagnosis import undriven_freedoms
+        from mbref.method import bushings
         from mbref.simulation.simulate import why_no_code
 
         method = _method(family)
+        if method.is_series and bushings(scene):
+            return False
         if method.formulation.needs_independent_columns and undriven_freedoms(scene) > 0:
             return False
         handles = method.is_series or method.formulation.handles_singular_mass

@@ -90,12 +90,18 @@ def _spring(
     (start, start_rate), (stop, stop_rate) = (_point(motion, *end) for end in ends)
     offset = stop - start
     length = np.sqrt(np.sum(offset**2, axis=1, keepdims=True))
-    direction = offset / length
+    direction = _direction(np.where(length > 0.0, offset, stop_rate - start_rate))
     rate = np.sum((stop_rate - start_rate) * direction, axis=1, keepdims=True)
     pull = (load.stiffness * (length - load.natural_length) + load.damping * rate) * direction
     for (body, local), sign in zip(ends, (1, -1), strict=True):
         if body >= 0:
             _push(body, motion.rotation[:, body] @ local, sign * pull, force, moment)
+
+
+def _direction(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (K, 3) of unit length, and of length zero without a direction."""
+    length = np.sqrt(np.sum(vectors**2, axis=1, keepdims=True))
+    return np.asarray(vectors / np.where(length > 0.0, length, 1.0))
 
 
 def _torsion_spring(

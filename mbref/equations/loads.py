@@ -86,6 +86,10 @@ def spring(k, loads, frames, g):
         force = scale(tension / length, d)
         push(i, s_i, force, frames, g)
         push(j, s_j, scale(-1.0, force), frames, g)
+    else:  # the ends part along their relative velocity
+        force = scale(loads.damping[k], v)
+        push(i, s_i, force, frames, g)
+        push(j, s_j, scale(-1.0, force), frames, g)
 
 
 @kernel

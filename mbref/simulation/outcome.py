@@ -15,6 +15,7 @@ from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import Model
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
 from mbref.lazy import LazySequence
+from mbref.method import Method, bushings, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.dead_position import ROUNDED, is_at_dead_position
@@ -77,6 +78,10 @@ NEARLY_DEPENDENT = (
 NEAR_SINGULAR_HINT = (
     "; if the mechanism begins near a singular position, rounding changes its motion: begin at that "
     "position, or at a pose with a singular value above {:g}"
+)
+BUSHING = (
+    "the ends of the damped spring load[{}] coincide at the start, so that taylor has no series of its "
+    "force; the default method advances in steps"
 )
 REDUNDANT = "rows with a singular value of {:.1e} at the start count as redundant"
 NONE_TAKEN = 0  # the branch taken at a singular position at which the run ended
@@ -196,7 +201,14 @@ def _message(run: Run, status: int) -> str:
         parts = _cause(run, status), _rounded(run.ranks), _remedy(run, status), chosen
         return "; ".join(filter(None, parts))
     found = report_of(run.start, run.ranks, int(run.memory.equations.system.counts.crossings))
-    return "; ".join(filter(None, (_left_from_rest(run), found)))
+    return "; ".join(filter(None, (_of_bushings(run), _left_from_rest(run), found)))
+
+
+def _of_bushings(run: Run) -> str:
+    """Return the reason why the default method is not `taylor`; empty if it is, or for another method."""
+    found = bushings(run.scene)
+    is_default = str(run.method) == str(Method.parse(default_method(run.scene)))
+    return BUSHING.format(found[0]) if found and is_default else ""
 
 
 def _left_from_rest(run: Run) -> str:

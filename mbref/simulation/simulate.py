@@ -11,7 +11,7 @@ import numpy as np
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.method import Method, MethodError, default_method
+from mbref.method import Method, MethodError, bushings, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -96,6 +96,11 @@ def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits)
         raise MethodError(f"branches: {method} does not cross singular positions; use taylor")
     if limits.code == GENERATED and not method.is_series:
         raise MethodError(f"code: {method} has no generated code; use taylor")
+    if method.is_series and (found := bushings(scene)):
+        raise MethodError(
+            f"{method}: the ends of the damped spring load[{found[0]}] coincide at the start, so that its "
+            f"force has no series; use {default_method(scene)}"
+        )
     try:
         return start_run(scene, method, times, limits)
     except NoGeneratedCode as reason:

@@ -8,7 +8,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 from mbref.input_error import InputError
-from mbref.method import MOST_BODIES, SERIES_METHOD, Method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method, bushings
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, UNDECIDED
@@ -32,8 +32,8 @@ class Trial:
 def trial_of(run: Run) -> Trial | None:
     """Return the trial of a run, which is made once.
 
-    None for a run of `taylor` itself, for more than 100 bodies, and before the kernels of `taylor` are
-    compiled.
+    None for a run of `taylor` itself, for more than 100 bodies, for bushings, and before the kernels of
+    `taylor` are compiled.
     """
     if run not in _TRIALS:
         _TRIALS[run] = _made(run)
@@ -62,7 +62,7 @@ def passes_with(run: Run, **changes: Any) -> bool | None:
 
 def _made(run: Run) -> Trial | None:
     is_cheap = len(run.scene.body) <= MOST_BODIES and all(kernel.is_kept for kernel in KERNELS_OF_SERIES)
-    if run.method.is_series or not is_cheap:
+    if run.method.is_series or not is_cheap or bushings(run.scene):
         return None
     limits = Limits(code=GENERIC, most_steps=MOST_TRIAL_STEPS)
     trial = start_run(run.scene, Method.parse(SERIES_METHOD), run.times, limits)

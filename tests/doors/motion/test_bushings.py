@@ -1,0 +1,87 @@
+"""Damped springs whose ends coincide at the start / closed forms of a slide and of a hinge."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from crosscheck.judge.gauss_principle import gauss
+from mbref import Scene, simulate
+from mbref.cli.commands import main
+from mbref.method import MethodError
+from tests.helpers.statics import DOWN, G, hinge, pendulum, rod, slide
+
+MASS, STIFFNESS, DAMPING, SPEED = 2.0, 80.0, 6.0, 1.5
+TIMES = [0.1, 0.5, 1.0, 2.0]
+
+
+def bushing(body: str, place) -> dict:
+    return {
+        "type": "spring",
+        "bodies": ["ground", body],
+        "points": [list(place), list(place)],
+        "stiffness": STIFFNESS,
+        "damping": DAMPING,
+        "natural_length": 0.0,
+    }
+
+
+def on_a_slide() -> Scene:
+    block = {**rod("block", (0.0, 0.0, 0.0), MASS), "velocity": [SPEED, 0.0, 0.0]}
+    return Scene(
+        name="bushing",
+        body=[block],
+        joint=[slide("S", "block", (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))],
+        load=[bushing("block", (0.0, 0.2, 0.0))],
+    )
+
+
+def test_a_block_on_a_bushing_is_a_damped_oscillator():
+    """m x'' = -k x - c x', also where the ends meet again."""
+    run = simulate(on_a_slide(), times=[0.0, *TIMES])
+    decay = DAMPING / (2 * MASS)
+    rate = np.sqrt(STIFFNESS / MASS - decay**2)
+    exact = SPEED / rate * np.exp(-decay * np.array(TIMES)) * np.sin(rate * np.array(TIMES))
+    assert run.outcome.name == "COMPLETED"
+    assert np.allclose(run.position[1:, 0, 0], exact, rtol=0.0, atol=1e-8)
+    assert run.acceleration[0, 0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
+    assert "the ends of the damped spring load[0] coincide at the start" in run.message
+
+
+def test_a_pendulum_on_a_bushing_obeys_its_power():
+    """I a'' = -m g l cos a - k r² sin a - c r² cos²(a/2) a', from l' = r cos(a/2) a'."""
+    reach, arm, about = 1.1, 0.7, 0.3 + 2.0 * 0.49
+    run = simulate(pendulum(load=[bushing("rod", (reach, 0.0, 0.0))]), times=TIMES)
+
+    def rates(t, y):
+        angle, rate = y
+        torque = -MASS * G * arm * np.cos(angle) - STIFFNESS * reach**2 * np.sin(angle)
+        return rate, (torque - DAMPING * (reach * np.cos(angle / 2)) ** 2 * rate) / about
+
+    exact = solve_ivp(rates, (0.0, TIMES[-1]), (0.0, 0.0), "DOP853", TIMES, rtol=1e-12, atol=1e-13).y[0]
+    assert np.allclose(np.arctan2(run.position[:, 0, 1], run.position[:, 0, 0]), exact, rtol=0.0, atol=1e-8)
+
+
+def test_taylor_refuses_a_bushing_with_the_method_to_use(tmp_path, capsys):
+    with pytest.raises(
+        MethodError, match=r"load\[0\] coincide at the start.*use alf-dual\+projection/dop853"
+    ):
+        simulate(on_a_slide(), "taylor")
+    path = str(tmp_path / "bushing.toml")
+    on_a_slide().save(path)
+    assert main(["run", path, "--method", "taylor"]) == 2
+    assert "use alf-dual+projection/dop853" in " ".join(capsys.readouterr().err.split())
+
+
+def test_the_judge_knows_the_damping_of_a_bushing_that_parts():
+    """A division by the length of zero would be a warning, which fails."""
+    assert gauss(on_a_slide())[0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
+    hanging = Scene(
+        name="rest",
+        gravity=DOWN,
+        body=[rod("rod", (0.7, 0.0, 0.0))],
+        joint=[hinge("A", ("ground", "rod"))],
+        load=[bushing("rod", (1.0, 0.0, 0.0))],
+    )
+    assert gauss(hanging)[0, 1] == pytest.approx(-MASS * G * 0.7**2 / (0.3 + 2.0 * 0.49), rel=1e-12)
