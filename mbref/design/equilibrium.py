@@ -134,7 +134,8 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     """
     scene = find_scene(scene).assembled()
     refuse_conflict(scene)
-    frame, model = _frame(scene), Model(scene)
+    frame = _frame(scene)
+    model = Model(frame.with_armature(scene, 0.0))
     first = Tangent(model, consistent_start(model).q, frame, np.zeros(slots(model)))
     if reason := unsteady(first):
         raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
@@ -249,7 +250,8 @@ def _equilibrium(found: Newton, singular: bool, freedoms: int) -> Equilibrium:
     model, count = tangent.model, len(tangent.model.scene.body)
     q = tangent.q.reshape(1, model.nb, 7)
     scene = placed_with_springs(model, tangent.q, spring_angles(model, tangent.angles))
-    placed = scene.with_(body=tangent.frame.bodies(scene))
+    placed = tangent.frame.with_armature(scene, tangent.frame.armature)
+    placed = placed.with_(body=tangent.frame.bodies(scene))
     if singular or tangent.freedoms != freedoms:
         none = np.zeros(0, dtype=complex)
         return Equilibrium(placed, none, np.zeros((0, count, 6), dtype=complex), {}, tangent.frame.rate)

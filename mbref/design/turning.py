@@ -16,12 +16,13 @@ UNCHANGED = 1e-9  # largest change of accelerations / scale of accelerations, an
 
 
 class Turning(NamedTuple):
-    """Frame that turns with a driver: angular velocity (3,) rad/s, a point (3,) of its axis, and the driver's
-    joint."""
+    """Frame that turns with a driver: angular velocity (3,) rad/s, a point (3,) of its axis, the driver's
+    joint and its armature (kg m²)."""
 
     spin: np.ndarray
     point: np.ndarray
     joint: str
+    armature: float = 0.0
 
     @property
     def rate(self) -> float:
@@ -69,6 +70,16 @@ class Turning(NamedTuple):
         """Return the unit quaternion (4,) of a rotation by an angle (rad) about the axis."""
         return rotations.from_vector(angle * self.spin / self.rate)
 
+    def with_armature(self, scene: Scene, armature: float) -> Scene:
+        """Return the scene with another armature of the driver's joint.
+
+        At a constant rate the armature has no effect. Without it the model has no rotor, which would not turn
+        as the bodies do.
+        """
+        change = {"armature": armature}
+        joints = [j.model_copy(update=change) if j.name == self.joint else j for j in scene.joint]
+        return scene.with_(joint=joints) if self.armature else scene
+
     def bodies(self, scene: Scene) -> list[Body]:
         """Return the bodies of a scene with the velocities of the turning mechanism; without ones at rest."""
         if not self.rate:
@@ -115,4 +126,5 @@ def turning(scene: Scene) -> Turning:
             [f"driver[{driver.joint}]: its axis is not parallel to gravity, so the motion is not steady"]
         )
     sign = 1.0 if joint.bodies[0] == GROUND else -1.0
-    return Turning(sign * driver.polynomial[1] * axis, np.array(joint.anchor_pair[0]), driver.joint)
+    spin, point = sign * driver.polynomial[1] * axis, np.array(joint.anchor_pair[0])
+    return Turning(spin, point, driver.joint, joint.reflected_inertia)

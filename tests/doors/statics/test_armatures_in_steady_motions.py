@@ -1,0 +1,43 @@
+"""Steady motions of mechanisms with motors: reflected inertia changes vibrations, not the motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbref import Scene, equilibria
+from tests.helpers.parts import X, Z, hinge, slide
+
+MASS, START, STIFFNESS, RATE = 0.6, 0.25, 30.0, 4.0
+
+
+def table(of_motor: float, of_slide: float) -> Scene:
+    """Return a turntable of a motor with a carriage on a radial guide, which a spring holds."""
+    bodies = [
+        {"name": "table", "mass": 2.0, "inertia": [0.1, 0.1, 0.2], "position": [0.0, 0.0, 0.0]},
+        {"name": "carriage", "mass": MASS, "inertia": [0.01] * 3, "position": [START, 0.0, 0.0]},
+    ]
+    joints = [
+        hinge("H", "ground", "table", (0.0, 0.0, 0.0), Z, armature=of_motor),
+        slide("S", "table", "carriage", (START, 0.0, 0.0), X, armature=of_slide),
+    ]
+    return Scene(
+        name="turntable",
+        gravity=(0.0, 0.0, -9.81),
+        body=bodies,
+        joint=joints,
+        driver=[{"joint": "H", "polynomial": [0.0, RATE]}],
+        load=[{"type": "slide_spring", "joint": "S", "stiffness": STIFFNESS}],
+    )
+
+
+@pytest.mark.parametrize("armatures", [(0.0, 0.0), (0.7, 0.0), (0.0, 1.3), (0.7, 1.3)])
+def test_carriage_on_a_turntable_rests_and_vibrates_as_its_closed_form(armatures):
+    """m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s."""
+    (found,) = equilibria(table(*armatures), starts=2)
+    place = START * STIFFNESS / (STIFFNESS - MASS * RATE**2)
+    assert np.linalg.norm(found.scene.body[1].position) == pytest.approx(place, rel=1e-9)
+    frequency = np.sqrt((STIFFNESS - MASS * RATE**2) / (MASS + armatures[1]))
+    assert np.abs(found.eigenvalues) == pytest.approx(frequency, rel=1e-7)
+    assert found.rate == RATE
+    assert tuple(joint.armature for joint in found.scene.joint) == armatures
