@@ -149,6 +149,19 @@ def record_file(text: str) -> str:
     return output_file(text)
 
 
+def whole(least: int, most: int) -> Callable[[str], int]:
+    """Return a parser of whole numbers from ``least`` to ``most``."""
+
+    def number(text: str) -> int:
+        # more digits than the limit has are not converted: their conversion takes long
+        is_number = text.isdecimal() and len(text) <= len(str(most))
+        if not (is_number and least <= int(text) <= most):
+            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}, got {text:.40}")
+        return int(text)
+
+    return number
+
+
 def output_folder(text: str) -> str:
     """Return the path of a folder, if files can be written there: the type of an option.
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
 from crosscheck.study.sweep import QUICK_LIMIT
 from mbref import formats
-from mbref.command_line import add_force, add_output, output_folder
+from mbref.command_line import add_force, add_output, output_folder, whole
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
@@ -178,19 +177,6 @@ def add_reference_time(parser: argparse.ArgumentParser) -> None:
     """Add the option for the CPU time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
     parser.add_argument("--reference-time", type=seconds, default=SECONDS, metavar="T", help=about)
-
-
-def whole(least: int, most: int) -> Callable[[str], int]:
-    """Return a parser of whole numbers from ``least`` to ``most``."""
-
-    def number(text: str) -> int:
-        # more digits than the limit has are not converted: their conversion takes long
-        is_number = text.isdecimal() and len(text) <= len(str(most))
-        if not (is_number and least <= int(text) <= most):
-            raise argparse.ArgumentTypeError(f"must be a whole number from {least} to {most}, got {text:.40}")
-        return int(text)
-
-    return number
 
 
 def digits(text: str) -> int:

@@ -27,13 +27,12 @@ from crosscheck.cli.options import (
     not_negative,
     numbers,
     positive,
-    whole,
 )
 from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.timings import REPEATS
-from mbref.command_line import Parser, add_output, commands, record_file
+from mbref.command_line import Parser, add_output, commands, record_file, whole
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
 FIRST = """\

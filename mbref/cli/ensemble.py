@@ -10,14 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import add_method_options, add_scene, limits_of, sample_times
+from mbref.cli.options import MOST_STATES, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
-from mbref.command_line import record_file
+from mbref.command_line import record_file, whole
 from mbref.input_error import InputError
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
+
+MOST_VARIANTS, MOST_WORKERS = 1_000_000, 1000
+MOST_SEED = 10**12
 
 
 def add(commands: Any) -> None:
@@ -41,9 +44,13 @@ def add(commands: Any) -> None:
         metavar="PATH=LOW:HIGH",
         help="a parameter with a uniform distribution; PATH=MEAN+-DEVIATION: normal distribution; may repeat",
     )
-    many.add_argument("--count", type=int, default=100, help="variants (default 100)")
-    many.add_argument("--seed", type=int, default=0, help="seed of the random numbers (default 0)")
-    many.add_argument("--workers", type=int, help="number of processes (default: one for each core)")
+    many.add_argument("--count", type=whole(1, MOST_VARIANTS), default=100, help="variants (default 100)")
+    many.add_argument(
+        "--seed", type=whole(0, MOST_SEED), default=0, help="seed of the random numbers (default 0)"
+    )
+    many.add_argument(
+        "--workers", type=whole(1, MOST_WORKERS), help="number of processes (default: one for each core)"
+    )
     many.add_argument(
         "--out", type=record_file, metavar="FILE", help="append every trajectory, one JSON line each"
     )
@@ -58,8 +65,12 @@ def _ensemble(options: argparse.Namespace) -> int:
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), limits_of(options)
     warn(scene)
-    if options.count < 1 or not (options.workers is None or options.workers > 0):
-        raise InputError("--count and --workers: must be at least 1")
+    if options.count * len(times) * len(scene.body) > MOST_STATES:
+        most = MOST_STATES // (len(times) * len(scene.body))
+        raise InputError(
+            f"--count: must be at most {most} for {len(times)} samples of {len(scene.body)} bodies, "
+            f"got {options.count}"
+        )
     scenes = variants(scene, [Variation.parse(text) for text in options.vary], options.count, options.seed)
     runs, began = {}, time.perf_counter()
     with processes(options.workers) as pool, progress_bar("simulating", options.count) as progress:

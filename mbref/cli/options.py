@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.cli.output import progress_bar, warn
+from mbref.command_line import whole
 from mbref.formulations import FORMULATIONS
 from mbref.input_error import InputError
 from mbref.integrators import INTEGRATORS
@@ -28,6 +29,8 @@ if TYPE_CHECKING:
     from mbref.motion import Motion
     from mbref.stepping.limits import Limits
 
+MOST_SAMPLES = 1_000_000
+MOST_STATES = 10_000_000  # samples times bodies of a run; a state takes about 200 bytes
 # option of a command line by the field of Limits that it sets
 LIMIT_OPTIONS = {"rtol": "--rtol", "largest_step": "--max-step", "branches": "--branch", "code": "--code"}
 
@@ -63,7 +66,11 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
     """Add --times, --samples and --duration."""
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", help="sample times in s, increasing, e.g. 0.1,0.2,0.4")
-    when.add_argument("--samples", type=int, help="this many equally spaced times from 0 to the duration")
+    when.add_argument(
+        "--samples",
+        type=whole(2, MOST_SAMPLES),
+        help=f"this many equally spaced times from 0 to the duration (2 to {MOST_SAMPLES})",
+    )
     parser.add_argument("--duration", type=float, help="end time in s (default: the scene's)")
 
 
@@ -111,8 +118,9 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
         raise InputError(f"--duration: must be positive, got {duration:g}")
     if options.times is None:
         samples = 101 if options.samples is None else options.samples
-        if samples < 2:
-            raise InputError(f"--samples: must be at least 2, got {samples}")
+        if samples * len(scene.body) > MOST_STATES:
+            most = MOST_STATES // len(scene.body)
+            raise InputError(f"--samples: must be at most {most} for {len(scene.body)} bodies, got {samples}")
         return np.linspace(0.0, duration, samples)
     try:
         times = np.array([float(word) for word in options.times.split(",")])

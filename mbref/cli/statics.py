@@ -10,7 +10,7 @@ import numpy as np
 from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
-from mbref.command_line import add_output
+from mbref.command_line import add_output, whole
 from mbref.drawing.film import MOVING, write_film
 from mbref.input_error import InputError
 from mbref.records import strict_json
@@ -20,6 +20,7 @@ from mbref.scenes import find_scene
 if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium
 
+MOST_STARTS = 10_000
 PUSHING = ("moment", "force", "joint_torque", "joint_force")  # loads that do not change with the pose
 SINGULAR = "at a singular position, where the number of freedoms, stability and reactions are not defined"
 ROUNDED = 1e-9  # part of the largest number below which a number is printed as zero
@@ -59,7 +60,9 @@ def add(commands: Any) -> None:
 
 def _add_search(parser: argparse.ArgumentParser) -> None:
     add_scene(parser)
-    parser.add_argument("--starts", type=int, default=24, help="number of poses to search from (default 24)")
+    parser.add_argument(
+        "--starts", type=whole(1, MOST_STARTS), default=24, help="number of poses to search from (default 24)"
+    )
     parser.add_argument("--number", type=int, metavar="K", help="number of the equilibrium, as listed")
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
@@ -69,8 +72,6 @@ def _found(options: argparse.Namespace) -> list[Equilibrium]:
     larger than theirs."""
     from mbref.design.equilibrium import equilibria
 
-    if options.starts < 1:
-        raise InputError(f"--starts: must be at least 1, got {options.starts}")
     scene = find_scene(options.scene)
     warn(scene)
     found = equilibria(scene, options.starts)

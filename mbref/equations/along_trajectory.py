@@ -76,7 +76,7 @@ def poses(model: Model, position: np.ndarray, orientation: np.ndarray) -> np.nda
     q = np.tile(model.start(), (count, 1)).reshape(count, model.nb, 7)
     q[:, :own, :3] = position
     q[:, :own, 3:] = rotations.multiply(orientation, model.principal[:own])
-    return q.reshape(count, -1)
+    return q.reshape(count, 7 * model.nb)
 
 
 def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndarray) -> np.ndarray:
@@ -85,7 +85,7 @@ def _in_frames(model: Model, p: np.ndarray, linear: np.ndarray, angular: np.ndar
     found = np.zeros((len(p), model.nb, 6))
     found[:, : p.shape[1], :3] = linear
     found[:, : p.shape[1], 3:] = rotations.rotate(rotations.conjugate(p), angular)
-    return found.reshape(len(p), -1)
+    return found.reshape(len(p), 6 * model.nb)
 
 
 def _largest(rows: np.ndarray) -> np.ndarray:

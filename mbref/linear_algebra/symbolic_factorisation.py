@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mbref.input_error import InputError
 from mbref.kernels import checked_file
 from mbref.kernels.compilation import CACHE
 from mbref.kernels.layout import SparseFactor, Symbolic
@@ -21,6 +22,8 @@ from mbref.kernels.named_memory import allocate
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 MOST_PATTERNS = 64  # number of cached patterns
+MOST_STORED = 2**25  # bytes of a pattern in a file; a larger one is made in each process
+MOST_UPDATES = 20_000_000  # of a factorisation; making the list of one takes about 100 bytes
 
 
 def symbolic_factorisation(
@@ -29,8 +32,8 @@ def symbolic_factorisation(
     """Return the symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
     Places are indices into the flat constraint Jacobian; ``active`` (n,) selects the columns. Scenes of one
-    structure share the arrays of their pattern, which are never changed. Raises OverflowError for a pattern
-    too large for 32-bit indices.
+    structure share the arrays of their pattern, which are never changed. Raises InputError for a pattern that
+    is too large.
     """
     indices = (np.asarray(array, dtype=np.int64).tobytes() for array in (row, column, entry))
     return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes())
@@ -46,7 +49,8 @@ def _of_pattern(*pattern: bytes) -> Symbolic:
     if data is None:
         symbolic = _made(*pattern)
         sizes = np.array([array.size for array in symbolic], dtype=np.int64)
-        checked_file.write(path, sizes.tobytes() + b"".join(array.tobytes() for array in symbolic))
+        if 4 * sizes.sum() <= MOST_STORED:
+            checked_file.write(path, sizes.tobytes() + b"".join(array.tobytes() for array in symbolic))
         return symbolic
     count = len(Symbolic._fields)
     sizes, indices = np.frombuffer(data, np.int64, count), np.frombuffer(data, np.uint32, offset=8 * count)
@@ -61,6 +65,12 @@ def _made(*pattern: bytes) -> Symbolic:
     kept, row = np.unique(row, return_inverse=True)
     d = csr_array((np.ones(row.size), (row, column)), shape=(kept.size, active.size))
     order, l_start, l_row = _factor_pattern(d)
+    below = np.diff(l_start) - 1
+    if (updates := int(np.sum(below * (below + 1) // 2))) > MOST_UPDATES:
+        raise InputError(
+            f"the scene is too large: {order.size} constraint rows share bodies, so that their factorisation "
+            f"has {updates} updates, at most {MOST_UPDATES} fit; use fewer joints on one body"
+        )
     place = np.empty_like(order)
     place[order] = np.arange(order.size)
     row, column, entry = _sorted_by(place[row], column, entry)

@@ -73,6 +73,10 @@ CHAINS: dict[str, Callable[[int, str], Scene]] = {
 }
 
 
+# rows and columns of a Jacobian grow with the loops: at 3000 its 39 000 by 36 000 numbers take 11 GB
+LARGEST_CHAIN = 3000
+
+
 def find_scene(name: Scene | str | Path) -> Scene:
     """Return a built-in scene, the scene in a file, or a scene that is given itself.
 
@@ -94,6 +98,8 @@ def find_scene(name: Scene | str | Path) -> Scene:
         return SCENES[name]()
     chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)
     if chain and chain[1] in CHAINS:
+        if len(chain[2]) > len(str(LARGEST_CHAIN)) or int(chain[2]) > LARGEST_CHAIN:
+            raise SceneError([f"{name:.80}: must have at most {LARGEST_CHAIN} loops"])
         return CHAINS[chain[1]](int(chain[2]), name)
     if Path(name).suffix in OTHER_FILES:
         makes = f"`mbref import {name}` makes one, and `crosscheck compare {name}` reads it as it is"

@@ -1,0 +1,79 @@
+"""Sizes of scenes and runs that no machine has are refused before anything is built."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.cli import main as crosscheck
+from mbref import simulate
+from mbref.cli import main
+from mbref.input_error import InputError
+from mbref.scene import Body, Revolute, Scene
+
+HUGE = "9" * 20
+COMMANDS = [
+    (main, ["run"]),
+    (main, ["diagnose"]),
+    (main, ["draw"]),
+    (main, ["animate"]),
+    (main, ["plot"]),
+    (main, ["assemble"]),
+    (main, ["equilibrium"]),
+    (main, ["modes"]),
+    (main, ["ensemble", "--vary", "gravity[1]=0:1"]),
+    (main, ["export", "--out", "new.xml"]),
+    (crosscheck, ["run"]),
+    (crosscheck, ["compare"]),
+    (crosscheck, ["tune", "mbref"]),
+    (crosscheck, ["modes"]),
+    (crosscheck, ["reference", "--out", "new.csv"]),
+]
+
+
+@pytest.mark.parametrize(("program", "words"), COMMANDS, ids=lambda x: x[0] if isinstance(x, list) else "")
+@pytest.mark.parametrize("chain", ["four_bar_chain", "slider_crank_chain"])
+def test_chain_of_too_many_loops_is_refused(program, words, chain, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert program([*words, f"{chain}[{HUGE}]"]) == 2
+    assert f"{chain}[{HUGE}]: must have at most 3000 loops" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("command", "option"),
+    [
+        ("run", "--samples"),
+        ("plot", "--samples"),
+        ("animate", "--samples"),
+        ("equilibrium", "--starts"),
+        ("modes", "--starts"),
+        ("ensemble", "--count"),
+        ("ensemble", "--workers"),
+        ("ensemble", "--seed"),
+    ],
+)
+@pytest.mark.parametrize("number", [HUGE, "9" * 5000, "-1", "1.5"])
+def test_number_beyond_its_limits_is_refused_with_them(command, option, number, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main([command, "four_bar", *["--vary", "gravity[1]=0:1"] * (command == "ensemble"), option, number])
+    assert ended.value.code == 2
+    assert f"argument {option}: must be a whole number from " in capsys.readouterr().err
+
+
+def test_states_that_no_memory_holds_are_refused(capsys):
+    assert main(["run", "four_bar_chain[100]", "--samples", "1000000"]) == 2
+    assert "--samples: must be at most 49751 for 201 bodies" in capsys.readouterr().err
+    vary = ["--vary", "gravity[1]=0:1", "--count", "1000000"]
+    assert main(["ensemble", "four_bar", *vary]) == 2
+    assert "--count: must be at most 33003" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_hundreds_of_hinges_on_one_axis_are_refused_with_their_size():
+    hinges = [
+        Revolute(name=f"h{k}", bodies=("ground", "door"), anchor=(0.0, 0.0, float(k)), axis=(0.0, 0.0, 1.0))
+        for k in range(150)
+    ]
+    body = Body(name="door", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))
+    with pytest.raises(InputError, match="750 constraint rows"):
+        simulate(Scene(name="door", gravity=(0.0, -9.81, 0.0), body=(body,), joint=tuple(hinges)))

@@ -1,0 +1,1 @@
+"""Numbers, tables, files and pictures of motions."""

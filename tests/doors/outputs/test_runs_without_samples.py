@@ -1,0 +1,81 @@
+"""Runs that reach no sample: their outcome is printed, and their tables and files are empty."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+import mbref
+from mbref import Motion
+from mbref.cli import main
+from mbref.trajectory import Outcome, Trajectory
+from tests.fuzz.mutations import EVERYTHING
+
+STUCK = ["planar_slider_crank", "--method", "lm1"]  # redundant rows, which this method cannot solve
+
+
+@pytest.fixture(scope="module")
+def stuck() -> Motion:
+    """Return a run that ends before its first sample."""
+    return mbref.simulate("planar_slider_crank", method="lm1")
+
+
+@pytest.mark.parametrize("columns", [[], ["--columns", "slider.position", "energy"]])
+@pytest.mark.parametrize("estimate", [pytest.param("auto", marks=pytest.mark.slow), "no"])
+def test_run_prints_its_outcome_and_advice(columns, estimate, capsys):
+    assert main(["run", *STUCK, *columns, "--estimate", estimate]) == 1
+    said = capsys.readouterr().out
+    assert "SINGULAR_MATRIX at t = 0 s" in said and "the leading matrix is singular" in said
+
+
+@pytest.mark.slow
+def test_files_have_headers_and_no_rows(tmp_path, capsys):
+    table, whole = tmp_path / "m.csv", tmp_path / "m.json"
+    assert main(["run", *STUCK, "--out", str(table)]) == 1
+    rows = list(csv.reader(table.read_text().splitlines()))
+    assert len(rows) == 1 and {"time", "slider.position.x", "energy"} <= set(rows[0])
+    assert main(["run", *STUCK, "--out", str(whole)]) == 1
+    again = Motion.load(whole)
+    assert again.outcome is Outcome.SINGULAR_MATRIX and set(again.columns()) >= set(rows[0])
+    assert main(["run", *STUCK, "--json"]) == 1
+    capsys.readouterr()
+    assert main(["run", *STUCK, "--json", "--columns", "energy"]) == 1
+    assert json.loads(capsys.readouterr().out)["records"][0]["times"] == []
+
+
+@pytest.mark.slow
+def test_pictures_are_empty_or_refused(tmp_path, capsys):
+    assert main(["plot", *STUCK, "--out", str(tmp_path / "p.svg")]) == 1
+    assert main(["animate", *STUCK, "--out", str(tmp_path / "a.svg")]) == 2
+    assert "no sample to draw: the leading matrix is singular" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["p.svg"]
+
+
+def test_every_number_of_a_motion_has_no_sample(stuck, tmp_path):
+    stuck.to_csv(tmp_path / "m.csv")
+    assert (tmp_path / "m.csv").read_text().count("\n") == 1
+    columns = stuck.columns()
+    assert columns and all(values.shape == (0,) for values in columns.values())
+    assert stuck.violation.position.shape == stuck.energy.shape == stuck.largest_reaction.shape == (0,)
+    assert all(found.shape == (0, 6) for found in stuck.determined_reactions.values())
+    assert stuck.joint("A").angle.shape == (0,) and len(stuck.to_dataframe()) == 0
+    assert "SINGULAR_MATRIX" in stuck._repr_html_()
+
+
+def test_empty_motion_of_another_engine_has_all_columns():
+    scene = mbref.Scene(**EVERYTHING)
+    failed = Trajectory.failed(
+        scene=scene.name,
+        engine="other",
+        version="1",
+        method="m",
+        settings={},
+        bodies=tuple(body.name for body in scene.body),
+        outcome=Outcome.CRASHED,
+        message="ended",
+    )
+    motion = Motion.of(scene, failed)
+    assert all(values.shape == (0,) for values in motion.columns().values())
+    assert len(motion.load_at(2).power) == len(motion.energy) == 0
