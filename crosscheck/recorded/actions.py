@@ -48,7 +48,7 @@ def actions(scene: Scene, motion: Trajectory, moved: Mapping[str, np.ndarray]) -
     """
     found: dict[str, np.ndarray] = {}
     for place, load in enumerate(scene.load):
-        numbers = ()
+        numbers: tuple[np.ndarray, ...] = ()
         if isinstance(load, JointLoad):
             numbers = _of_joint(load, motion.times, moved)
         elif isinstance(load, Spring):

@@ -12,9 +12,10 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.truth import NoSolution, closed_form
-from crosscheck.recorded.columns import values
+from crosscheck.recorded.columns import kind_of, values
 from crosscheck.recorded.explanations import Cause, Columns, Difference, with_signs
 from mbref.scene import JointLoad, Scene, SceneError, SlideSpring, TorsionSpring
+from mbref.scene_functions import Factor
 from mbref.scene_joints import ANGLE
 
 ITERATIONS = 5
@@ -23,6 +24,7 @@ ITERATIONS = 5
 PROMISING = 0.7
 RTOL = 1e-9
 SMALL = 1e-3  # first relative change of a number
+LEAPING = ("acceleration", "angular_acceleration", "force", "torque", "power")
 GONE = 0.02  # fraction of a number below which it counts as left out
 KNOWN_GRAVITY = {9.80665: "9.80665", 9.81: "9.81", 9.8: "9.8", 10.0: "10"}
 NUMBERS = {  # field of a load → its name in a sentence
@@ -104,27 +106,32 @@ def _of_load(scene: Scene, place: int) -> Iterator[Change]:
         if np.any(getattr(load, field, 0.0)):
             yield _scaled(scene, "load", load, (field,), f"{name} of load({place})")
     function = load.over_time
-    if function is not None:
-        times = [t for t in (function.start, function.stop) if t] + [t for t, _ in function.table or ()]
-        if times:
-            yield _later(scene, place, times)
+    if function is None:
+        return
+    if function.start:
+        yield _later(scene, place, function, ("start",), "on")
+    if function.stop is not None:
+        yield _later(scene, place, function, ("stop",), "off")
+    if (function.start and function.stop is not None) or function.table:
+        yield _later(scene, place, function, ("start", "stop", "table"), "on and off")
 
 
-def _later(scene: Scene, place: int, times: list[float]) -> Change:
-    """Return the change by which the switching times and the table of a load are later by x times their
-    largest."""
-    load, longest = scene.load[place], max(times)
+def _later(scene: Scene, place: int, function: Factor, fields: tuple[str, ...], word: str) -> Change:
+    """Return the change by which times of a load's factor are later by x times the scene's duration."""
 
     def of(x: float) -> Scene:
-        function = load.over_time
-        late = {"start": function.start and function.start + x * longest}
-        if function.stop is not None:
-            late["stop"] = function.stop + x * longest
-        if function.table:
-            late["table"] = tuple((t + x * longest, value) for t, value in function.table)
-        return _replaced(scene, "load", load, {"factor": _with(function, late)})
+        shift, late = x * scene.duration, {}
+        for name in fields:
+            value = getattr(function, name)
+            if name == "table" and value:
+                late[name] = [(t + shift, size) for t, size in value]
+            elif value:
+                late[name] = value + shift
+        return _replaced(scene, "load", scene.load[place], {"factor": _with(function, late)})
 
-    return Change(of, SMALL, lambda x: f"load({place}) is switched later by {x * longest:.6g} s")
+    return Change(
+        of, SMALL, lambda x: f"load({place}) is switched {word} later by {x * scene.duration:.6g} s"
+    )
 
 
 def _scaled(scene: Scene, kind: str, part: Any, fields: tuple[str, ...], name: str) -> Change:
@@ -229,5 +236,8 @@ def _fitted(value: float, moved: _Moved, d: Difference) -> tuple[float, Columns]
 
 
 def _stacked(d: Difference, columns: Columns) -> np.ndarray:
+    """Return the columns one after another, relative to their scales; if there are others, without columns
+    that leap where a load is switched."""
     signed = with_signs(d.recorded, columns)
-    return np.concatenate([signed[name] / d.scale[name] for name in d.recorded])
+    smooth = [name for name in d.recorded if kind_of(name) not in LEAPING] or list(d.recorded)
+    return np.concatenate([signed[name] / d.scale[name] for name in smooth])

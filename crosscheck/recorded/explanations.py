@@ -20,7 +20,7 @@ Cause = tuple[str, int, Columns]  # sentence, number of fitted parameters and ch
 # fraction of a column's difference that an accepted explanation leaves: errors of fits are below it, and the
 # difference of two causes over a motion is above it
 LEFT = 1e-4
-# fraction of the whole difference that the rounding of cells may leave; at more, causes are not told apart
+# fraction of the whole difference that the rounding of cells may leave; above it causes look alike
 ROUNDED = 0.02
 CELLS = 4  # least number of cells that are off, for each parameter of an explanation
 ALIKE = 1e-9  # relative difference of two predictions below which they state one cause in two ways

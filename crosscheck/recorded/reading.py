@@ -113,7 +113,9 @@ def _chosen(
 ) -> tuple[dict[str, int], dict[str, str]]:
     """Return for each column of the scene the number of the table's column, and its unit if a unit is
     given."""
-    known, chosen, units = ["time", *names(scene)], {}, {}
+    known = ["time", *names(scene)]
+    chosen: dict[str, int] = {}
+    units: dict[str, str] = {}
     for k, header in enumerate(headers):
         name, unit = _recognised(header, known)
         if name in chosen and name not in columns:

@@ -1,0 +1,114 @@
+"""Damaged tables end with "off" or with one sentence and exit status 2, never with a traceback."""
+
+from __future__ import annotations
+
+import codecs
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import crosscheck
+from crosscheck.cli import main
+from mbref.scene import Scene, SceneError
+from tests.helpers.tables import spinning_rod
+
+HEAD = "time,A.angle,A.rate"
+TIMES = [f"{k / 8:g}" for k in range(9)]
+
+
+def rows(cell: str, at: int | None = None, rate: str = "16") -> str:
+    """Return a table of the rod with a cell in each row, or in one row among exact ones."""
+    exact = [f"{2 * k}" for k in range(9)]
+    cells = [cell if at is None or k == at else exact[k] for k in range(9)]
+    return "\n".join([HEAD, *(f"{t},{c},{rate}" for t, c in zip(TIMES, cells, strict=True))])
+
+
+OFF = {
+    "zeros": rows("0", rate="0"),
+    "huge numbers": rows("1e308"),
+    "huge numbers of both signs": "\n".join(
+        [HEAD, *(f"{t},{'-' * (k % 2)}1.7e308,16" for k, t in enumerate(TIMES))]
+    ),
+    "one huge number": rows("1e308", at=3),
+    "the least numbers": rows("4.9e-324"),
+    "one row": f"{HEAD}\n0,1,1",
+}
+REFUSED = {
+    "a cell of 200 000 digits": rows("0." + "1" * 200_000, at=2),
+    "a cell of 2 000 digits": rows("0." + "1" * 2_000, at=2),
+    "more than the largest double": rows("1e999", at=2),
+    "not a number": rows("nan", at=2),
+    "infinite": rows("-inf", at=0),
+    "underscores": rows("1_0", at=1),
+    "hexadecimal": rows("0x10", at=1),
+    "empty": "",
+    "blanks": "\n \n",
+    "a header alone": HEAD,
+    "two columns of one name": "time,A.angle,A.angle\n0,0,0\n0.5,8,8",
+    "two columns of times": "time,t,A.angle\n0,0,0\n0.5,0.5,8",
+    "equal times": f"{HEAD}\n0,0,16\n0,0,16",
+    "times far beyond the duration": f"{HEAD}\n0,0,16\n1e308,0,16",
+    "a row that is cut": rows("0", at=8)[:-4],
+    "a quote that is not closed": f'{HEAD}\n0,"0,16\n0.5,8,16',
+    "a number too large for its unit": "time,A.angle [rev],A.rate\n0,1e308,16\n0.5,1e308,16",
+}
+
+
+def status(table: bytes, folder: Path, scene: Scene | None = None) -> int:
+    """Return the exit status of the command for a table."""
+    (scene or spinning_rod()).save(folder / "scene.toml")
+    (folder / "run.csv").write_bytes(table)
+    return main(["judge", str(folder / "scene.toml"), str(folder / "run.csv")])
+
+
+@pytest.mark.parametrize("name", OFF)
+def test_numbers_of_any_size_are_off(name: str, tmp_path: Path) -> None:
+    assert status(OFF[name].encode(), tmp_path) == 1
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_damaged_tables_are_refused_with_one_sentence(
+    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert status(REFUSED[name].encode(), tmp_path) == 2
+    printed = capsys.readouterr()
+    assert not printed.out and len(printed.err.strip().splitlines()) == 1 and len(printed.err) < 500
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_random_bytes_are_refused(seed: int, tmp_path: Path) -> None:
+    assert status(np.random.default_rng(seed).bytes(3000), tmp_path) == 2
+
+
+@pytest.mark.parametrize(
+    "table",
+    [
+        rows("0", at=0).encode("utf-8-sig"),
+        codecs.BOM_UTF16_LE + rows("0", at=0).encode("utf-16-le"),
+        rows("0", at=0).replace(",", "\t").encode(),
+        "\n".join(
+            [HEAD.replace(",", ";"), *(f"{t};{2 * k};16".replace(".", ",") for k, t in enumerate(TIMES))]
+        ).encode(),
+        rows("0.0D+00", at=0).encode(),
+        "\n".join(f'"{line}"'.replace(",", '","') for line in rows("0", at=0).splitlines()).encode(),
+        rows("0", at=0).replace("\n", "\r\n").encode(),
+    ],
+    ids=["mark", "UTF-16", "tabs", "semicolons", "Fortran", "quotes", "lines of Windows"],
+)
+def test_other_ways_to_write_a_table_are_read(table: bytes, tmp_path: Path) -> None:
+    assert status(table, tmp_path) == 0
+
+
+def test_columns_in_python_are_checked() -> None:
+    """Columns that are missing, of another length or not finite are named."""
+    times = np.array([0.0, 0.5])
+    for motion, says in (
+        ({"A.angle": times}, "no column time"),
+        ({"time": times, "b.angle": times}, "no column of the scene"),
+        ({"time": times, "A.angle": times[:1]}, "A.angle: must have one number for each time"),
+        ({"time": times, "A.angle": times * np.nan}, "A.angle: is not finite"),
+        ({"time": times[::-1], "A.angle": times}, "must increase"),
+    ):
+        with pytest.raises(SceneError, match=says):
+            crosscheck.judge_motion(spinning_rod(), motion)

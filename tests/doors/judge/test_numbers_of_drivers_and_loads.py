@@ -1,0 +1,168 @@
+"""Columns of drivers, loads and energies: closed forms, the balance of power, full turns."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+import crosscheck
+from crosscheck.cli import main
+from mbref.scene import (
+    Body,
+    Coupling,
+    Driver,
+    Revolute,
+    Scene,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
+
+INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
+
+
+def driven(armature: float = 0.0, ratio: float | None = None) -> Scene:
+    """Return a disc that a driver accelerates evenly, with a second disc at a gear if there is a ratio."""
+    inertia = (0.2, 0.2, INERTIA)
+    bodies = [Body(name="first", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0))]
+    axis = {"axis": (0.0, 0.0, 1.0)}
+    hinges = [Revolute(name="A", bodies=("ground", "first"), anchor=(0, 0, 0), armature=armature, **axis)]
+    if ratio is not None:
+        bodies.append(Body(name="second", mass=1.0, inertia=inertia, position=(1.0, 0.0, 0.0)))
+        hinges.append(Revolute(name="B", bodies=("ground", "second"), anchor=(1, 0, 0), **axis))
+    gears = [] if ratio is None else [Coupling(name="gear", joints=("A", "B"), ratio=ratio)]
+    return Scene(
+        name="driven_discs",
+        gravity=(0.0, -9.81, 0.0),
+        duration=1.0,
+        body=bodies,
+        joint=hinges,
+        coupling=gears,
+        driver=[Driver(joint="A", polynomial=(0.0, 0.0, RATE / 2))],
+    )
+
+
+def machine(seed: int) -> Scene:
+    """Return a driven crank with armature, a slide with spring, and a spring between points, of random sizes
+    under a gravity of random direction."""
+    size = np.random.default_rng(seed).uniform(0.3, 1.0, 12)
+    mass, inertia = size[0] + 0.5, (0.1 + size[1], 0.1 + size[1], 0.1 + size[1])
+    return Scene(
+        name="machine",
+        gravity=tuple(9.81 * (size[2:5] - 0.6)),
+        duration=1.0,
+        body=[
+            Body(name="crank", mass=mass, inertia=inertia, position=(0.3, 0.0, 0.0)),
+            Body(name="block", mass=size[5], inertia=inertia, position=(1.0, 0.0, 0.0)),
+        ],
+        joint=[
+            Revolute(
+                name="A", bodies=("ground", "crank"), anchor=(0, 0, 0), axis=(0, 0, 1), armature=size[6]
+            ),
+            Translational(
+                name="B", bodies=("crank", "block"), anchor=(1, 0, 0), axis=(1, 0, 0), armature=size[7]
+            ),
+        ],
+        load=[
+            SlideSpring(joint="B", stiffness=20 * size[8], damping=size[9], natural_displacement=0.2),
+            Spring(
+                bodies=("ground", "block"),
+                points=((0.2, 1.5, 0.1), (1.1, 0.1, 0.0)),
+                stiffness=10 * size[10],
+                damping=0.5,
+                natural_length=0.5,
+            ),
+        ],
+        driver=[Driver(joint="A", polynomial=(0.0, 0.5, 1.0), sine={"amplitude": 0.3, "frequency": 4.0})],
+    )
+
+
+@pytest.mark.parametrize(
+    ("scene", "torque"),
+    [
+        (driven(), INERTIA * RATE),
+        (driven(armature=ARMATURE), (INERTIA + ARMATURE) * RATE),
+        (driven(ratio=-2.0), INERTIA * (1 + 4) * RATE),
+        (driven(armature=ARMATURE, ratio=3.0), (INERTIA * (1 + 9) + ARMATURE) * RATE),
+    ],
+    ids=["disc", "armature", "gear", "both"],
+)
+def test_torque_of_a_driver_turns_all_that_it_drives(scene: Scene, torque: float) -> None:
+    """The torque is the reduced inertia times the angular acceleration, the power torque times rate."""
+    times = np.linspace(0.0, 1.0, 6)
+    table = crosscheck.reference_table(scene, times)
+    assert table["driver(A).torque"] == pytest.approx(torque, rel=1e-12)
+    assert table["driver(A).power"] == pytest.approx(torque * RATE * times, rel=1e-12, abs=1e-12)
+    assert table["kinetic_energy"] == pytest.approx(torque * RATE * times**2 / 2, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+def test_power_of_drivers_and_dampers_is_the_rate_of_the_energy(seed: int) -> None:
+    """The spline through 401 samples of the power is exact to 1e-8."""
+    scene, times = machine(seed), np.linspace(0.0, 1.0, 401)
+    table = crosscheck.reference_table(scene, times)
+    spring, bar = scene.load
+    lost = (
+        spring.damping * table["B.displacement_rate"] ** 2 + bar.damping * table["load(1).length_rate"] ** 2
+    )
+    work = CubicSpline(times, table["driver(A).power"] - lost).antiderivative()(times)
+    gained = table["energy"] - table["energy"][0]
+    assert np.abs(gained - work).max() <= 1e-7 * np.abs(table["energy"]).max()
+    pull = bar.stiffness * (table["load(1).length"] - 0.5) + bar.damping * table["load(1).length_rate"]
+    assert table["load(1).force"] == pytest.approx(pull, rel=1e-12)
+
+
+def test_a_torque_without_the_armature_is_off_and_named(tmp_path: Path) -> None:
+    scene, times = driven(armature=ARMATURE), np.linspace(0.0, 1.0, 21)
+    table = crosscheck.reference_table(scene, times)
+    wrong = {"time": times, "driver(A).torque": 0 * times + INERTIA * RATE, "A.angle": table["A.angle"]}
+    found = crosscheck.judge_motion(scene, wrong)
+    assert [c.name for c in found.columns if not c.is_right] == ["driver(A).torque"]
+    assert all("armature" in e.sentence or "factor" in e.sentence for e in found.explanations)
+
+
+def test_two_drivers_of_one_freedom_have_no_determined_torque(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command names the column that it does not judge, and a table of it alone is not right."""
+    scene = driven(ratio=-1.0)
+    scene = scene.with_(driver=[*scene.driver, Driver(joint="B", polynomial=(0.0, 0.0, -RATE / 2))])
+    scene.save(tmp_path / "scene.toml")
+    (tmp_path / "run.csv").write_text("time,driver(A).torque\n0.5,0.7\n1,0.7\n", encoding="utf-8")
+    assert main(["judge", str(tmp_path / "scene.toml"), str(tmp_path / "run.csv")]) == 1
+    assert "driver(A).torque" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))])
+def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[float, ...]) -> None:
+    """A disc on a torsion spring turns by 10 sin t; its energy is constant, and its torque is -10 sin t."""
+    scene = Scene(
+        name="wound_disc",
+        gravity=(0.0, 0.0, 0.0),
+        duration=10.0,
+        body=[
+            Body(
+                name="disc",
+                mass=1.0,
+                inertia=(1.0, 1.0, 1.0),
+                position=(0, 0, 0),
+                angular_velocity=(0, 0, 10.0),
+            )
+        ],
+        joint=[Revolute(name="A", bodies=("ground", "disc"), anchor=(0, 0, 0), axis=(0, 0, 1))],
+        load=[TorsionSpring(joint="A", stiffness=1.0)],
+    )
+    table, angle = crosscheck.reference_table(scene, times), 10 * np.sin(times)
+    assert table["A.angle"] == pytest.approx(angle, abs=1e-10)
+    assert table["load(0).torque"] == pytest.approx(-angle, abs=1e-10)
+    assert table["energy"] == pytest.approx(50.0, abs=1e-9)
+    right = {"time": np.array(times), "A.angle": angle}
+    assert crosscheck.judge_motion(scene, right).is_right
+    wrapped = {"time": np.array(times), "A.angle": np.angle(np.exp(1j * angle))}
+    found = crosscheck.judge_motion(scene, wrapped)
+    assert not found.is_right
+    assert all("full turns are not counted" in e.sentence for e in found.explanations)
