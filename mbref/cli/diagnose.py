@@ -42,6 +42,7 @@ def add(commands: Any) -> None:
 
 def _diagnose(options: argparse.Namespace) -> int:
     from mbref.design.exchange import exchanges
+    from mbref.design.idle_freedoms import idle_freedoms
     from mbref.equations.diagnosis import diagnose
 
     scene = find_scene(options.scene)
@@ -50,8 +51,9 @@ def _diagnose(options: argparse.Namespace) -> int:
     along = None if options.start else _along(scene)
     redundant = bool(found.counts.redundant) or along_redundant(along)
     swaps = exchanges(scene) if redundant else []
+    idle = idle_freedoms(scene)
     if options.json:
-        print(strict_json(_record(scene, found, along, swaps)))
+        print(strict_json(_record(scene, found, along, swaps) | {"idle_freedoms": idle}))
     else:
         console().print(
             "\n".join(
@@ -59,6 +61,7 @@ def _diagnose(options: argparse.Namespace) -> int:
                     *_scene_lines(scene),
                     *_unit_lines(options.scene),
                     *_start_lines(found),
+                    *(f"    idle freedom        {sentence}" for sentence in idle),
                     *_motion_lines(along),
                     *_swap_lines(swaps, redundant),
                     *_driver_lines(scene),

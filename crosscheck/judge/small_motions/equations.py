@@ -18,6 +18,7 @@ from crosscheck.judge.reference.tree_equations import Instant, TreeEquations
 from crosscheck.judge.reference.vectors import apply, product, unit
 from crosscheck.judge.small_motions.turning import REST, Turning
 from crosscheck.judge.tolerances import RANK
+from mbref import rotations
 from mbref.scene import Scene
 
 STEP = 0.02  # increment of difference quotients, rad or lengths of the mechanism
@@ -41,10 +42,13 @@ class Small(NamedTuple):
 
     def eigenvalues(self) -> np.ndarray:
         """Return the exponents s (2f,), 1/s, of motions exp(s t), slowest first."""
+        return ordered(np.linalg.eigvals(self.matrix()).astype(complex))
+
+    def matrix(self, rate: float = 1.0) -> np.ndarray:
+        """Return the matrix (2f, 2f) of the motions of (u, u' / rate)."""
         f = len(self.mass)
-        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness, -self.damping]))
-        found = np.linalg.eigvals(np.vstack([np.eye(f, 2 * f, f), lower]))
-        return ordered(found.astype(complex))
+        lower = np.linalg.solve(self.mass, np.hstack([-self.stiffness / rate, -self.damping]))
+        return np.vstack([rate * np.eye(f, 2 * f, f), lower])
 
 
 def ordered(eigenvalues: np.ndarray) -> np.ndarray:
@@ -147,6 +151,13 @@ class Balance:
         found = self.equations._moved(states, step, jacobian)
         found[:, self.equations.ends[2] :] = states[:, self.equations.ends[2] :]
         return found
+
+    def between(self, y: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Return the displacement (nv,) of the joint coordinates from one state (n,) to another."""
+        scalars, light = self.equations.tree.scalars, self.equations.light
+        there, here = (state[scalars:light].reshape(-1, 4) for state in (end, y))
+        turned = rotations.to_vector(rotations.multiply(there, rotations.conjugate(here)))
+        return np.concatenate([end[:scalars] - y[:scalars], turned.ravel()])
 
     def stiffness(self, y: np.ndarray, basis: np.ndarray, h: float, order: int = 8) -> np.ndarray:
         """Return K N (nv, f) at a steady state."""

@@ -11,6 +11,7 @@ from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.constraints import closure, scene_length
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.small_motions.equations import STEP, Balance, NotSteady, Small, in_doubles
+from crosscheck.judge.small_motions.error_bounds import error_bounds
 from crosscheck.judge.small_motions.turning import turning
 from crosscheck.judge.tolerances import NEXT_TO_SINGULAR
 from mbref import rotations
@@ -26,9 +27,11 @@ LONGEST = 0.4  # rad or lengths; longest Newton step
 BALANCED = 1e-10  # unbalanced force / largest force at the starts, of a pose in double precision
 REFINED = 1e-15  # the same after refinement in long doubles
 REFINEMENTS = 6
+# distance to a steady pose, lengths or rad, above which the change of the small motions up to there counts
+UNDETERMINED = 1e-9
 ASSEMBLED = 1e-8  # largest residual of a joint, m or rad
 SAME = 1e-6  # rad or lengths; distance below which two poses count as one
-STILL = 1e-6  # part of the largest eigenvalue below which a real part or an eigenvalue counts as zero
+LINKS = 40  # largest number of poses that are tested between two steady poses
 UNSTEADY = 1e-8  # change of the matrices / largest entry after a rotation; above, the motion is not steady
 ROTATED = 1.0  # rad; rotation after which the matrices are compared
 SMALLEST = 4e-16  # relative uncertainty of eigenvalues of matrices in double precision
@@ -46,6 +49,8 @@ class Steady:
         Exponents s, 1/s, slowest first.
     uncertainty : float
         Change of the eigenvalues / largest eigenvalue with twice the increment of the differences.
+    bounds : ndarray, shape (2f,)
+        Largest error of each eigenvalue, 1/s.
     balance, state, small
         The equations, the state (n,) of them, and the matrices of small motions.
     """
@@ -54,17 +59,17 @@ class Steady:
     orientation: np.ndarray
     eigenvalues: np.ndarray
     uncertainty: float
+    bounds: np.ndarray
     balance: Balance
     state: np.ndarray
     small: Small
 
     @property
     def stability(self) -> str:
-        """``stable``, ``unstable`` or ``indifferent``, by the largest real part of the eigenvalues."""
-        size = float(np.abs(self.eigenvalues).max(initial=0.0))
-        if size == 0.0 or np.abs(self.eigenvalues).min() < STILL * size:
-            return "indifferent"
-        return "unstable" if self.eigenvalues.real.max() > STILL * size else "stable"
+        """``stable``, ``unstable`` or ``indifferent``, by the real parts that exceed their bounds."""
+        if (self.eigenvalues.real > self.bounds).any():
+            return "unstable"
+        return "indifferent" if (np.abs(self.eigenvalues) <= self.bounds).any() else "stable"
 
 
 def steady_poses(scene: Scene, starts: int = STARTS) -> list[Steady]:
@@ -90,7 +95,7 @@ def steady_poses(scene: Scene, starts: int = STARTS) -> list[Steady]:
     found: list[Steady] = []
     for pose in poses:
         settled = _settled(quick, pose, scale)
-        if settled is None or any(_is_same(quick, settled, other) for other in found):
+        if settled is None or any(_is_known(quick, settled, other, scale) for other in found):
             continue
         if (each := _steady(balance, settled, scale)) is not None:
             found.append(each)
@@ -182,13 +187,49 @@ def _steady(balance: Balance, y: np.ndarray, scale: float) -> Steady | None:
     y = balance.steady(balance.closed(y))
     if not _is_assembled(balance, y):
         return None
+    if not _moves_on(balance, y, doubles(basis)):
+        return None
     small, coarse = balance.small(y), balance.small(y, 2 * STEP)
     eigenvalues = small.eigenvalues()
     size = float(np.abs(eigenvalues).max(initial=0.0)) or 1.0
     change = float(np.abs(coarse.eigenvalues() - eigenvalues).max()) / size
     if balance.conditioning(y) < NEXT_TO_SINGULAR or (balance.motion.rate and not _stays(balance, y, small)):
         return None
-    return Steady(*balance.poses(y), eigenvalues, max(change, SMALLEST), balance, y, small)
+    others = [coarse, *_beside(balance, y, small)]
+    bounds = error_bounds(small, others)
+    return Steady(*balance.poses(y), eigenvalues, max(change, SMALLEST), bounds, balance, y, small)
+
+
+def _beside(balance: Balance, y: np.ndarray, small: Small) -> list[Small]:
+    """Return the small motions as far from the state as the steady state may be: where stiffness vanishes,
+    forces do not determine the pose."""
+    off = small.basis.T @ doubles(balance.forces(balance.at(y[None]))[0])
+    step = np.linalg.lstsq(small.stiffness, off, rcond=SMALLEST)[0]
+    size = float(np.abs(small.basis @ step / balance.sizes).max(initial=0.0))
+    if size < UNDETERMINED:
+        return []
+    share = 3 * min(1.0, STEP / (3 * size))
+    moved = balance.moved(y, balance.arithmetic.array((small.basis @ (share * step))[None]))[0]
+    try:
+        return [balance.small(balance.steady(balance.closed(moved)))]
+    except NotSteady:
+        return []
+
+
+def _moves_on(balance: Balance, y: np.ndarray, basis: np.ndarray) -> bool:
+    """Return whether the joints hold at poses along the columns of a basis (nv, f) and along their sum.
+
+    At a singular position displacements that the rows allow are of no motion.
+    """
+    for way in (*basis.T, basis.sum(axis=1)):
+        step = balance.arithmetic.array(STEP / np.abs(way / balance.sizes).max() * way)
+        try:
+            there = balance.closed(balance.moved(y, step[None])[0])
+        except NotSteady:
+            return False
+        if not _is_assembled(balance, there):
+            return False
+    return True
 
 
 def _is_assembled(balance: Balance, y: np.ndarray) -> bool:
@@ -215,10 +256,28 @@ def _stays(balance: Balance, y: np.ndarray, small: Small) -> bool:
     return bool(max(change, off / (heavy * rate**2)) < UNSTEADY)
 
 
-def _is_same(balance: Balance, pose: np.ndarray, other: Steady) -> bool:
-    """Return whether two poses are one, also if they differ by a rotation of the whole mechanism."""
+def _is_known(balance: Balance, pose: np.ndarray, other: Steady, scale: float) -> bool:
+    """Return whether two steady poses are one, also if they differ by a rotation of the whole mechanism.
+
+    Poses are one if the poses between them are steady, too.
+    """
     position, orientation = balance.poses(pose)
     length = scene_length(balance.scene)
     apart = np.abs(position - other.position).max() / length
     angle = float(rotations.angle_between(orientation, other.orientation).max())
-    return bool(max(apart, angle) < SAME)
+    return bool(max(apart, angle) < SAME) or _are_linked(balance, doubles(other.state), pose, scale)
+
+
+def _are_linked(balance: Balance, y: np.ndarray, end: np.ndarray, scale: float) -> bool:
+    """Return whether poses from one to another, along the joint coordinates, are steady."""
+    step = balance.between(y, end)
+    size = float(np.abs(step / balance.sizes).max(initial=0.0))
+    count = min(LINKS, int(size / STRIDE) + 2)
+    for share in np.linspace(0.0, 1.0, count + 1)[1:]:
+        try:
+            there = balance.steady(balance.closed(balance.moved(y, (share * step)[None])[0]))
+        except NotSteady:
+            return False
+        if not np.linalg.norm(balance.unbalanced(there)) <= BALANCED * scale:
+            return False
+    return True

@@ -1,0 +1,61 @@
+"""Equilibria of the judge: families without force, singular positions, slow motions / closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.judge.small_motions.equilibria import steady_poses
+from mbref import Scene
+from tests.helpers.statics import DOWN, G, parallelogram, pendulum, rod, slide
+
+
+def balance_of_weights() -> Scene:
+    """Two equal weights on a rope over a pulley: in balance at every height."""
+    places = ((0.0, 0.0, 0.0), (0.8, -0.2, 0.0))
+    return Scene(
+        name="weights",
+        gravity=DOWN,
+        body=[rod(name, place, 1.5) for name, place in zip("ab", places, strict=True)],
+        joint=[
+            slide(joint, body, place, (0.0, 1.0, 0.0))
+            for joint, body, place in zip("AB", "ab", places, strict=True)
+        ],
+        coupling=[{"name": "rope", "joints": ["A", "B"], "ratio": -1.0}],
+    )
+
+
+def test_weights_in_balance_at_every_height_are_one_table(tmp_path, capsys):
+    path = str(tmp_path / "weights.toml")
+    balance_of_weights().save(path)
+    assert main(["modes", path, "--engine", "mbref"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("weights: Equilibrium") == 1 and "indifferent" in shown
+
+
+def test_a_spring_that_just_holds_a_pendulum_is_one_indifferent_pose():
+    spring = {"type": "torsion_spring", "joint": "A", "stiffness": 2.0 * G * 0.7}
+    [each] = steady_poses(pendulum((0.0, 0.7, 0.0), load=[spring]))
+    assert each.stability == "indifferent"
+
+
+def test_a_flat_parallelogram_has_no_small_motions():
+    assert not steady_poses(parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0)), starts=1)
+
+
+def test_a_slow_fall_beside_a_fast_damper_is_unstable():
+    beside = pendulum((0.0, 0.7, 0.0))
+    damper = {"type": "slide_spring", "joint": "T", "stiffness": 50.0, "damping": 800.0}
+    scene = beside.with_(
+        body=(*beside.body, rod("block", (1.0, 0.0, 0.0), 1e-4)),
+        joint=(*beside.joint, slide("T", "block", (1.0, 0.0, 0.0), (1.0, 0.0, 0.0))),
+        load=[damper],
+    )
+    found = {each.stability: each for each in steady_poses(scene, starts=6)}
+    assert set(found) == {"stable", "unstable"}
+    rate = np.sqrt(2.0 * G * 0.7 / (0.3 + 2.0 * 0.49))
+    near = int(np.argmin(np.abs(found["unstable"].eigenvalues - rate)))
+    error = np.abs(found["unstable"].eigenvalues[near] - rate)
+    assert error <= found["unstable"].bounds[near] + 4e-16 * rate
+    assert found["unstable"].bounds[near] == pytest.approx(0.0, abs=1e-9)
