@@ -133,7 +133,7 @@ def main() -> int:
     if asked.poses:
         print(json.dumps(poses_at_the_end(asked.names)))
         return 0
-    chosen = asked.setting or [name for name in SETTINGS if runs_here(SETTINGS[name])]
+    chosen = [name for name in asked.setting or SETTINGS if runs_here(SETTINGS[name])]
     if asked.motions:
         return 0 if motions(chosen, asked.names) else 1
     return 0 if tests(chosen, [*asked.names, *(f"--ignore-glob={glob}" for glob in asked.ignore_glob)]) else 1

@@ -63,7 +63,7 @@ def random_mechanism(seed: int) -> Scene:
 
     Poses satisfy the joints by construction, velocities by projection. A mechanism that is singular at its
     start, so that it has a velocity but no finite motion, is replaced by another. The result depends on the
-    seed only.
+    seed only, to 12 digits: the last ones of a projection depend on the processor.
     """
     rng = np.random.default_rng(seed)
     for _ in range(MOST_DRAWS):
