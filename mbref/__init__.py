@@ -44,6 +44,7 @@ _PUBLIC = {  # module → its public names
 _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
 
 _SERVICES = {  # functions behind methods of Scene and Motion
+    "angles_at_start": "mbref.design.offsets",
     "assembled": "mbref.design.offsets",
     "counts": "mbref.equations.diagnosis",
     "determined_reactions": "mbref.equations.along_trajectory",

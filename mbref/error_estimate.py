@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
+from mbref.trajectory import Trajectory
 
 # error / relative tolerance, and error: a warning is given if both are exceeded
 RATIO, LEAST_WARNED = 1e3, 1e-6
@@ -21,7 +22,7 @@ class ErrorEstimate:
 
     The error of a sample is the largest distance of a body's centre of mass from its true place, divided by
     the length of the mechanism, or the angle between its orientation and the true one, rad, whichever is
-    larger. It is estimated by the difference from a second run.
+    larger. It is estimated by the difference from a second run, and is at least the error by rounding.
 
     Attributes
     ----------
@@ -177,6 +178,24 @@ def distances(
     turns = rotations.angle_between(other[1], pose[1])
     found: np.ndarray = np.maximum(places, turns).max(axis=-1, initial=0.0)
     return found
+
+
+def rounding(motion: Trajectory, length: float) -> np.ndarray:
+    """Return the error (k,) that rounding alone leaves in a motion, over the length (m), or rad.
+
+    ``u (|r| / length + √(n + 1) (1 + s))`` with the unit u of doubles, the largest distance |r| from the
+    origin so far, the n steps so far, and the way s = t max(|v| / length, |ω|) of the fastest body: each step
+    rounds velocities by u at random, and rounded velocities act until the end.
+    """
+    k = len(motion.times)
+    far, fast, spin = (
+        np.linalg.norm(each, axis=-1).reshape(k, -1).max(axis=1, initial=0.0)
+        for each in (motion.position, motion.velocity, motion.angular_velocity)
+    )
+    way = motion.times * np.maximum.accumulate(np.maximum(fast / length, spin))
+    steps = motion.cost.steps * motion.times / (motion.t_end or 1.0)
+    unit = float(np.finfo(float).eps)
+    return np.asarray(unit * (np.maximum.accumulate(far) / length + np.sqrt(steps + 1.0) * (1.0 + way)))
 
 
 def _short(number: float | None) -> str:

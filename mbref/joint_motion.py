@@ -22,8 +22,8 @@ class JointMotion:
     name : str
         Name of the joint.
     angle, rate : ndarray, shape (k,), or None
-        Angle about the axis (rad, counted on over full turns) and its rate (rad/s), of revolute, cylindrical
-        and planar joints.
+        Angle about the axis (rad, full turns counted) and its rate (rad/s), of revolute, cylindrical and
+        planar joints. NaN where samples of an engine that counts no turns are too far apart to count them.
     displacement, displacement_rate : ndarray, shape (k,), or None
         Displacement along the axis, m, and its rate, m/s, of translational and cylindrical joints.
     rotation : ndarray, shape (k, 3)
@@ -59,9 +59,8 @@ def joint_motion(scene: Scene, motion: Trajectory, name: str) -> JointMotion:
     joint = scene.joint_named(name)
     turned = [turned_since_start(scene, motion, body) for body in joint.bodies]
     relative = rotations.multiply(rotations.conjugate(turned[0]), turned[1])
-    turns = joint.facts.free_rotations == 1 and bool(joint.directions)
     slides = joint.facts.free_translations == 1 and bool(joint.directions)
-    angle, rate = _angle(scene, motion, joint, turned[0], relative) if turns else (None, None)
+    angle, rate = _angle(scene, motion, joint, turned[0], relative) if joint.facts.turns else (None, None)
     slid, speed = _displacement(scene, motion, joint, turned[0]) if slides else (None, None)
     wrench = (motion.reactions or {}).get(name)
     force, moment = (None, None) if wrench is None else (wrench[:, :3], wrench[:, 3:])
@@ -121,16 +120,29 @@ def turned_since_start(scene: Scene, motion: Trajectory, name: str) -> np.ndarra
 def _angle(
     scene: Scene, motion: Trajectory, joint: Joint, first: np.ndarray, relative: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the angle about the axis, with full turns counted by the mean rate between samples, and its
-    rate."""
+    """Return the angle about the axis and its rate. Full turns are as the run counted them, otherwise counted
+    from the samples."""
     axis = rotations.unit(joint.directions[0])
     spins = [angular_velocity_of(scene, motion, name) for name in joint.bodies]
     rate = np.einsum("ki,ki->k", spins[1] - spins[0], rotations.rotate(first, axis[None]))
     wrapped = 2 * np.arctan2(relative[:, 1:] @ axis, relative[:, 0])
-    expected = (rate[1:] + rate[:-1]) / 2 * np.diff(motion.times)
-    turns = np.round((expected - np.diff(wrapped)) / (2 * np.pi))
-    start = -2 * np.pi * np.round(wrapped[:1] / (2 * np.pi))
-    return wrapped + start + 2 * np.pi * np.concatenate([np.zeros(len(wrapped[:1])), np.cumsum(turns)]), rate
+    counted = (motion.angles or {}).get(joint.name)
+    if counted is None:
+        return _counted(motion.times, wrapped, rate), rate
+    return wrapped + 2 * np.pi * np.round((counted - wrapped) / (2 * np.pi)), rate
+
+
+def _counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Return angles (k,), given up to full turns, with turns counted by the mean rate (k,) between samples.
+
+    The first sample is within half a turn of the start. The result is NaN from the first sample on at which
+    the rates leave a choice.
+    """
+    before, step = np.concatenate([rate[:1], rate[:-1]]), np.diff(times, prepend=0.0)
+    turns = np.round((step * (before + rate) / 2 - np.diff(angle, prepend=0.0)) / (2 * np.pi))
+    doubt = step * np.abs(rate - before)
+    doubt[:1] = step[:1] * np.abs(rate[:1])
+    return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, angle + 2 * np.pi * np.cumsum(turns))
 
 
 def angular_velocity_of(scene: Scene, motion: Trajectory, name: str) -> np.ndarray:

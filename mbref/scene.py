@@ -215,6 +215,19 @@ class Scene(SceneEntry):
         """
         return SERVICES["assembled"](self) if any(c.offset for c in self.coupling) else self
 
+    def angles_at_start(self) -> dict[str, float]:
+        """Return the angles of joints, rad, between the given poses and the poses of ``assembled``.
+
+        Full turns are counted. The result has every joint that turns about one axis; without offsets all
+        angles are zero.
+
+        Raises
+        ------
+        SceneError
+            If no pose obeys an offset; the message names the coupling.
+        """
+        return SERVICES["angles_at_start"](self)
+
     def counts(self) -> Counts:
         """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0.
 

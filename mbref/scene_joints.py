@@ -69,9 +69,14 @@ class JointFacts:
         return 3 - len(self.forbidden_rotations) - (self.condition == "perpendicular axes")
 
     @property
+    def turns(self) -> bool:
+        """True if the bodies can turn relative to each other about the joint's axis only."""
+        return self.forbidden_rotations == (X, Y)
+
+    @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """Joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
-        angle = (ANGLE,) if self.forbidden_rotations == (X, Y) else ()
+        angle = (ANGLE,) if self.turns else ()
         return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
 
 

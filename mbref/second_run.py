@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.error_estimate import ErrorEstimate, distances
+from mbref.error_estimate import ErrorEstimate, distances, rounding
 from mbref.input_error import InputError
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, bushings, default_method
 from mbref.motion import Motion
@@ -63,7 +63,8 @@ def estimate_error(
     check = _Check(seconds, progress)
     by, finer = _finer(motion.mechanism, method, limits)
     second = _second_run(motion, by, finer, check)
-    error, reason = second.distances(motion), second.reason if second.is_short(motion) else ""
+    error = np.maximum(second.distances(motion), rounding(motion, second.length))
+    reason = second.reason if second.is_short(motion) else ""
     estimate = ErrorEstimate(motion.times, error, rtol, f"{by}, rtol {finer.rtol:g}", reason)
     if not estimate.warning or limits.rtol <= RTOL_EXPLICIT:
         return estimate

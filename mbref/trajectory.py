@@ -130,6 +130,9 @@ class Trajectory:
         By joint: number of reaction components that equilibrium does not determine, because of redundant
         constraint rows or at a singular position. By ``driver(A)``: 1 where it does not determine the force
         or torque of a driver.
+    angles : mapping of str to ndarray, shape (k,), or None
+        By joint that turns about one axis: angle since t = 0, rad, with full turns as the run counted them.
+        None if the engine does not count turns.
     crossings : sequence of Crossing, or None
         Singular positions that the run crossed, or the one at which it ended. None if the method or engine
         does not look for them.
@@ -167,6 +170,7 @@ class Trajectory:
     cost: Cost = field(default_factory=Cost)
     crossings: Sequence[Crossing] | None = None
     open_reactions: Mapping[str, np.ndarray] | None = None
+    angles: Mapping[str, np.ndarray] | None = None
 
     def __repr__(self) -> str:
         return (
@@ -261,6 +265,7 @@ class Trajectory:
             },
             "reactions": _lists(self.reactions or {}),
             "open_reactions": None if self.open_reactions is None else _lists(self.open_reactions),
+            "angles": None if self.angles is None else _lists(self.angles),
             "crossings": None if self.crossings is None else [c.to_record() for c in self.crossings],
             "metrics": {},
             "cost": {f.name: getattr(self.cost, f.name) for f in fields(Cost)},
@@ -283,7 +288,8 @@ class Trajectory:
             The trajectory, with arrays as attributes.
         """
         names = tuple(record["bodies"])
-        k, crossings, marks = len(record["times"]), record.get("crossings"), record.get("open_reactions")
+        k, crossings = len(record["times"]), record.get("crossings")
+        marks, angles = record.get("open_reactions"), record.get("angles")
 
         def stacked(key: str, width: int) -> np.ndarray:
             rows = [record["bodies"][name][key] for name in names]
@@ -307,6 +313,7 @@ class Trajectory:
             angular_acceleration=optional("angular_acceleration"),
             reactions=reactions or None,
             open_reactions=None if marks is None else {n: np.array(v, dtype=int) for n, v in marks.items()},
+            angles=None if angles is None else {n: np.array(v, dtype=float) for n, v in angles.items()},
             outcome=Outcome[record["outcome"]],
             cost=Cost(**record["cost"]),
             crossings=None if crossings is None else tuple(Crossing.from_record(c) for c in crossings),

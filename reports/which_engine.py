@@ -27,7 +27,7 @@ from reports.stored import groups, verified
 HERE = Path(__file__).parent
 KINDS_FOLDER = HERE / "kinds"
 FOLDERS = (HERE / "reference", KINDS_FOLDER)  # of committed records
-MOTION = ("bodies", "reactions", "open_reactions", "crossings")  # fields that the page does not need
+MOTION = ("bodies", "reactions", "open_reactions", "angles", "crossings")  # the page needs none
 HEAD = f"""# Which engine, which settings, for my mechanism?
 
 This page answers by kind of mechanism: which engines reach an error of {SAID}, at which settings, in which

@@ -26,7 +26,7 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
     springs continue."""
     t, carry = float(motion.times[sample]), _Carry(scene, motion, sample)
     angles = joint_coordinates(
-        scene, motion.times, motion.position, motion.orientation, motion.angular_velocity
+        scene, motion.times, motion.position, motion.orientation, motion.angular_velocity, motion.angles
     )
     bodies = [
         replaced(

@@ -8,7 +8,7 @@ the samples of a trajectory.
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -93,14 +93,15 @@ def coupling_gaps(
     position: np.ndarray,
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
+    counts: Mapping[str, np.ndarray] | None = None,
 ) -> Residuals:
-    """Return position residuals (k, 1) of couplings by name, q₂ - offset - ratio q₁ in m or rad, for
-    trajectory arrays (k, nb, ·).
+    """Return position residuals (k, 1) of couplings by name, q₂ - offset - ratio q₁ in m or rad, with the
+    arguments of ``joint_coordinates``.
 
     The residuals are NaN from the first sample on at which the samples are too far apart to count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
-    found = _coupled(scene, lambda joint: coordinates(joint, *motion))
+    found = _coupled(scene, lambda joint: coordinates(joint, *motion, counts))
     return {c.name: found[c.name] - c.offset for c in scene.coupling}
 
 
@@ -132,17 +133,19 @@ def joint_coordinates(
     position: np.ndarray,
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
+    counts: Mapping[str, np.ndarray] | None = None,
 ) -> dict[str, np.ndarray]:
     """Return angle (rad) and displacement (m) since t = 0 (k, 2) of every joint with a coordinate, by name.
 
-    Arguments are trajectory arrays (k, nb, ·). The angle counts full turns. The angle is NaN from the first
-    sample on at which the samples are too far apart to count turns.
+    Arguments are trajectory arrays (k, nb, ·), and the angles (k,) by joint of an engine that counts full
+    turns. Without these, the angle is NaN from the first sample on at which the samples are too far apart to
+    count turns.
     """
     motion = (np.asarray(times, float), *with_ground(position, orientation), grounded(angular_velocity))
     with_axis = [joint for joint in joint_residuals.joint_frames(scene) if joint.facts.coordinates]
     if not len(motion[0]):
         return {joint.name: np.zeros((0, 2)) for joint in with_axis}
-    return {joint.name: coordinates(joint, *motion) for joint in with_axis}
+    return {joint.name: coordinates(joint, *motion, counts) for joint in with_axis}
 
 
 def joint_rates(

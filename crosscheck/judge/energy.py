@@ -119,7 +119,9 @@ def _potential_gains(scene: Scene, trajectory: Trajectory) -> Iterator[np.ndarra
     position, orientation, _, angular_velocity = _motion(trajectory)
     start = (a[None] for a in constraints.initial_poses(scene))
     yield potential_energy(scene, position, orientation) - potential_energy(scene, *start)
-    angles = constraints.joint_coordinates(scene, trajectory.times, position, orientation, angular_velocity)
+    angles = constraints.joint_coordinates(
+        scene, trajectory.times, position, orientation, angular_velocity, trajectory.angles
+    )
     for load in scene.load:
         if isinstance(load, Force):
             moved = _point(scene, load.body, load.point, position, orientation) - np.array(load.point)

@@ -7,6 +7,7 @@ and the ground as their last body.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,14 +70,20 @@ def coordinates(
     position: np.ndarray,
     orientation: np.ndarray,
     angular_velocity: np.ndarray,
+    counts: Mapping[str, np.ndarray] | None = None,
 ) -> np.ndarray:
-    """Return the unwrapped angle about the axis and the displacement along it (k, 2) since t = 0, over k
-    samples."""
+    """Return the angle about the axis and the displacement along it (k, 2) since t = 0, over k samples.
+
+    The pose gives the angle up to full turns. Full turns are as the engine counted them, if ``counts`` has
+    its angles (k,) by joint, otherwise counted between samples.
+    """
     _, offset, frames = in_world(joint, position, orientation)
     turned = twist(rotations.multiply(rotations.conjugate(frames[0]), frames[1]))
     w = [angular_velocity[..., b, :] for b in joint.bodies]
     rate = resolve(frames[0], w[1] - w[0])[..., 2]
-    return np.stack([counted(times, turned, rate), resolve(frames[0], offset)[:, 2]], axis=1)
+    known = (counts or {}).get(joint.name)
+    angle = counted(times, turned, rate) if known is None else known + wrapped(turned - known)
+    return np.stack([angle, resolve(frames[0], offset)[:, 2]], axis=1)
 
 
 def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarray:

@@ -152,7 +152,7 @@ def violation_series(scene: Scene, trajectory: Trajectory, level: int = 0) -> np
     rates = (trajectory.velocity, trajectory.angular_velocity)
     if level == 0:
         residuals = constraints.closure(scene, *pose)
-        gaps = constraints.coupling_gaps(scene, *pose, trajectory.angular_velocity)
+        gaps = constraints.coupling_gaps(scene, *pose, trajectory.angular_velocity, trajectory.angles)
         residuals |= {name: np.nan_to_num(gap, nan=0.0) for name, gap in gaps.items()}
     elif level == 1:
         residuals = constraints.closure_rates(scene, *pose, *rates)

@@ -103,7 +103,7 @@ def along(scene: Scene, run: Trajectory) -> Difference | None:
     if linear is None or angular is None or not scene.has_mass():
         return None
     pose = run.times, run.position, run.orientation, run.angular_velocity
-    angles = joint_coordinates(scene, *pose)
+    angles = joint_coordinates(scene, *pose, run.angles)
     twisted = [load.joint for load in turning_loads(scene)]
     chosen = np.unique(np.linspace(0, len(run.times) - 1, ALONG).round().astype(int)).tolist()
     for k in _regular(scene, run, chosen if len(run.times) else []):

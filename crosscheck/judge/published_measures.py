@@ -93,7 +93,7 @@ def opposite_hinges(pairs: Sequence[tuple[str, str]]) -> Measure:
 
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         state = motion.position, motion.orientation, motion.angular_velocity
-        turned = constraints.joint_coordinates(scene, motion.times, *state)
+        turned = constraints.joint_coordinates(scene, motion.times, *state, motion.angles)
         sums = [np.abs(turned[a][:, 0] + turned[b][:, 0]) for a, b in pairs]
         return float(np.max(sums, initial=0.0))
 

@@ -101,7 +101,7 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
     if exact.acceleration is None or exact.angular_acceleration is None:
         raise ValueError(f"{exact.engine} gives no accelerations of {scene.name}")
     pose = exact.times, exact.position, exact.orientation, exact.angular_velocity
-    coordinates = joint_coordinates(scene, *pose)
+    coordinates = joint_coordinates(scene, *pose, exact.angles)
     springs = [load.joint for load in turning_loads(scene)]
     mass = np.array([body.mass for body in scene.body])[:, None]
     found = []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from crosscheck.judge.constraints import (
@@ -11,11 +13,9 @@ from crosscheck.judge.constraints import (
     joint_coordinates,
     scene_length,
 )
-from mbref.scene import Coupling, Scene, SceneError
-from mbref.scene_joints import ANGLE
+from mbref.scene import Scene, SceneError
 
 MET = 1e-12  # residual over the mechanism's length (m) or over 1 rad; rounding leaves 1e-15
-TURNS = 2 * np.pi * np.arange(-100, 101)  # full turns that one pose of a joint does not show, rad
 
 
 def started(scene: Scene) -> Scene:
@@ -26,30 +26,27 @@ def started(scene: Scene) -> Scene:
     found = scene.assembled()
     if found is scene:
         return scene
-    position, orientation = initial_poses(found)
-    still = np.zeros((1, len(scene.body), 3))
     gaps = {
         name: float(np.abs(rows).max(initial=0.0))
-        for name, rows in closure(scene, 0.0, position, orientation).items()
+        for name, rows in closure(scene, 0.0, *initial_poses(found)).items()
     }
-    coupled = coupling_gaps(scene, np.zeros(1), position[None], orientation[None], still)
-    gaps |= {c.name: _up_to_turns(scene, c, coupled[c.name].item()) for c in scene.coupling}
+    gaps |= {name: abs(gap.item()) for name, gap in coupling_gaps(scene, *_sample(scene)).items()}
     for name, gap in gaps.items():
         if not gap <= MET * max(1.0, scene_length(scene)):
             raise SceneError([f"{name}: the poses at the start violate it by {gap:.3g} m or rad"])
     return found
 
 
-def _up_to_turns(scene: Scene, coupling: Coupling, gap: float) -> float:
-    """Return the least size of a coupling's gap, to which full turns of both joints are added."""
-    first, second = (TURNS if kind == ANGLE else np.zeros(1) for _, kind in scene.coupled(coupling))
-    return float(np.abs(gap + second[:, None] - coupling.ratio * first).min())
-
-
 def start_coordinates(scene: Scene) -> dict[str, np.ndarray]:
-    """Return angle (rad, within half a turn) and displacement (m) (2,) of every joint with a coordinate at
-    the start, counted from the poses of the scene."""
-    position, orientation = initial_poses(started(scene))
+    """Return angle (rad, full turns counted) and displacement (m) (2,) of every joint with a coordinate, from
+    the poses of the scene to its start. Raises the error of ``started``."""
+    started(scene)
+    return {name: both[0] for name, both in joint_coordinates(scene, *_sample(scene)).items()}
+
+
+def _sample(scene: Scene) -> tuple[Any, ...]:
+    """Return time, poses and spins (1, …) at the start, and the angles with full turns (1,) by joint."""
+    position, orientation = initial_poses(scene.assembled())
+    turns = {name: np.array([angle]) for name, angle in scene.angles_at_start().items()}
     still = np.zeros((1, len(scene.body), 3))
-    found = joint_coordinates(scene, np.zeros(1), position[None], orientation[None], still)
-    return {name: both[0] for name, both in found.items()}
+    return np.zeros(1), position[None], orientation[None], still, turns

@@ -109,7 +109,7 @@ def _state(scene: Scene, motion: Trajectory, sample: int) -> State:
     """Return the state at a sample, with the angles of loads about joints' axes."""
     place = motion.position[sample], motion.orientation[sample]
     whole = motion.times, motion.position, motion.orientation, motion.angular_velocity
-    coordinates = joint_coordinates(scene, *whole)
+    coordinates = joint_coordinates(scene, *whole, motion.angles)
     angles = [coordinates[load.joint][sample, 0] for load in turning_loads(scene)]
     return *place, motion.velocity[sample], motion.angular_velocity[sample], np.array(angles)
 

@@ -57,6 +57,7 @@ def drawable(label: Label, scene: Scene, record: Record) -> Record:
         "violation": _violation(scene, record) if drawn or label.part == GROWTH else [],
         "reactions": {},
         "open_reactions": None,
+        "angles": None,
         "crossings": None,
     }
 

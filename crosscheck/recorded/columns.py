@@ -90,7 +90,7 @@ def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = No
                 array = _continuous(array[:, b]) if kind == "orientation" else array[:, b]
                 found.update({f"{body.name}.{kind}.{axis}": array[:, i] for i, axis in enumerate(axes)})
     pose = motion.position, motion.orientation
-    coordinates = joint_coordinates(scene, motion.times, *pose, motion.angular_velocity)
+    coordinates = joint_coordinates(scene, motion.times, *pose, motion.angular_velocity, motion.angles)
     rates = joint_rates(scene, *pose, motion.velocity, motion.angular_velocity)
     for joint in scene.joint:
         if joint.facts.coordinates:

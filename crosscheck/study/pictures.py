@@ -20,7 +20,7 @@ from mbref.trajectory import Trajectory
 DIGITS = 6  # decimal digits kept of a position, relative to the size of the mechanism: finer than a pixel
 FRAMES = 75  # frames of the motion on a branch
 MOST = 2  # largest number of singular positions of a scene whose branches are shown
-DROPPED = ("reactions", "open_reactions")  # fields of a record that no picture needs
+DROPPED = ("reactions", "open_reactions", "angles")  # fields of a record that no picture needs
 POSES = ("position", "orientation")
 
 Run = tuple[Case, Record]

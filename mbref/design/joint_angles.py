@@ -1,4 +1,4 @@
-"""Angles of torsion springs and couplings at a pose, counted over full turns from pose to pose."""
+"""Angles of joints at a pose, counted over full turns from pose to pose."""
 
 from __future__ import annotations
 
@@ -7,30 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mbref import rotations
+from mbref.equations.joint_angles import angles_of_pose
 from mbref.equations.model import Model
 
 
 def angles_at(model: Model, q: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return the angles (k,), rad, of loads about axes and of couplings at q (7 nb,), each nearest to its
-    value ``before``."""
-    loads, primitives = model.data.loads, model.data.primitives
-    found = before.copy()
-    for part, x, y, u in (
-        (loads, loads.x_first, loads.y_first, loads.x_second),
-        (primitives, primitives.direction_first, primitives.turning_first, primitives.direction_second),
-    ):
-        for k in np.flatnonzero(part.angle >= 0):
-            first, second = int(part.first[k]), int(part.second[k])
-            along, across = _in_world(model, q, first, x[k]), _in_world(model, q, first, y[k])
-            turned = _in_world(model, q, second, u[k])
-            angle, slot = np.arctan2(turned @ across, turned @ along), part.angle[k]
-            found[slot] = angle + 2 * np.pi * np.round((before[slot] - angle) / (2 * np.pi))
-    return found
-
-
-def _in_world(model: Model, q: np.ndarray, body: int, vector: np.ndarray) -> np.ndarray:
-    return vector if body == model.nb else rotations.rotate(q.reshape(model.nb, 7)[body, 3:], vector)
+    """Return the angles (k,), rad, of turning joints at q (7 nb,), each nearest to its value ``before``."""
+    angles = angles_of_pose(model, q)
+    return np.asarray(angles + 2 * np.pi * np.round((before - angles) / (2 * np.pi)))
 
 
 @contextlib.contextmanager

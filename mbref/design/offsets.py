@@ -9,6 +9,7 @@ import numpy as np
 from mbref.design.placed import placed_with_springs
 from mbref.equations.gaps import gaps
 from mbref.equations.initial_state import solve_positions
+from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
 from mbref.scene import Scene, SceneError
 
@@ -19,11 +20,25 @@ MOST_PARTS = 1024  # limit of time: some seconds
 MET_OFFSET = 1e-12  # gap (lengths of the mechanism, or rad) that rounding may leave
 
 
-@functools.lru_cache(maxsize=64)
 def assembled(scene: Scene) -> Scene:
     """Return a scene with offsets of couplings at poses that obey them (see ``Scene.assembled``)."""
+    return _moved(scene)[0]
+
+
+def angles_at_start(scene: Scene) -> dict[str, float]:
+    """Return the angle, rad, by joint that turns about one axis, from the poses that the scene gives to the
+    poses that obey its offsets; full turns count."""
+    if not any(coupling.offset for coupling in scene.coupling):
+        return {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
+    return _moved(scene)[1]
+
+
+@functools.lru_cache(maxsize=64)
+def _moved(scene: Scene) -> tuple[Scene, dict[str, float]]:
+    """Return the scene at poses that obey its offsets, and the angles of joints from the given poses."""
     offsets = {c.name: c.offset / max(1.0, abs(c.ratio)) for c in scene.coupling}
     found = scene.with_(coupling=[c.model_copy(update={"offset": 0.0}) for c in scene.coupling])
+    angles = {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
     value = np.array([offsets.get(name, 0.0) for name in Model(found).row_joint])
     parts = 1
     while parts < MOST_PARTS and not _is_small(found, value / parts):
@@ -34,8 +49,10 @@ def assembled(scene: Scene) -> Scene:
         gap = gaps(model.terms(0.0, q).less(value / parts), model.length)
         if not gap.max(initial=0.0) <= MET_OFFSET:
             raise SceneError([_unmet(scene, model, residual, part / parts)])
+        steps = angles_by_joint(found, model.structure, angles_of_pose(model, q)[None])
+        angles = {name: angle + float(steps[name][0]) for name, angle in angles.items()}
         found = placed_with_springs(model, q)
-    return found
+    return found, angles
 
 
 def _is_small(scene: Scene, value: np.ndarray) -> bool:

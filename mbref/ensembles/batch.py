@@ -18,8 +18,10 @@ import numpy as np
 from mbref.crossing import Crossing
 from mbref.ensembles.candidates import Candidates, Parameters, candidates_of
 from mbref.equations.initial_state import LARGE
+from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import motion_of
+from mbref.equations.structure import Structure
 from mbref.kernels.layout import OperationCounts
 from mbref.kernels.memory_pool import SavedNumbers
 from mbref.motion import Motion
@@ -49,8 +51,9 @@ class BatchResult(NamedTuple):
     """The s completed runs of a batch, each with k samples.
 
     Fields are ``places`` (s), the indices of the scenes; poses (s, k, nb, …) with the names of a Motion;
-    coordinates (s, k, nb, 7); multipliers (s, k, m); ``layout.Counts`` (s, 6); the seconds of stepping (s)
-    and construction; and the message and the passed singular positions of each run.
+    coordinates (s, k, nb, 7); multipliers (s, k, m); angles of joints (s, k, a); ``layout.Counts`` (s, 6);
+    the seconds of stepping (s) and construction; and the message and the passed singular positions of each
+    run.
     """
 
     places: list[int]
@@ -58,12 +61,14 @@ class BatchResult(NamedTuple):
     poses: dict[str, np.ndarray]
     coordinates: np.ndarray
     multipliers: np.ndarray
+    angles: np.ndarray
     counts: np.ndarray
     seconds: list[float]
     built: float
     messages: list[str]
     crossings: list[Sequence[Crossing]]
     facts: dict[str, Any]
+    structure: Structure
 
     def motions(self, scenes: Sequence[Scene]) -> Iterator[tuple[int, Motion]]:
         """Return index and motion of each run; ``scenes`` are all scenes of the batch."""
@@ -77,6 +82,7 @@ class BatchResult(NamedTuple):
                     times=self.times,
                     **poses,
                     **lazy_reactions(scenes[place], self.times, self.coordinates[k], self.multipliers[k]),
+                    angles=angles_by_joint(scenes[place], self.structure, self.angles[k]),
                     outcome=OUTCOMES[DONE],
                     t_end=float(self.times[-1]),
                     message=self.messages[k],
@@ -136,7 +142,7 @@ class Batch:
         """Return the runs with these indices, which together took the given CPU seconds."""
         packs, nb = self._candidates.packs, self._run.model.nb
         shape = len(places), self._run.times.size, nb
-        q, v, a, multipliers = (each[places] for each in self._samples)
+        q, v, a, multipliers, angles = (each[places] for each in self._samples)
         q, v, a = q.reshape(*shape, 7), v.reshape(*shape, 6), a.reshape(*shape, 6)
         principal = packs.principal[places][:, None] if packs.turns_frames else None
         stepping, crossings = self._seconds[places], [self._crossings.get(k, ()) for k in places]
@@ -148,6 +154,8 @@ class Batch:
             poses=motion_of(q, v, a, principal, len(self._run.scene.body)),
             coordinates=q,
             multipliers=multipliers,
+            angles=angles,
+            structure=self._run.model.structure,
             counts=self._counts[places],
             seconds=stepping.tolist(),
             built=(seconds - float(stepping.sum())) / max(1, len(places)),

@@ -318,7 +318,7 @@ def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float,
         weight = np.sqrt(scenes.mass[k]) * scale
         x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=START_RANK_TOLERANCE)[0]
     size = max(np.abs(x).max(), np.abs(as_given).max())
-    return x * scale, float(np.abs(unit @ as_given - rhs).max() / size), bool(open_.size)
+    return x * scale, float(np.abs(unit @ as_given - rhs).max(initial=0.0) / size), bool(open_.size)
 
 
 def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:

@@ -50,7 +50,7 @@ def forces(t, equations):
         elif kind == SPRING:
             spring(k, loads, frames, g)
         elif kind == ABOUT_AXIS:
-            act_about_axis(k, force[0], loads, frames, equations.angles, g)
+            act_about_axis(k, force[0], equations)
         else:
             act_along_axis(k, force[0], loads, frames, g)
 
@@ -93,26 +93,23 @@ def spring(k, loads, frames, g):
 
 
 @kernel
-def joint_angle(i, j, x, y, u, reference, rotation):
-    """Return the angle from x towards y on body i to u on body j (rad), nearest to ``reference``."""
-    x, y, u = to_world(rotation, i, x), to_world(rotation, i, y), to_world(rotation, j, u)
+def joint_angle(s, reference, equations):
+    """Return the angle (rad) of the joint with index s in ``TurningJoints``, nearest to ``reference``."""
+    turning, rotation = equations.scene.turning, equations.frames.rotation
+    x = to_world(rotation, turning.first[s], vector(turning.x_first, s))
+    y = to_world(rotation, turning.first[s], vector(turning.y_first, s))
+    u = to_world(rotation, turning.second[s], vector(turning.x_second, s))
     return unwrapped_angle(dot(u, y), dot(u, x), reference)
 
 
 @kernel
-def angle_of_load(k, angles, loads, rotation):
-    """Return the angle of the joint on which a load acts (rad), nearest to the angle at the last step."""
-    x, y, u = vector(loads.x_first, k), vector(loads.y_first, k), vector(loads.x_second, k)
-    return joint_angle(loads.first[k], loads.second[k], x, y, u, angles[loads.angle[k]], rotation)
-
-
-@kernel
-def act_about_axis(k, torque, loads, frames, angles, g):
+def act_about_axis(k, torque, equations):
     """Add the moment torque - stiffness (φ - natural angle) - damping φ' on the second body, and the opposite
     moment on the first body."""
+    loads, frames, g = equations.scene.loads, equations.frames, equations.system.force
     i, j, rotation = loads.first[k], loads.second[k], frames.rotation
     axis = to_world(rotation, i, vector(loads.axis, k))
-    angle = angle_of_load(k, angles, loads, rotation)
+    angle = joint_angle(loads.angle[k], equations.angles[loads.angle[k]], equations)
     w_i = to_world(rotation, i, vector(frames.angular_velocity, i))
     w_j = to_world(rotation, j, vector(frames.angular_velocity, j))
     rate = dot(subtract(w_j, w_i), axis)
@@ -143,16 +140,24 @@ def act_along_axis(k, force, loads, frames, g):
 
 @kernel
 def remember_angles(equations):
-    """Save the angles of loads about axes and of couplings at the accepted state, from which later angles are
-    unwrapped."""
-    loads, primitives = equations.scene.loads, equations.scene.primitives
-    angles, rotation = equations.angles, equations.frames.rotation
-    for k in range(loads.angle.shape[0]):
-        if loads.angle[k] >= 0:
-            angles[loads.angle[k]] = angle_of_load(k, angles, loads, rotation)
-    for p in range(primitives.angle.shape[0]):
-        slot = primitives.angle[p]
-        if slot >= 0:
-            x, y = vector(primitives.direction_first, p), vector(primitives.turning_first, p)
-            i, j, u = primitives.first[p], primitives.second[p], vector(primitives.direction_second, p)
-            angles[slot] = joint_angle(i, j, x, y, u, angles[slot], rotation)
+    """Save the angles of joints at the state in ``equations.frames``; bodies have turned by less than a right
+    angle since the last call."""
+    angles = equations.angles
+    for s in range(angles.shape[0]):
+        angles[s] = joint_angle(s, angles[s], equations)
+
+
+@kernel
+def advance_angles(interval, equations):
+    """Save the angles of joints and their rates at the accepted state, a time ``interval`` (s) after the last
+    one. The mean rate predicts each angle, so that a steady step may have full turns."""
+    turning, frames = equations.scene.turning, equations.frames
+    angles, rates, rotation = equations.angles, equations.angle_rates, equations.frames.rotation
+    for s in range(angles.shape[0]):
+        i, j = turning.first[s], turning.second[s]
+        axis = to_world(rotation, i, cross(vector(turning.x_first, s), vector(turning.y_first, s)))
+        spin_i = to_world(rotation, i, vector(frames.angular_velocity, i))
+        spin_j = to_world(rotation, j, vector(frames.angular_velocity, j))
+        rate = dot(subtract(spin_j, spin_i), axis)
+        angles[s] = joint_angle(s, angles[s] + 0.5 * interval * (rates[s] + rate), equations)
+        rates[s] = rate

@@ -16,38 +16,34 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
-from mbref.equations.joints import Primitive, driver_primitive, frame, primitives_of
-from mbref.equations.parts import FRAME, ORIGIN, all_parts
-from mbref.equations.structure import LoadPlace, Places, PrimitivePlace, structure_of
+from mbref.equations.joints import Primitive, driver_primitive, primitives_of
+from mbref.equations.load_numbers import (
+    Values,
+    anchors_of,
+    directions_across,
+    load_place,
+    numbers_of_load,
+    turning_joints,
+)
+from mbref.equations.parts import FRAME, all_parts
+from mbref.equations.structure import Places, PrimitivePlace, TurningPlace, structure_of
 from mbref.equations.units import body_lengths, inverse_root, metric
 from mbref.kernels.scene_layout import (
-    ABOUT_AXIS,
-    ALONG_AXIS,
-    FORCE,
-    MOMENT,
-    SPRING,
     Bodies,
     Functions,
     Loads,
     Primitives,
     SceneData,
+    TurningJoints,
 )
 from mbref.scene import (
     GROUND,
     Body,
-    Force,
     Joint,
-    JointLoad,
-    Load,
-    Moment,
     Scene,
-    SceneError,
-    Spring,
 )
 from mbref.scene_fields import COINCIDENT
-from mbref.scene_joints import ANGLE
 
-Values = tuple[float, ...]
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 
 
@@ -80,7 +76,7 @@ class Packs:
         )
         bodies = self._bodies()
         lengths = self._lengths(joints)
-        primitives, loads = self._fixed_in_bodies(
+        primitives, loads, turning = self._fixed_in_bodies(
             self._in_order([rows for _, rows in of_joints], of_couplings)
         )
         # gravity acts on the bodies of the scene, not on rotors or a modelled ground
@@ -91,6 +87,7 @@ class Packs:
             metric_root=inverse_root(metric(self.mass, lengths)),
             bodies=bodies,
             primitives=primitives,
+            turning=turning,
             row_bodies=self._all(self.structure.row_bodies),
             functions=self._functions(),
             loads=loads,
@@ -119,6 +116,7 @@ class Packs:
     ) -> Places:
         """Return the first scene without its numbers, from the primitives of its joints and couplings."""
         scene, joints = self.scenes[0], self.joints[0]
+        turning = {joint.name: k for k, joint in enumerate(turning_joints(joints))}
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads, functions = () if self.kinematic else scene.load, functions_of(scene)
         factor = itertools.count(len(scene.driver))
@@ -131,8 +129,13 @@ class Packs:
             )
             + tuple(self._of_couplings(coupled)),
             loads=tuple(
-                self._load_place(k, load, next(factor) if load.over_time else -1)
+                load_place(scene, k, self.index, turning, next(factor) if load.over_time else -1)
                 for k, load in enumerate(loads)
+            ),
+            turning=tuple(
+                TurningPlace(joint.name, *bodies)
+                for joint, bodies in zip(joints, ends, strict=True)
+                if joint.name in turning
             ),
             anchored=tuple(body for bodies in ends for body in bodies),
             functions=tuple(len(function.pieces()) for function in functions),
@@ -145,18 +148,6 @@ class Packs:
             for k, (joint, p) in enumerate(zip(coupling.joints, pair, strict=True)):
                 first, second = map(self.index.__getitem__, joint.bodies)
                 yield PrimitivePlace(p.kind, coupling.name, first, second, -1, k + 1, joint.name)
-
-    def _load_place(self, place: int, load: Load, function: int) -> LoadPlace:
-        """Return kind, bodies and function of time of load[place]; raises SceneError for an unknown type."""
-        if isinstance(load, Moment | Force):
-            return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, self.index[load.body], 0, function)
-        if isinstance(load, Spring):
-            first, second = map(self.index.__getitem__, load.bodies)
-            return LoadPlace(SPRING, first, second, function)
-        if not isinstance(load, JointLoad):
-            raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
-        first, second = map(self.index.__getitem__, self.scenes[0].joint_named(load.joint).bodies)
-        return LoadPlace(ABOUT_AXIS if load.coordinate == ANGLE else ALONG_AXIS, first, second, function)
 
     def _all(self, array: np.ndarray) -> np.ndarray:
         """Return an array that is equal for all scenes."""
@@ -189,7 +180,7 @@ class Packs:
 
     def _lengths(self, joints: Sequence[Joint]) -> np.ndarray:
         """Return lengths (s, nb) of bodies, the vectors to their anchors, and the scenes' ``length``."""
-        anchors = self._rows(_once(_anchors, joints), 6).reshape(len(self.scenes), -1, 3)
+        anchors = self._rows(_once(anchors_of, joints), 6).reshape(len(self.scenes), -1, 3)
         nb, nj = len(self.scenes[0].body), len(self.scenes[0].joint)
         points = np.concatenate((self._centres[:, :nb], anchors[:, : 2 * nj]), axis=1)
         apart = points[:, :, None] - points[:, None]
@@ -197,30 +188,37 @@ class Packs:
         self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
         return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
 
-    def _fixed_in_bodies(self, of_primitives: Sequence[Values]) -> tuple[Primitives, Loads]:
-        """Return primitives and loads from the numbers of the primitives of all joints, drivers and
-        couplings. Their vectors are rotated to the principal frames of the bodies in one operation."""
+    def _fixed_in_bodies(self, of_primitives: Sequence[Values]) -> tuple[Primitives, Loads, TurningJoints]:
+        """Return primitives, loads and turning joints from the numbers of all primitives. Their vectors are
+        rotated to the principal frames of the bodies in one operation."""
         structure, scenes = self.structure, () if self.kinematic else self.scenes
         numbers = self._rows(of_primitives, 16)
-        of_loads = self._rows((_numbers_of(load, scene) for scene in scenes for load in scene.load), 24)
+        of_loads = self._rows((numbers_of_load(load, scene) for scene in scenes for load in scene.load), 15)
+        turning = [joint for joints in self.joints for joint in turning_joints(joints)]
+        of_angles = self._rows(_once(directions_across, turning), 9)
         (s, p), l = numbers.shape[:2], of_loads.shape[1]
         world = np.concatenate(
-            [numbers[..., :15].reshape(s, 5 * p, 3), of_loads[..., 3:21].reshape(s, 6 * l, 3)], axis=1
+            [
+                numbers[..., :15].reshape(s, 5 * p, 3),
+                of_loads[..., 3:12].reshape(s, 3 * l, 3),
+                of_angles.reshape(s, -1, 3),
+            ],
+            axis=1,
         )
         own = self.in_bodies(world)
-        vectors_of, vectors = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, l, 6, 3)
+        vectors_of, others = own[:, : 5 * p].reshape(s, p, 5, 3), own[:, 5 * p :].reshape(s, -1, 3, 3)
         places = (structure.kind, structure.first, structure.second, structure.driver, structure.row)
         places += (*structure.places_in_row,)
         directions = [vectors_of[:, :, k] for k in range(5)]
         primitives = Primitives._make([*map(self._all, places), *directions, numbers[..., 15]])
-        ends = [*map(self._all, structure.load), self._all(structure.angle), of_loads[..., :3]]
-        constants = [of_loads[..., k] for k in range(21, 24)]
-        loads = Loads._make([*ends, *(vectors[:, :, k] for k in range(6)), *constants])
-        return primitives, loads
+        ends, constants = [*map(self._all, structure.load)], [of_loads[..., k] for k in range(12, 15)]
+        loads = Loads._make([*ends, of_loads[..., :3], *(others[:, :l, k] for k in range(3)), *constants])
+        across = [others[:, l:, k] for k in range(3)]
+        return primitives, loads, TurningJoints._make([*map(self._all, structure.turning), *across])
 
     def in_bodies(self, vectors: np.ndarray) -> np.ndarray:
-        """Return world vectors (s, 5 p + 6 l, 3) of the structure at t = 0 in the principal frames of its
-        bodies."""
+        """Return world vectors (s, 5 p + 3 l + 3 a, 3) of the structure at t = 0 in the principal frames of
+        its bodies."""
         origins = self._centres[:, self.structure.vector_origin]
         return self.directions(self.structure.vector_body, vectors - origins)
 
@@ -294,12 +292,6 @@ def _principal_axes(inertia: Any) -> tuple[Sequence[float], np.ndarray | None]:
     return np.maximum(moments, 0.0), axes
 
 
-def _anchors(joint: Joint) -> tuple[float, ...]:
-    """Return the anchors on the first and on the second body, world at t = 0."""
-    first, second = joint.anchor_pair
-    return *first, *second
-
-
 def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive], list[Values]]:
     """Return the primitives of a joint and its driver, and 16 numbers of each: two points, three directions
     and a length. The directions are ``direction_first``, ``turning_first`` and ``direction_second``."""
@@ -310,19 +302,3 @@ def _of_joint(joint: Joint, driven: Mapping[str, int]) -> tuple[list[Primitive],
 def _numbers(p: Primitive) -> Values:
     """Return two points, three directions and a length, or the factor of a joint coordinate."""
     return *p.point_first, *p.point_second, *p.first, *p.turning, *p.second, p.length
-
-
-def _numbers_of(load: Load, scene: Scene) -> tuple[float, ...]:
-    """Return seven world vectors at t = 0, stiffness, damping, and natural length or angle of a load; unused
-    vectors are zero. Vectors are force, two points, axis, x and y on the first body, and x on the second."""
-    if isinstance(load, Moment):
-        return *load.moment, *ORIGIN * 7
-    if isinstance(load, Force):
-        return *load.force, *load.point, *ORIGIN * 6
-    if isinstance(load, Spring):
-        first, second = load.points
-        return *ORIGIN, *first, *second, *ORIGIN * 4, load.stiffness, load.damping, load.natural_length
-    joint, action = scene.joint_named(load.joint), load.action
-    x, y, z = frame(joint.directions[0])
-    numbers = action.stiffness, action.damping, action.natural
-    return action.amount, 0.0, 0.0, *_anchors(joint), *z, *x, *y, *x, *numbers

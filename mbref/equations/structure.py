@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.equations.joints import ROWS_OF
-from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
+from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -39,10 +39,20 @@ class LoadPlace(NamedTuple):
     first: int  # index of the first body
     second: int  # index of the second body, 0 without
     function: int  # index of the load's function of time, -1 without
+    angle: int = -1  # index of its joint among ``Places.turning``, -1 for other loads
+
+
+class TurningPlace(NamedTuple):
+    """A joint that turns about one axis, without its numbers."""
+
+    joint: str
+    first: int  # index of the first body
+    second: int
 
 
 class Places(NamedTuple):
-    """Kinds and bodies of all primitives and loads, without numbers; body nb is the fixed frame.
+    """Kinds and bodies of all primitives, loads and turning joints, without numbers; body nb is the fixed
+    frame.
 
     ``anchored`` are the bodies of the joints' anchors, ``functions`` the numbers of pieces of the functions
     of time, ``terms`` is the length of their longest polynomial.
@@ -51,6 +61,7 @@ class Places(NamedTuple):
     nb: int
     primitives: tuple[PrimitivePlace, ...]
     loads: tuple[LoadPlace, ...]
+    turning: tuple[TurningPlace, ...]
     anchored: tuple[int, ...]
     functions: tuple[int, ...]
     terms: int
@@ -61,7 +72,8 @@ class Structure:
     """The p primitives, l loads, m rows and their columns. The arrays are read-only.
 
     ``entry_columns`` (m, 12) is the column of every entry of the blocks; columns of the fixed frame are ≥ n.
-    Vectors of the primitives come first, then vectors of the loads, in the order of ``packing``.
+    Vectors of the primitives come first, then vectors of the loads and of the a turning joints, in the order
+    of ``packing``.
     """
 
     nb: int  # bodies; the fixed frame has this number
@@ -75,11 +87,11 @@ class Structure:
     row_bodies: np.ndarray  # (m, sides), padded with the fixed frame
     entry_columns: np.ndarray  # (m, width)
     row_joint: tuple[str, ...]  # (m,) names of the joints
-    load: np.ndarray  # (4, l): kind, first and second body, function of time
-    angle: np.ndarray  # (l,) index of the unwrapped angle of a load about a joint's axis, else -1
+    load: np.ndarray  # (5, l): kind, first and second body, function of time, index of its joint's angle
+    turning: np.ndarray  # (2, a) first and second body
     anchored: np.ndarray  # (e,) bodies of the joints' anchors
-    vector_body: np.ndarray  # (5 p + 6 l,) the body in whose frame each vector is fixed
-    # (5 p + 6 l,) the body from whose centre of mass points are measured; the fixed frame for directions
+    vector_body: np.ndarray  # (5 p + 3 l + 3 a,) the body in whose frame each vector is fixed
+    # (5 p + 3 l + 3 a,) the body from whose centre points are measured; the fixed frame for directions
     vector_origin: np.ndarray
     places: Places
 
@@ -87,12 +99,11 @@ class Structure:
     def sizes(self) -> dict[str, int]:
         """Sizes of the memory of evaluations (see ``kernels.layout``)."""
         sides, m = self.sides, len(self.row_joint)
-        angles = max(1, int(np.count_nonzero(self.angle >= 0) + np.count_nonzero(self.places_in_row[3] >= 0)))
         return {
             "nb": self.nb,
             "n": 6 * self.nb,
             "m": m,
-            "angles": angles,
+            "angles": self.turning.shape[1],
             "f": len(self.places.functions),
             "dense_rows": 0,
             "sides": sides,
@@ -102,7 +113,7 @@ class Structure:
     @functools.cached_property
     def has_angles(self) -> bool:
         """True if a load about a joint's axis or a coupling unwraps its angle."""
-        return bool((self.angle >= 0).any() or (self.places_in_row[3] >= 0).any())
+        return bool((self.load[4] >= 0).any() or (self.places_in_row[3] >= 0).any())
 
     @functools.cached_property
     def of_bodies(self) -> np.ndarray:
@@ -112,11 +123,12 @@ class Structure:
 
     @functools.cached_property
     def vector_is_point(self) -> np.ndarray:
-        """Return (5 p + 6 l,) whether each vector is a point: the first two vectors of a primitive or a load
-        are points."""
+        """Return (5 p + 3 l + 3 a,) whether each vector is a point: the first two vectors of a primitive or a
+        load are points."""
         places = self.places
         return np.array([k < 2 for _ in places.primitives for k in range(5)]
-                        + [k < 2 for _ in places.loads for k in range(6)], dtype=bool)  # fmt: skip
+                        + [k < 2 for _ in places.loads for k in range(3)]
+                        + [False for _ in places.turning for k in range(3)], dtype=bool)  # fmt: skip
 
     @functools.cached_property
     def rows(self) -> np.ndarray:
@@ -166,8 +178,7 @@ def structure_of(places: Places) -> Structure:
     kind, first, second, driver = (
         np.array([place[k] for place in primitives], dtype=np.int64) for k in (0, 2, 3, 4)
     )
-    load = np.array(places.loads, dtype=np.int64).reshape(-1, 4).T.copy()
-    is_angle = load[0] == ABOUT_AXIS
+    load = np.array(places.loads, dtype=np.int64).reshape(-1, 5).T.copy()
     rows = np.array([ROWS_OF[place.kind] * (place.part != 1) for place in primitives], dtype=np.int64)
     coupled, columns = _coupled_bodies(places)
     sides = 4 if coupled else 2
@@ -175,8 +186,8 @@ def structure_of(places: Places) -> Structure:
     row_bodies[:, :2] = np.repeat(np.stack([first, second], axis=1), rows, axis=0)
     for bodies, row in zip(coupled, np.cumsum(rows)[[p.part == 2 for p in primitives]] - 1, strict=True):
         row_bodies[row] = bodies
-    unwraps = np.array([place.kind == COUPLED_ANGLE for place in primitives], dtype=bool)
-    slots = np.where(unwraps, np.count_nonzero(is_angle) + np.cumsum(unwraps) - 1, -1)
+    turning = {place.joint: k for k, place in enumerate(places.turning)}
+    slots = [turning[place.of] if place.kind == COUPLED_ANGLE else -1 for place in primitives]
     begins = np.array([place.part != 2 for place in primitives], dtype=np.int64)
     return Structure(
         nb=nb,
@@ -193,12 +204,14 @@ def structure_of(places: Places) -> Structure:
             place.joint for place, count in zip(primitives, rows, strict=True) for _ in range(count)
         ),
         load=load,
-        angle=np.where(is_angle, np.cumsum(is_angle) - 1, -1),
+        turning=np.array([place[1:] for place in places.turning], dtype=np.int64).reshape(-1, 2).T.copy(),
         anchored=np.array(places.anchored, dtype=int),
         vector_body=_of_vectors([(p.first, p.second, p.first, p.first, p.second) for p in primitives]
-                                + [(l.first, l.second, *(l.first,) * 3, l.second) for l in places.loads]),
+                                + [(l.first, l.second, l.first) for l in places.loads]
+                                + [(t.first, t.first, t.second) for t in places.turning]),
         vector_origin=_of_vectors([(p.first, p.second, nb, nb, nb) for p in primitives]
-                                  + [_origins(l, nb) for l in places.loads]),
+                                  + [_origins(l, nb) for l in places.loads]
+                                  + [(nb, nb, nb) for _ in places.turning]),
         places=places,
     )  # fmt: skip
 
@@ -227,7 +240,7 @@ def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:
 
 def _origins(load: LoadPlace, nb: int) -> tuple[int, ...]:
     """Return the bodies from whose centres of mass the vectors of a load are measured: two points, then
-    directions."""
+    an axis."""
     first = load.first if load.kind in (FORCE, SPRING, ALONG_AXIS) else nb
     second = load.second if load.kind in (SPRING, ALONG_AXIS) else nb
-    return first, second, nb, nb, nb, nb
+    return first, second, nb

@@ -99,7 +99,10 @@ class Equations(NamedTuple):
     frames: Frames
     rows: Rows
     system: System
-    angles: Annotated[Vector, "angles"]  # rad, at the last accepted step, unwrapped
+    angles: Annotated[
+        Vector, "angles"
+    ]  # rad, of turning joints at the last accepted step, full turns counted
+    angle_rates: Annotated[Vector, "angles"]  # rad/s, at the last accepted step of an explicit integrator
     piece: Annotated[Indices, "f"]  # index of the interval in use, for each piecewise function of time
 
 
@@ -183,6 +186,7 @@ class Watch(NamedTuple):
     generic_rank: int = 0
     regular: int = 0  # 1 if the motion does not begin at a singular position
     accepted_time: float = 0.0  # s
+    angle_time: float = 0.0  # s, of the angles of joints
     # position of the singular position in the last step, as a fraction of the step
     singular_part: float = 0.0
 
@@ -205,12 +209,13 @@ class Clock(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """States, accelerations and multipliers at the sample times."""
+    """States, accelerations, multipliers and angles of joints (rad, turns counted) at the sample times."""
 
     coordinates: Annotated[Matrix, "k", "7*nb"]
     velocities: Annotated[Matrix, "k", "n"]
     accelerations: Annotated[Matrix, "k", "n"]
     multipliers: Annotated[Matrix, "k", "m"]
+    angles: Annotated[Matrix, "k", "angles"]
 
 
 class Ends(NamedTuple):

@@ -36,13 +36,23 @@ class Primitives(NamedTuple):
     begins: Annotated[Indices, "p"]  # 0 for the second coordinate in the row of a coupling, otherwise 1
     column_first: Annotated[Indices, "p"]  # index in the blocks of the first body's columns
     column_second: Annotated[Indices, "p"]
-    angle: Annotated[Indices, "p"]  # index of the unwrapped angle of a joint coordinate, otherwise -1
+    angle: Annotated[Indices, "p"]  # index in ``TurningJoints`` of the joint of a coupled angle, otherwise -1
     point_first: Annotated[Matrix, "p", 3]
     point_second: Annotated[Matrix, "p", 3]
     direction_first: Annotated[Matrix, "p", 3]
     turning_first: Annotated[Matrix, "p", 3]  # direction_first rotated by 90°, if a driver rotates it
     direction_second: Annotated[Matrix, "p", 3]
     length: Annotated[Vector, "p"]  # length of a distance constraint (m), or the factor of a joint coordinate
+
+
+class TurningJoints(NamedTuple):
+    """Joints that turn about one axis: their bodies, and directions across the axis, fixed in the bodies."""
+
+    first: Annotated[Indices, "angles"]
+    second: Annotated[Indices, "angles"]
+    x_first: Annotated[Matrix, "angles", 3]
+    y_first: Annotated[Matrix, "angles", 3]  # x_first rotated by 90° about the axis
+    x_second: Annotated[Matrix, "angles", 3]  # x_first at t = 0, in the second body
 
 
 class Functions(NamedTuple):
@@ -69,14 +79,11 @@ class Loads(NamedTuple):
     first: Annotated[Indices, "l"]
     second: Annotated[Indices, "l"]
     function: Annotated[Indices, "l"]  # index of the function of time that multiplies the load, else -1
-    angle: Annotated[Indices, "l"]  # index of the unwrapped angle of a load about a joint's axis, else -1
+    angle: Annotated[Indices, "l"]  # index in ``TurningJoints`` of the joint of a load about an axis, else -1
     force: Annotated[Matrix, "l", 3]  # N, or the moment in N m; along a joint coordinate the first number
     point_first: Annotated[Matrix, "l", 3]
     point_second: Annotated[Matrix, "l", 3]
-    axis: Annotated[Matrix, "l", 3]  # joint axis in the first body's frame; x and y are perpendicular to it
-    x_first: Annotated[Matrix, "l", 3]
-    y_first: Annotated[Matrix, "l", 3]
-    x_second: Annotated[Matrix, "l", 3]  # x_first at t = 0, in the second body
+    axis: Annotated[Matrix, "l", 3]  # joint axis in the first body's frame
     stiffness: Annotated[Vector, "l"]
     damping: Annotated[Vector, "l"]
     natural: Annotated[Vector, "l"]  # length or displacement (m) or angle (rad)
@@ -94,6 +101,7 @@ class SceneData(NamedTuple):
     metric_root: Annotated[Vector, "n"]  # inverse roots of the projection's metric
     bodies: Bodies
     primitives: Primitives
+    turning: TurningJoints
     row_bodies: Annotated[IndexTable, "m", "sides"]  # bodies of each row, padded with the fixed frame
     functions: Functions
     loads: Loads
@@ -108,6 +116,7 @@ class SceneData(NamedTuple):
             self.metric_root,
             *self.bodies,
             *primitives,
+            *self.turning[2:],
             *self.functions[1:],
             *loads,
         )

@@ -11,6 +11,7 @@ from mbref import __version__
 from mbref.crossing import Crossing
 from mbref.equations.branches import Passed, branches_passed, tangents
 from mbref.equations.initial_state import Start
+from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import Model
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
@@ -101,7 +102,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         status, run.memory.loop.clock.time = SINGULAR_AHEAD, met.time
     model, loop, counts = run.model, run.memory.loop, run.memory.equations.system.counts
     reached, nb = int(loop.clock.sample), run.model.nb
-    q, v, a, multipliers = (sample[:reached].copy() for sample in loop.samples)
+    q, v, a, multipliers, angles = (sample[:reached].copy() for sample in loop.samples)
     q, v, a = q.reshape(reached, nb, 7), v.reshape(reached, nb, 6), a.reshape(reached, nb, 6)
     times = run.times[:reached]
     return Motion(
@@ -110,6 +111,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         times=times,
         **model.motion(q, v, a),
         **lazy_reactions(run.scene, times, q, multipliers),
+        angles=angles_by_joint(run.scene, model.structure, angles),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status) if met is None else _met(run, met),
@@ -260,5 +262,17 @@ def _cause(run: Run, status: int) -> str:
         return f"the error estimate requires a step below {h:.3g} s at t = {t:.6g} s"
     if status == LEFT_MOTION:
         return f"{OUTCOMES[status].sentence}, as a run by another method shows, by t = {t:.6g} s"
-    part = run.method.integrator if run.method.is_series else run.method.formulation
-    return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({part.name})"
+    return f"{OUTCOMES[status].sentence} at t = {t:.6g} s ({_failed_part(run, status)})"
+
+
+def _failed_part(run: Run, status: int) -> str:
+    """Return the name of the part that failed: a stabilisation may solve positions by Newton's method,
+    and a formulation may iterate, too."""
+    formulation, stabilisation, integrator = run.method.parts
+    if run.method.is_series:
+        return integrator.name
+    corrects = stabilisation.projects or stabilisation.chooses_coordinates
+    if status != NOT_CONVERGED or not corrects:
+        return formulation.name
+    iterates = formulation.crosses == "by regularisation"
+    return f"{formulation.name} or {stabilisation.name}" if iterates else stabilisation.name

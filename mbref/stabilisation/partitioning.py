@@ -9,7 +9,7 @@ The partition is kept while the smallest pivot of Φ_u relative to its largest s
 value when the partition was chosen; then another partition is chosen, and the integrator restarts.  With
 ``kept`` = 0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger
 than with 0.6. A new partition with fewer dependent coordinates ends the run: the run is at a singular
-position.
+position. Another partition is also chosen at the last accepted state where Newton–Raphson fails in a step.
 """
 
 from __future__ import annotations
@@ -295,5 +295,6 @@ PARTITIONING = Stabilisation(
     accept,
     memory=Scratch,
     numbers=Options,
+    chooses_coordinates=True,
     watches_rank=True,
 )

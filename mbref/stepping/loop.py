@@ -6,7 +6,7 @@ from numpy import isnan
 
 from mbref.equations.coordinates import copy_state, fastest_turn
 from mbref.equations.functions import end_of_pieces, select_pieces
-from mbref.equations.loads import remember_angles
+from mbref.equations.loads import advance_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
@@ -26,13 +26,14 @@ LEAST_TOLERANCE, EARLY = 1e-13, 1e-2  # least tolerance of a step; tolerance of 
 
 @kernel
 def take_sample(memory):
-    """Record state, accelerations and multipliers of the last evaluation."""
+    """Record state, accelerations, multipliers and angles of the last evaluation."""
     samples, state, system = memory.loop.samples, memory.state, memory.equations.system
     k = memory.loop.clock.sample
     copy(state.coordinates, samples.coordinates[k])
     copy(state.velocities, samples.velocities[k])
     copy(system.acceleration, samples.accelerations[k])
     copy(system.multipliers, samples.multipliers[k])
+    copy(memory.equations.angles, samples.angles[k])
     memory.loop.clock.sample = k + 1
 
 
@@ -65,7 +66,8 @@ def remember_accepted_state(t, memory):
     """Save the accepted state, from which dependent coordinates are predicted and angles are unwrapped."""
     copy_state(memory.state, memory.previous)
     memory.watch.accepted_time = t
-    remember_angles(memory.equations)
+    advance_angles(t - memory.watch.angle_time, memory.equations)
+    memory.watch.angle_time = t
 
 
 @kernel

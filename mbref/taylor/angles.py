@@ -32,7 +32,7 @@ def add_angles(memory):
     nz, y = memory.solver.pivot_columns.shape[0], terms[0]
     for s in range(torsions.row.shape[0]):
         if torsions.row[s] >= 0:
-            f, near = components(9 * s + 6, 1.0, y, torsions), memory.angles[s]
+            f, near = components(9 * s + 6, 1.0, y, torsions), memory.run.equations.angles[torsions.slot[s]]
             cosine = dot(components(9 * s, 1.0, y, torsions), f)
             sine = dot(components(9 * s + 3, 1.0, y, torsions), f)
             phi[nz + torsions.row[s]] += torsions.factor[s] * unwrapped_angle(sine, cosine, near)

@@ -10,7 +10,7 @@ import numpy as np
 from mbref.equations.model import Model
 from mbref.equations.packing import Packs, row_of
 from mbref.kernels.memory_pool import arrays_in
-from mbref.kernels.scene_layout import Loads, Primitives, SceneData
+from mbref.kernels.scene_layout import Loads, Primitives, SceneData, TurningJoints
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.natural import NaturalCoordinates, pose_of, unit_of_length
 from mbref.taylor.numbers import ManyScenes
@@ -56,7 +56,9 @@ def _joint(joints: Sequence[Any], batch: ManyScenes) -> JointNumbers:
 def _numbers(data: SceneData, batch: ManyScenes) -> SceneData:
     """Return data with the numbers of all scenes."""
     loads = Loads(*map(batch.together, data.loads))._replace(force=data.loads.force)
-    return data._replace(primitives=Primitives(*map(batch.together, data.primitives)), loads=loads)
+    primitives = Primitives(*map(batch.together, data.primitives))
+    turning = TurningJoints(*map(batch.together, data.turning))
+    return data._replace(primitives=primitives, turning=turning, loads=loads)
 
 
 def equations_of_all(

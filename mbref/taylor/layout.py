@@ -199,17 +199,31 @@ class Crossings(NamedTuple):
 
 
 class StepStart(NamedTuple):
-    """Start of a series: values and rates of the variables, and angles of torsion springs."""
+    """Start of a series: values and rates of the variables, and angles of joints."""
 
     terms: Annotated[Matrix, 2, "lanes"]
-    angles: Annotated[Vector, "torsions"]
+    angles: Annotated[Vector, "angles"]
+
+
+class TurnWatch(NamedTuple):
+    """Rotation since angles of joints were computed."""
+
+    unseen: float = 0.0  # rad, a bound for each body
+
+
+class Turns(NamedTuple):
+    """Bounds of the bodies' rotations (``mbref.taylor.turning``)."""
+
+    watch: TurnWatch
+    weights: Annotated[Vector, "lanes"]  # largest rate of a body's rotation / rate of a variable
+    squares: Annotated[Vector, "lanes"]  # of one body, while weights are computed
 
 
 class Waiting(NamedTuple):
     """Samples whose accelerations and multipliers are computed after the steps of a call."""
 
     state: Annotated[Matrix, "k", "3*lanes"]  # variables and their two derivatives
-    angles: Annotated[Matrix, "k", "torsions"]  # rad, unwrapped
+    angles: Annotated[Matrix, "k", "angles"]  # rad, up to MOST_TURN of each body from the sample
     exact: Annotated[Indices, "k"]  # 1 for a high-accuracy step near a singular position
 
 
@@ -237,7 +251,7 @@ class TaylorMemory(NamedTuple):
     crossing_end: Annotated[Matrix, 2, "lanes"]  # values and rates of the variables at the end of a crossing
     state: Annotated[Matrix, 3, "lanes"]  # variables and their two derivatives at some time
     pose: Annotated[Matrix, 3, "12*nb"]
-    angles: Annotated[Vector, "torsions"]  # rad, unwrapped, at the time of expansion
+    turns: Turns
     waiting: Waiting
     before_samples: SavedState  # the state of the run while samples are completed
 

@@ -88,16 +88,17 @@ def coupled_angles(forms: Forms) -> list[tuple[Any, ...]]:
     return rows
 
 
-def torsions_of(loads: Loads, forms: Forms, angles: Sequence[tuple[Any, ...]]) -> Torsions:
+def torsions_of(data: SceneData, forms: Forms, angles: Sequence[tuple[Any, ...]]) -> Torsions:
     """Return the loads about joints' axes, then the coupled angles."""
-    of, rows, places = forms.of, [], np.flatnonzero(loads.kind == ABOUT_AXIS)
+    of, rows, loads, turning = forms.of, [], data.loads, data.turning
+    places = np.flatnonzero(loads.kind == ABOUT_AXIS)
     for k in places:
-        first, second = int(loads.first[k]), int(loads.second[k])
-        direction_vectors = (of.direction(first, loads.x_first[k]), of.direction(first, loads.y_first[k]),
-                  of.direction(second, loads.x_second[k]))  # fmt: skip
+        first, second, s = int(loads.first[k]), int(loads.second[k]), int(loads.angle[k])
+        direction_vectors = (of.direction(first, turning.x_first[s]), of.direction(first, turning.y_first[s]),
+                  of.direction(second, turning.x_second[s]))  # fmt: skip
         constant, form = forms([e for direction_vector in direction_vectors for e in direction_vector])
         stiffness, damping = (c[k] / of.length**2 for c in (loads.stiffness, loads.damping))
-        indices = loads.function[k], loads.angle[k], -1
+        indices = loads.function[k], s, -1
         rows.append((constant, form, stiffness, damping, loads.natural[k], *indices, 0.0))
     rows += angles
     constant, form, stiffness, damping, natural, function, slot, row, factor = _stacked(rows, 9, forms.d, 7)

@@ -153,7 +153,8 @@ def grow_torsions(k, memory):
             sine += product_order(of[E2 + c], of[F + c], k)
         of[COS, k], of[SIN, k] = cosine, sine
         if k == 0:
-            of[TORSION, 0] = unwrapped_angle(sine, cosine, memory.angles[s])
+            near = memory.run.equations.angles[torsions.slot[s]]
+            of[TORSION, 0] = unwrapped_angle(sine, cosine, near)
         else:
             value = 0.0
             for i in range(1, k + 1):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from mbref.equations.model import Model
-from mbref.kernels.scene_layout import Loads
+from mbref.kernels.scene_layout import SceneData
 from mbref.taylor.expressions import ONE, cleaned
 from mbref.taylor.forms import Forms
 from mbref.taylor.load_polynomials import (
@@ -53,16 +53,17 @@ class Geometry:
             inertia=_inertia(model, self._forms, self._lanes),
             poses=self._poses,
             given=self._given,
-            **self._loads(model.data.loads),
+            **self._loads(model.data),
         )
 
-    def _loads(self, loads: Loads) -> dict[str, Any]:
+    def _loads(self, data: SceneData) -> dict[str, Any]:
         """Return the tables of loads that are not constant; tables without loads are made once."""
+        loads = data.loads
         if not loads.kind.size and self._no_loads:
             return self._no_loads
         found = {
             "springs": springs_of(loads, self._forms),
-            "torsions": torsions_of(loads, self._forms, self._angles),
+            "torsions": torsions_of(data, self._forms, self._angles),
             "slides": slides_of(loads, self._forms),
             "timed": timed_forces(loads, self._forms),
         }

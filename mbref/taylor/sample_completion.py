@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from mbref.equations.evaluation import evaluate
 from mbref.equations.functions import select_pieces
+from mbref.equations.loads import remember_angles
 from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import OK, SINGULAR
 from mbref.linear_algebra.minimum_norm import ALPHA, find_least_multipliers
@@ -35,7 +36,7 @@ def complete_samples(go_on, memory):
     if memory.progress.completed >= end:
         return OK
     save_state(memory.run, memory.before_samples)
-    save_variables(memory.series.terms, memory.angles, memory.series_start)
+    save_variables(memory.series.terms, memory.run.equations.angles, memory.series_start)
     status = complete_until(end, memory)
     if status == OK:
         restore_state(memory.before_samples, memory.run)
@@ -66,13 +67,11 @@ def complete_sample(memory):
 
     The sign of its quaternions agrees with the previous sample, or the start.
     """
-    run, waiting, slot = memory.run, memory.waiting, memory.polynomials.torsions.slot
+    run, waiting = memory.run, memory.waiting
     k, status, before = run.loop.clock.sample, OK, run.loop.samples.coordinates
     copy(before[k - 1] if k > 0 else run.previous.coordinates, run.state.coordinates)
     copy(waiting.state[k], memory.state.reshape(-1))
-    copy(waiting.angles[k], memory.angles)
-    for s in range(slot.shape[0]):
-        run.equations.angles[slot[s]] = waiting.angles[k, s]
+    copy(waiting.angles[k], run.equations.angles)
     if not waiting.exact[k]:
         status = expand_at_sample(memory)
     find_poses(memory)
@@ -80,6 +79,7 @@ def complete_sample(memory):
     if status == OK:
         status = memory.kernels.balance(run.loop.times[k], memory)
     if status == OK:
+        remember_angles(run.equations)
         take_sample(run)
     return status
 
@@ -126,7 +126,7 @@ def balance_forces(t, memory):
 @kernel
 def return_to_series(memory):
     """Restore the series about the saved variables in ``terms``."""
-    restore_variables(memory.series_start, memory.series.terms, memory.angles)
+    restore_variables(memory.series_start, memory.series.terms, memory.run.equations.angles)
     select_pieces(memory.run.loop.clock.time, memory.run.equations)
     expand_functions(memory.run.loop.clock.time, memory)
     memory.kernels.partition(memory)

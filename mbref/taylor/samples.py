@@ -123,7 +123,7 @@ def keep_sample(h, memory):
     evaluate_series(h, memory)
     put_angles(h, memory)
     copy(memory.state.reshape(-1), waiting.state[clock.sample])
-    copy(memory.angles, waiting.angles[clock.sample])
+    copy(memory.run.equations.angles, waiting.angles[clock.sample])
     waiting.exact[clock.sample] = is_accurate(memory)
     clock.sample += 1
 
@@ -137,4 +137,3 @@ def put_angles(h, memory):
         for k in range(memory.step.used_order, -1, -1):
             value = value * h + past[s, k]
         memory.run.equations.angles[torsions.slot[s]] = value
-        memory.angles[s] = value

@@ -30,7 +30,7 @@ def restore_state(saved, run):
 
 @kernel
 def save_variables(series, angles, saved):
-    """Save variables and rates, the first two orders of a series, and the angles of torsion springs."""
+    """Save variables and rates, the first two orders of a series, and the angles of joints."""
     copy(series[0], saved.terms[0])
     copy(series[1], saved.terms[1])
     copy(angles, saved.angles)

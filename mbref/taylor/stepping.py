@@ -38,6 +38,7 @@ from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
 from mbref.taylor.series import turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
 from mbref.taylor.step_start import save_series
+from mbref.taylor.turning import begin_turns, follow_turns, turning_speed
 
 ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
 LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
@@ -272,11 +273,17 @@ def begin_pieces(stop, memory):
 
 @kernel
 def end_step(h, stop, memory):
-    """Keep the samples of a step of h seconds, and end it, at the time ``stop`` (s) at the latest."""
+    """Keep the samples of a step of h seconds, follow its turns, and end it, at the time ``stop`` (s) at the
+    latest."""
     clock, times = memory.run.loop.clock, memory.run.loop.times
     now = stop if h >= stop - clock.time else clock.time + h
+    speed, seen = turning_speed(h, memory), 0.0
     while clock.sample < times.shape[0] and times[clock.sample] <= now:
-        keep_sample(times[clock.sample] - clock.time, memory)
+        at = times[clock.sample] - clock.time
+        follow_turns(seen, at, speed, memory)
+        keep_sample(at, memory)
+        seen = at
+    follow_turns(seen, h, speed, memory)
     memory.run.equations.system.counts.steps += 1
     clock.time, clock.length = now, h
 
@@ -293,11 +300,10 @@ def begin_once(memory):
 @exchangeable(BEGIN)
 def begin_series(memory):
     """Choose the partition at the present state and expand there; return OK or the failure status."""
-    t, slot = memory.run.loop.clock.time, memory.polynomials.torsions.slot
-    for s in range(slot.shape[0]):
-        memory.angles[s] = memory.run.equations.angles[slot[s]]
+    t = memory.run.loop.clock.time
     select_pieces(t, memory.run.equations)
     read_variables(t, memory)
+    begin_turns(memory)
     expand_functions(t, memory)
     memory.kernels.partition(memory)
     memory.step.crossed, memory.progress.leaving, memory.progress.rests_near = 0, 0, 0

@@ -119,11 +119,11 @@ def test_driven_joint_stays_at_its_pose():
     agree(motion.joint("B").angle, np.array([0.4, 0.4 - 0.5 * 0.5]))
 
 
-@pytest.mark.parametrize(("offset", "turns"), [(0.4, 0), (40 * LARGEST_PART, 2)])
-def test_springs_of_joints_count_their_angle_from_the_file(offset, turns):
+@pytest.mark.parametrize("offset", [0.4, 40 * LARGEST_PART])
+def test_springs_of_joints_count_their_angle_from_the_file(offset):
     """A spring that is relaxed at the assembled start leaves the wheels at rest; full turns count."""
     scene = shifted(gear_pair, "teeth", offset)
-    at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0] + turns * 2 * np.pi
+    at = mbref.simulate(scene, times=[0.0]).joint("A").angle[0]
     assert at == pytest.approx(0.5 * 0.2 / 0.08 * offset, rel=0.01)
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 3.0, "natural_angle": at}
     motion = mbref.simulate(scene.with_(load=[spring]), times=[0.0, 1.0])

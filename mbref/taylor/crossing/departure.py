@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from mbref.equations.branches import SMOOTH, Passed, branches_passed
+from mbref.equations.joint_angles import angles_of_pose
 from mbref.equations.model import displaced, displacement
 from mbref.kernels.layout import OK
 from mbref.stepping.loop import PAUSED, UNDECIDED
@@ -96,6 +97,7 @@ class Departure:
         samples.coordinates[k], samples.velocities[k], samples.accelerations[k] = q, v, acceleration
         across = terms.force - terms.mass * acceleration
         samples.multipliers[k] = np.linalg.lstsq(terms.jacobian.T, across, rcond=None)[0]
+        samples.angles[k] = angles_of_pose(run.model, q)
 
     def _come_from(self, start: Passed, velocities: np.ndarray, ahead: float, moved: Moved) -> int:
         """Continue at a time ``ahead`` (s) after a singular position that is left with velocities (n,).

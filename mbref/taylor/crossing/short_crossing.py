@@ -52,7 +52,8 @@ def cross_briefly(memory):
     time, sample, attempt_end = clock.time, clock.sample, clock.attempt_end
     steps, crossings = counts.steps, counts.crossings
     put_angles(0.0, memory)
-    save_variables(memory.series.past, memory.angles, memory.step_start)
+    unseen = memory.turns.watch.unseen
+    save_variables(memory.series.past, memory.run.equations.angles, memory.step_start)
     memory.kernels.return_to_start(memory)
     set_high_accuracy(memory)
     memory.step.start_pivot = 1.0
@@ -64,17 +65,9 @@ def cross_briefly(memory):
     if not has_crossed:
         clock.time, clock.sample, clock.attempt_end = time, sample, attempt_end
         counts.steps, counts.crossings = steps, crossings
-        restore_step_start(memory)
+        restore_variables(memory.step_start, memory.series.past, memory.run.equations.angles)
+        memory.turns.watch.unseen = unseen
     return has_crossed
-
-
-@kernel
-def restore_step_start(memory):
-    """Restore the variables at the start of the last step, and the angles of the run."""
-    slot = memory.polynomials.torsions.slot
-    restore_variables(memory.step_start, memory.series.past, memory.angles)
-    for s in range(slot.shape[0]):
-        memory.run.equations.angles[slot[s]] = memory.angles[s]
 
 
 @kernel

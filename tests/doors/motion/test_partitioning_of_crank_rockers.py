@@ -1,0 +1,86 @@
+"""Coordinate partitioning follows crank-rockers in fixed steps, also from near a singular position."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref.scene import Scene
+
+RATE = 7.0  # rad/s of the crank at the start
+Z = [0.0, 0.0, 1.0]
+ORDINARY = (0.2, 0.5, 0.45, 0.55)  # crank, coupler, rocker and ground, m
+CHANGE_POINT = (0.2, 0.4, 0.3, 0.5)  # flat at half a turn of the crank
+
+
+def pin(lengths: tuple[float, ...], angle: np.ndarray, side: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the pins B and C (…, 2) of a four-bar at angles of its crank; ``side`` is the branch."""
+    crank, coupler, rocker, ground = lengths
+    b = crank * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    across = np.array([ground, 0.0]) - b
+    apart = np.linalg.norm(across, axis=-1, keepdims=True)
+    along = (coupler**2 - rocker**2 + apart**2) / (2 * apart)
+    height = np.sqrt(np.maximum(coupler**2 - along**2, 0.0))
+    unit = across / apart
+    return b, b + along * unit + side * height * np.stack([-unit[..., 1], unit[..., 0]], axis=-1)
+
+
+def turning_rates(lengths: tuple[float, ...], angle: float, side: float) -> tuple[float, ...]:
+    """Return the rates of crank, coupler and rocker, rad/s, by central differences of their directions."""
+    step = 1e-5
+
+    def directions(at: float) -> np.ndarray:
+        b, c = pin(lengths, np.array(at), side)
+        ends = (b, c - b, c - np.array([lengths[3], 0.0]))
+        return np.array([math.atan2(y, x) for x, y in ends])
+
+    changes = directions(angle + step) - directions(angle - step)
+    return tuple((np.mod(changes + np.pi, 2 * np.pi) - np.pi) / (2 * step) * RATE)
+
+
+def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
+    """Return a four-bar of thin rods that moves freely, with the crank at an angle, rad."""
+    b, c = pin(lengths, np.array(angle), 1.0)
+    a, d = np.zeros(2), np.array([lengths[3], 0.0])
+    rates, bodies = turning_rates(lengths, angle, 1.0), []
+    starts = (0.0 * b, RATE * np.array([-b[1], b[0]]), 0.0 * b)
+    for name, (p, q), rate, start in zip("abc", ((a, b), (b, c), (d, c)), rates, starts, strict=True):
+        turn, size = math.atan2(*(q - p)[::-1]) / 2, float(np.linalg.norm(q - p))
+        arm = (q - p) / 2
+        bodies.append(
+            {
+                "name": name,
+                "mass": size,
+                "inertia": [1e-4 * size, size**3 / 12, size**3 / 12 + 1e-5 * size],
+                "position": [*(p + arm), 0.0],
+                "orientation": [math.cos(turn), 0.0, 0.0, math.sin(turn)],
+                "velocity": [*(start + rate * np.array([-arm[1], arm[0]])), 0.0],
+                "angular_velocity": [0.0, 0.0, rate],
+            }
+        )
+    hinges = (("A", "ground", "a", a), ("B", "a", "b", b), ("C", "b", "c", c), ("D", "ground", "c", d))
+    joints = [
+        {"name": name, "type": "revolute", "bodies": [one, other], "anchor": [*place, 0.0], "axis": Z}
+        for name, one, other, place in hinges
+    ]
+    return Scene(name="crank_rocker", gravity=[0.0, 0.0, 0.0], duration=1.0, body=bodies, joint=joints)
+
+
+def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: float) -> None:
+    """Check that the run completes, on a branch of the linkage and with its kinetic energy."""
+    scene = crank_rocker(lengths, angle)
+    motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, 1.0, 11))
+    assert motion.outcome is mbref.Outcome.COMPLETED, motion.message
+    crank = angle + motion.joint("A").angle
+    tip = 2 * motion.position[:, 2, :2] - np.array([lengths[3], 0.0])
+    apart = [np.linalg.norm(tip - pin(lengths, crank, side)[1], axis=1) for side in (1.0, -1.0)]
+    assert np.min(apart, axis=0).max() < tolerance
+    assert motion.energy == pytest.approx(motion.energy[0], rel=tolerance)
+
+
+@pytest.mark.parametrize("part", [0.9998, 0.3])
+def test_partitioning_completes_a_crank_rocker_in_fixed_steps(part):
+    check(ORDINARY, part * math.pi, 2e-3, 1e-4)

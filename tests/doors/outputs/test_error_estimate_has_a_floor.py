@@ -1,0 +1,104 @@
+"""The error estimate is at least the error by rounding, so that the true error is at most ten times it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref import rotations
+from mbref.scene import Scene
+
+ORIGIN, Z = [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]
+TIMES = np.linspace(0.0, 5.0, 6)
+Truth = tuple[np.ndarray, np.ndarray]  # position along x (k,), angle about z (k,)
+
+
+def wheel(**parts) -> dict:
+    """Return the fields of a scene of one wheel about z."""
+    body = {"name": "b", "mass": 1.5, "inertia": [1.5, 1.5, 2.0], "position": ORIGIN, **parts.pop("body", {})}
+    joint = {"name": "J", "type": "revolute", "bodies": ["ground", "b"], "anchor": ORIGIN, "axis": Z}
+    return {"name": "floor", "duration": 5.0, "gravity": ORIGIN, "body": [body], "joint": [joint], **parts}
+
+
+def spinning(rate: float) -> tuple[Scene, Truth]:
+    """Return a wheel that turns freely."""
+    return Scene(**wheel(body={"angular_velocity": [0.0, 0.0, rate]})), (0.0 * TIMES, rate * TIMES)
+
+
+def driven(rate: float) -> tuple[Scene, Truth]:
+    """Return a wheel that a driver turns."""
+    scene = Scene(**wheel(driver=[{"joint": "J", "polynomial": [0.0, rate]}]))
+    return scene, (0.0 * TIMES, rate * TIMES)
+
+
+def twisted(rate: float) -> tuple[Scene, Truth]:
+    """Return a wheel on a torsion spring, of one radian per second."""
+    spring = {"type": "torsion_spring", "joint": "J", "stiffness": 2.0}
+    scene = Scene(**wheel(body={"angular_velocity": [0.0, 0.0, rate]}, load=[spring]))
+    return scene, (0.0 * TIMES, rate * np.sin(TIMES))
+
+
+def resting(rate: float) -> tuple[Scene, Truth]:
+    """Return a wheel at rest at a distance from the origin."""
+    scene = Scene(**wheel(body={"position": [rate, 0.0, 0.0]}))
+    return scene, (rate + 0.0 * TIMES, 0.0 * TIMES)
+
+
+def flying(rate: float) -> tuple[Scene, Truth]:
+    """Return a free body that gravity along x accelerates."""
+    fields = wheel(body={"velocity": [rate, 0.0, 0.0]}, gravity=[-1.7, 0.0, 0.0])
+    return Scene(**{**fields, "joint": []}), (rate * TIMES - 0.85 * TIMES**2, 0.0 * TIMES)
+
+
+def sliding(rate: float) -> tuple[Scene, Truth]:
+    """Return a slider on a spring of the frequency 1.2 rad/s."""
+    fields = wheel(body={"velocity": [rate, 0.0, 0.0]})
+    joint = {**fields["joint"][0], "type": "translational", "axis": [1.0, 0.0, 0.0]}
+    spring = {"type": "slide_spring", "joint": "J", "stiffness": 1.5 * 1.44}
+    scene = Scene(**{**fields, "joint": [joint], "load": [spring]})
+    return scene, (rate / 1.2 * np.sin(1.2 * TIMES), 0.0 * TIMES)
+
+
+MAKERS = (spinning, driven, twisted, resting, flying, sliding)
+
+
+def true_error(scene: Scene, motion: mbref.Motion, truth: Truth) -> np.ndarray:
+    """Return the larger of distance over length and angle (k,), rad, from the closed form."""
+    place = np.stack([truth[0], 0.0 * TIMES, 0.0 * TIMES], axis=1)
+    half = truth[1] / 2
+    turned = np.stack([np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)], axis=1)
+    points = [[0.0, 0.0, 0.0], *(body.position for body in scene.body)] if scene.joint else [ORIGIN]
+    length = max(math.dist(p, q) for p in points for q in points) or 1.0
+    apart = np.linalg.norm(motion.position[:, 0] - place, axis=1) / length
+    return np.maximum(apart, rotations.angle_between(motion.orientation[:, 0], turned))
+
+
+def check(make, rate: float, method: str | None, rtol: float) -> None:
+    scene, truth = make(rate)
+    motion = mbref.simulate(scene, method, TIMES, rtol=rtol)
+    estimate = motion.error_estimate.error
+    assert (estimate > 0.0).all()
+    assert (true_error(scene, motion, truth) <= 10 * estimate).all()
+
+
+@pytest.mark.parametrize("make", MAKERS)
+def test_true_error_is_at_most_ten_estimates(make):
+    check(make, 3.3, None, 1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rtol", [1e-6, 1e-9, 1e-13])
+@pytest.mark.parametrize("rate", [0.07, 1.0, 19.0, 410.0])
+@pytest.mark.parametrize("make", MAKERS)
+def test_true_error_of_many_motions_is_at_most_ten_estimates(make, rate, rtol):
+    check(make, rate, "taylor", rtol)
+
+
+@pytest.mark.parametrize("make", [resting, spinning])
+def test_an_estimate_of_equal_runs_is_rounding_and_not_zero(make):
+    scene, _ = make(1.0)
+    largest = mbref.simulate(scene, times=TIMES).error_estimate.largest
+    assert 2.0**-53 < largest < 1e-13

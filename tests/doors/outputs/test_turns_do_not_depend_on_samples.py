@@ -1,0 +1,152 @@
+"""Angles, torques of springs and energies are equal at common times, whatever samples a run is asked for."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mbref
+from crosscheck.judge.energy import energy_series
+from mbref.cli import main
+from mbref.scene import Scene
+from tests.helpers.spinning import spinning_mechanism
+
+END = 3.0  # s, some 20 turns of the fastest joints
+NATURAL, STIFFNESS, INERTIA = 40.0, 12.0, 3.0  # rad, N m/rad, kg m²
+TIMES = np.linspace(0.0, END, 601)
+OUTPUTS = (".angle", ".torque", "energy")
+# taylor computes samples inside its steps; other methods end steps at samples, which changes errors of 1e-9
+ROUNDING, STEPS = 1e-12, 1e-6
+
+
+def wound_wheel() -> Scene:
+    """Return a wheel at rest on a torsion spring, wound up by 40 rad: φ = 40 (1 - cos 2 t) rad."""
+    return Scene(
+        name="wound",
+        duration=END,
+        body=[{"name": "wheel", "mass": 2.0, "inertia": [2.0, 2.0, INERTIA], "position": [0.0, 0.0, 0.0]}],
+        joint=[
+            {
+                "name": "H",
+                "type": "revolute",
+                "bodies": ["ground", "wheel"],
+                "anchor": [0, 0, 0],
+                "axis": [0, 0, 1],
+            }
+        ],
+        load=[{"type": "torsion_spring", "joint": "H", "stiffness": STIFFNESS, "natural_angle": NATURAL}],
+    )
+
+
+def choices(random: np.random.Generator, count: int) -> Iterator[np.ndarray]:
+    """Yield places of samples: the ends, a few at random, only late ones, a single one."""
+    yield np.array([0, count - 1])
+    yield np.sort(random.choice(count, 6, replace=False))
+    yield np.array([count // 2, count - 1])
+    yield np.array([count - 1])
+
+
+def differences(scene: Scene, method: str | None, random: np.random.Generator) -> float:
+    """Return the largest difference of an output between dense and other samples, over the output's size."""
+    dense = mbref.simulate(scene, method, TIMES)
+    reached, table = len(dense.times), dense.columns()
+    largest = 0.0
+    for chosen in choices(random, reached):
+        found = mbref.simulate(scene, method, TIMES[chosen]).columns()
+        for name, column in table.items():
+            if name.endswith(OUTPUTS):
+                size = max(1.0, np.abs(column).max())
+                largest = max(largest, np.abs(found[name] - column[chosen]).max() / size)
+    return largest
+
+
+@pytest.mark.parametrize("method", ["taylor", "alf-dual", "mpi-svd+partitioning/rk4[step=5e-3]"])
+@pytest.mark.parametrize("times", [[END], [0.4, 1.3, 2.9], [2.2, END]])
+def test_a_wheel_on_a_spring_counts_its_turns_from_the_start(method, times):
+    motion = mbref.simulate(wound_wheel(), method, times)
+    t = np.array(times)
+    angle = NATURAL * (1.0 - np.cos(2.0 * t))
+    tolerance = 1e-4 if "rk4" in method else 1e-6
+    assert motion.joint("H").angle == pytest.approx(angle, rel=tolerance, abs=tolerance)
+    assert motion.load_at(0).torque == pytest.approx(-STIFFNESS * (angle - NATURAL), rel=tolerance, abs=0.01)
+    assert motion.energy == pytest.approx(STIFFNESS * NATURAL**2 / 2, rel=tolerance)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_outputs_of_random_mechanisms_are_equal_for_other_samples(seed):
+    assert differences(spinning_mechanism(seed), "taylor", np.random.default_rng(seed)) < ROUNDING
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8, 200))
+def test_outputs_of_many_random_mechanisms_are_equal_for_other_samples(seed):
+    scene = spinning_mechanism(seed)
+    other = ("alf-dual", "mpi-svd+projection", "mpi-svd+partitioning/rk4[step=2e-3]", "lm1/adams")[seed % 4]
+    for method, tolerance in (("taylor", ROUNDING), (other, STEPS)):
+        assert differences(scene, method, np.random.default_rng(seed)) < tolerance
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_counted_turns_follow_dense_poses(seed):
+    """Poses so dense that no joint turns by half a turn between them show the turns by themselves."""
+    scene = spinning_mechanism(seed)
+    dense = mbref.simulate(scene, times=TIMES)
+    late = mbref.simulate(scene, times=TIMES[[-1]])
+    for joint in scene.joint:
+        seen = np.unwrap(np.mod(dense.joint(joint.name).angle + np.pi, 2 * np.pi) - np.pi)
+        assert late.joint(joint.name).angle[0] == pytest.approx(seen[-1], abs=1e-9)
+
+
+def test_files_and_commands_have_the_turns_of_the_run(tmp_path, capsys):
+    scene, path = wound_wheel(), tmp_path / "wound.toml"
+    scene.save(path)
+    expected = NATURAL * (1.0 - math.cos(2.0 * END))
+    motion = mbref.simulate(scene, times=[END])
+    motion.save(tmp_path / "run.json")
+    loaded = mbref.Motion.load(tmp_path / "run.json")
+    assert loaded.joint("H").angle[0] == motion.joint("H").angle[0] == pytest.approx(expected)
+    assert loaded.energy[0] == motion.energy[0]
+    table = tmp_path / "run.csv"
+    assert main(["run", str(path), "--times", str(END), "--out", str(table)]) == 0
+    rows = list(csv.DictReader(table.open(encoding="utf-8")))
+    assert float(rows[0]["H.angle"]) == pytest.approx(expected)
+    capsys.readouterr()
+    assert main(["run", str(path), "--times", str(END), "--json"]) == 0
+    record = json.loads(capsys.readouterr().out)["records"][0]
+    assert record["angles"]["H"] == pytest.approx([expected])
+
+
+def test_scenes_of_a_batch_have_their_turns():
+    scenes = [wound_wheel().with_("load[0].stiffness", k) for k in (9.0, STIFFNESS, 20.0)]
+    with ThreadPoolExecutor(1) as pool:
+        found = dict(mbref.ensemble(scenes, [END], executor=pool))
+    for place, scene in enumerate(scenes):
+        motion = mbref.Motion.of(scene, found[place])
+        frequency = math.sqrt(scene.load[0].stiffness / INERTIA)
+        angle = NATURAL * (1.0 - math.cos(frequency * END))
+        assert motion.joint("H").angle[0] == pytest.approx(angle, rel=1e-7)
+
+
+def test_an_engine_without_turns_gives_no_angle_where_rates_leave_a_choice():
+    motion = mbref.simulate(wound_wheel(), times=TIMES)
+    dense = mbref.Motion.of(motion.mechanism, replace(motion, angles=None))
+    assert dense.joint("H").angle == pytest.approx(motion.joint("H").angle, abs=1e-9)
+    few = mbref.simulate(wound_wheel(), times=[0.0, 0.7, END])
+    sparse = mbref.Motion.of(few.mechanism, replace(few, angles=None))
+    assert np.isnan(sparse.joint("H").angle).tolist() == [False, True, True]
+    assert np.isnan(sparse.energy).tolist() == [False, True, True]
+
+
+def test_the_judge_balances_the_energy_of_few_samples():
+    few = mbref.simulate(wound_wheel(), times=[0.7, END])
+    assert energy_series(few.mechanism, few).max() < 1e-9
+    assert energy_series(few.mechanism, replace(few, angles=None)) is None
+    wrong = {"H": few.angles["H"] + 2 * np.pi}  # a miscounted turn changes the spring's energy
+    assert energy_series(few.mechanism, replace(few, angles=wrong)).min() > 1e-3
