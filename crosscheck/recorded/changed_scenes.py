@@ -57,14 +57,14 @@ def changed(scene: Scene, difference: Difference) -> Iterator[Cause]:
         return
     # what the integration leaves is the same in a slightly changed scene
     shift = {n: difference.exact[n] - with_signs(difference.exact, same)[n] for n in difference.recorded}
-    for change in changes(scene):
-        moved = _Moved(change, difference, shift)
+    for number, change in enumerate(changes(scene)):
+        name, moved = f"change {number}", _Moved(change, difference, shift)
         for value in () if change.without is None else (change.without,):
             if (columns := moved.columns(value)) is not None:
-                yield change.says(value), 2, columns
+                yield Cause(change.says(value), 2, columns, name)
         found = _fitted(change.small, moved, difference)
         if found is not None:
-            yield change.says(found[0]), 2, found[1]
+            yield Cause(change.says(found[0]), 2, found[1], name)
 
 
 def changes(scene: Scene) -> Iterator[Change]:

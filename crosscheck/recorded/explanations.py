@@ -6,9 +6,10 @@ within the rounding of the cells, or below a part of the difference that only th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from crosscheck.judge.deadline import ask
 from crosscheck.recorded.columns import VECTORS, kind_of
 
 Columns = Mapping[str, np.ndarray]
-Cause = tuple[str, int, Columns]  # sentence, number of fitted parameters and choices, predicted columns
 # fraction of a column's difference that an accepted explanation leaves: errors of fits are below it, and the
 # difference of two causes over a motion is above it
 LEFT = 1e-4
@@ -27,6 +27,16 @@ ALIKE = 1e-9  # relative difference of two predictions below which they state on
 TIERS = (1, 3, 6)  # parameters up to which explanations are equally simple
 SHOWN = 3  # explanations that are named together if the table does not tell them apart
 MOST = 1e12  # multiple of a quantity's size; a table with a larger number is not explained
+
+
+class Cause(NamedTuple):
+    """A possible cause: its sentence, the number of fitted parameters and choices, the columns that it
+    predicts, and its kind. Causes of one kind that predict one table are one cause."""
+
+    sentence: str
+    complexity: int
+    columns: Columns
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -104,7 +114,7 @@ class Difference:
 
     def explained(self, cause: Cause) -> Explanation | None:
         """Return a cause as an explanation if the difference that it leaves is small in every column."""
-        sentence, complexity, predicted = cause
+        sentence, complexity, predicted, _ = cause
         total = sum(self.squares.values())
         if not total or self.cells < CELLS * complexity:
             return None
@@ -161,24 +171,27 @@ def accepted(difference: Difference, causes: Iterable[Cause]) -> Iterator[tuple[
             yield found, cause
 
 
-def simplest(difference: Difference, found: list[tuple[Explanation, Cause]]) -> list[Explanation]:
-    """Return the simplest of the accepted explanations, as one explanation.
+def simplest(
+    difference: Difference, found: Sequence[tuple[Explanation, Cause]]
+) -> list[tuple[Explanation, Cause]]:
+    """Return the simplest of the accepted explanations: all that are equally simple.
 
-    If several are equally simple and the table does not tell them apart, all are named; more than SHOWN name
-    nothing. Of causes that predict one table, the first is named.
+    Of causes of one kind, or without fitted numbers, that predict one table, the first is returned.
     """
-    if not found:
-        return []
-    least = min(_tier(e.complexity) for e, _ in found)
+    least = min((_tier(e.complexity) for e, _ in found), default=0)
     different: list[tuple[Explanation, Cause]] = []
     for one in found:
         if _tier(one[0].complexity) == least and not any(_alike(difference, one, o) for o in different):
             different.append(one)
-    if len(different) > SHOWN:
-        return []
-    explanations = [e for e, _ in different]
+    return different
+
+
+def joined(explanations: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """Return explanations that the table does not tell apart as one; more than SHOWN explain nothing."""
+    if not 0 < len(explanations) <= SHOWN:
+        return ()
     sentence = "; or ".join(e.sentence for e in explanations)
-    return [Explanation(sentence, max(e.remains for e in explanations), explanations[0].complexity)]
+    return (Explanation(sentence, max(e.remains for e in explanations), explanations[0].complexity),)
 
 
 def _tier(complexity: int) -> int:
@@ -186,8 +199,10 @@ def _tier(complexity: int) -> int:
 
 
 def _alike(d: Difference, one: tuple[Explanation, Cause], other: tuple[Explanation, Cause]) -> bool:
-    """Return whether two causes predict one table."""
-    first, second = ({**d.exact, **cause[2]} for _, cause in (one, other))
+    """Return whether two causes of one kind, or without fitted numbers, predict one table."""
+    if one[1].kind != other[1].kind and one[1].complexity > 1:
+        return False
+    first, second = ({**d.exact, **cause.columns} for _, cause in (one, other))
     return all(
         np.abs(first[n] - second[n]).max() <= ALIKE * max(1.0, np.abs(first[n]).max()) for n in d.recorded
     )

@@ -35,6 +35,7 @@ class Judgement:
     until: float
     reason: str
     left: tuple[str, ...] = ()  # columns that the judge cannot determine
+    alike: int = 0  # number of changes that explain the difference and that the table does not tell apart
     is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
 
     @property
@@ -49,6 +50,7 @@ class Judgement:
             "until": self.until,
             "reason": self.reason,
             "not judged": list(self.left),
+            "alike": self.alike,
             "searched": self.is_complete,
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
             "explanations": [vars(e) for e in self.explanations],
@@ -155,15 +157,14 @@ def _judged(
     )
     if "time" in recording.rounding:
         compared = aligned(compared, recording.rounding["time"][known], later)
-    errors, found_causes = compared.errors(), Search(())
+    errors, causes = compared.errors(), Search()
     if any(e.largest > e.allowed for e in errors):
         if progress is not None:
             progress(f"searching for an explanation, at most {SEARCHED:g} CPU s")
-        found_causes = search(scene, compared, later, float(found.motion.times[-1]))
+        causes = search(scene, compared, later, float(found.motion.times[-1]))
     left = tuple(n for n in recording.columns if n not in whole)
-    return Judgement(
-        errors, found_causes.explanations, float(times[-1]), found.reason, left, found_causes.is_complete
-    )
+    until, searched = float(times[-1]), (causes.alike, causes.is_complete)
+    return Judgement(errors, causes.explanations, until, found.reason, left, *searched)
 
 
 def _spline(times: np.ndarray, column: np.ndarray) -> BSpline:

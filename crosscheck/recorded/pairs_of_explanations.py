@@ -24,9 +24,9 @@ def pairs(difference: Difference, singles: Iterable[Cause]) -> Iterator[Cause]:
     before, sized = difference.size({}), []
     for n, cause in enumerate(singles):
         ask()
-        sized.append((difference.size(cause[2]) / before, n, cause))
+        sized.append((difference.size(cause.columns) / before, n, cause))
         sized = sorted(entry for entry in sized if entry[0] < MOST)[:FIRST]
-    for _, _, (sentence, complexity, columns) in sized:
+    for _, _, (sentence, complexity, columns, _) in sized:
         explained = {**difference.exact, **columns}
         left = replace(
             difference,
@@ -36,8 +36,9 @@ def pairs(difference: Difference, singles: Iterable[Cause]) -> Iterator[Cause]:
             end=float(difference.times[-1]),
             every=None,
         )
-        for second, more, predicted in simple(left):
-            yield f"{sentence}; and {second}", complexity + more + 1, {**columns, **predicted}
+        for second, more, predicted, _ in simple(left):
+            both = {**columns, **predicted}
+            yield Cause(f"{sentence}; and {second}", complexity + more + 1, both, "pair")
 
 
 def _explained(difference: Difference, columns: Columns) -> dict[str, Callable[[np.ndarray], np.ndarray]]:

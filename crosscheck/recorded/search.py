@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.judge.deadline import TimeIsUp, within
 from crosscheck.recorded.changed_scenes import changed
 from crosscheck.recorded.column_errors import Compared
-from crosscheck.recorded.explanations import CELLS, Cause, Difference, Explanation, accepted, simplest
+from crosscheck.recorded.explanations import CELLS, Cause, Difference, Explanation, accepted, joined, simplest
 from crosscheck.recorded.pairs_of_explanations import pairs
 from crosscheck.recorded.simple_causes import simple
 from mbref.scene import Scene
@@ -22,9 +22,11 @@ SAMPLES = 400  # samples of a table that are searched; more add no information a
 
 @dataclass(frozen=True)
 class Search:
-    """Explanations of a difference, and whether the search ended before its limit of time."""
+    """Explanation of a difference, the number of equally simple explanations, and whether the search ended
+    before its limit of time."""
 
-    explanations: tuple[Explanation, ...]
+    explanations: tuple[Explanation, ...] = ()
+    alike: int = 0
     is_complete: bool = True
 
 
@@ -39,14 +41,16 @@ def search(
     found: list[tuple[Explanation, Cause]] = []
     difference = _difference(compared, later, end)
     if difference.is_absurd or difference.cells < CELLS:
-        return Search(())
+        return Search()
+    is_complete = True
     try:
         with within(SECONDS):
             for one in accepted(difference, _causes(scene, difference, found)):
                 found.append(one)
     except TimeIsUp:
-        return Search(tuple(simplest(difference, found)), is_complete=False)
-    return Search(tuple(simplest(difference, found)))
+        is_complete = False
+    different = [explanation for explanation, _ in simplest(difference, found)]
+    return Search(joined(different), len(different), is_complete)
 
 
 def _causes(scene: Scene, difference: Difference, found: list[tuple[Explanation, Cause]]) -> Iterator[Cause]:

@@ -32,6 +32,7 @@ SHIFTS = np.linspace(-0.1, 0.1, 41)
 FASTER = 0.1  # largest relative error of a clock that is tried
 NEAR = 1e-3  # rad; rounding by which a wrapped angle may exceed its interval
 REFINED = 3  # intervals in which a fitted number is refined, each a thousandth of the former
+Stated = tuple[str, int, Columns]  # sentence, number of fitted parameters and choices, predicted columns
 INSIDE = 0.8  # least fraction of the samples at which a shifted motion is known
 
 
@@ -39,7 +40,8 @@ def simple(difference: Difference) -> Iterator[Cause]:
     """Return (sentence, number of fitted parameters, predicted columns) for explanations that need no further
     simulation."""
     for family in FAMILIES_OF_CAUSES:
-        yield from family(difference)
+        for cause in family(difference):
+            yield Cause(*cause, family.__name__)
 
 
 def _scopes(d: Difference) -> Iterator[tuple[str, list[str]]]:
@@ -60,7 +62,7 @@ def _scopes(d: Difference) -> Iterator[tuple[str, list[str]]]:
             yield title if len(columns) > 1 else columns[0], columns
 
 
-def _units(d: Difference) -> Iterator[Cause]:
+def _units(d: Difference) -> Iterator[Stated]:
     """Return columns in another unit, or of opposite sign."""
     for title, columns in _scopes(d):
         yield f"{title}: of opposite sign (factor -1)", 1, {n: -d.exact[n] for n in columns}
@@ -77,7 +79,7 @@ def _units(d: Difference) -> Iterator[Cause]:
                 yield f"{title}: in {first}, read as {unit} (factor {factor:.6g})", 1, scaled
 
 
-def _factors(d: Difference) -> Iterator[Cause]:
+def _factors(d: Difference) -> Iterator[Stated]:
     for title, columns in _scopes(d):
         top = sum(float(d.recorded[n] @ d.exact[n]) for n in columns)
         below = sum(float(d.exact[n] @ d.exact[n]) for n in columns)
@@ -86,7 +88,7 @@ def _factors(d: Difference) -> Iterator[Cause]:
             yield f"{title}: a factor of {factor:.9g}", 2, {n: factor * d.exact[n] for n in columns}
 
 
-def _offsets(d: Difference) -> Iterator[Cause]:
+def _offsets(d: Difference) -> Iterator[Stated]:
     for title, columns in _scopes(d):
         moved = {n: float(np.mean(d.recorded[n] - d.exact[n])) for n in columns}
         listed = ", ".join(f"{v:.6g}" for v in moved.values())
@@ -97,7 +99,7 @@ def _offsets(d: Difference) -> Iterator[Cause]:
         )
 
 
-def _turns(d: Difference) -> Iterator[Cause]:
+def _turns(d: Difference) -> Iterator[Stated]:
     """Return angles that differ by full turns."""
     angles = [n for n in d.recorded if kind_of(n) == "angle"]
     for columns in [angles, *([n] for n in angles)] if len(angles) > 1 else [angles]:
@@ -113,7 +115,7 @@ def _turns(d: Difference) -> Iterator[Cause]:
         yield f"{title}: {says}", 1, {n: d.exact[n] + 2 * np.pi * turns[n] for n in columns}
 
 
-def _shifts(d: Difference) -> Iterator[Cause]:
+def _shifts(d: Difference) -> Iterator[Stated]:
     """Return all columns shifted by a time, at the samples that the exact motion then has."""
     size = float(d.times[-1] - d.times[0])
 
@@ -124,7 +126,7 @@ def _shifts(d: Difference) -> Iterator[Cause]:
         yield f"all columns: later by {shift:.6g} s", 2, columns
 
 
-def _clocks(d: Difference) -> Iterator[Cause]:
+def _clocks(d: Difference) -> Iterator[Stated]:
     """Return the motion at times that a clock shows which goes fast or slow."""
 
     def faster(rate: float) -> Columns | None:
@@ -167,7 +169,7 @@ def _at(d: Difference, times: np.ndarray) -> Columns | None:
     return {n: np.where(inside, d.later[n](known), d.recorded[n]) for n in d.recorded}
 
 
-def _axes(d: Difference) -> Iterator[Cause]:
+def _axes(d: Difference) -> Iterator[Stated]:
     """Return columns with components exchanged or reversed: of one quantity of a body, of a body, or of all
     bodies."""
     vectors = [
@@ -196,7 +198,7 @@ def _axes(d: Difference) -> Iterator[Cause]:
                 yield f"{title}: x, y, z hold {read} of the exact motion", 2 + signs.count(-1), columns
 
 
-def _quaternions(d: Difference) -> Iterator[Cause]:
+def _quaternions(d: Difference) -> Iterator[Stated]:
     turning = {b: q for b in d.bodies if (q := d.vector(b, "orientation", d.exact)) is not None}
     changes: dict[str, Callable[[np.ndarray], np.ndarray]] = {
         "quaternions in the order x, y, z, w": lambda q: q[:, [1, 2, 3, 0]],
@@ -224,7 +226,7 @@ def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
     return np.hstack([first * angle, vectors])
 
 
-def _frames(d: Difference) -> Iterator[Cause]:
+def _frames(d: Difference) -> Iterator[Stated]:
     """Return the columns for another world frame: the rotation and translation that fit the positions
     best."""
     pairs = [(d.vector(b, "position", d.recorded), d.vector(b, "position", d.exact)) for b in d.bodies]
@@ -249,7 +251,7 @@ def _frames(d: Difference) -> Iterator[Cause]:
     yield f"all bodies: another world frame, turned by {angle:.6g} degrees, origin at ({where}) m", 6, columns
 
 
-def _points(d: Difference) -> Iterator[Cause]:
+def _points(d: Difference) -> Iterator[Stated]:
     """Return the columns for another body-fixed point than the centre of mass, and for other body axes, of
     every body."""
     for body in d.bodies:
@@ -295,7 +297,7 @@ def _another_point(
     return columns, arm
 
 
-def _other_axes(d: Difference, body: str) -> Iterator[Cause]:
+def _other_axes(d: Difference, body: str) -> Iterator[Stated]:
     exact, recorded = (d.vector(body, "orientation", of) for of in (d.exact, d.recorded))
     if exact is None or recorded is None:
         return
@@ -309,7 +311,7 @@ def _other_axes(d: Difference, body: str) -> Iterator[Cause]:
         yield f"{body}: other body axes, turned by a constant rotation", 4, columns
 
 
-def _interpolations(d: Difference) -> Iterator[Cause]:
+def _interpolations(d: Difference) -> Iterator[Stated]:
     """Return all columns interpolated from every m-th row of the table, linearly or by the previous value."""
     times, exact = d.every or (d.times, d.exact)
     rows = np.searchsorted(times, d.times)
