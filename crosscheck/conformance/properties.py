@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -22,6 +22,7 @@ from crosscheck.conformance.trial import (
     completed,
     difference,
 )
+from crosscheck.conformance.vanishing import vanishing
 from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series
@@ -80,7 +81,9 @@ def unit_orientations(bench: Bench) -> Finding:
 
 def closure(bench: Bench) -> Finding:
     """Joints and drivers hold at every sample, by the judge's own joint equations."""
-    return Finding(float(violation_series(bench.scene, bench.motion).max()), STAYS_CLOSED)
+    return vanishing(
+        bench, lambda k: float(violation_series(bench.scene, bench.sweep[k]).max()), STAYS_CLOSED
+    )
 
 
 def honest_end(bench: Bench) -> Finding:
@@ -95,7 +98,14 @@ def honest_end(bench: Bench) -> Finding:
 
 def velocities(bench: Bench) -> Finding:
     """Velocities and angular velocities (world) agree with central differences of the poses."""
-    run = _at(bench.close, slice(NEIGHBOURS - 1, NEIGHBOURS + 2))
+    noise = GRAINS * bench.rounding / (np.diff(bench.close.times)[0] * motion_rate(bench.scene, bench.close))
+    return vanishing(bench, lambda k: _unlike_differences(bench, k), max(LIKE_TRUTH, float(noise)))
+
+
+def _unlike_differences(bench: Bench, coarser: int) -> float:
+    """Return the largest difference of velocities from central differences of poses, relative to the largest
+    velocity."""
+    run = _at(bench.near(coarser) if coarser else bench.close, slice(NEIGHBOURS - 1, NEIGHBOURS + 2))
     h = (run.times[2] - run.times[0]) / 2
     moved = (run.position[2] - run.position[0]) / (2 * h)
     turn = rotations.multiply(run.orientation[2], rotations.conjugate(run.orientation[0]))
@@ -104,13 +114,17 @@ def velocities(bench: Bench) -> Finding:
     speeds = np.concatenate([run.velocity[1], length * run.angular_velocity[1]])
     off = speeds - np.concatenate([moved, length * turned])
     scale = max(np.linalg.norm(speeds, axis=1).max(), length / bench.scene.duration)
-    noise = GRAINS * bench.rounding / (h * motion_rate(bench.scene, run))
-    return Finding(float(np.linalg.norm(off, axis=1).max() / scale), max(LIKE_TRUTH, noise))
+    return float(np.linalg.norm(off, axis=1).max() / scale)
 
 
 def truth(bench: Bench) -> Finding:
     """Poses agree with a closed form, the judge's reference, or an integration of Gauss's principle."""
-    return Finding(difference(bench.scene, bench.motion, bench.exact), LIKE_TRUTH, bench.exact.engine)
+    return vanishing(
+        bench,
+        lambda k: difference(bench.scene, bench.sweep[k], bench.exact),
+        LIKE_TRUTH,
+        bench.exact.engine,
+    )
 
 
 def convergence(bench: Bench) -> Finding | Outside:
@@ -126,8 +140,10 @@ def convergence(bench: Bench) -> Finding | Outside:
 
 def rates_closed(bench: Bench) -> Finding:
     """Velocities obey joints and drivers at every sample."""
-    off = violation_series(bench.scene, bench.motion, 1)
-    return Finding(float(off.max()) / motion_rate(bench.scene, bench.motion), LIKE_TRUTH)
+    rate = motion_rate(bench.scene, bench.motion)
+    return vanishing(
+        bench, lambda k: float(violation_series(bench.scene, bench.sweep[k], 1).max()) / rate, LIKE_TRUTH
+    )
 
 
 def true_velocities(bench: Bench) -> Finding | Outside:
@@ -135,11 +151,14 @@ def true_velocities(bench: Bench) -> Finding | Outside:
     exact, length = bench.exact, scene_length(bench.scene)
     if np.isnan(exact.velocity).any():
         return Outside("the closed form of this scene gives poses only")
-    linear = np.linalg.norm(bench.motion.velocity - exact.velocity, axis=2) / length
-    angular = np.linalg.norm(bench.motion.angular_velocity - exact.angular_velocity, axis=2)
-    return Finding(
-        float(max(linear.max(), angular.max())) / motion_rate(bench.scene, bench.motion), LIKE_TRUTH
-    )
+    rate = motion_rate(bench.scene, bench.motion)
+
+    def off(k: int) -> float:
+        linear = np.linalg.norm(bench.sweep[k].velocity - exact.velocity, axis=2) / length
+        angular = np.linalg.norm(bench.sweep[k].angular_velocity - exact.angular_velocity, axis=2)
+        return float(max(linear.max(), angular.max())) / rate
+
+    return vanishing(bench, off, LIKE_TRUTH)
 
 
 def true_accelerations(bench: Bench) -> Finding | Outside:
@@ -148,34 +167,43 @@ def true_accelerations(bench: Bench) -> Finding | Outside:
         return Outside("the engine gives no accelerations")
     if bench.exact.acceleration is None:
         return Outside("the closed form of this scene gives poses only")
-    found = [
-        (stacked(bench.scene, bench.motion, k), stacked(bench.scene, bench.exact, k))
-        for k in range(len(bench.times))
-    ]
-    scale = max(float(np.abs(true).max()) for _, true in found)
-    scale = max(scale, scene_length(bench.scene) / bench.scene.duration**2)
-    return Finding(float(np.max([np.abs(got - true).max() for got, true in found])) / scale, REACTIONS)
+    samples = range(len(bench.times))
+    exact = np.array([stacked(bench.scene, bench.exact, n) for n in samples])
+    scale = max(float(np.abs(exact).max()), scene_length(bench.scene) / bench.scene.duration**2)
+
+    def off(k: int) -> float:
+        found = np.array([stacked(bench.scene, bench.sweep[k], n) for n in samples])
+        return float(np.abs(found - exact).max()) / scale
+
+    return vanishing(bench, off, REACTIONS)
 
 
 def energy(bench: Bench) -> Finding | Outside:
     """Energy minus the work of loads is constant, in scenes without dampers and drivers."""
-    motion = bench.motion
-    if any(isinstance(load, Moment) for load in bench.scene.load):  # its work is a sum over samples
-        motion = bench.run(bench.scene, np.linspace(0.0, bench.scene.duration, DENSE))
-    if difference(bench.scene, motion, _at(motion, np.zeros(len(motion.times), dtype=int))) < SAME_MOTION:
+    has_moment = any(isinstance(load, Moment) for load in bench.scene.load)  # its work is a sum over samples
+    dense = np.linspace(0.0, bench.scene.duration, DENSE)
+
+    @cache
+    def motion(k: int) -> Trajectory:
+        return bench.run(bench.scene, dense, k) if has_moment else bench.sweep[k]
+
+    at_start = _at(motion(0), np.zeros(len(motion(0).times), dtype=int))
+    if difference(bench.scene, motion(0), at_start) < SAME_MOTION:
         return Outside("nothing moves")
-    drift = energy_series(bench.scene, motion)
-    if drift is None:
+    if energy_series(bench.scene, motion(0)) is None:
         return Outside("a driver or a damper does work, or nothing has mass or energy")
-    return Finding(float(drift.max()), LIKE_TRUTH)
+    return vanishing(bench, lambda k: _largest(energy_series(bench.scene, motion(k))), LIKE_TRUTH)
 
 
 def momentum(bench: Bench) -> Finding | Outside:
     """Momentum and angular momentum change by gravity and external loads only."""
-    drift = momentum_series(bench.scene, bench.motion)
-    if drift is None:
+    if momentum_series(bench.scene, bench.motion) is None:
         return Outside("a joint or spring is fixed to the ground, or nothing moves or has mass")
-    return Finding(float(drift.max()), LIKE_TRUTH)
+    return vanishing(bench, lambda k: _largest(momentum_series(bench.scene, bench.sweep[k])), LIKE_TRUTH)
+
+
+def _largest(series: np.ndarray | None) -> float:
+    return np.inf if series is None else float(series.max())
 
 
 def balanced(bench: Bench) -> Finding | Outside:
@@ -197,7 +225,7 @@ def _of_reactions(
         return Outside("the accelerations are not known here")
     if silent := [joint.name for joint in bench.scene.joint if joint.name not in bench.motion.reactions]:
         return Finding(np.inf, REACTIONS, f"no reaction is given in {', '.join(silent)}")
-    return Finding(measured(bench.scene, bench.motion, bench.exact), REACTIONS)
+    return vanishing(bench, lambda k: measured(bench.scene, bench.sweep[k], bench.exact), REACTIONS)
 
 
 def silence(bench: Bench) -> Finding:

@@ -152,13 +152,21 @@ class Bench:
     @cached_property
     def close(self) -> Trajectory:
         """Completed run at equally spaced times so near that differences of samples give rates."""
-        rate = motion_rate(self.scene, self.motion)
-        step = min(STEP * self.scene.duration, TURN / rate)
-        return self.run(self.scene, self.scene.duration / 2 + step * np.arange(-NEIGHBOURS, NEIGHBOURS + 1))
+        return self.near(0)
 
-    def run(self, scene: Scene, times: np.ndarray) -> Trajectory:
-        """Return a completed run of a scene at the finest setting of this bench's scene; raises Broken."""
-        return completed(scene, self.observed(scene, times, self.settings[-1]).value, len(times))
+    def near(self, coarser: int) -> Trajectory:
+        """Return the run `close`; at a coarser setting its samples are farther apart in proportion.
+
+        An engine that shortens its steps to meet samples has steps of the samples' distance.
+        """
+        step = (1 + coarser) * min(STEP * self.scene.duration, TURN / motion_rate(self.scene, self.motion))
+        times = self.scene.duration / 2 + step * np.arange(-NEIGHBOURS, NEIGHBOURS + 1)
+        return self.run(self.scene, times, coarser)
+
+    def run(self, scene: Scene, times: np.ndarray, coarser: int = 0) -> Trajectory:
+        """Return a completed run of a scene at the finest setting of this bench's scene, or at a setting that
+        is ``coarser`` by a number of settings; raises Broken."""
+        return completed(scene, self.observed(scene, times, self.settings[-1 - coarser]).value, len(times))
 
     def refuses(self, scene: Scene) -> Cannot | None:
         """Return the reason why the engine, in the judged family, cannot run another scene, or None."""
@@ -207,11 +215,16 @@ class Bench:
         """Difference of the runs at the second and third finest settings; 0 for fewer settings."""
         return self._apart(1) if len(self.sweep) == SWEPT else 0.0
 
+    @property
+    def remaining(self) -> float:
+        """Sum of all further differences between ever finer settings, over the last difference."""
+        shrink = min(max(self.contraction, FASTEST), SLOWEST)
+        return shrink / (1 - shrink)
+
     @cached_property
     def left(self) -> float:
         """Estimated error of the finest setting: the sum of all further differences between settings."""
-        shrink = min(max(self.contraction, FASTEST), SLOWEST)
-        return self.steps_apart * shrink / (1 - shrink)
+        return self.steps_apart * self.remaining
 
     @cached_property
     def resolution(self) -> float:

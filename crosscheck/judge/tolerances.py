@@ -125,6 +125,10 @@ OWN_ACCURACY = 4.0
 """Multiples of an engine's own accuracy by which such runs may differ: each is off by about one, and what
 the coarser setting adds is not all of it."""
 
+COARSEST = 0.1
+"""Residual, error or drift beyond which no engine conforms, even if it decreases with the engine's steps:
+above a tenth of the mechanism's size, a radian or the energy, a decrease is no convergence yet."""
+
 PERTURBED = 100.0
 """Multiples of the difference of perturbed runs, whose data differ by two units in the last place, by which
 runs that should agree may differ: a rotated or reordered scene rounds in every operation."""

@@ -235,7 +235,6 @@ DAMAGES = {
     "unknown joint": lambda good: replace(good, reactions={"X": np.zeros((3, 6))}),
     "no cost": lambda good: replace(good, cost=1.0),
     "negative cost": lambda good: replace(good, cost=Cost(seconds=-0.1)),
-    "cost of nothing": lambda good: replace(good, cost=Cost(seconds=0.0)),
     "another scene": lambda good: replace(good, scene="moving"),
     "no version": lambda good: replace(good, version=" "),
     "cost of NaN": lambda good: replace(good, cost=Cost(seconds=float("nan"))),

@@ -34,7 +34,6 @@ SAYS = {
     "unknown joint": "reactions: name joints that",
     "no cost": "cost: is float, not a Cost",
     "cost of NaN": "cost: is not finite",
-    "cost of nothing": "cost: is 0 s",
     "another scene": "scene: is 'moving', not 'still'",
     "no version": "version: is empty",
     "negative cost": "cost: is negative",

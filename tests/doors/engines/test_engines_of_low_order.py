@@ -1,0 +1,58 @@
+"""The suite's verdict on engines of low order: a right one conforms, and one with a fault does not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from crosscheck.conformance import suite
+from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.trial import specimens
+from tests.helpers.low_order_engines import FAULTS, Step, euler, low_order, midpoint, symplectic_euler
+
+# without changed scenes, whose runs take most of the time
+SPECIMENS = {each.scene.name: replace(each, related=False) for each in specimens()}
+SHOWN_ON = {  # a scene of the suite on which each fault shows
+    "gravity has the other sign": "pendulum",
+    "gravity acts twice": "pendulum",
+    "a moment acts twice": "moment load",
+    "a spring has half its stiffness": "several springs",
+    "gyroscopic moments are forgotten": "tumbling body",
+}
+
+
+def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
+    """Return the checks that fail, in this process."""
+    found = suite.held_against(InProcess(low_order(step, fault)), [SPECIMENS[name] for name in scenes])
+    return [
+        f"{v.scene} {v.property} {v.measured} {v.allowed} {v.reason}"
+        for v in found.verdicts
+        if v.status == "fail"
+    ]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
+@pytest.mark.parametrize("scene", sorted(set(SHOWN_ON.values())))
+def test_right_engine_of_low_order_conforms(step: Step, scene: str):
+    assert failures(step, [scene]) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
+@pytest.mark.parametrize("fault", FAULTS)
+def test_engine_of_low_order_with_a_fault_does_not_conform(step: Step, fault: str):
+    assert failures(step, [SHOWN_ON[fault]], fault)
+
+
+@pytest.mark.parametrize("step", [euler, midpoint])
+def test_engine_of_low_order_falls_right_and_not_with_twice_the_weight(step: Step):
+    assert failures(step, ["free_fall"]) == []
+    assert failures(step, ["free_fall"], "gravity acts twice")
+
+
+@pytest.mark.parametrize("step", [symplectic_euler, midpoint])
+def test_engine_of_low_order_that_forgets_armature_does_not_conform(step: Step):
+    """The example engine has no armature, and runs the scene as if it had none."""
+    assert failures(step, ["armature pendulum"])
