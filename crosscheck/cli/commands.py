@@ -79,7 +79,7 @@ def _run(arguments: argparse.Namespace) -> int:
 def _verify(arguments: argparse.Namespace) -> int:
     from crosscheck.conformance import suite
 
-    (engine,) = request.find_engines([arguments.engine], notice)
+    engine = request.find_engine(arguments.engine, notice)
     if arguments.mechanisms:
         return _verify_random(engine, arguments)
     chosen = request.find_specimens(arguments.scene, arguments.reference_time, engine)

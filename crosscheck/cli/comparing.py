@@ -69,7 +69,7 @@ def tune(arguments: argparse.Namespace) -> int:
     reading = import_options(arguments)
     (scene,) = scene_request.find_scenes([arguments.scene], reading, notice)
     path = shlex.join([arguments.scene, *reading.words()])
-    (name,) = request.find_engines([arguments.engine], notice)
+    name = request.find_engine(arguments.engine, notice)
     scene = request.lasting(scene, None, arguments.duration)
     times = request.sample_times(scene, None, sweep.QUICK_SAMPLES)
     scouted([scene], [name])

@@ -42,6 +42,13 @@ def find_engines(names: Sequence[str] | None, notice: Notice) -> list[str]:
     return [name for name in wanted if name not in missing]
 
 
+def find_engine(name: str, notice: Notice) -> str:
+    """Return the name of one installed engine. Raises RequestError as ``find_engines``, and for "all"."""
+    if name == ALL:
+        raise RequestError(f"ENGINE: must be one engine, got {ALL!r}")
+    return find_engines([name], notice)[0]
+
+
 def find_specimens(names: Sequence[str] | None, reference_time: float, name: str = "") -> list[Specimen]:
     """Return the scenes of the conformance suite with these names, or all of them, each with its truth.
     ``reference_time`` is the CPU time (s) of a reference. Planar loops are added if the engine called

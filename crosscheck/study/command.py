@@ -44,7 +44,7 @@ def parsed_option(text: str) -> tuple[str, Any]:
         raise ValueError(f"must be name=value, got {text!r}")
     try:
         return name, json.loads(value)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):  # also a number of thousands of digits, and deep nesting
         return name, value
 
 

@@ -198,7 +198,7 @@ def test_parts_that_change_the_motion_are_refused_unless_asked_for(old, new, kin
 
 
 def test_an_unknown_kind_of_parts_is_refused():
-    with pytest.raises(ValueError, match="--without: 'rust' is none of armature, couplings"):
+    with pytest.raises(SceneError, match="--without: 'rust' is none of armature, couplings"):
         formats.read(MODELS / "four_bar.xml", ImportOptions(without=["rust"]))
 
 

@@ -1,4 +1,4 @@
-"""Mutations of scenes, methods, limits and command lines; each is drawn from a seeded generator."""
+"""Mutations of scenes, methods and limits; each is drawn from a seeded generator."""
 
 from __future__ import annotations
 
@@ -286,7 +286,6 @@ LIMITS = (
     "most_steps",
     "code",
 )
-PATHS = ("body[0].mass", "gravity[1]", "joint[0].anchor[2]", "body[", "x", "")
 CODES = ("auto", "generic", "generated")
 RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1, 100)  # numbers that a user may well give
 
@@ -324,35 +323,3 @@ def times(draw: random.Random) -> list[Any]:
     if draw.random() < 0.8:
         return [0.0, *sorted(draw.uniform(0, 0.1) for _ in range(draw.randint(1, 4)))]
     return [number(draw) for _ in range(draw.randint(0, 3))]
-
-
-def option_words(draw: random.Random) -> list[str]:
-    """Words of a command line after its command and scene."""
-    pairs = {
-        "--method": method,
-        "--rtol": number,
-        "--duration": number,
-        "--samples": number,
-        "--max-step": number,
-        "--times": lambda draw: ",".join(map(str, times(draw))),
-        "--code": lambda d: d.choice(("auto", "x")),
-        "--vary": lambda d: f"{d.choice(PATHS)}={number(d)}:{number(d)}",
-        "--count": number,
-        "--seed": number,
-        "--workers": lambda d: d.choice(("1", "0", "-1", "x")),
-        "--engine": lambda d: d.choice(("mbref", "nothing", "a:b", "os:path", ":", "mbref:x", "..")),
-        "--setting": lambda d: d.choice(("taylor", "x", "")),
-        "--time-limit": number,
-        "--scene": str,
-        "--out": lambda d: d.choice(("scene.toml", "runs.jsonl", "", "no/such", "/", "x" * 300)),
-        "--repeats": number,
-        "--section": lambda d: d.choice(("x", "", "../..")),
-    }
-    words = ["--samples", "3", "--duration", "0.01"] if draw.random() < 0.7 else []
-    for name in draw.sample(sorted(pairs), draw.choice((0, 1, 1, 2, 3))):
-        words += [name, str(pairs[name](draw))]
-    if draw.random() < 0.3:
-        words.append("--json")
-    if words and draw.random() < 0.15:
-        words[draw.randrange(len(words))] = draw.choice(WORDS)
-    return [word.replace("\x00", "") for word in words]

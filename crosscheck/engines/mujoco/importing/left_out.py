@@ -36,10 +36,10 @@ class Part:
 
 
 def checked(without: Collection[str]) -> frozenset[str]:
-    """Return the kinds of parts to be left out; raises ValueError for an unknown kind."""
+    """Return the kinds of parts to be left out; raises SceneError for an unknown kind."""
     for kind in without:
         if kind not in (*KINDS, EVERYTHING):
-            raise ValueError(f"--without: {kind!r} is none of {', '.join((*KINDS, EVERYTHING))}")
+            raise SceneError([f"--without: {kind!r} is none of {', '.join((*KINDS, EVERYTHING))}"])
     return frozenset(KINDS) if EVERYTHING in without else frozenset(without)
 
 
