@@ -14,8 +14,9 @@ from crosscheck.cli.options import add_depth, add_engines, add_folder, add_refer
 from crosscheck.cli.scene_request import RequestError, find_scenes
 from mbref.command_line import INTERRUPTED, Parser, output_file, status_of
 from mbref.files import write
-from reports.blocks import Block
-from reports.runs import Run, by_scene
+
+from .blocks import Block
+from .runs import Run, by_scene
 
 # module → package to install
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}
@@ -36,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _report(argv: Sequence[str] | None) -> int:
     if missing := [package for module, package in NEEDS.items() if find_spec(module) is None]:
         raise RequestError(f"the report needs {' and '.join(missing)}: pip install 'mbref[report]'")
-    from reports.sections import NAMES
+    from .sections import NAMES
 
     arguments = _parser((*NAMES, *OWN)).parse_args(argv)
     if arguments.picture:
@@ -63,7 +64,7 @@ def _report(argv: Sequence[str] | None) -> int:
 
 def _picture(path: Path) -> int:
     """Write the animated picture of the README."""
-    from reports import mechanisms
+    from . import mechanisms
 
     found = moving_picture()
     runs = [Run(record) for record in found.records]
@@ -74,8 +75,8 @@ def _picture(path: Path) -> int:
 
 def _render(folder: Path, names: Sequence[str]) -> int:
     """Render the records of a folder again; nothing runs."""
-    from reports import sections, stored
-    from reports.sections import closed_loops, paper, stability
+    from . import sections, stored
+    from .sections import closed_loops, paper, stability
 
     blocks: list[Block] = []
     try:
@@ -95,8 +96,8 @@ def _render(folder: Path, names: Sequence[str]) -> int:
 
 def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Block]:
     """Return the blocks of the named sections; only the records that they need are made."""
-    from reports import sections, stored
-    from reports.sections import closed_loops, paper, stability
+    from . import sections, stored
+    from .sections import closed_loops, paper, stability
 
     blocks: list[Block] = []
     if set(names) - set(OWN):
@@ -116,7 +117,7 @@ def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Bl
 
 
 def _write(blocks: Sequence[Block], out: Path, names: Sequence[str]) -> None:
-    from reports import render
+    from . import render
 
     render.write(blocks, out, TITLES.get(tuple(names), render.TITLE))
     _notice(f"written: {out / 'index.html'} and {out / 'report.md'}")

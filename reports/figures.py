@@ -20,7 +20,8 @@ from crosscheck.engine import engine_names
 from mbref.drawing import film
 from mbref.drawing.svg import COLOURS, GREY, INK
 from mbref.printable import printable
-from reports.runs import Curve
+
+from .runs import Curve
 
 MARKERS = ("o", "s", "^", "D", "v", "P", "h", "<", ">", "p")
 DASHES = ("-", "--", ":", "-.", (0, (6, 1.5, 1, 1.5, 1, 1.5)), (0, (1, 3)))

@@ -14,8 +14,9 @@ from mbref.drawing.svg import GREY
 from mbref.drawing.timeline import Timeline
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
-from reports import figures
-from reports.runs import Run, power
+
+from . import figures
+from .runs import Run, power
 
 BEHIND = Look(GREY, 9.0, 0.45)  # look of the true motion behind a run
 RUN = 3.5  # px, thickness of the bodies in a run

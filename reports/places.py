@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import zlib
 
-from reports.runs import Curve, Run
+from .runs import Curve, Run
 
 
 def of_run(run: Run) -> str:

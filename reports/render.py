@@ -10,8 +10,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from mbref import files
-from reports import figures
-from reports.blocks import (
+
+from . import figures
+from .blocks import (
     Block,
     Cell,
     Figure,
@@ -60,7 +61,7 @@ def write(blocks: Sequence[Block], out: Path, title: str = TITLE) -> None:
 def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> str:
     """Return the HTML page; ``drawn`` maps the name of every figure to its SVG element."""
     environment = Environment(
-        loader=PackageLoader("reports"),
+        loader=PackageLoader(__package__),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,

@@ -8,9 +8,10 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
-from reports.engine_looks import is_hollow, mark, named, tone
-from reports.places import of_run
-from reports.runs import Run, SceneRuns, duration
+
+from .engine_looks import is_hollow, mark, named, tone
+from .places import of_run
+from .runs import Run, SceneRuns, duration
 
 HEIGHT, TOP, FOOT = 380.0, 26.0, 40.0  # px; height of the axes, margin above, margin below
 LEAST_WIDE = 18  # least width of a grade's zone, in percent of the width, at which its name is shown

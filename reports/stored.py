@@ -15,7 +15,8 @@ from crosscheck.study.record_shape import Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
 from mbref.records import looked_at, read_json
 from mbref.scene import Scene
-from reports.runs import SceneRuns, by_scene
+
+from .runs import SceneRuns, by_scene
 
 SHAPES = {"records": Run, "truths": Truth, "motions": Run, "branches": Run}  # of the records of each file
 

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from matplotlib.figure import Figure
 
-from reports import figures
-from reports.runs import Curve, Run, SceneRuns
+from . import figures
+from .runs import Curve, Run, SceneRuns
 
 SMALLEST = 1e-17  # smaller magnitudes are plotted at this value, since a logarithmic axis has no zero
 

@@ -21,8 +21,9 @@ from mbref.command_line import Parser
 from mbref.files import file_name
 from mbref.records import strict_json
 from mbref.trajectory import Outcome
-from reports.runs import SceneRuns, duration, plain
-from reports.stored import groups, verified
+
+from .runs import SceneRuns, duration, plain
+from .stored import groups, verified
 
 HERE = Path(__file__).parent
 KINDS_FOLDER = HERE / "kinds"

@@ -7,6 +7,7 @@ for each other. ``slow.toml`` lists cases with the mark slow.
 import gc
 import os
 import tomllib
+from collections.abc import Iterator
 from fnmatch import fnmatchcase
 from pathlib import Path
 
@@ -22,6 +23,7 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "check"))
 
 HERE = Path(__file__).parent
 SLOW = tomllib.loads((HERE / "slow.toml").read_text())  # file: test: patterns of the slow cases
+OWN_FOLDERS = {".pytest_cache", ".hypothesis", "__pycache__", ".coverage"}  # of the tests' own tools
 MANY = 2000  # tests, among which every kernel is needed
 
 
@@ -77,3 +79,13 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     from tests.kernels import prepare
 
     prepare(backwards=worker != "gw0")
+
+
+@pytest.fixture(autouse=True)
+def nothing_is_written_into_the_working_folder() -> Iterator[None]:
+    """Fail a test after which the working folder has files that it did not have before."""
+    folder = Path.cwd()
+    before = set(os.listdir(folder))
+    yield
+    if Path.cwd() == folder and (new := set(os.listdir(folder)) - before - OWN_FOLDERS):
+        pytest.fail(f"the working folder has new files: {', '.join(sorted(new))}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
+from importlib.util import find_spec
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
@@ -128,8 +129,12 @@ def _paper(arguments: argparse.Namespace) -> int:
 
 
 def _rendered(options: Sequence[str]) -> int:
-    """Run `reports` as a program. This package must not import `reports`, which depends on it."""
-    status = run_program("reports", options)
+    """Run `reports` as a program: a part of this package in a wheel, a folder beside it in a checkout.
+
+    This package must not import `reports`, which depends on it.
+    """
+    inside = "crosscheck.reports"
+    status = run_program(inside if find_spec(inside) else "reports", options)
     return status if status >= 0 else KILLED - status
 
 

@@ -15,14 +15,19 @@ import sys
 import tempfile
 from pathlib import Path
 
+from mbref.kernels.safe_folder import is_safe, make
+
 DIGEST = hashlib.sha256().digest_size  # bytes before the data
 
 
 def read(path: Path) -> bytes | None:
-    """Return the data stored at this path; None if the file is missing or damaged.
+    """Return the data stored at this path; None if the file is missing or damaged, or if other users can
+    write to its folder.
 
     A damaged file is reported in one line on stderr and removed if possible.
     """
+    if not _is_safe(path.parent):
+        return None
     try:
         found = path.read_bytes()
     except FileNotFoundError:
@@ -43,8 +48,10 @@ def write(path: Path, data: bytes) -> None:
     """Store the data completely or not at all; a failure is reported in one line on stderr, once for each
     folder."""
     temporary = ""
+    if not _is_safe(path.parent):
+        return
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make(path.parent)
         with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as file:
             temporary = file.name
             file.write(hashlib.sha256(data).digest() + data)
@@ -54,6 +61,11 @@ def write(path: Path, data: bytes) -> None:
         if temporary:
             with contextlib.suppress(OSError):
                 os.unlink(temporary)
+
+
+def _is_safe(folder: Path) -> bool:
+    """Return whether no other user can write to the folder and to the folders of the cache above it."""
+    return is_safe(folder) and is_safe(folder.parent)
 
 
 @functools.cache

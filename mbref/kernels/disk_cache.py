@@ -15,11 +15,13 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numba
+
+from mbref.kernels.safe_folder import is_safe, make
 
 CHECKSUMS = "checksums.txt"  # one line for each file: SHA-256, blank, path in the folder
 LEAST_FREE = 1 << 27  # bytes of free disk; kernels of all methods take 40 MB, and numba fails on a full disk
@@ -40,9 +42,12 @@ def cached_in(folder: Path) -> Iterator[None]:
 
 @functools.cache
 def is_writable(folder: Path) -> bool:
-    """Return whether files can be stored in the folder; otherwise one line on stderr reports it."""
+    """Return whether files can be stored in the folder, and nobody else can; otherwise one line on stderr
+    reports it."""
+    if not is_safe(folder) or not all(is_safe(place) for place in _folders(folder) if place.is_dir()):
+        return False
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        make(folder)
         tempfile.TemporaryFile(dir=folder).close()
         if shutil.disk_usage(folder).free < LEAST_FREE:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -70,10 +75,10 @@ def remove_damaged(folder: Path, function: Callable[..., Any]) -> None:
     stderr.
 
     Files written since this process began to use the folder belong to a process that compiles now, and are
-    not removed.
+    not removed. Files with a time in the future do not.
     """
-    since = begin(folder)
-    paths, is_whole = [path for path in files_of(folder, function) if _time_of(path) < since], True
+    new = _new_among(folder, files_of(folder, function))
+    paths, is_whole = [path for path in files_of(folder, function) if path not in new], True
     for path in paths:
         known, found = _known(folder, path), _checksum(path)
         is_whole = is_whole and found in known
@@ -86,12 +91,9 @@ def remove_damaged(folder: Path, function: Callable[..., Any]) -> None:
 
 def record_files(folder: Path) -> None:
     """Add to the list the checksums of all files written since this process began to use the folder."""
-    lines, since = [], begin(folder)
-    for place in _folders(folder):
-        for name in _names_in(place):
-            path = place / name
-            if path.suffix in (".nbi", ".nbc") and _time_of(path) >= since:
-                lines.append(f"{_checksum(path)} {place.name}/{name}\n")
+    paths = [place / name for place in _folders(folder) for name in _names_in(place)]
+    kept = [path for path in paths if path.suffix in (".nbi", ".nbc")]
+    lines = [f"{_checksum(path)} {path.parent.name}/{path.name}\n" for path in _new_among(folder, kept)]
     with contextlib.suppress(OSError), (folder / CHECKSUMS).open("a") as file:
         file.write("".join(lines))
 
@@ -99,8 +101,21 @@ def record_files(folder: Path) -> None:
 @functools.cache
 def begin(folder: Path) -> float:
     """Begin to use the folder; return the time (s) by the clock of the folder's file system."""
+    return _now(folder)
+
+
+def _now(folder: Path) -> float:
+    """Return the time (s) by the clock of the folder's file system."""
     with tempfile.NamedTemporaryFile(dir=folder) as file:
         return os.stat(file.name).st_mtime
+
+
+def _new_among(folder: Path, paths: Sequence[Path]) -> list[Path]:
+    """Return the files that were written since this process began to use the folder."""
+    since = begin(folder)
+    later = [(path, written) for path in paths if (written := _time_of(path)) >= since]
+    now = _now(folder) if later else since
+    return [path for path, written in later if written <= now]
 
 
 def _known(folder: Path, path: Path) -> set[str]:

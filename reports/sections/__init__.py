@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
-from reports.blocks import Block, Heading, Text
-from reports.runs import SceneRuns
-from reports.sections import (
+from ..blocks import Block, Heading, Text
+from ..runs import SceneRuns
+from ..sections import (
     accelerations,
     conformance,
     convergence,

@@ -7,8 +7,9 @@ import numpy as np
 
 from crosscheck.judge.gauss_principle import gauss, singular_values, stacked
 from crosscheck.judge.tolerances import RANK
-from reports.blocks import Block, Heading, Table
-from reports.runs import SceneRuns, beyond_rounding
+
+from ..blocks import Block, Heading, Table
+from ..runs import SceneRuns, beyond_rounding
 
 HEADER = ("Engine", "Family", "Difference")
 

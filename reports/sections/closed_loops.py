@@ -10,8 +10,9 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error
 from crosscheck.study.verdict import Grade, grade
-from reports.blocks import Block, Heading, HeatMap, Listing, Table, Text
-from reports.blocks import Cell as Shown
+
+from ..blocks import Block, Heading, HeatMap, Listing, Table, Text
+from ..blocks import Cell as Shown
 
 KINDS = {Grade.RIGHT: "kept", Grade.INACCURATE: "kept", Grade.WRONG: "false", Grade.FAILED: "ended"}
 MOST_DIGITS = 14  # digits of a cell of the deepest colour

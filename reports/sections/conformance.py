@@ -14,7 +14,8 @@ from typing import Any
 from crosscheck.conformance.explained import explanations, proofs
 from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, abouts
 from crosscheck.study.speed_sentences import title
-from reports.blocks import Block, Heading, Table, Text
+
+from ..blocks import Block, Heading, Table, Text
 
 Verified = Mapping[str, Any]  # an engine, its version and its verdicts, as stored in JSON
 Verdict = Mapping[str, Any]

@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 from crosscheck.judge.metrics import error_series, order_of_convergence
 from crosscheck.judge.richardson import limit
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Curve, Run, SceneRuns, number, power
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import Curve, Run, SceneRuns, number, power
 
 STEP = "step"
 TELLING = 5.0  # ratio of bias to discretisation error; a smaller bias may be due to the extrapolation itself

@@ -10,9 +10,10 @@ import numpy as np
 from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Record
 from mbref.trajectory import Outcome
-from reports import mechanisms
-from reports.blocks import Block, Heading, Moving, Table, Text
-from reports.runs import Run, SceneRuns, plain
+
+from .. import mechanisms
+from ..blocks import Block, Heading, Moving, Table, Text
+from ..runs import Run, SceneRuns, plain
 
 DIGITS = 12  # decimals of displayed times (s)
 SHOWN = 12  # largest number of singular positions of a motion in the table

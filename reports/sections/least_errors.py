@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.least_errors import HEADER, least_errors
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import SceneRuns, short
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import SceneRuns, short
 
 BEST = 6  # first cells of a row, which describe the run of least error
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 
-from reports import mechanisms
-from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run, SceneRuns
+from .. import mechanisms
+from ..blocks import Block, Figure, Heading, Table, Text
+from ..runs import Run, SceneRuns
 
 
 def render(scene_runs: SceneRuns) -> list[Block]:

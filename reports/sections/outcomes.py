@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 
 from crosscheck.study.record_view import error_bound
-from reports.blocks import Block, Heading, Linked, Table, Text
-from reports.places import of_run
-from reports.runs import Run, SceneRuns, duration, power
+
+from ..blocks import Block, Heading, Linked, Table, Text
+from ..places import of_run
+from ..runs import Run, SceneRuns, duration, power
 
 HEADER = (
     "Engine",

@@ -11,9 +11,10 @@ from crosscheck.paper.cells import CELLS, CLOSE, COUNTS_III, COUNTS_IV, SPATIAL,
 from crosscheck.paper.illustration import Illustration
 from crosscheck.paper.runs import FREE, KEPT_RTOLS, SPATIAL_DYNAMIC, Label, Records, draws, found, has
 from crosscheck.paper.settings import LINKAGES, STRICT, TIGHT
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, power, ratio
-from reports.sections import (
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import Run, power, ratio
+from ..sections import (
     paper_cranks,
     paper_figures,
     paper_methods,

@@ -11,8 +11,9 @@ import numpy as np
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper.runs import HEAVY, RAISED, TRUE_BRANCH, UNEQUAL, Label, Records, dynamic_scene
 from mbref.trajectory import Trajectory
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, ended_briefly, number, power
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import Run, ended_briefly, number, power
 
 OFF = 0.01  # m; a body at this distance from the true motion is on another branch
 

@@ -24,10 +24,11 @@ from crosscheck.paper.runs import (
 from crosscheck.paper.settings import BASE
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
-from reports import figures, mechanisms
-from reports.blocks import Block, Figure, Heading
-from reports.runs import Run
-from reports.sections.paper_teaching import violation
+
+from .. import figures, mechanisms
+from ..blocks import Block, Figure, Heading
+from ..runs import Run
+from ..sections.paper_teaching import violation
 
 HALF = "θ₂ = π/2"
 POSES = 12

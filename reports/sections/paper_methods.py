@@ -17,9 +17,10 @@ from crosscheck.paper.cells import SPATIAL
 from crosscheck.paper.illustration import DISTANCES, GAMMA_ERRORS, TURNED, Illustration
 from crosscheck.paper.runs import ALPHAS, DUAL, EXACT, PENALTY, Label, Records, digits_scene
 from mbref.trajectory import Trajectory
-from reports import figures
-from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run, ended_briefly, number, power
+
+from .. import figures
+from ..blocks import Block, Figure, Heading, Table, Text
+from ..runs import Run, ended_briefly, number, power
 
 SMALLEST = 1e-17  # smaller magnitudes are plotted at this value
 

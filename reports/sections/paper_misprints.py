@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from crosscheck.paper.cells import COUNTS_III, COUNTS_IV
-from reports.blocks import Block, Heading, Table
+
+from ..blocks import Block, Heading, Table
 
 MISPRINTS = (
     ("Eq. 16", "h from t^i to t^(i-1)", "from t^(i-1) to t^i: the estimate goes forwards"),

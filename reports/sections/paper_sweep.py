@@ -12,9 +12,10 @@ from crosscheck.paper import singular
 from crosscheck.paper.cells import CELLS, FIVE_BAR, FOUR_BAR_COLUMNS, Cell, Match, match
 from crosscheck.paper.runs import SHARE, SHORT, SIZED_ROWS, Label, Records, found
 from crosscheck.paper.settings import BASE, DRAWN, FEW, LINKAGES, SIZE, SIZES, SWEEP
-from reports import figures
-from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run
+
+from .. import figures
+from ..blocks import Block, Figure, Heading, Table, Text
+from ..runs import Run
 
 SHARE_TEXT = f"{100 * SHARE:g} %"
 COLUMNS = (*FOUR_BAR_COLUMNS, FIVE_BAR)

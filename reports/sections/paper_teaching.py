@@ -10,9 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure as Drawing
 
 from crosscheck.paper.runs import GAIN, GROWTH, SPATIAL_DYNAMIC, TEACHING, Label, Records
-from reports import figures
-from reports.blocks import Block, Figure, Heading, Table, Text
-from reports.runs import Run, ended_briefly, power
+
+from .. import figures
+from ..blocks import Block, Figure, Heading, Table, Text
+from ..runs import Run, ended_briefly, power
 
 SMALLEST = 1e-17
 REMEDIES = ("LM2", "LM2 + CP", "ALF", "ALF + CP", "MPI (SVD)", "MPI (SVD) + CP")

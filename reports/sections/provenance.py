@@ -5,9 +5,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from reports.blocks import Block, Heading, Listing, Table, Text
-from reports.runs import Curve, Run, SceneRuns, plain
-from reports.sections.records import path
+from ..blocks import Block, Heading, Listing, Table, Text
+from ..runs import Curve, Run, SceneRuns, plain
+from ..sections.records import path
 
 
 def render(groups: Sequence[SceneRuns]) -> list[Block]:

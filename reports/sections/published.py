@@ -9,8 +9,9 @@ from collections.abc import Sequence
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.published import BY_SCENE, problem_of
 from crosscheck.study.record_view import error_bound
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import Run, SceneRuns, duration, power
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import Run, SceneRuns, duration, power
 
 LEAST = 1e-14  # smaller values are rounding in double precision
 HEADER = ("Engine", "Family", "Settings", "Error", "Accepted", "Time")

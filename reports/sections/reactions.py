@@ -9,8 +9,9 @@ from crosscheck.judge.joint_reactions import Comparison, compare, largest_reacti
 from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import ROUNDING, Run, SceneRuns, beyond_rounding, number
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import ROUNDING, Run, SceneRuns, beyond_rounding, number
 
 CAPTION = (
     "Largest difference from the reactions of the exact motion, relative to the largest of them, over "

@@ -8,10 +8,11 @@ from collections.abc import Sequence
 from crosscheck.study.command import command
 from crosscheck.study.verdict import grade
 from mbref.files import file_name
-from reports import places
-from reports.blocks import Block, Card, Heading, Record, Text
-from reports.engine_looks import SIGNS, named, tone
-from reports.runs import Run, SceneRuns, duration, power
+
+from .. import places
+from ..blocks import Block, Card, Heading, Record, Text
+from ..engine_looks import SIGNS, named, tone
+from ..runs import Run, SceneRuns, duration, power
 
 NUMBERS = {
     "Joints open by": "violation_position",

@@ -13,10 +13,11 @@ from matplotlib.figure import Figure as Drawing
 from matplotlib.gridspec import GridSpec
 
 from crosscheck.study.record_view import UNTIMED
-from reports import figures
-from reports.blocks import Block, Figure, Heading, Plot, Table, Text
-from reports.runs import WRONG, Curve, Run, SceneRuns, duration, short
-from reports.speed_figure import speed_svg, toggles
+
+from .. import figures
+from ..blocks import Block, Figure, Heading, Plot, Table, Text
+from ..runs import WRONG, Curve, Run, SceneRuns, duration, short
+from ..speed_figure import speed_svg, toggles
 
 Failures = Mapping[tuple[Curve, str], Sequence[Run]]
 

@@ -13,8 +13,9 @@ from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.stability import MBREF, METHODS, RTOL, Ladder, ladders, place
 from mbref.trajectory import Outcome
-from reports.blocks import Block, Cell, Heading, HeatMap, Table, Text
-from reports.runs import Curve
+
+from ..blocks import Block, Cell, Heading, HeatMap, Table, Text
+from ..runs import Curve
 
 # largest error of a right run of an mbref method; a completed run with a larger error is a false success
 ALLOWED = 1e3 * RTOL

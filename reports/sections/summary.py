@@ -7,8 +7,9 @@ from collections.abc import Mapping, Sequence
 
 from crosscheck.judge.metrics import cost_at_error
 from crosscheck.judge.tolerances import EXCESS
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, ratio, short
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import LEVELS, WRONG, Curve, Run, SceneRuns, duration, ratio, short
 
 HEADER = (
     "Engine",

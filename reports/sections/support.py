@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from crosscheck.cli import support
 from crosscheck.engine import engine_names
-from reports.blocks import Block, Heading, Table, Text
-from reports.runs import SceneRuns
+
+from ..blocks import Block, Heading, Table, Text
+from ..runs import SceneRuns
 
 CAPTION = "✓: supported; –: not supported, for the numbered reason below."
 

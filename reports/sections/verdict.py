@@ -10,12 +10,13 @@ from crosscheck.study.record_view import ended
 from crosscheck.study.sentences import verdict
 from crosscheck.study.speed_sentences import title
 from crosscheck.study.verdict import DEFAULTS, Grade, Judged, grade
-from reports import places
-from reports.blocks import Block, Heading, Matrix, Opening, Verdict
-from reports.engine_looks import SIGNS, mark, named, tone
-from reports.mechanisms import motion_of, over_truth
-from reports.runs import Run, SceneRuns, duration, power, short
-from reports.sections import speed
+
+from .. import places
+from ..blocks import Block, Heading, Matrix, Opening, Verdict
+from ..engine_looks import SIGNS, mark, named, tone
+from ..mechanisms import motion_of, over_truth
+from ..runs import Run, SceneRuns, duration, power, short
+from ..sections import speed
 
 KEY = (
     f"= right: error up to {short(FLOOR)}; ≈ inaccurate: up to {short(FALSE_SUCCESS)}; ≠ wrong: above, "

@@ -7,9 +7,10 @@ from functools import partial
 import numpy as np
 
 from crosscheck.judge.metrics import violation_series
-from reports import time_series
-from reports.blocks import Block, Figure, Heading, Text
-from reports.runs import Run, SceneRuns, power
+
+from .. import time_series
+from ..blocks import Block, Figure, Heading, Text
+from ..runs import Run, SceneRuns, power
 
 LABELS = ("position (rad, or of the length)", "velocity (per second)")
 

@@ -50,9 +50,21 @@ def imported(path: Path) -> Iterator[str]:
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         else:
-            assert not node.level, f"{path}: relative import"
-            yield str(node.module)
-            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+            module = origin(path, node)
+            yield module
+            yield from (f"{module}.{alias.name}" for alias in node.names)
+
+
+def origin(path: Path, node: ast.ImportFrom) -> str:
+    """Return the full name of the module from which a statement of a file imports.
+
+    Only ``reports`` imports relatively, since a wheel has it as ``crosscheck.reports``.
+    """
+    if not node.level:
+        return str(node.module)
+    package = path.relative_to(ROOT).parts[: -node.level]
+    assert package[:1] == ("reports",), f"{path}: relative import"
+    return ".".join([*package, *filter(None, [node.module])])
 
 
 @functools.cache
@@ -74,8 +86,8 @@ def _targets(path: Path, modules: Mapping[str, Path]) -> set[str]:
             found |= {alias.name for alias in node.names}
         else:
             for alias in node.names:
-                whole = f"{node.module}.{alias.name}"
-                found.add(whole if whole in modules else str(node.module))
+                whole = f"{origin(path, node)}.{alias.name}"
+                found.add(whole if whole in modules else origin(path, node))
     return found & set(modules)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engines.mujoco.model import compiled
+from crosscheck.engines.mujoco.warnings_off import without_warnings
 from crosscheck.linearising import Linearising
 from mbref.scene import Scene
 
@@ -29,10 +30,10 @@ class Linearised(Linearising):
         model = (made := compiled(scene)).model
         model.opt.timestep, model.opt.tolerance = STEP, 0.0
         model.eq_solref[:, 0], model.eq_solimp[:, :2] = STIFFEST, HARDEST
-        data = mujoco.MjData(model)
-        made.apply(data, 0.0)
-        mujoco.mj_forward(model, data)
         size = 2 * model.nv + model.na
-        transition = np.zeros((size, size))
-        mujoco.mjd_transitionFD(model, data, INCREMENT, True, transition, None, None, None)
+        transition, data = np.zeros((size, size)), mujoco.MjData(model)
+        with without_warnings(mujoco):
+            made.apply(data, 0.0)
+            mujoco.mj_forward(model, data)
+            mujoco.mjd_transitionFD(model, data, INCREMENT, True, transition, None, None, None)
         return np.asarray(np.log(np.linalg.eigvals(transition).astype(complex)) / STEP)

@@ -19,6 +19,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
+from crosscheck.engines.mujoco.warnings_off import without_warnings
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
@@ -130,15 +131,9 @@ def run(scene: Scene, times: np.ndarray, setting: Setting, version: str) -> Traj
     start = time.process_time()
     original = _Original(mujoco, setting)
     labels = {"engine": "mujoco", "version": version, "method": setting.family, "settings": original.settings}
-    mujoco.set_mju_user_warning(lambda _: None)
-    try:
-        with np.errstate(all="ignore"):
-            built = time.process_time() - start
-            return run_through(
-                scene, times, original.advance, original.sample, original.counts, built, labels
-            )
-    finally:
-        mujoco.set_mju_user_warning(None)
+    with without_warnings(mujoco), np.errstate(all="ignore"):
+        built = time.process_time() - start
+        return run_through(scene, times, original.advance, original.sample, original.counts, built, labels)
 
 
 class _Original:

@@ -26,6 +26,7 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.projection import projected
+from crosscheck.engines.mujoco.warnings_off import without_warnings
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.judge.time_functions import next_end
@@ -97,15 +98,13 @@ class Simulation:
         """Install this run's callbacks in MuJoCo, whose callbacks are global in the process, until the run
         ends."""
         mujoco = self.mujoco
-        # MuJoCo would write warnings to the terminal and to MUJOCO_LOG.TXT
-        mujoco.set_mju_user_warning(lambda _: None)
         try:
-            if self.compiled.drivers or self.compiled.timed:
-                mujoco.set_mjcb_control(self._drive)
-            yield
+            with without_warnings(mujoco):
+                if self.compiled.drivers or self.compiled.timed:
+                    mujoco.set_mjcb_control(self._drive)
+                yield
         finally:
             mujoco.set_mjcb_control(None)
-            mujoco.set_mju_user_warning(None)
 
     def integrated(self, times: np.ndarray, start: float, labels: dict[str, Any]) -> Trajectory:
         """Return the run of a compiled family; its construction began at ``start`` (s of CPU time)."""

@@ -94,10 +94,12 @@ def direction(axis: ET.Element | None, name: str, at: Pose, frames: Frames) -> n
 
 
 def number(element: ET.Element | None, where: str, default: float) -> float:
+    """Return the number of an element, the default without element; raises SceneError for other text."""
     return default if element is None else float(numbers(element, where, 1)[0])
 
 
 def is_true(element: ET.Element | None) -> bool:
+    """Return whether an element says true or 1."""
     return element is not None and (element.text or "").strip().lower() in ("true", "1")
 
 

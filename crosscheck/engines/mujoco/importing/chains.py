@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -246,3 +246,14 @@ def _meeting(chain: Chain, part: slice, extent: float) -> list[float] | None:
     missed = np.linalg.norm(np.einsum("kij,kj->ki", across, anchors - point), axis=1).max()
     found: list[float] = point.tolist()
     return found if missed <= ALIGNED * extent else None
+
+
+def renamed(joints: Sequence[Joint]) -> Iterator[Joint]:
+    """Return joints with unique names: a repeated name gets a number."""
+    seen: set[str] = set()
+    for joint in joints:
+        name, number = joint.name, 2
+        while name in seen:
+            name, number = f"{joint.name} {number}", number + 1
+        seen.add(name)
+        yield joint.model_copy(update={"name": name})

@@ -15,8 +15,7 @@ SMALLEST = 1e-9  # m; extent of a model that is a rounding error
 
 
 def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf.Text | None, list[str]]:
-    """Return the compiled model, the text of a URDF, and notes; warnings of MuJoCo write no log file."""
-    mujoco.set_mju_user_warning(lambda _: None)
+    """Return the compiled model, the text of a URDF, and notes."""
     try:
         if path.suffix != ".urdf":
             path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
@@ -26,8 +25,6 @@ def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None
-    finally:
-        mujoco.set_mju_user_warning(None)
     text.take_back(mujoco, model)
     return model, text, []
 

@@ -29,12 +29,13 @@ from crosscheck.engines.mujoco.importing import (
 from crosscheck.engines.mujoco.importing.actuators import Actuators
 from crosscheck.engines.mujoco.importing.agreement import Agreement
 from crosscheck.engines.mujoco.importing.asked_closures import Frames, asked, unclosed
-from crosscheck.engines.mujoco.importing.chains import Chain, branching, kind_of
+from crosscheck.engines.mujoco.importing.chains import Chain, branching, kind_of, renamed
 from crosscheck.engines.mujoco.importing.closures import Closure, of_equalities
 from crosscheck.engines.mujoco.importing.compiling import compiled, extent_of, root_link
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
+from crosscheck.engines.mujoco.warnings_off import without_warnings
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import Body, Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
@@ -67,6 +68,11 @@ def source(path: Path, options: ImportOptions) -> Source:
     """
     import mujoco
 
+    with without_warnings(mujoco):
+        return _read(mujoco, path, options)
+
+
+def _read(mujoco: Any, path: Path, options: ImportOptions) -> Source:
     without = left_out.checked(options.without)
     model, text, notes = compiled(mujoco, path, options)
     values.check(mujoco, model)
@@ -91,17 +97,6 @@ def source(path: Path, options: ImportOptions) -> Source:
         tuple(reader.notes),
     )
     return Source(imported, model, original, reader.groups, reader.actuators, *state)
-
-
-def _renamed(joints: list[Joint]) -> Iterator[Joint]:
-    """Return joints with unique names: a repeated name gets a number."""
-    seen: set[str] = set()
-    for joint in joints:
-        name, number = joint.name, 2
-        while name in seen:
-            name, number = f"{joint.name} {number}", number + 1
-        seen.add(name)
-        yield joint.model_copy(update={"name": name})
 
 
 @dataclass
@@ -229,7 +224,7 @@ class _Reader:
             found += self._with_armature(chain, joints)
         count = len(found)
         found += [c.joint(data, self.groups) for c in closures]
-        self.joints = list(_renamed(found))
+        self.joints = list(renamed(found))
         self.tree = [joint.name for joint in self.joints[:count]]
         self.joint_of = {j: self.joints[k] for j, k in whole.items()}
         self._read_merged()

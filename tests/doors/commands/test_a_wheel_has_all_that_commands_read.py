@@ -1,0 +1,159 @@
+"""The wheel, installed into an empty environment in another folder, runs one of each command."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli.parser import parser as crosscheck_parser
+from mbref.cli.commands import parser as mbref_parser
+
+ROOT = Path(__file__).parents[3]
+SHORT = ("--samples", "3", "--duration", "0.01")
+MODEL = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0"/>
+<inertial pos="0 0 -1" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
+COMMANDS = {
+    "mbref": [
+        ("new", "my.toml"),
+        ("assemble", "my.toml", "--out", "closed.toml"),
+        ("schema",),
+        ("draw", "my.toml"),
+        ("animate", "my.toml", "--duration", "0.1"),
+        ("diagnose", "my.toml"),
+        ("run", "four_bar_gravity", *SHORT, "--out", "motion.csv"),
+        ("plot", "four_bar_gravity", "energy", *SHORT, "--out", "energy.svg"),
+        ("equilibrium", "four_bar_gravity"),
+        ("modes", "four_bar_gravity"),
+        ("ensemble", "four_bar_gravity", "--help"),
+        ("import", "model.xml"),
+        ("export", "four_bar_gravity", "--out", "four_bar.xml"),
+        ("list",),
+        ("completion", "bash"),
+    ],
+    "crosscheck": [
+        ("list", "engines"),
+        ("run", "four_bar_gravity", "--engine", "mbref", "--method", "lm1", *SHORT),
+        ("compare", "four_bar_gravity", "--engine", "exudyn", "--samples", "3", "--duration", "0.01"),
+        ("tune", "--help"),
+        ("verify", "--help"),
+        ("findings",),
+        ("closed-loops",),
+        ("convergence",),
+        ("modes",),
+        ("reference", "four_bar_gravity", *SHORT, "--out", "reference.csv"),
+        ("judge", "four_bar_gravity", "motion.csv"),
+        ("report", "--render", "report", "--section", "speed"),
+        ("paper", "--help"),
+        ("diff", "report", "report"),
+        ("certify", "--help"),
+    ],
+}
+RUNNER = """
+import importlib, io, json, sys, contextlib, traceback
+found = []
+for program, *words in json.load(open("commands.json")):
+    main, said = importlib.import_module(f"{program}.cli").main, io.StringIO()
+    try:
+        with contextlib.redirect_stderr(said):
+            status = main(words)
+    except SystemExit as end:
+        status = end.code or 0
+    except BaseException:
+        status, said = "traceback", io.StringIO(traceback.format_exc())
+    found.append([program, words, status, said.getvalue()[-2000:]])
+files = [getattr(module, "__file__", None) or "" for module in list(sys.modules.values())]
+json.dump([found, files], open("found.json", "w"))
+"""
+LARGE = ("*.png", "*.svg", "*.jsonl", "*.pyc", "index.html", "paper-runs.json")
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory) -> Path:
+    """Return a folder with the wheel and the source archive of a copy of the project."""
+    pytest.importorskip("setuptools", minversion="77", reason="older versions cannot build the project")
+    source, made = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("made")
+    for folder in ("mbref", "crosscheck"):
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("reports", "docs", "examples", "tests"):
+        shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns(*LARGE))
+    for path in ROOT.iterdir():
+        if path.is_file():
+            shutil.copy(path, source)
+    build = "from setuptools import build_meta as b; b.build_sdist({0!r}); b.build_wheel({0!r})"
+    command = [sys.executable, "-c", build.format(str(made))]
+    subprocess.run(command, cwd=source, check=True, capture_output=True)
+    return made
+
+
+def names(place: Path) -> list[str]:
+    """Return the names of the files of the only wheel or source archive in a folder."""
+    (wheel,) = place.glob("*.whl")
+    return zipfile.ZipFile(wheel).namelist()
+
+
+@pytest.mark.slow
+def test_a_wheel_has_two_packages_and_every_file_of_data(built):
+    files = names(built)
+    assert {name.partition("/")[0] for name in files if ".dist-info" not in name} == {"mbref", "crosscheck"}
+    needed = {name for folder in ("mbref", "crosscheck") for name in of_folder(folder)}
+    of_reports = [name for name in of_folder("reports") if name.endswith(".py") or "/templates/" in name]
+    needed |= {f"crosscheck/{name}" for name in of_reports}
+    assert len(of_reports) > 20 and needed <= set(files), sorted(needed - set(files))
+
+
+def of_folder(folder: str) -> list[str]:
+    """Return the names of the files in a folder of the project, without compiled modules."""
+    paths = [
+        path for path in (ROOT / folder).rglob("*") if path.is_file() and "__pycache__" not in path.parts
+    ]
+    return [path.relative_to(ROOT).as_posix() for path in paths]
+
+
+@pytest.mark.slow
+def test_a_source_archive_has_documents_and_no_tests(built):
+    (archive,) = built.glob("*.tar.gz")
+    with tarfile.open(archive) as file:
+        inside = {name.partition("/")[2] for name in file.getnames()}
+    assert {"CHANGELOG.md", "README.md", "LICENSE", "docs/tutorial.md", "setup.py"} <= inside
+    assert not [name for name in inside if name.startswith("tests")]
+
+
+@pytest.mark.slow
+def test_each_command_of_a_wheel_runs_in_another_folder(built, tmp_path):
+    for program, made in (("mbref", mbref_parser()), ("crosscheck", crosscheck_parser())):
+        known = re.findall(r"^    ([a-z][a-z-]+)( |$)", made.format_help(), flags=re.M)
+        assert {words[0] for words in COMMANDS[program]} == {name for name, _ in known}, "one of each"
+    here, environment = tmp_path / "here", tmp_path / "environment"
+    here.mkdir()
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(environment)], check=True)
+    (packages,) = environment.glob("lib/python*/site-packages")
+    (wheel,) = built.glob("*.whl")
+    zipfile.ZipFile(wheel).extractall(packages)
+    (packages / "libraries.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
+    shutil.copytree(
+        ROOT / "reports" / "reference", here / "report", ignore=shutil.ignore_patterns("*.md", "*.png")
+    )
+    (here / "model.xml").write_text(MODEL)
+    (here / "runner.py").write_text(RUNNER)
+    commands = [(program, *words) for program, rows in COMMANDS.items() for words in rows]
+    (here / "commands.json").write_text(json.dumps(commands))
+    python = environment / "bin" / "python"
+    variables = {**os.environ, "NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    done = subprocess.run(
+        [str(python), "-I", "runner.py"], cwd=here, env=variables, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    found, files = json.loads((here / "found.json").read_text())
+    assert not [row for row in found if row[2] not in (0, 1) or "Traceback" in row[3]]
+    assert not [name for name in files if name.startswith((str(ROOT / "mbref"), str(ROOT / "reports")))]
+    assert (here / "report" / "report.md").is_file()
