@@ -117,7 +117,7 @@ ladders: $(VENV)/ready ## mbref's methods on mechanisms that become difficult, w
 	$(BIN)/crosscheck report --section stability --render reports/stability
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/
-	$(BIN)/python -m reports --picture reports/rendered/passage.svg
+	$(BIN)/python -m reports --force --picture reports/rendered/passage.svg
 
 docs: $(VENV)/ready ## every page, schema and report that is made from code and committed records
 	mkdir -p build && $(BIN)/mbref schema > build/scene.schema.json && mv build/scene.schema.json mbref/templates/
@@ -127,9 +127,9 @@ docs: $(VENV)/ready ## every page, schema and report that is made from code and 
 	$(BIN)/python -m crosscheck.cli.support docs/engines.md
 	$(BIN)/python -m crosscheck.findings.document docs/findings.md
 	$(BIN)/python -m reports.which_engine docs/which-engine.md
-	$(BIN)/crosscheck closed-loops --page docs/closed-loops.md
-	$(BIN)/crosscheck convergence --page docs/convergence.md
-	$(BIN)/crosscheck modes --page docs/small-motions.md
+	$(BIN)/crosscheck closed-loops --force --page docs/closed-loops.md
+	$(BIN)/crosscheck convergence --force --page docs/convergence.md
+	$(BIN)/crosscheck modes --force --page docs/small-motions.md
 	$(BIN)/crosscheck report --render reports/reference
 	$(BIN)/crosscheck report --section stability --render reports/stability
 	$(BIN)/crosscheck report --section paper --render $(PAPER)

@@ -90,7 +90,7 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
             raise
 
 
-def read_json(path: str | Path) -> Any:
+def json_content(path: str | Path) -> Any:
     """Return the content of a JSON file; raises RecordsError for another file, OSError."""
     try:
         return json.loads(Path(path).read_text(encoding="utf-8"))

@@ -13,7 +13,7 @@ from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
-from mbref.records import looked_at, read_json
+from mbref.records import json_content, looked_at
 from mbref.scene import Scene
 
 from .runs import SceneRuns, by_scene
@@ -41,7 +41,7 @@ def verified(folder: Path) -> list[Record]:
     crosscheck's own engines first."""
     order = list(engine_names())
     paths = sorted((folder / "conformance").glob("*.json"))
-    found = [record for path in paths for record in checked(path, [read_json(path)], Verdicts)]
+    found = [record for path in paths for record in checked(path, [json_content(path)], Verdicts)]
     return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))
 
 

@@ -20,7 +20,7 @@ is hard in one way. A cell has the largest error of any body at any sample, agai
 ```sh
 crosscheck closed-loops                        # print the two tables; nothing is simulated
 crosscheck closed-loops --run --engine drake   # measure an engine that is installed here
-crosscheck closed-loops --page docs/closed-loops.md
+crosscheck closed-loops --force --page docs/closed-loops.md
 ```
 """
 BEST = f"""Each engine by its best family of settings, at the finest setting of each family that was

@@ -31,7 +31,7 @@ and the defaults, whose steps take about 0.1 s.
 ```sh
 crosscheck convergence                        # print the table; nothing is simulated
 crosscheck convergence --run --engine drake   # make the runs of an installed engine that the records lack
-crosscheck convergence --page docs/convergence.md
+crosscheck convergence --force --page docs/convergence.md
 ```
 
 Each cell has the least error of all runs and the measured order. The error is the largest of any body at any

@@ -12,7 +12,7 @@ from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown
 from crosscheck.study.record_shape import checked
 from mbref.files import write
-from mbref.records import RecordsError, looked_at, read_json
+from mbref.records import RecordsError, json_content, looked_at
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -85,7 +85,7 @@ def indexed(folder: Path) -> Records:
     """Return the records of a folder by label; raises FileNotFoundError if the folder has no records."""
     known = looked_at(folder / FILE)
     checked(folder / FILE, list(known.values()))
-    keys = read_json(folder / INDEX)
+    keys = json_content(folder / INDEX)
     try:
         return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}
     except (AttributeError, TypeError, ValueError):

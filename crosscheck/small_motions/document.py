@@ -17,7 +17,7 @@ takes. An error is the largest one over all eigenvalues and poses, relative to t
 ```sh
 crosscheck modes my.toml                                  # a mechanism of your own
 crosscheck modes                                          # this table, from stored records
-crosscheck modes --run --page docs/small-motions.md       # measure again, and write this page
+crosscheck modes --run --force --page docs/small-motions.md  # measure again, and write this page
 ```
 """
 NOTES = """## How to read it

@@ -31,10 +31,10 @@ def follow(places: np.ndarray, content: str, timeline: Timeline | None) -> str:
 def text(x: float, y: float, words: str, look: str = "", anchor: str = "middle") -> str:
     """Return text at a position, with a halo that keeps it legible over lines."""
     halo = f'stroke="{PAPER}" stroke-width="3" paint-order="stroke" stroke-linejoin="round"'
-    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {halo} {look}>{printable(words)}</text>'
+    return f'<text x="{x:.1f}" y="{y:.1f}" text-anchor="{anchor}" {halo} {look}>{svg_text(words)}</text>'
 
 
-def printable(words: str) -> str:
+def svg_text(words: str) -> str:
     """Return text escaped for SVG, with unprintable characters replaced."""
     return escape("".join(c if c.isprintable() else "\ufffd" for c in words))
 
@@ -85,7 +85,7 @@ def document(width: float, height: float, parts: list[str], title: str) -> str:
             'style="max-width:100%;height:auto" '
             'font-family="system-ui, DejaVu Sans, sans-serif" font-size="13" '
             'stroke-linecap="round" stroke-linejoin="round">',
-            f"<title>{printable(title)}</title>",
+            f"<title>{svg_text(title)}</title>",
             f'<rect width="{width:.0f}" height="{height:.0f}" fill="{PAPER}"/>',
             *parts,
             "</svg>\n",
