@@ -1,0 +1,76 @@
+"""Equilibria of random mechanisms / accelerations and differences of the judge's own equations."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import linear_sum_assignment
+
+from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.relations import in_other_units, scaled
+from crosscheck.judge.gauss_principle import gauss
+from crosscheck.judge.small_motions.equations import Balance
+from crosscheck.judge.small_motions.error_bounds import error_bounds
+from mbref import Scene, equilibria
+from tests.helpers.statics import parallelogram, pendulum
+
+STEP = 0.003  # of the judge's differences: their errors are about 1e-14
+BALANCED = 1e-9  # acceleration at an equilibrium / acceleration at the start
+ROUNDED = 1e-13  # error of eigenvalues in doubles / largest one
+
+
+def at_rest(seed: int) -> Scene:
+    scene = random_mechanism(seed)
+    still = {"velocity": None, "angular_velocity": None}
+    return scene.with_(body=[body.model_copy(update=still) for body in scene.body])
+
+
+def check(scene: Scene, starts: int) -> int:
+    """Check all equilibria of a scene; return their number."""
+    found = equilibria(scene, starts=starts)
+    size = np.abs(gauss(scene)).max()
+    for each in found:
+        assert np.abs(gauss(each.scene)).max() < BALANCED * size
+        if each.is_singular:
+            continue
+        balance = Balance(each.scene)
+        state = balance.start()
+        small, coarse = balance.small(state, STEP), balance.small(state, 2 * STEP)
+        exact = small.eigenvalues()
+        assert len(exact) == len(each.eigenvalues)
+        gaps = np.abs(exact[:, None] - each.eigenvalues[None])
+        pairs = linear_sum_assignment(gaps)
+        allowed = each.bounds[pairs[1]] + error_bounds(small, [coarse]) + ROUNDED * np.abs(exact).max()
+        assert (gaps[pairs] <= allowed).all()
+    return len(found)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_eigenvalues_are_the_judges_within_their_bounds(seed):
+    check(at_rest(seed), starts=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("first", range(10, 210, 10))
+def test_eigenvalues_of_many_mechanisms_are_the_judges(first):
+    """Ten mechanisms each, of which several have an equilibrium."""
+    assert sum(check(at_rest(seed), starts=3) for seed in range(first, first + 10))
+
+
+@pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1.0, 1.0), (1e3, 1e-9, 1e-3), (1e6, 1e9, 1e3)])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        parallelogram(0.6, 0.8),
+        pendulum(load=[{"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 0.5}]),
+    ],
+    ids=["linkage", "sprung"],
+)
+def test_units_of_length_mass_and_time_have_no_influence(scene, length, mass, time):
+    changed = in_other_units(scaled(scene, mass), length, time)
+    for each, other in zip(equilibria(scene, 3), equilibria(changed, 3), strict=True):
+        assert each.stability == other.stability
+        allowed = (each.bounds + time * other.bounds) + ROUNDED * np.abs(each.eigenvalues).max()
+        assert (np.abs(each.eigenvalues - time * other.eigenvalues) <= allowed).all()
+        places = [np.array([body.position for body in found.scene.body]) for found in (each, other)]
+        assert np.allclose(places[0], places[1] / length, rtol=0.0, atol=1e-9)
