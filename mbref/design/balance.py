@@ -59,13 +59,18 @@ class Newton:
 
     def _held(self, most: np.ndarray) -> np.ndarray:
         """Return σ (f,), not less than the accelerations at the pose over the largest displacements."""
-        return np.maximum(self.stiffness, np.abs(self.parts(self.off)) / most)
+        return np.maximum(self.stiffness, np.maximum(np.abs(self.parts(self.off)), self._ignored) / most)
+
+    @property
+    def _ignored(self) -> np.ndarray:
+        """Accelerations (f,) that no step reduces: those in balance, or rounding if all are in balance."""
+        return self.rounding if self.is_balanced else self.bound
 
     def step(self) -> np.ndarray:
         """Return the Newton step y (f,): at most LONGEST_STEP along each direction."""
         parts = self.parts(self.off)
         moves = -self.displacements(self.off, LONGEST_STEP)
-        return np.asarray(self.directions @ np.where(np.abs(parts) <= self.rounding, 0.0, moves))
+        return np.asarray(self.directions @ np.where(np.abs(parts) <= self._ignored, 0.0, moves))
 
     def level(self, off: np.ndarray) -> float:
         """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
