@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.energy import kinetic_energy
+from crosscheck.judge.gauss_principle import gauss, stacked
 from mbref import Limits, Motion, Scene, simulate
 from tests.helpers.power_balance import panel_times, unbalanced
 from tests.helpers.powered_mechanisms import powered_mechanism
@@ -16,7 +17,7 @@ BALANCED = 1e-9  # difference / largest power
 PANELS = 3
 # mechanism 14 begins so near a singular position that rounding would decide its motion
 GATE = [seed for seed in range(21) if seed != 14]
-BLOCK = 20  # mechanisms of a slow test, of which one may begin as mechanism 14 does
+BLOCK = 20  # mechanisms of a slow test; two may begin as mechanism 14 does, or move too fast for the samples
 PLAIN = [0, 2, 6, 10]  # mechanisms without massless links
 
 
@@ -25,10 +26,13 @@ def run(scene: Scene, method: str = "taylor", rtol: float = 1e-13) -> Motion:
 
 
 def off(motion: Motion) -> float:
-    """Return the imbalance, relative to the largest power of a driver, a load or a weight."""
+    """Return the imbalance, relative to the largest power of a driver, a load or a weight; NaN without
+    samples."""
     scene = motion.mechanism
+    if not motion.times.size:
+        return float("nan")
     falling = [body.mass * motion[body.name].velocity @ np.array(scene.gravity) for body in scene.body]
-    return unbalanced(motion.columns(), float(np.abs(falling).max()))
+    return unbalanced(motion.columns(), float(np.abs(falling).max(initial=0.0)))
 
 
 @pytest.mark.parametrize("seed", GATE)
@@ -42,10 +46,18 @@ def test_work_of_drivers_and_loads_is_the_change_of_energy(seed):
 @pytest.mark.parametrize("block", range(12))
 def test_work_is_the_change_of_energy_of_many_mechanisms(block):
     seeds = range(100 + BLOCK * block, 100 + BLOCK * (block + 1))
-    motions = {seed: run(powered_mechanism(seed)) for seed in seeds}
-    moved = {seed: motion for seed, motion in motions.items() if motion.t_end >= 0.1 / PANELS}
-    assert len(moved) >= BLOCK - 2, {seed: motions[seed].message for seed in seeds if seed not in moved}
-    assert {seed: found for seed, motion in moved.items() if (found := off(motion)) >= BALANCED} == {}
+    found = {seed: off(run(powered_mechanism(seed))) for seed in seeds}
+    moved = {seed: imbalance for seed, imbalance in found.items() if not np.isnan(imbalance)}
+    assert len(moved) >= BLOCK - 2, f"no motion of {seeds} without {list(moved)}"
+    assert max(moved.values()) < BALANCED, moved
+
+
+@pytest.mark.parametrize("seed", GATE[:10])
+def test_first_accelerations_are_those_of_gauss_s_principle(seed):
+    scene = powered_mechanism(seed)
+    exact = gauss(scene)
+    motion = simulate(scene, times=[0.0, 1e-6])
+    assert np.abs(stacked(scene, motion, 0) - exact).max() < 1e-10 * np.abs(exact).max()
 
 
 @pytest.mark.parametrize("method", ["alf-dual+projection", "mpi-qr+partitioning", "alf-dual+baumgarte/adams"])
