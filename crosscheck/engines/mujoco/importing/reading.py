@@ -257,8 +257,9 @@ class _Reader:
         coordinate; rows of coordinates that no scene has are parts to be left out."""
         taken = {joint.name for joint in self.joints}
         for row in list(self.rows):
-            ends = [self._coordinate(row, j) for j in row.joints if j >= 0]
-            if None in ends:
+            found = [self._coordinate(row, j) for j in row.joints if j >= 0]
+            ends = [end for end in found if end is not None]
+            if len(ends) < len(found):
                 self.parts.append(couplings.removed(self.mujoco, self.model, row))
                 self.rows.remove(row)
                 continue
