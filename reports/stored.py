@@ -18,7 +18,13 @@ from mbref.scene import Scene
 
 from .runs import SceneRuns, by_scene
 
-SHAPES = {"records": Run, "truths": Truth, "motions": Run, "branches": Run}  # of the records of each file
+# shape of the records of each file
+SHAPES: dict[str, type[Run] | type[Truth]] = {
+    "records": Run,
+    "truths": Truth,
+    "motions": Run,
+    "branches": Run,
+}
 
 
 def groups(folder: Path) -> list[SceneRuns]:

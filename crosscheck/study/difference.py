@@ -52,13 +52,13 @@ def load(path: str | Path) -> dict[Identity, Record]:
         raise ValueError(f"{file}: no such file")
     times, records = looked_at(file.parent / "timings.jsonl"), list(looked_at(file).values())
     checked(file.parent / "timings.jsonl", list(times.values()), Timing)
+    if any("asked" not in record for record in records):
+        raise ValueError(
+            f"{file}: its records lack the field `asked` with the request of the run; run them again"
+        )
+    checked(file, records)
     found: dict[Identity, Record] = {}
     for record in _of_the_report(file, records):
-        if "asked" not in record:
-            raise ValueError(
-                f"{file}: its records lack the field `asked` with the request of the run; run them again"
-            )
-        checked(file, [record])
         timed = times.get(record["key"]) or record["cost"]
         cost = {**record["cost"], "seconds": timed["seconds"]}
         found[identity(record)] = {**record, "cost": cost, "repeated": record["key"] in times}

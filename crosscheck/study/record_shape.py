@@ -4,15 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
 from mbref.records import RecordsError
 from mbref.trajectory import Outcome
 
 Record = dict[str, Any]
-Labels = Literal[tuple(outcome.label for outcome in Outcome)]  # type: ignore[valid-type]
+
+
+def _label(text: str) -> str:
+    if text not in Outcome.__members__:
+        raise ValueError(f"must be one of {', '.join(Outcome.__members__)}")
+    return text
+
+
+Label = Annotated[str, AfterValidator(_label)]
 
 
 class _Shape(BaseModel):
@@ -42,7 +50,7 @@ class Ladder(_Shape):
     engine: str
     family: str
     version: str | None
-    outcome: Labels
+    outcome: Label
     message: str
     t_end: float
     time_limit: float
@@ -66,7 +74,7 @@ class Measured(Refused):
     """Record of a run without its motion, as tables of stored runs keep it."""
 
     family: str
-    outcome: Labels
+    outcome: Label
     t_end: float
     asked: _Asked
     metrics: dict[str, float | None]

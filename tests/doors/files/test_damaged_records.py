@@ -1,0 +1,82 @@
+"""Damaged records of a report: one sentence that names the file, and exit status 2."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from crosscheck.cli import main as crosscheck
+from mbref.scenes import SCENES
+from reports.__main__ import main as report
+from tests.fuzz.broken_files import RECORD
+
+FOREIGN = [b"null\n", b"[" * 100_000 + b"\n", b"\xff\xfe\x00\n", b"[]\n", b'{"key": 1}\n', b"\x1b[31m\n"]
+FAULTS: list[tuple[str, Any]] = [
+    ("outcome", None),
+    ("outcome", "FLYING"),
+    ("metrics", {"error": "small"}),
+    ("cost", {}),
+    ("times", "soon"),
+    ("scene", 1),
+    ("asked", {"engine": "mbref"}),
+    ("versions", []),
+]
+
+
+def folder(place: Path, lines: bytes) -> Path:
+    """Make the folder of a report with these records."""
+    (place / "scenes").mkdir(parents=True)
+    SCENES["four_bar"]().save(place / "scenes" / "four_bar.toml")
+    (place / "records.jsonl").write_bytes(lines)
+    return place
+
+
+def record_without(field: str, value: Any = None) -> bytes:
+    """Return a record with another value of a field, or without the field."""
+    record = copy.deepcopy(RECORD)
+    del record[field]
+    return json.dumps(record if value is None else {**record, field: value}).encode() + b"\n"
+
+
+def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
+    """Return the message with which a folder is neither rendered nor compared."""
+    assert report(["--render", str(place)]) == 2
+    rendering = capsys.readouterr().err
+    assert crosscheck(["diff", str(place), str(place)]) == 2
+    comparing = capsys.readouterr().err
+    assert "Traceback" not in rendering + comparing and "\x1b" not in rendering + comparing
+    assert rendering.count("\n") == comparing.count("\n") == 1
+    assert "records.jsonl" in rendering and "records.jsonl" in comparing
+    return rendering
+
+
+@pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
+def test_file_without_records_is_named(content, tmp_path, capsys):
+    assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
+
+
+@pytest.mark.parametrize(("field", "value"), FAULTS, ids=lambda x: str(x)[:12])
+def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
+    said = refused(capsys, folder(tmp_path / "r", record_without(field, value)))
+    assert f"record 'k1': {field}" in said
+
+
+@pytest.mark.parametrize("name", ["timings.jsonl", "truths.jsonl", "motions.jsonl", "conformance/x.json"])
+def test_faulty_companions_of_records_are_named(name, tmp_path, capsys):
+    place = folder(tmp_path / "r", record_without("seed", 0))
+    (place / name).parent.mkdir(exist_ok=True)
+    (place / name).write_text('{"key": "k1", "scene": "four_bar"}\n')
+    assert report(["--render", str(place)]) == 2
+    assert name in capsys.readouterr().err
+
+
+def test_stored_tables_of_the_commands_are_checked(tmp_path, capsys):
+    faulty = tmp_path / "records.jsonl"
+    faulty.write_bytes(record_without("cost"))
+    for command in ("closed-loops", "convergence"):
+        assert crosscheck([command, "--records", str(faulty)]) == 2
+        assert "record 'k1': cost: field required" in capsys.readouterr().err
