@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import xml.etree.ElementTree as ET
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
@@ -24,17 +25,15 @@ def parsed(path: Path) -> ET.Element:
 
 def parsed_bytes(text: bytes, where: str) -> ET.Element:
     """Return the root element of an XML text; ``where`` begins the sentence of a SceneError."""
-    parser, deepest, depth = ET.XMLPullParser(("start", "end")), 0, 0
+    root: ET.Element | None = None
+    deepest = depth = 0
     try:
-        parser.feed(text)
-        parser.close()
+        for event, element in ET.iterparse(io.BytesIO(text), ("start", "end")):
+            root = element if root is None else root
+            depth += 1 if event == "start" else -1
+            deepest = max(deepest, depth)
     except (ET.ParseError, ValueError, LookupError) as error:  # also unknown or wrong encodings
         raise SceneError([f"{where}: is no XML: {' '.join(str(error).split())}"]) from None
-    root: ET.Element | None = None
-    for event, element in parser.read_events():
-        root = element if root is None else root
-        depth += 1 if event == "start" else -1
-        deepest = max(deepest, depth)
     if root is None:
         raise SceneError([f"{where}: is no XML: it has no element"])
     if deepest > DEEPEST:
