@@ -6,6 +6,7 @@ Everything that follows from names, types and bodies alone is computed once and 
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -234,7 +235,7 @@ def _coupled_bodies(places: Places) -> tuple[list[list[int]], tuple[list[int], l
     return coupled, columns
 
 
-def _of_vectors(bodies: list[tuple[int, ...]]) -> np.ndarray:
+def _of_vectors(bodies: Sequence[Sequence[int]]) -> np.ndarray:
     return np.array([body for each in bodies for body in each], dtype=np.int64)
 
 

@@ -32,7 +32,7 @@ class Stabilisation:
     numbers: type = NoNumbers  # the method's own numbers, a record with their defaults
     feedback: Callable[[Mapping[str, float]], tuple[float, float]] | None = None  # gains of Φ' and Φ in γ
     projects: bool = False  # True if every accepted state satisfies the constraints
-    chooses_coordinates: bool = False  # True if ``enter`` chooses which coordinates are integrated
+    chooses_coordinates: bool = False  # True if Newton's method solves for the other coordinates
     watches_rank: bool = False  # True if a run ends at a singular position
     # rad; largest rotation of a body in an adaptive step unless the user chooses another
     largest_turn: float = 1.0

@@ -6,10 +6,10 @@ coordinates u follow from Φ(u, v, t) = 0 by Newton–Raphson (Eq. 15), started 
 last accepted step (Eq. 16), and their rates from Φ_u u' = ν - Φ_v v' (Eq. 14).  Φ_p = 2 Φ_π' L.
 
 The partition is kept while the smallest pivot of Φ_u relative to its largest stays above ``kept`` times its
-value when the partition was chosen; then another partition is chosen, and the integrator restarts.  With
-``kept`` = 0.1 partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger
-than with 0.6. A new partition with fewer dependent coordinates ends the run: the run is at a singular
-position. Another partition is also chosen at the last accepted state where Newton–Raphson fails in a step.
+largest value so far; then another partition is chosen, and the integrator restarts. So a partition that is
+chosen near a singular position, where its pivot is small, is replaced behind it.  With ``kept`` = 0.1
+partitions last near turning points of a coordinate, and errors are 10 to 1000 times larger than with 0.6. A
+new partition with fewer dependent coordinates ends the run: the run is at a singular position.
 """
 
 from __future__ import annotations
@@ -38,12 +38,12 @@ class Options(NamedTuple):
 
 
 class CoordinatePartition(NamedTuple):
-    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, at the last state and
-    when the partition was chosen."""
+    """Number of dependent coordinates; smallest pivot of Φ_u relative to its largest, at the last state, and
+    its largest value since the partition was chosen."""
 
     rank: int = 0
     pivot: float = 0.0
-    chosen_pivot: float = 0.0  # 0 until the pivot is known
+    largest_pivot: float = 0.0
 
 
 class Scratch(NamedTuple):
@@ -97,7 +97,7 @@ def choose_coordinates(memory):
     )
     scratch.partition.rank = rank
     memory.loop.clock.y_size = 2 * (q.shape[0] - rank)
-    scratch.partition.chosen_pivot = 0.0
+    scratch.partition.largest_pivot = 0.0
 
 
 @kernel
@@ -275,9 +275,8 @@ def accept(t, y, memory):
     copy_state(memory.state, memory.previous)
     memory.watch.accepted_time = t
     partition = scratch_of(memory.chart).partition
-    if partition.chosen_pivot == 0.0:
-        partition.chosen_pivot = partition.pivot
-    if partition.pivot < options_of(memory.chart_options).kept * partition.chosen_pivot:
+    partition.largest_pivot = max(partition.largest_pivot, partition.pivot)
+    if partition.pivot < options_of(memory.chart_options).kept * partition.largest_pivot:
         rank = partition.rank
         choose_coordinates(memory)
         if partition.rank < rank:

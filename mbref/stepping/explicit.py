@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from mbref.kernels.layout import NOT_CONVERGED, SINGULAR_AHEAD
+from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.stepping.loop import PAUSED, advance_to_end
 from mbref.stepping.pace import Pace
 from mbref.stepping.ranks import ranks_at
@@ -19,8 +19,9 @@ class ExplicitStepper:
     def __init__(self, run: Run):
         self.run = run
         self._pace = Pace(run)
-        self._chosen_at = 0  # steps when coordinates were chosen anew
-        self._enter()
+        clock, enter = run.memory.loop.clock, run.method.stabilisation.enter.callable
+        clock.y_size = enter(clock.time, run.memory.loop.y, run.packed.argument)
+        clock.restart = run.memory.equations.system.counts.steps
 
     def advance(self, progress: Callable[[float], None] | None) -> tuple[int, float]:
         """Run to the end; return the final status and the process CPU time of the stepping alone (s)."""
@@ -28,33 +29,11 @@ class ExplicitStepper:
         if self.run.times[-1] > 0.0 and begins_on_singular_position(self.run):
             status = SINGULAR_AHEAD
         while status == PAUSED:
-            status = int(advance_to_end(self.run.packed.argument))
-            if status == NOT_CONVERGED and self._chooses_anew():
-                status = PAUSED
-            status = self._pace.judge(status)
+            status = self._pace.judge(int(advance_to_end(self.run.packed.argument)))
             self._look_at_rows_again()
             if progress is not None:
                 progress(float(self.run.memory.loop.clock.time))
         return status, time.process_time() - began
-
-    def _chooses_anew(self) -> bool:
-        """Choose independent coordinates at the last accepted state, after Newton's method failed in the next
-        step; return False if the chart chooses none, or has just chosen the present ones."""
-        run, memory = self.run, self.run.memory
-        steps = int(memory.equations.system.counts.steps)
-        if not run.method.stabilisation.chooses_coordinates or self._chosen_at == steps:
-            return False
-        self._chosen_at = steps
-        memory.state.coordinates[:], memory.state.velocities[:] = memory.previous[:2]
-        self._enter()
-        return True
-
-    def _enter(self) -> None:
-        """Enter the chart at the present state; the integrator restarts."""
-        run, clock = self.run, self.run.memory.loop.clock
-        enter = run.method.stabilisation.enter.callable
-        clock.y_size = enter(clock.time, run.memory.loop.y, run.packed.argument)
-        clock.restart = run.memory.equations.system.counts.steps
 
     def release(self) -> None:
         """Release no memory: the stepper has none of its own."""

@@ -10,7 +10,7 @@ import pytest
 import mbref
 from mbref.scene import Scene
 
-RATE = 7.0  # rad/s of the crank at the start
+RATE, END = 7.0, 0.45  # rad/s of the crank at the start, and s
 Z = [0.0, 0.0, 1.0]
 ORDINARY = (0.2, 0.5, 0.45, 0.55)  # crank, coupler, rocker and ground, m
 CHANGE_POINT = (0.2, 0.4, 0.3, 0.5)  # flat at half a turn of the crank
@@ -72,7 +72,7 @@ def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
 def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: float) -> None:
     """Check that the run completes, on a branch of the linkage and with its kinetic energy."""
     scene = crank_rocker(lengths, angle)
-    motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, 1.0, 11))
+    motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, END, 6))
     assert motion.outcome is mbref.Outcome.COMPLETED, motion.message
     crank = angle + motion.joint("A").angle
     tip = 2 * motion.position[:, 2, :2] - np.array([lengths[3], 0.0])
@@ -81,6 +81,20 @@ def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: floa
     assert motion.energy == pytest.approx(motion.energy[0], rel=tolerance)
 
 
-@pytest.mark.parametrize("part", [0.9998, 0.3])
-def test_partitioning_completes_a_crank_rocker_in_fixed_steps(part):
-    check(ORDINARY, part * math.pi, 2e-3, 1e-4)
+@pytest.mark.parametrize("step", [2e-3, 5e-3])
+def test_partitioning_completes_an_ordinary_crank_rocker(step):
+    check(ORDINARY, 0.3 * math.pi, step, 1e-4)
+
+
+@pytest.mark.parametrize("step", [2e-3, 5e-3])
+def test_partitioning_goes_on_behind_the_singular_position_beside_its_start(step):
+    """The crank passes half a turn in the first step; its coordinate turns back at a full turn."""
+    check(CHANGE_POINT, 0.9998 * math.pi, step, 1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3])
+@pytest.mark.parametrize("part", [0.9998, 0.99, 0.5, 1.0002, 1.5])
+@pytest.mark.parametrize("lengths", [ORDINARY, CHANGE_POINT, (0.1, 0.5, 0.45, 0.5)])
+def test_partitioning_completes_crank_rockers_from_many_starts(lengths, part, step):
+    check(lengths, part * math.pi, step, 2e-3)
