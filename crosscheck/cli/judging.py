@@ -76,7 +76,7 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
 
 def _nothing(found: Judgement) -> str:
     if found.alike:
-        return f"{found.alike} changes explain the difference; the table does not tell them apart"
+        return f"{found.alike} changes explain the difference equally well, so that none is named"
     if found.is_complete:
         return "No single change explains the difference"
     return (

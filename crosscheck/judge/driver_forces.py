@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.judge.constraints import jacobian, length_rows
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.reaction_balance import demanded
 from crosscheck.judge.tolerances import RANK
@@ -39,6 +40,7 @@ def driver_forces(scene: Scene, exact: Trajectory) -> dict[str, np.ndarray]:
 def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> np.ndarray:
     """Return the multipliers (rows,) at a sample, for the forces (6 nb,) that act on bodies without
     armatures."""
+    ask()
     assert exact.acceleration is not None
     assert exact.angular_acceleration is not None
     state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k]

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.judge.constraints import jacobian, joint_coordinates, scene_length
+from crosscheck.judge.deadline import ask
 from crosscheck.judge.gauss_motion import applied
 from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.joint_loads import turning_loads
@@ -106,6 +107,7 @@ def demanded(scene: Scene, exact: Trajectory) -> np.ndarray:
     mass = np.array([body.mass for body in scene.body])[:, None]
     found = []
     for k in range(len(exact.times)):
+        ask()
         angles = np.array([coordinates[name][k, 0] for name in springs])
         state = exact.position[k], exact.orientation[k], exact.velocity[k], exact.angular_velocity[k], angles
         inertia = world_inertia(scene, rotations.to_matrix(exact.orientation[k]))

@@ -14,8 +14,7 @@ from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.truth import NoSolution, closed_form
 from crosscheck.recorded.columns import kind_of, values
 from crosscheck.recorded.explanations import Cause, Columns, Difference, with_signs
-from mbref.scene import JointLoad, Scene, SceneError, SlideSpring, TorsionSpring
-from mbref.scene_functions import Factor
+from mbref.scene import Factor, JointLoad, Scene, SceneError, SlideSpring, TorsionSpring
 from mbref.scene_joints import ANGLE
 
 ITERATIONS = 5

@@ -17,6 +17,7 @@ from crosscheck.judge.deadline import ask
 from crosscheck.recorded.columns import VECTORS, kind_of
 
 Columns = Mapping[str, np.ndarray]
+Stated = tuple[str, int, Columns]  # sentence, number of fitted parameters and choices, predicted columns
 # fraction of a column's difference that an accepted explanation leaves: errors of fits are below it, and the
 # difference of two causes over a motion is above it
 LEFT = 1e-4

@@ -1,16 +1,16 @@
-"""Causes of a difference that need no further simulation: units, signs, axes, quaternions, turns, times,
-frames, points and interpolation."""
+"""Causes of a difference that need no further simulation: units, signs, quaternions, turns, times and
+interpolation, and the geometric ones."""
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from crosscheck.judge.deadline import ask
 from crosscheck.recorded.columns import KNOWN_UNITS, SI, VECTORS, kind_of
-from crosscheck.recorded.explanations import Cause, Columns, Difference, vector_names
+from crosscheck.recorded.explanations import Cause, Columns, Difference, Stated, vector_names
+from crosscheck.recorded.geometric_causes import axes, frames, points
 from mbref import rotations
 
 WORDS = {
@@ -32,7 +32,6 @@ SHIFTS = np.linspace(-0.1, 0.1, 41)
 FASTER = 0.1  # largest relative error of a clock that is tried
 NEAR = 1e-3  # rad; rounding by which a wrapped angle may exceed its interval
 REFINED = 3  # intervals in which a fitted number is refined, each a thousandth of the former
-Stated = tuple[str, int, Columns]  # sentence, number of fitted parameters and choices, predicted columns
 INSIDE = 0.8  # least fraction of the samples at which a shifted motion is known
 
 
@@ -169,35 +168,6 @@ def _at(d: Difference, times: np.ndarray) -> Columns | None:
     return {n: np.where(inside, d.later[n](known), d.recorded[n]) for n in d.recorded}
 
 
-def _axes(d: Difference) -> Iterator[Stated]:
-    """Return columns with components exchanged or reversed: of one quantity of a body, of a body, or of all
-    bodies."""
-    vectors = [
-        (b, k)
-        for b in d.bodies
-        for k in VECTORS
-        if k != "orientation" and d.vector(b, k, d.exact) is not None
-    ]
-    scopes = [("all bodies", vectors)] + [(b, [v for v in vectors if v[0] == b]) for b in d.bodies]
-    scopes += [(f"all columns of {k}", [v for v in vectors if v[1] == k]) for k in VECTORS]
-    scopes += [(f"{b}.{k}", [(b, k)]) for b, k in vectors]
-    for title, chosen in scopes:
-        for order in itertools.permutations(range(3)) if chosen else ():
-            for signs in itertools.product((1, -1), repeat=3):
-                if order == (0, 1, 2) and signs.count(-1) != 2:
-                    continue  # single components and equal signs are covered by the factors
-                read = ", ".join(
-                    f"{'-' if s < 0 else ''}{'xyz'[o]}" for s, o in zip(signs, order, strict=True)
-                )
-                columns: dict[str, np.ndarray] = {}
-                for body, kind in chosen:
-                    exact = d.vector(body, kind, d.exact)
-                    names = vector_names(body, kind)
-                    if exact is not None:
-                        columns |= {n: s * exact[:, o] for n, s, o in zip(names, signs, order, strict=True)}
-                yield f"{title}: x, y, z hold {read} of the exact motion", 2 + signs.count(-1), columns
-
-
 def _quaternions(d: Difference) -> Iterator[Stated]:
     turning = {b: q for b in d.bodies if (q := d.vector(b, "orientation", d.exact)) is not None}
     changes: dict[str, Callable[[np.ndarray], np.ndarray]] = {
@@ -226,91 +196,6 @@ def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
     return np.hstack([first * angle, vectors])
 
 
-def _frames(d: Difference) -> Iterator[Stated]:
-    """Return the columns for another world frame: the rotation and translation that fit the positions
-    best."""
-    pairs = [(d.vector(b, "position", d.recorded), d.vector(b, "position", d.exact)) for b in d.bodies]
-    known = [(r, e) for r, e in pairs if r is not None and e is not None]
-    if not known:
-        return
-    recorded, exact = (np.vstack(side) for side in zip(*known, strict=True))
-    middle = recorded.mean(axis=0), exact.mean(axis=0)
-    u, _, vt = np.linalg.svd((recorded - middle[0]).T @ (exact - middle[1]))
-    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
-    move, q = middle[0] - turn @ middle[1], rotations.from_matrix(turn)
-    angle = np.degrees(2 * np.arctan2(np.linalg.norm(q[1:]), abs(q[0])))
-    columns: dict[str, np.ndarray] = {}
-    for body in d.bodies:
-        for kind in VECTORS:
-            vector = d.vector(body, kind, d.exact)
-            if vector is not None:
-                moved = rotations.multiply(q, vector) if kind == "orientation" else vector @ turn.T
-                moved = moved + move if kind == "position" else moved
-                columns |= dict(zip(vector_names(body, kind), moved.T, strict=True))
-    where = ", ".join(f"{x:.6g}" for x in move)
-    yield f"all bodies: another world frame, turned by {angle:.6g} degrees, origin at ({where}) m", 6, columns
-
-
-def _points(d: Difference) -> Iterator[Stated]:
-    """Return the columns for another body-fixed point than the centre of mass, and for other body axes, of
-    every body."""
-    for body in d.bodies:
-        yield from _other_axes(d, body)
-        q = np.array([d.whole[n] for n in vector_names(body, "orientation")]).T
-        w = np.array([d.whole[n] for n in vector_names(body, "angular_velocity")]).T
-        known = [k for k in ("position", "velocity") if d.vector(body, k, d.recorded) is not None]
-        for chosen in [known, *([k] for k in known)] if len(known) > 1 else [known]:
-            columns, arm = _another_point(d, body, chosen, (q, w))
-            where = ", ".join(f"{x:.6g}" for x in arm)
-            only = "" if "position" in chosen else ": velocities"
-            if columns:
-                yield (
-                    f"{body}{only}: a point at ({where}) m in the body's frame, not the centre of mass",
-                    4,
-                    columns,
-                )
-
-
-def _another_point(
-    d: Difference, body: str, kinds: list[str], turning: tuple[np.ndarray, np.ndarray]
-) -> tuple[Columns, np.ndarray]:
-    """Return positions, velocities or both of a point, and the point's arm (3,) m in the body's frame."""
-    q, w = turning
-    axes = np.stack([rotations.rotate(q, unit) for unit in np.eye(3)], axis=2)  # (k, 3, 3)
-    rates = np.stack([np.cross(w, axes[:, :, i]) for i in range(3)], axis=2)
-    left, rows = [], []
-    for kind in kinds:
-        exact, recorded = (d.vector(body, kind, of) for of in (d.exact, d.recorded))
-        assert exact is not None
-        assert recorded is not None
-        size = d.scale[vector_names(body, kind)[0]]
-        left.append((recorded - exact).ravel() / size)
-        rows.append((axes if kind == "position" else rates).reshape(-1, 3) / size)
-    if not kinds:
-        return {}, np.zeros(3)
-    arm = np.linalg.lstsq(np.vstack(rows), np.concatenate(left), rcond=1e-9)[0]
-    columns: dict[str, np.ndarray] = {}
-    for kind in kinds:
-        moved = np.array([d.exact[n] for n in vector_names(body, kind)]).T
-        moved = moved + (axes if kind == "position" else rates) @ arm
-        columns |= dict(zip(vector_names(body, kind), moved.T, strict=True))
-    return columns, arm
-
-
-def _other_axes(d: Difference, body: str) -> Iterator[Stated]:
-    exact, recorded = (d.vector(body, "orientation", of) for of in (d.exact, d.recorded))
-    if exact is None or recorded is None:
-        return
-    turned = rotations.multiply(rotations.conjugate(exact), recorded)
-    turned = turned * np.where(turned @ turned[0] < 0, -1.0, 1.0)[:, None]
-    mean = turned.mean(axis=0)
-    if (size := float(np.linalg.norm(mean))) > 0:
-        columns = dict(
-            zip(vector_names(body, "orientation"), rotations.multiply(exact, mean / size).T, strict=True)
-        )
-        yield f"{body}: other body axes, turned by a constant rotation", 4, columns
-
-
 def _interpolations(d: Difference) -> Iterator[Stated]:
     """Return all columns interpolated from every m-th row of the table, linearly or by the previous value."""
     times, exact = d.every or (d.times, d.exact)
@@ -336,8 +221,8 @@ FAMILIES_OF_CAUSES = (
     _offsets,
     _shifts,
     _clocks,
-    _frames,
-    _points,
+    frames,
+    points,
     _interpolations,
-    _axes,
+    axes,
 )
