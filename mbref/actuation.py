@@ -8,8 +8,9 @@ import numpy as np
 
 from mbref.driving_forces import driving_forces
 from mbref.joint_motion import along, angular_velocity_of, joint_motion, position_of, velocity_of
-from mbref.scene import Force, JointLoad, Load, Moment, Scene, SlideSpring, Spring, TorsionSpring
+from mbref.scene import Force, JointLoad, Moment, Scene, SlideSpring, Spring, TorsionSpring
 from mbref.scene_joints import ANGLE
+from mbref.scene_loads import LoadEntry
 from mbref.trajectory import DRIVER, Trajectory
 
 
@@ -117,7 +118,7 @@ def load_motion(scene: Scene, motion: Trajectory, place: int) -> LoadMotion:
     return LoadMotion(place, power=factor_of(load, motion) * _power_of_constant(scene, motion, load))
 
 
-def factor_of(load: Load, motion: Trajectory) -> np.ndarray:
+def factor_of(load: LoadEntry, motion: Trajectory) -> np.ndarray:
     """Return the factor (k,) of a load over time; ones for a load without a factor."""
     values = np.ones(len(motion.times)) if load.over_time is None else load.over_time.values(motion.times)
     return np.asarray(values)
