@@ -198,12 +198,14 @@ def test_springs_of_slides_and_motors_of_a_keyframe_are_loads(tmp_path):
     assert not {"joint_torque", "joint_force"} & {load.type for load in read(tmp_path, plain).scene.load}
 
 
-def test_servos_with_a_control_value_are_refused_by_name(tmp_path):
-    servo = MOTORS.replace("SERVO", '<position name="s" joint="turn" kp="3"/>').replace("SERVED", " 0.2")
-    with pytest.raises(SceneError, match=r"'s' in the keyframe, no motor of a joint.*--without motors"):
-        read(tmp_path, servo, keyframe="on")
-    left = read(tmp_path, servo, keyframe="on", without=("motors",)).scene
-    assert {load.type for load in left.load} == {"torsion_spring", "slide_spring"}
+def test_servos_with_a_range_of_forces_are_refused_by_name(tmp_path):
+    servo = '<position name="s" joint="turn" kp="3" forcerange="-1 1"/>'
+    text = MOTORS.replace("SERVO", servo).replace("SERVED", " 0.2")
+    with pytest.raises(SceneError, match=r"'s', whose range of forces.*--without motors"):
+        read(tmp_path, text, keyframe="on")
+    left = read(tmp_path, text, keyframe="on", without=("motors",)).scene
+    plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
+    assert left.load == read(tmp_path, plain, keyframe="on").scene.load, "motors that a scene has stay"
 
 
 def test_loads_of_joints_return_from_mjcf(tmp_path):
