@@ -41,6 +41,7 @@ def record(
         "outcome": "COMPLETED",
         "message": "",
         "t_end": 1.0,
+        "times": [],
         "cost": {"seconds": seconds},
         "versions": {},
         "metrics": {"error": error, "error_bound": 3e-14},

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import functools
+import importlib
 import io
 import json
 import os
@@ -129,7 +130,9 @@ class Command(NamedTuple):
 @functools.cache
 def commands() -> tuple[Command, ...]:
     """Return all commands of the programs; the program `reports` carries out `crosscheck report`."""
-    import matplotlib.figure  # noqa: F401  an import that is interrupted cannot be repeated
+    for package in ("matplotlib.figure", "pinocchio"):  # an import that is interrupted cannot be repeated
+        with contextlib.suppress(ImportError):
+            importlib.import_module(package)
 
     from crosscheck.cli import main as crosscheck_main
     from crosscheck.cli.parser import parser as crosscheck_parser
