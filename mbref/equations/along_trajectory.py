@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mbref import rotations
@@ -24,10 +26,11 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     model = Model(without_armatures(scene))
     q, v, a = coordinates(model, motion)
     terms = model.terms(motion.times, q, v)
+    counted = _from_start(scene, motion)
     for coupled in couplings_of(model.scene):
         ends = zip(coupled.joints, coupled.coordinates, coupled.factors, strict=True)
         terms.phi[:, model.row_joint.index(coupled.name)] = sum(
-            factor * along(joint_motion(model.scene, motion, joint.name), coordinate)[0]
+            factor * along(joint_motion(model.scene, counted, joint.name), coordinate)[0]
             for joint, coordinate, factor in ends
         )
     velocity = np.einsum("kmn,kn->km", terms.jacobian, v) - terms.nu
@@ -36,6 +39,12 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     return Violation(
         _largest(terms.phi), _largest(velocity), None if acceleration is None else _largest(acceleration)
     )
+
+
+def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
+    """Return the motion with angles that count from its start, as couplings without offsets do."""
+    start = scene.angles_at_start()
+    return replace(motion, angles={name: each - start[name] for name, each in (motion.angles or {}).items()})
 
 
 def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:

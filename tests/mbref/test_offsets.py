@@ -128,6 +128,7 @@ def test_springs_of_joints_count_their_angle_from_the_file(offset):
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 3.0, "natural_angle": at}
     motion = mbref.simulate(scene.with_(load=[spring]), times=[0.0, 1.0])
     assert np.abs(motion.angular_velocity).max() < 1e-11
+    assert motion.violation.position.max() < 1e-12
 
 
 def test_points_of_springs_move_with_their_bodies():
