@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep shuffle fuzz kills mutants machines coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
+.PHONY: help check test lint deep fuzz kills mutants machines coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -24,9 +24,6 @@ lint: $(VENV)/ready ## format, lint, types and the prose of README and docs, in 
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"
-
-shuffle: $(VENV)/ready ## the tests of at most 0.05 s, most of all, in 20 random splits over two processes
-	$(BIN)/python -m tests.random_order --times 20 --at-most 0.05
 
 fuzz: $(VENV)/ready ## mutated scenes, runs and command lines against both packages
 	$(BIN)/python -m tests.fuzz scene_file --count 20000

@@ -1,7 +1,6 @@
 """Table of the thresholds of mbref outside ``mbref.taylor.crossing``, from the constants and their comments.
 
-``python -m tests.thresholds docs/internals/thresholds.md`` writes the page.  A check of a threshold stands in
-``tests/mbref/interpreted_limits.py`` under the name of its module, and fails when the threshold moves.
+``python -m tests.thresholds docs/internals/thresholds.md`` writes the page.
 """
 
 from __future__ import annotations
@@ -15,9 +14,6 @@ from typing import NamedTuple
 from mbref.command_line import Parser
 
 ROOT = Path(__file__).parents[1]
-CHECKS = tuple(
-    ROOT / "tests" / "mbref" / f"limits_of_{kind}.py" for kind in ("equations", "runs", "scenes", "solutions")
-)
 LEFT_OUT = (
     "cli/",
     "drawing/",
@@ -97,12 +93,10 @@ Numbers on which decisions of mbref depend, besides the thresholds at singular p
 `mbref/taylor/crossing/thresholds.py`. `python -m tests.thresholds docs/internals/thresholds.md` writes this
 page from the constants and their comments. {count}
 
-| check | meaning |
+| acts on | meaning |
 |---|---|
-| yes | a decision is checked on both sides; the check fails if the number moves by a tenth, a count by one |
+| result | a decision depends on the number; tests state what is decided, not the number |
 | cost | the number changes time, memory or the size of an output only |
-
-`tests/mbref/test_decisions.py` runs the checks.
 
 """
 
@@ -165,27 +159,19 @@ def _is_number(node: ast.expr) -> bool:
     return isinstance(node, ast.Dict) and all(map(_is_number, node.values))
 
 
-def checked() -> set[tuple[str, str]]:
-    """Return module and name of each threshold with a check."""
-    texts = [path.read_text() for path in CHECKS]
-    return {pair for text in texts for pair in re.findall(r'^@check\("(\S+) (\w+)"\)', text, re.M)}
-
-
 def page() -> str:
     """Return the page: a table for each folder of mbref."""
-    have, rows, marks = checked(), dict[str, list[str]](), list[str]()
+    rows, marks = dict[str, list[str]](), list[str]()
     for each in thresholds():
         if each.name in NUMBERS:
             continue
-        mark = "yes" if each[:2] in have else "cost" if each.name in COSTS else "no"
+        mark = "cost" if each.name in COSTS else "result"
         marks.append(mark)
         folder, _, file = each.module.rpartition(".")
         cells = f"`{file}`", f"`{each.name}`", f"`{each.value}`", each.comment.replace("|", "\\|"), mark
         rows.setdefault(folder or "scenes and methods", []).append(f"| {' | '.join(cells)} |")
-    count = (
-        f"Of {len(marks)} numbers {marks.count('yes')} have a check, {marks.count('cost')} change cost only."
-    )
-    head = "| file | name | value | quantity and reason | check |\n|---|---|---|---|---|\n"
+    count = f"Of {len(marks)} numbers {marks.count('cost')} change cost only."
+    head = "| file | name | value | quantity and reason | acts on |\n|---|---|---|---|---|\n"
     parts = [f"## {folder}\n\n{head}" + "\n".join(lines) + "\n" for folder, lines in rows.items()]
     return HEAD.format(count=count) + "\n".join(parts)
 
