@@ -215,19 +215,6 @@ def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_
     assert out == says and "cannot write to" in error and "Traceback" not in error, error
 
 
-def test_files_of_a_process_that_compiles_now_stay(tmp_path: Path, monkeypatch):
-    """They have no checksum until its kernel is compiled; older ones without a checksum do not stay."""
-    function = test_what_is_written_is_read
-    file = tmp_path / "mbref_0" / f"test_caches.{function.__qualname__}-1.py311.nbi"
-    file.parent.mkdir()
-    file.write_bytes(b"index")
-    written = file.stat().st_mtime
-    for began, stays in ((written, True), (written + 1.0, False)):
-        monkeypatch.setattr(disk_cache, "begin", lambda _, began=began: began)
-        disk_cache.remove_damaged(tmp_path, function)
-        assert file.exists() is stays
-
-
 def test_kernels_are_not_kept_on_a_disk_that_is_nearly_full(tmp_path: Path, monkeypatch, capsys):
     usage = shutil.disk_usage(tmp_path)
     for free, kept_there in ((disk_cache.LEAST_FREE, True), (disk_cache.LEAST_FREE - 1, False)):

@@ -12,11 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mbref.cli import main, output
+from mbref.cli import main
 from mbref.ensembles.ensemble import ensemble
 from mbref.ensembles.processes import processes
-from mbref.ensembles.simulate_all import run_all
-from mbref.scene import Driver, Scene, SceneError
+from mbref.scene import Scene, SceneError
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
 from mbref.simulation.simulate import Limits, simulate
@@ -58,31 +57,6 @@ def test_variants_and_closed_form_of_the_varied_lengths_agree():
         exact = np.sqrt(l**2 - (r * np.cos(theta) - OFFSET) ** 2 - (r * np.sin(theta)) ** 2)
         off = np.abs(runs[k].position[:, 2, 1] - exact).max()
         assert off < 1e-9, f"variant {k} with r = {r}: off by {off:.2e} m"
-
-
-def test_interrupted_and_uninterrupted_ensembles_agree(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    scenes, path, ran = list(variants(DRIVEN, VARY, 6)), tmp_path / "runs.jsonl", []
-
-    def counted(given, *arguments):
-        ran.extend(map(scenes.index, given))
-        return run_all(given, *arguments)
-
-    monkeypatch.setattr("mbref.ensembles.ensemble.run_all", counted)
-    with ThreadPoolExecutor(1) as one:
-        whole = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one))
-        ran.clear()
-        with pytest.raises(KeyboardInterrupt):
-            for taken, _ in enumerate(ensemble(scenes, TIMES, METHOD, LIMITS, one, path), 1):
-                if taken == 2:
-                    raise KeyboardInterrupt
-        kept = path.read_text().splitlines()
-        assert len(kept) >= 2, "what had been handed out was not stored"
-        path.write_text("\n".join(kept[:3]) + '\n{"key": "cut sho')
-        ran.clear()
-        again = dict(ensemble(scenes, TIMES, METHOD, LIMITS, one, path))
-        assert len(ran) == 6 - len(kept[:3]), ran
-    assert poses(again.items()) == poses(whole.items())
-    assert len({json.loads(line)["key"] for line in path.read_text().splitlines()}) == 6
 
 
 def test_other_limits_and_stored_results_are_not_confused(tmp_path: Path):
@@ -150,35 +124,6 @@ def test_command_refuses_what_cannot_vary(text: str, says: str, capsys: pytest.C
     printed = capsys.readouterr()
     assert (status, printed.out) == (2, "")
     assert says in printed.err, printed.err
-
-
-def test_command_tells_why_variants_end_early(tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch):
-    """A four-bar whose coupler alone is longer cannot turn over: its driver comes to a dead position."""
-    bar, asked = output.progress_bar, []
-    monkeypatch.setattr("mbref.cli.ensemble.progress_bar", lambda *of: asked.append(of) or bar(*of))
-    driver = Driver(joint="A", polynomial=(0.0, 3.0))
-    SCENES["four_bar_gravity"]().with_(driver=(driver,), duration=2.0).save(tmp_path / "driven.toml")
-    x = SCENES["four_bar_gravity"]().joint_named("C").anchor_pair[0][0]
-    status = main(
-        [
-            "ensemble",
-            str(tmp_path / "driven.toml"),
-            "--vary",
-            f"joint[C].anchor[0]={x + 0.04}:{x + 0.06}",
-            "--count",
-            "2",
-            "--workers",
-            "1",
-            "--method",
-            "taylor",
-        ]
-    )
-    printed = capsys.readouterr()
-    assert status == 1 and "0 of 2 variants completed" in printed.out, printed
-    assert asked == [("simulating", 2)]
-    assert printed.err.startswith("UNDECIDED: 2, the first of them variant 0: the drivers come to a dead"), (
-        printed
-    )
 
 
 def test_command_and_single_runs_agree(tmp_path: Path, capsys: pytest.CaptureFixture):
@@ -265,34 +210,6 @@ def test_a_killed_run_is_told_and_not_stored(tmp_path: Path):
     assert [runs[k].outcome.name for k in range(3)] == ["COMPLETED", "CRASHED", "COMPLETED"]
     assert runs[1].message == "its process was killed" and runs[1].bodies == runs[0].bodies
     assert len(path.read_text().splitlines()) == 2
-
-
-def test_runs_are_given_several_at_a_time_and_tried_one_by_one_where_a_process_is_killed(
-    monkeypatch: pytest.MonkeyPatch,
-):
-    """However long a run takes, as many as may be are given at a time."""
-    monkeypatch.setattr("mbref.ensembles.ensemble.SECONDS", np.inf)
-    scenes = list(variants(DRIVEN, VARY, 60))
-    executor = Fragile(lambda given: scenes[50] in given)
-    runs = dict(ensemble(scenes, TIMES, METHOD, Limits(rtol=1e-3), executor))
-    crashed = [k for k in range(60) if runs[k].outcome.name == "CRASHED"]
-    assert (sorted(runs), crashed) == (list(range(60)), [50])
-    assert max(executor.calls) > 50, executor.calls
-    assert sum(executor.calls) > 60, "none was tried again"
-
-
-def test_scenes_that_come_slowly_do_not_wait_for_others(monkeypatch: pytest.MonkeyPatch):
-    """With no time to wait, each is run before the next one is drawn."""
-    monkeypatch.setattr("mbref.ensembles.ensemble.SECONDS", 0.0)
-    executor, drawn = Fragile(lambda given: False), []
-
-    def drawing():
-        for scene in variants(DRIVEN, VARY, 6):
-            drawn.append((len(drawn), sum(executor.calls)))
-            yield scene
-
-    assert len(dict(ensemble(drawing(), TIMES, METHOD, Limits(rtol=1e-3), executor))) == 6
-    assert drawn == [(k, k) for k in range(6)]
 
 
 def test_runs_before_a_faulty_scene_are_handed_out():

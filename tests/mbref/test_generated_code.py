@@ -17,13 +17,12 @@ if PLAIN:
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.kernels.layout import OK
-from mbref.method import Method, MethodError
+from mbref.method import Method
 from mbref.scene import Driver
-from mbref.scenes import SCENES, find_scene
+from mbref.scenes import SCENES
 from mbref.simulation.outcome import trajectory_of
-from mbref.simulation.simulate import Limits, simulate, why_no_code
+from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
-from mbref.stepping.loop import DONE
 from mbref.taylor.generated import build
 from mbref.trajectory import Outcome
 
@@ -219,16 +218,6 @@ def test_springs_with_code_move_as_by_the_kernels(name):
     assert np.abs(generic.position - own.position).max() < 1e-9
 
 
-def test_a_scene_that_has_no_code_is_told_why(monkeypatch):
-    assert why_no_code(SCENES["four_bar"](), TAYLOR) == ""
-    assert why_no_code(SCENES["andrews_squeezer"](), TAYLOR) == ""
-    with pytest.raises(MethodError, match="products of vectors, more than 2000"):
-        simulate(find_scene("four_bar_chain[16]"), "taylor", [0.01], Limits(code="generated"))
-    monkeypatch.setattr(build, "PLAIN", True)
-    with pytest.raises(MethodError, match="without the JIT"):
-        simulate(SCENES["four_bar"](), "taylor", [0.01], Limits(code="generated"))
-
-
 WITHOUT = """
 import importlib.util
 from mbref.method import MethodError
@@ -261,13 +250,3 @@ def test_mbref_runs_without_the_subpackage(tmp_path):
         check=False,
     )
     assert done.returncode == 0, done.stderr
-
-
-def test_auto_goes_on_by_the_kernels_without_the_subpackage(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mbref.taylor.generated.build", None)
-    scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
-    run = start_run(scene, TAYLOR, times, Limits(rtol=1e-9, largest_step=1.2e-5))
-    assert run.stepper.advance(None)[0] == DONE
-    assert not run.stepper._wants_code and run.stepper.taylor.code.expand == 0, (
-        "code was asked for, and there is none"
-    )

@@ -14,7 +14,6 @@ from scipy.special import ellipj, ellipk
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.study import stability
-from mbref import rotations
 from mbref.integrators.dop853 import sum_with
 from mbref.integrators.dop853_tableau import ERROR3, ERROR5, STAGES, A, B, C
 from mbref.method import Method
@@ -128,20 +127,6 @@ CRANK = SCENES["planar_slider_crank_gravity"]()
 CRANK_TRUTH = truth_for(CRANK)
 
 
-def crank_error(method, times, **limits):
-    """Largest error of the crank's angle of ``planar_slider_crank_gravity``."""
-    trajectory = ran(CRANK, method, times, **limits)
-    true = CRANK_TRUTH.poses(times).orientation
-    return np.max(rotations.angle_between(trajectory.orientation[:, 0], true[:, 0])), trajectory.cost
-
-
-def crank_acceleration(q, rate):
-    """The reduced equation of motion, which the truth solves in other variables."""
-    terms = CRANK_TRUTH._reduced._terms(np.array([q]), np.array([rate]))
-    root, push, half_slope = (float(term[0]) for term in terms)
-    return (push - half_slope * rate**2) / root**2
-
-
 # error of a method, the same problem as one second-order equation, its start, its end, what it ends at
 REDUCED = {
     "oscillator": (oscillator_error, lambda x, _: -4 * (x - 0.7), (1.0, 0.0), 20.0, displacement(20.0)),
@@ -152,7 +137,6 @@ REDUCED = {
         10.0,
         pendulum_angle(10.0),
     ),
-    "crank": (crank_error, crank_acceleration, (0.0, 30.0), 0.25, CRANK_TRUTH._reduced([0.25])[0][0]),
 }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mbref import __version__, scene_slips
+from mbref import __version__
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
@@ -478,14 +478,3 @@ def test_progress_in_a_pipe_is_a_line_every_ten_seconds(capsys):
         "simulating: 25 %, about 36 s left",
         "simulating: 75 %, about 10 s left",
     ]
-
-
-def test_heights_at_the_limit_are_flat(monkeypatch):
-    """Points 0.5 and 2 m apart in the plane; one is as high as the limit, or twice as high."""
-    for height, is_flat in (
-        (scene_slips.FLAT_MECHANISM * 2.0, True),
-        (scene_slips.FLAT_MECHANISM * 4.0, False),
-    ):
-        points = [(0.0, 0.0, 0.0), (2.0, 0.5, 0.0), (1.0, 0.0, height)]
-        monkeypatch.setattr(scene_slips, "_points", lambda scene, points=points: points)
-        assert scene_slips._is_flat(find_scene("four_bar"), np.array([0.0, 0.0, 1.0])) is is_flat

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mbref.ensembles import simulate_all as module
 from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.scenes import find_scene
 from mbref.scenes.four_bar import four_bar_gravity
@@ -72,58 +71,3 @@ def test_scenes_of_other_structures_and_unfit_methods_are_run_alone():
     coupled = [*variants(gear_pair(), [Variation("body[0].mass", 1.0, 2.0)], 2, seed=3)]
     made = simulate_all(coupled, "taylor", TIMES, LIMITS)
     assert [results(run) for run in made] == [results(simulate(s, "taylor", TIMES, LIMITS)) for s in coupled]
-
-
-def test_a_batch_of_which_few_complete_is_finished_by_single_runs(monkeypatch):
-    """Of five scenes that follow a lead run, two, then three complete; with three the others lead again."""
-    asked = []
-
-    class Batched:
-        def __init__(self, places):
-            self.places = places
-
-    for completed, rest, batches in (([0, 4], [2, 3, 4], 1), ([0, 2, 4], [2], 2), ([0, 1, 2, 3, 4], [], 1)):
-        runs = module._Runs(list("abcdef"), None, None, None)
-        asked.clear()
-        found = iter([Batched(completed), Batched([0])])
-        monkeypatch.setattr(module, "may_lead", lambda run: True)
-        monkeypatch.setattr(module, "run_batch", lambda run, scenes, found=found: next(found))
-        monkeypatch.setattr(
-            module, "checked_run", lambda scene, *_: type("Run", (), {"release": lambda self: None})()
-        )
-        monkeypatch.setattr(module, "finish_run", lambda run: "led")
-        monkeypatch.setattr(module, "simulate", lambda scene, *_: asked.append(scene) or "alone")
-        runs.in_batches([0, 1, 2, 3, 4, 5])
-        alone = {place for place, how in runs.ended.alone.items() if how == "alone"}
-        if batches == 1:
-            assert alone == set(rest) and len(runs.ended.batches) == 1
-        else:
-            assert not alone and [places for places, _ in runs.ended.batches] == [[1, 2, 3, 4, 5], [4]]
-            assert [*runs.ended.alone] == [0, 2]
-        assert asked == ["abcdef"[place] for place in sorted(alone)]
-
-
-def test_a_batch_whose_matrix_is_singular_and_a_scene_that_fails(monkeypatch):
-    def singular(run, scenes):
-        raise np.linalg.LinAlgError
-
-    def checked(scene, *_):
-        if scene == "a":
-            raise ValueError("a is wrong")
-        return type("Run", (), {"release": lambda self: None})()
-
-    def made(scene, *_):
-        if scene == "d":
-            raise ValueError("d is wrong")
-        return scene.upper()
-
-    monkeypatch.setattr(module, "may_lead", lambda run: True)
-    monkeypatch.setattr(module, "run_batch", singular)
-    monkeypatch.setattr(module, "checked_run", checked)
-    monkeypatch.setattr(module, "finish_run", lambda run: "led")
-    monkeypatch.setattr(module, "simulate", made)
-    runs = module._Runs(list("abcde"), None, None, None)
-    runs.in_batches([0, 1, 2, 3, 4])
-    assert runs.ended.alone == {1: "led", 2: "C", 4: "E"} and not runs.ended.batches
-    assert {k: str(error) for k, error in runs.ended.errors.items()} == {0: "a is wrong", 3: "d is wrong"}
-    assert str(runs.ended.error) == "a is wrong" and module.Ended().error is None

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
 from crosscheck.judge.truth import truth_for
-from mbref.equations import diagnosis, initial_state
+from mbref.equations import initial_state
 from mbref.equations.active_coordinates import active_entries
 from mbref.equations.model import Model
 from mbref.kernels.layout import Ends
@@ -23,7 +23,7 @@ from mbref.linear_algebra.sparse_cholesky import (
     times_transpose,
 )
 from mbref.linear_algebra.sparse_lu import factorise_product
-from mbref.linear_algebra.symbolic_factorisation import _of_pattern, sparse_factor, symbolic_factorisation
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
 from mbref.method import Method
 from mbref.scenes import find_scene
 from mbref.simulation.simulate import Limits, simulate
@@ -161,48 +161,6 @@ def test_reactions_of_sparse_and_dense_runs_without_redundancy():
         assert gap < 1e-9, f"reactions of {joint} differ by {gap:.1e}"
 
 
-def test_sparse_start_and_dense_start(monkeypatch):
-    scene = find_scene("four_bar_chain[3]")
-    bodies = list(scene.body)
-    bodies[1] = bodies[1].model_copy(update={"position": (1.0, 0.5001, 0.0), "velocity": (0.5, 0.0, 0.0)})
-    bodies[0] = bodies[0].model_copy(update={"angular_velocity": None})
-    model, starts = Model(scene.with_(body=tuple(bodies))), []
-    for large in (0, 10**9):
-        monkeypatch.setattr(initial_state, "LARGE", large)
-        starts.append(initial_state.consistent_start(model))
-    sparse, dense = starts
-    for key in ("q", "v"):
-        gap = np.abs(getattr(sparse, key) - getattr(dense, key)).max()
-        assert gap < 1e-9, f"{key} of the starts differ by {gap:.1e}"
-    assert sparse.report() == dense.report()
-
-
-def test_sparse_start_of_slender_rods(monkeypatch):
-    """Rods without inertia about their length, whose velocities are left open."""
-    scene = find_scene("four_bar_chain[3]")
-    slender = {"inertia": (0.0, 1.0, 1.0), "angular_velocity": None, "velocity": None}
-    model = Model(scene.with_(body=tuple(body.model_copy(update=slender) for body in scene.body)))
-    monkeypatch.setattr(initial_state, "LARGE", 0)
-    start = initial_state.consistent_start(model)
-    assert np.abs(start.v).max() < 1e-12, "nothing moves the rods"
-
-
-@pytest.mark.parametrize(
-    "name", ["five_bar", "spatial_slider_crank", "four_bar_chain[5]", "slider_crank_chain[3]"]
-)
-def test_redundancy_by_regularised_inverse_and_by_singular_values(monkeypatch, name):
-    found = []
-    for large in (0, 10**9):
-        monkeypatch.setattr(diagnosis, "LARGE", large)
-        found.append(diagnosis.diagnose(find_scene(name)))
-    sparse, dense = found
-    assert (sparse.counts, sparse.redundant_by_joint) == (dense.counts, dense.redundant_by_joint)
-    assert sparse.unique_reactions == dense.unique_reactions
-    for key in ("smallest_singular_value", "largest_singular_value"):
-        gap = abs(getattr(sparse, key) / getattr(dense, key) - 1)
-        assert gap < 1e-6, f"{key} differs by {gap:.1e}"
-
-
 @pytest.mark.parametrize("loops", [20, 200])
 def test_counts_of_long_chains_and_their_formulas(loops):
     counts = find_scene(f"four_bar_chain[{loops}]").counts()
@@ -247,18 +205,6 @@ def test_what_decays_out_of_the_plane_is_zero_at_the_end(formulation):
     values = np.abs(np.concatenate([run.velocity, run.angular_velocity], axis=None))
     left = values[(values > 0) & (values < 1e-90)]
     assert not left.size, f"{left.size} velocities have decayed to {left.max():.0e}"
-
-
-def test_a_pattern_kept_on_disk_has_the_same_factorisation():
-    rng = np.random.default_rng(3)
-    row, column = np.nonzero(rng.random((9, 12)) < 0.3)
-    arguments = (row, column, np.arange(row.size), np.isin(np.arange(12), column))
-    made = symbolic_factorisation(*arguments)
-    _of_pattern.cache_clear()
-    kept = symbolic_factorisation(*arguments)
-    assert kept is not made
-    for one, other in zip(made, kept, strict=True):
-        assert np.array_equal(one, other) and one.dtype == other.dtype
 
 
 def test_shares_of_redundant_rows_are_those_of_left_null_vectors():

@@ -9,14 +9,11 @@ from __future__ import annotations
 import ctypes
 import functools
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import Any
 
 import llvmlite.binding as llvm
 import numpy as np
 import pytest
-from llvmlite import ir
-from numba import types
 
 from mbref.kernels.compilation import PLAIN
 
@@ -29,9 +26,8 @@ from mbref.scene import Moment
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
-from mbref.taylor import correction, generated_calls, series, simd, solver
 from mbref.taylor.correction import subtract_violation, violation_in_loops, violation_rate_in_loops
-from mbref.taylor.generated import build, driven_orders
+from mbref.taylor.generated import build
 from mbref.taylor.generated.instructions import levels
 from mbref.taylor.layout import TaylorMemory
 from mbref.taylor.series import expand_with_multipliers
@@ -236,166 +232,7 @@ def test_orders_by_power(name, last):
     assert rhs[0] == pytest.approx(velocity @ force / energy, rel=1e-12)
 
 
-def test_unused_lanes_are_given_to_the_rows_with_the_most_products():
-    """Three rows with ten, three and no products, and eight lanes."""
-    rows = [[(n, 0, 1.0) for n in range(10)], [(n, 1, 1.0) for n in range(3)], []]
-    lanes = [(row, [n for n, _, _ in terms]) for row, terms in driven_orders._lanes_of(rows)]
-    assert lanes == [(0, [0, 5]), (0, [1, 6]), (0, [2, 7]), (0, [3, 8]), (0, [4, 9]), (1, [0, 2]), (1, [1])]
-
-
 def test_terms_of_each_number_one_at_a_time():
     first, second = levels([[(2.0, 5), (3.0, 6)], [], [(4.0, 7)]])
     assert first[0].tolist() == [2.0, 0.0, 4.0] + [0.0] * 5 and first[1] == [5, -1, 7] + [-1] * 5
     assert second[0].tolist() == [3.0] + [0.0] * 7 and second[1] == [6] + [-1] * 7
-
-
-CALLS = {
-    "expand_by_code": "terms response left right scale growth sums",
-    "expand_by_power": "terms response left right sums",
-    "violation_by_code": "terms phi",
-    "close_by_code": "terms phi response change",
-    "factorise_by_code": "terms tableau particular null_space response last row order",
-}
-
-
-@pytest.mark.parametrize("name", CALLS)
-def test_calls_pass_arrays_in_order_and_then_integers(name):
-    names = CALLS[name].split()
-    whole = {"row", "order"} & set(names)
-    last = ["last"] if "expand" in name else []
-    kinds = {  # of as many dimensions as the number of the array, so that all differ
-        array: types.Array(types.int64 if array in whole else types.float64, number, "C")
-        for number, array in enumerate(names, 1)
-    }
-    kinds |= dict.fromkeys(last, types.int64)
-    made, emit = getattr(generated_calls, name)._defn(None, types.int64, *kinds.values())
-    assert made.args == (types.int64, *kinds.values()) and made.return_type == types.void
-    called = []
-    builder = SimpleNamespace(
-        inttoptr=lambda address, kind: (address, str(kind)), call=lambda *call: called.append(call)
-    )
-    read: list[Any] = []
-
-    def array_of(kind: types.Array) -> Any:
-        return lambda *given: read.append((kind, *given)) or SimpleNamespace(data=f"data of {given[-1]}")
-
-    context = SimpleNamespace(make_array=array_of, get_dummy_value=lambda: "nothing")
-    assert emit(context, builder, made, ["address", *names, *last]) == "nothing"
-    assert read == [(kinds[array], context, builder, array) for array in names]
-    kind = ", ".join(["double*"] * (len(names) - len(whole)) + ["i64*"] * len(whole) + ["i64"] * len(last))
-    assert called == [(("address", f"void ({kind})*"), [*(f"data of {array}" for array in names), *last])]
-
-
-# --- kernels that call the code ----------------------------------------------------------------------------
-class Called(list):
-    """Calls of generated functions, in place of them."""
-
-    def __init__(self, patch: pytest.MonkeyPatch) -> None:
-        super().__init__()
-        for module in (correction, solver, series):
-            for name in CALLS:
-                if hasattr(module, name):
-                    patch.setattr(module, name, lambda *call, name=name: self.append((name, *call)))
-
-
-def coded(**code: int) -> Any:
-    """Return memory whose arrays are their names, of one variable and two rows, with addresses of code."""
-    arrays = "terms left right scale growth sums"
-    matrices = "tableau particular null_space response last change"
-    memory = SimpleNamespace(
-        series=SimpleNamespace(**{name: name for name in arrays.split()}),
-        solver=SimpleNamespace(
-            **{name: name for name in matrices.split()},
-            pivot_columns=np.zeros(1),
-            pivot_rows=np.zeros(2),
-            phi=np.array([9.0, -0.5, 0.25, 7.0]),
-            rhs=np.array([-4.0]),
-        ),
-        code=SimpleNamespace(**dict.fromkeys(build.CODE_NAMES, 0), rank=2),
-        partition=SimpleNamespace(rank=2),
-        polynomials=SimpleNamespace(given=SimpleNamespace(driver=np.zeros(0))),
-        step=SimpleNamespace(deceleration=1.0),
-        mode=SimpleNamespace(order=9),
-        run=SimpleNamespace(loop=SimpleNamespace(clock=SimpleNamespace(length=0.5))),
-        kernels=SimpleNamespace(respond=lambda memory: "loops", multipliers=lambda memory: "multipliers"),
-    )
-    vars(memory.code).update(code)
-    return memory
-
-
-def test_corrections_call_the_code(monkeypatch):
-    called, memory = Called(monkeypatch), coded(violation=11, close=12, close_rate=13)
-    phi = memory.solver.phi
-    assert correction.violation(memory) == 0.5, "lanes of rows alone"
-    correction.close(memory)
-    correction.close_rate(memory)
-    assert called == [
-        ("violation_by_code", 11, "terms", phi),
-        ("close_by_code", 12, "terms", phi, "response", "change"),
-        ("close_by_code", 13, "terms", phi, "response", "change"),
-    ]
-
-
-def test_the_response_calls_the_code_at_its_rank(monkeypatch):
-    called, memory = Called(monkeypatch), coded(factorise=14)
-    solver.respond(memory)
-    arrays = "terms", "tableau", "particular", "null_space", "response", "last"
-    order = memory.solver.pivot_rows, memory.solver.pivot_columns
-    [(name, *call)] = called
-    assert (name, *call[:-2]) == ("factorise_by_code", 14, *arrays)
-    assert call[-2] is order[0] and call[-1] is order[1]
-    asked = []
-    memory.kernels.respond = asked.append
-    memory.partition.rank = 1
-    solver.respond(memory)
-    memory.partition.rank, memory.code.factorise = 2, 0
-    solver.respond(memory)
-    assert asked == [memory, memory] and len(called) == 1
-
-
-def test_orders_call_the_code_and_motions_that_turn_back_need_multipliers(monkeypatch):
-    """A step of 0.5 s and a deceleration of 4 / s: the motion stops after half of a step."""
-    called, memory = Called(monkeypatch), coded(expand=15)
-    assert series.expand_with_multipliers.function(memory) == OK and memory.step.deceleration == 0.0
-    rhs = memory.solver.rhs
-    assert called.pop() == (
-        "expand_by_code",
-        15,
-        "terms",
-        "response",
-        *["left", "right", "scale", "growth"],
-        rhs,
-        7,
-    )
-    memory.code.expand_by_power = 16
-    assert series.expand_series.function(memory) == OK
-    assert called == [("expand_by_power", 16, "terms", "response", "left", "right", rhs, 7)]
-    assert memory.step.deceleration == 4.0
-    memory.run.loop.clock.length = 0.51
-    assert series.expand_series.function(memory) == "multipliers"
-    memory.run.loop.clock.length, memory.partition.rank = 0.5, 1
-    assert series.expand_series.function(memory) == "multipliers" and memory.step.deceleration == 0.0
-    memory.partition.rank, memory.code.expand_by_power = 2, 0
-    assert series.expand_series.function(memory) == "multipliers" and len(called) == 2
-
-
-def test_the_largest_size_in_a_vector():
-    """A kernel finds the largest size wherever it stands in the vector, and whatever sign it has."""
-    module = ir.Module()
-    double = ir.DoubleType().as_pointer()
-    function = ir.Function(module, ir.FunctionType(ir.VoidType(), [double, double]), "largest")
-    builder = ir.IRBuilder(function.append_basic_block())
-    one, out = function.args
-    vector = builder.load(builder.bitcast(one, simd.SIMD_VECTOR.as_pointer()), align=8)
-    signature, emit = simd._max_abs._defn(None, simd.SIMD)
-    builder.store(emit(None, builder, signature, [vector]), out)
-    builder.ret_void()
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(str(module)), target_machine())
-    engine.finalize_object()
-    call = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("largest"))
-    for place in range(8):
-        for sign in (1.0, -1.0):
-            numbers, found = np.linspace(-0.5, 0.5, 8), np.zeros(1)
-            numbers[place] = sign * (1.0 + place)
-            call(numbers.ctypes.data, found.ctypes.data)
-            assert found[0] == 1.0 + place, (place, sign)

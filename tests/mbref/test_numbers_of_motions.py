@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -224,40 +223,6 @@ def one_body(**parts: object) -> Scene:
         **parts,
     }
     return Scene(name="s", gravity=(0.0, 0.0, -9.81), **given)
-
-
-def model(bodies: int = 1) -> SimpleNamespace:
-    """A model with a ground body behind the scene's bodies."""
-    return SimpleNamespace(nb=bodies + 1, scene=SimpleNamespace(body=[None] * bodies))
-
-
-def coordinates(q=(1.0, 0.0, 0.0, 0.0)) -> np.ndarray:
-    return np.array([3.0, 0.0, 7.0, *q, 9.0, 9.0, 9.0, 1.0, 0.0, 0.0, 0.0])
-
-
-def test_velocities_of_a_body_at_rest_in_a_turning_frame():
-    """2 m from the axis at 3 rad/s; turned by 90° about x, its y axis is along the spin."""
-    turned = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-    found = TURNED.velocities(model(), coordinates(turned)).reshape(2, 6)
-    assert found[0] == pytest.approx([0.0, 6.0, 0.0, 0.0, 3.0, 0.0]) and not found[1].any()
-    assert TURNED.rate == 3.0
-
-
-def test_accelerations_in_a_turning_frame():
-    """a - 2 Ω × r' - Ω × (Ω × r) = a + (6 v_y, -6 v_x, 0) + (18, 0, 0); ω̇' + ω' × Ω."""
-    rate = np.array([0.5, 0.25, 0.0, 1.0, 2.0, 0.0, *[4.0] * 6])
-    a = np.array([1.0, 1.0, 1.0, 0.1, 0.2, 0.3, *[5.0] * 6])
-    found = TURNED.relative(model(), coordinates(), rate, a)
-    assert found[:6] == pytest.approx([1 + 1.5 + 18, 1 - 3.0, 1.0, 0.1 + 6.0, 0.2 - 3.0, 0.3])
-    assert found[6:].tolist() == [5.0] * 6 and a[0] == 1.0, "the argument is not changed"
-
-
-def test_a_mechanism_turned_by_an_angle():
-    found = TURNED.turned(model(), coordinates(), math.pi / 2)
-    assert found[:3] == pytest.approx([1.0, 2.0, 7.0]) and found[3:7] == pytest.approx(about_z(math.pi / 2))
-    assert found[7:].tolist() == coordinates()[7:].tolist()
-    rates = TURNED.turned_rates(model(), np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0, *[7.0] * 6]), math.pi / 2)
-    assert rates == pytest.approx([-2.0, 1.0, 3.0, 4.0, 5.0, 6.0, *[7.0] * 6])
 
 
 def test_bodies_of_a_turning_mechanism_and_of_one_at_rest():

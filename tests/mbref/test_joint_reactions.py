@@ -6,7 +6,6 @@ The multipliers λ balance the forces that a test writes down: Φ_qᵀ λ = Q.
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -175,40 +174,6 @@ def test_two_hinges_share_all_but_the_moment_about_their_axis():
     assert vanishing[0].T @ vanishing[0] == pytest.approx(np.eye(5), abs=1e-14)
 
 
-def test_shares_at_the_limit_are_rounding(monkeypatch):
-    """Two of three singular values are not larger than the limit."""
-    system = door(0.0, 2.0)
-    limit = joint_reactions.SHARE
-    monkeypatch.setattr(joint_reactions, "_singular_values", lambda _: np.array([[2 * limit, limit, 0.0]]))
-    blocks = system.terms(np.zeros(1), poses(system)).blocks
-    assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {
-        "J0": [1],
-        "J1": [1],
-        "free": [1],
-    }
-
-
-def test_changes_at_the_limit_leave_a_component_determined(monkeypatch):
-    """A moment counts over the scene's length of 2 m; the second of two combinations changes one force."""
-    limit, units = joint_reactions.SHARE, np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-    changes = [limit * units, np.array([0.0, -1.0001, 0.0, 0.0, 0.0, -2.0001]) * limit]
-    vanishing, lengths = np.array([[[1.0, 2.0], [3.0, 4.0]]]), np.array([[0.5, 0.25]])
-    asked: list[Any] = []
-
-    def found_for(given: Any, q: Any, blocks: Any, multipliers: np.ndarray) -> Any:
-        asked.append((q, blocks, multipliers.tolist()))
-        return {"A": changes[len(asked) - 1][None]}
-
-    monkeypatch.setattr(joint_reactions, "reactions", found_for)
-    monkeypatch.setattr(joint_reactions, "vanishing_combinations", lambda *given: (vanishing, lengths))
-    system: Any = SimpleNamespace(length=2.0, scene=SimpleNamespace(joint=[SimpleNamespace(name="A")]))
-    found = determined_components(system, "q", "blocks")  # type: ignore[arg-type]
-    assert {name: mask.tolist() for name, mask in found.items()} == {
-        "A": [[True, False, True, True, True, False]]
-    }
-    assert asked == [("q", "blocks", [[2.0, 12.0]]), ("q", "blocks", [[4.0, 16.0]])]
-
-
 def test_a_single_hinge_leaves_nothing_open():
     system = door(0.0)
     blocks = system.terms(np.zeros(1), poses(system)).blocks
@@ -232,14 +197,6 @@ def test_reactions_are_open_at_a_singular_position_only():
     assert all(c[[0, 2]].all() for c in components.values())
     vanishing, _ = joint_reactions.vanishing_combinations(system, blocks)
     assert vanishing.shape == (3, 6, 1) and not vanishing[[0, 2]].any(), "zeros where no combination vanishes"
-
-
-def test_sizes_of_matrices_with_one_column_or_more():
-    assert joint_reactions._singular_values(np.array([[[3.0], [4.0]]])).tolist() == [[5.0]]
-    assert joint_reactions._singular_values(np.zeros((2, 3, 0))).shape == (2, 0)
-    two = np.array([[[3.0, 0.0], [4.0, 5.0]]])
-    assert joint_reactions._singular_values(two)[0] == pytest.approx([math.sqrt(45), math.sqrt(5)])
-    assert joint_reactions._singular_values(np.array([[[3.0, 4.0]]]))[0] == pytest.approx([5.0])
 
 
 # --- what a motion has ------------------------------------------------------------------------------------
