@@ -8,7 +8,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.cli import request
 from crosscheck.cli.scene_request import RequestError, find_scenes, held
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.original import FAMILIES, FINER, STIFFER, STIFFER_RK4
@@ -125,17 +124,6 @@ def test_smaller_steps_and_stiffer_closures_reach_the_scene_s_motion(tmp_path):
     }
     assert off[STIFFER_RK4] < 1e-7 < off[STIFFER] < 2e-4 < off[FINER], off
     assert 1e-3 < off[AS_IN_FILE] < 0.1, off
-
-
-def test_options_of_a_file_can_be_changed_one_at_a_time(tmp_path):
-    scene = found(tmp_path, FOUR_BAR, TILTED)
-    asked = Setting(AS_IN_FILE, {"step": 5e-4, "integrator": "RK4", "solref": "0.001 1", "solver": "CG"})
-    (case,) = request._single([scene], "mujoco", asked, [np.array([0.0, 0.1])], 5.0)
-    run = engine("mujoco").run(scene, case.times, case.setting)
-    assert {k: run.settings[k] for k in asked.options} == dict(asked.options)
-    wrong = Setting(AS_IN_FILE, {**case.setting.options, "integrator": "RK5"})
-    with pytest.raises(ValueError, match="option integrator: 'RK5' is none of Euler, RK4"):
-        engine("mujoco").run(scene, case.times, wrong)
 
 
 def test_settings_of_the_file_come_first_and_only_its_own_at_quick_depth(tmp_path):

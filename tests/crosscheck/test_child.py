@@ -14,7 +14,6 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.processes import fork_server
 from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
 
@@ -54,38 +53,6 @@ def test_child_has_the_present_environment(monkeypatch: pytest.MonkeyPatch):
         with closing(Child()) as made:
             assert made.call(os.getenv, ("CROSSCHECK_PROBE",), 60.0).value == value
             assert made.call(os.getenv, ("OMP_NUM_THREADS",), 60.0).value == "1"
-
-
-@pytest.mark.skipif(not fork_server.AVAILABLE, reason="children are no forks on this system")
-def test_child_starts_after_the_end_of_the_fork_server(monkeypatch: pytest.MonkeyPatch):
-    with closing(Child()) as made:
-        assert made.call(operator.add, (2, 3), 60.0).value == 5
-        (server,) = fork_server._servers
-        server.process.kill()
-        server.process.wait()
-        assert made.call(operator.add, (3, 3), 60.0).value == 6, "a fork does not need the server"
-    with closing(Child()) as made:
-        assert made.call(operator.add, (2, 5), 60.0).value == 7
-        assert fork_server._servers != [server]
-
-    def ended(*arguments: object) -> None:
-        raise EOFError
-
-    monkeypatch.setattr(fork_server, "forked", ended)
-    with closing(Child()) as made:
-        assert made.call(operator.add, (2, 6), 60.0).value == 8
-
-
-@pytest.mark.skipif(not fork_server.AVAILABLE, reason="children are no forks on this system")
-def test_cpu_time_of_forks_counts_as_time_of_children(child: Child):
-    from fake_engines import computing
-
-    before = os.times()
-    child.call(computing, (0.5,), 60.0)
-    child.close()
-    fork_server.end()
-    assert not fork_server._servers
-    assert os.times().children_user - before.children_user > 0.4
 
 
 def test_failed_call_and_its_child(child: Child):

@@ -12,14 +12,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.cli import certifying, request, running, tables
+from crosscheck.cli import certifying, request, tables
 from crosscheck.cli.commands import main
 from crosscheck.cli.parser import parser
 from crosscheck.engine import BUILT_IN, engine
-from crosscheck.processes.pool import ChildFailed
 from crosscheck.study import grid
 from crosscheck.study.command import command
-from crosscheck.study.fair_timing import timed
 from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC, is_judged
 from crosscheck.study.truth_sentences import unknown
@@ -27,7 +25,7 @@ from crosscheck.study.tuning import by_error
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity
-from mbref.trajectory import Cost, Outcome
+from mbref.trajectory import Cost
 
 FAKE = "fake_engines:FAKE"
 COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
@@ -240,26 +238,6 @@ def test_missing_package_and_what_to_install(capsys, still):
     assert status == 0 and sentence in err, (status, err)
 
 
-def test_missing_engine_of_ours_and_the_extra(monkeypatch):
-    class Absent:
-        package = "mujoco"
-
-        def version(self):
-            raise ImportError("No module named 'mujoco'")
-
-    monkeypatch.setattr(request, "engine", lambda name: Absent())
-    assert request.missing_package("mujoco").endswith("pip install 'mbref[engines]'")
-
-
-def test_tolerance_and_one_run_of_a_family_that_has_one(still):
-    scene = Scene.from_file(still)
-    sweep = (("a", {"rtol": 1e-3}), ("a", {"rtol": 1e-6}), ("b", {"step": 0.1}))
-    cases = [grid.Case(scene, [0, 1], "e", grid.Setting(family, options)) for family, options in sweep]
-    chosen = request._at_tolerance(cases, 1e-5)
-    settings = [(c.setting.family, dict(c.setting.options)) for c in chosen]
-    assert settings == [("a", {"rtol": 1e-5}), ("b", {"step": 0.1})], settings
-
-
 def test_method_beyond_the_sweep_and_its_tolerances(capsys, still):
     method = "lm1+baumgarte/rk4[step=0.1]"
     asked = ("--engine", "mbref", "--method", method, "--rtol", "1e-6", "--samples", "2", "--json")
@@ -273,18 +251,6 @@ def test_method_that_means_nothing_and_the_known_ones(capsys, still):
     status, _, err = run_main(capsys, "run", still, "--engine", "mbref", "--method", "lm9+none")
     known = ", ".join(dict.fromkeys(repr(s.family) for s in engine("mbref").settings(Scene.from_file(still))))
     assert status == 2 and f"unknown method or setting 'lm9+none'; known: {known}" in err, err
-
-
-def test_interrupt_and_the_records_finished_before(capsys, still, monkeypatch):
-    def interrupted(cases, progress, run):
-        progress(1, len(cases), grid.run_case(cases[1]))
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(running, "study", interrupted)
-    status, out, err = run_main(capsys, "run", still, "--engine", FAKE, "--json")
-    [record] = json.loads(out)["records"]
-    assert status == 130 and "interrupted" in err, (status, err)
-    assert record["settings"] == {"seconds": 0.2}, record
 
 
 @pytest.mark.parametrize("what", ["scenes", "engines", "methods", "settings", "metrics"])
@@ -543,18 +509,6 @@ def test_other_families_are_tried_before_an_engine_is_said_to_complete_no_run(ca
 def test_fewer_than_five_repeats_is_a_fault(capsys, still):
     status, _, err = run_main(capsys, "compare", still, "--engine", FAKE, "--repeats", "2")
     assert status == 2 and "--repeats: must be a whole number from 5 to 1000, got 2" in err, err
-
-
-def test_timing_that_fails_and_the_seconds_of_single_runs(still, monkeypatch):
-    def dies(*_):
-        raise ChildFailed(Outcome.CRASHED, "the process was ended by SIGSEGV")
-
-    monkeypatch.setattr("crosscheck.study.fair_timing.time_interleaved", dies)
-    case = grid.Case(Scene.from_file(still), [0, 1], FAKE, grid.Setting("plain", {"seconds": 0.3}))
-    record = {"scene": "still", "outcome": "COMPLETED", "cost": {"seconds": 0.3}}
-    sentences: list[str] = []
-    assert timed([case], [record], 5, sentences.append) == [record]
-    assert len(sentences) == 1 and "SIGSEGV" in sentences[0], sentences
 
 
 def test_cost_fields_and_the_trajectory_s():

@@ -10,9 +10,7 @@ import pytest
 from crosscheck.closed_loops import document, records
 from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
-from crosscheck.engine import Cannot, Owner
 from crosscheck.judge.truth import truth_for
-from crosscheck.study.grid import Unable, key
 from mbref.scenes import find_scene
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "closed-loops.md"
@@ -139,32 +137,6 @@ def test_new_records_supersede_old_ones() -> None:
     assert records.supersedes(new, run(1e-3, "defaults", version="3.0.0")), "an older version"
     assert records.supersedes(new, refusal()) and records.supersedes(refusal(), new)
     assert not records.supersedes(new, run(1e-3, scene="bennett", version="3.0.0"))
-
-
-def test_measuring_stores_each_run_and_resumes(tmp_path, monkeypatch) -> None:
-    path = tmp_path / "records.jsonl"
-    column = next(c for c in DIFFICULTIES if c.heading == "redundant")
-    wanted, unable = records.cases(["mujoco"], ["tuned"], path, [column])
-    records.write([run(None, outcome="TIMED_OUT", key=key(wanted[0]))], path)
-    coarser, _ = records.cases(["mujoco"], ["tuned"], path, [column])
-    assert coarser[0].setting.options["step"] > wanted[0].setting.options["step"]
-    finest, step = wanted[0].setting.options["step"], coarser[0].setting.options["step"]
-    for seconds, expected in ((1.01, step), (0.99, finest)):
-        cost = {"seconds": seconds * records.TIME_LIMIT * finest / step}
-        asked = {"options": {"step": step}}
-        records.write([run(1e-3, scene=column.scene, asked=asked, cost=cost, key="coarser")], path)
-        [[case], _] = records.cases(["mujoco"], ["tuned"], path, [column])
-        assert case.setting.options["step"] == expected, "the time of a finer run by the coarser run"
-    path.unlink()
-    assert [case.setting.family for case in wanted] == ["tuned"] and not unable
-    refused = Unable(column.make().with_(name="another"), "mujoco", Cannot(Owner.ENGINE, "no hinge"))
-    records.measure(wanted, [refused], path)
-    made, stored = records.read(path)
-    assert made["outcome"] == records.REFUSED and made["owner"] == "missing in the engine"
-    assert stored["metrics"]["error"] < 1e-8 and stored["version"] and "bodies" not in stored
-    monkeypatch.setattr(records, "study", lambda cases, **_: pytest.fail("again") if cases else [])
-    records.measure(wanted, [], path)
-    assert records.read(path) == [made, stored]
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:

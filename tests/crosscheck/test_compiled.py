@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -347,21 +346,6 @@ def test_newton_is_offered_where_drivers_prescribe_the_whole_motion() -> None:
     assert offered == {"four_bar": True, "planar_slider_crank": False}
 
 
-def test_the_places_of_mjdata_s_fields_are_those_of_the_library() -> None:
-    mujoco = pytest.importorskip("mujoco")
-    from crosscheck.engines.mujoco.model import compiled
-    from crosscheck.engines.mujoco.struct_layout import offset
-
-    model = compiled(SCENES["four_bar_gravity"]()).model
-    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    assert ctypes.c_int.from_address(data._address + offset("ne")).value == data.ne == 6
-    for field in ("qpos", "efc_J", "efc_pos"):
-        pointer = ctypes.c_size_t.from_address(data._address + offset(field)).value
-        assert pointer == getattr(data, field).ctypes.data, field
-
-
 @pytest.mark.parametrize("name", COORDINATES)
 def test_joint_coordinates_of_a_scene_and_of_it_in_its_plane(name: str) -> None:
     scene = SCENES[name]()
@@ -436,61 +420,6 @@ def test_pinocchio_compiled_on_a_free_body_and_truth(pinocchio: Engine) -> None:
     run = simulate("pinocchio", scene, 5, "tuned, compiled", rtol=1e-10, min_step=1e-12)
     error = measure(scene, run, truth_for(scene))["error"]
     assert error < MARGIN * ALONE, f"{error:.1e} from the free body's motion"
-
-
-def test_pinocchio_s_compiled_families_are_left_out_with_a_reason(monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("pinocchio")
-    from crosscheck.engines.pinocchio import compiled_run, library
-
-    scene = SCENES["flyball_governor"]()
-    if not library.why_not():
-        assert "load[0] of type 'spring'" in compiled_run.why_not(scene)
-    monkeypatch.setenv("CXX", "no-such-compiler")
-    assert library.why_not() == "no C++ compiler is installed (no-such-compiler)"
-    offered = {setting.family for setting in engine("pinocchio").settings(SCENES["point_pendulum"]())}
-    assert "tuned" in offered and "tuned, compiled" not in offered
-    monkeypatch.setattr(library, "EIGEN", Path("/nowhere"))
-    monkeypatch.setattr(library, "_prefix", lambda: Path("/nowhere"))
-    monkeypatch.delenv("CXX")
-    assert library.why_not() in (
-        "the headers of Eigen are not installed (package cmeel-eigen)",
-        "no C++ compiler is installed (c++, g++, clang++)",
-    )
-
-
-def test_a_damaged_library_is_compiled_anew(
-    pinocchio: Engine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    from crosscheck.engines.pinocchio import library
-
-    def compile_fast(target: Path) -> None:
-        target.write_bytes(b"library")
-
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(library, "_compile", compile_fast)
-    assert library._kept() is None
-    path = library._compiled()
-    assert library._kept() == path and list(path.parent.iterdir()) == [path]
-    path.write_bytes(b"damaged")
-    assert library._kept() is None
-    assert library._compiled() == path == library._kept()
-    path.write_bytes(b"no library at all")
-    monkeypatch.setattr(library, "_kept", lambda: path)
-    with pytest.raises(library.NoLibrary, match="cannot be loaded"):
-        library.library.__wrapped__()
-
-
-def test_a_compiler_that_fails_is_said(
-    pinocchio: Engine, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    from crosscheck.engines.pinocchio import library
-
-    compiler = tmp_path / "fails"
-    compiler.write_text("#!/bin/sh\necho 'rates.cpp:1: error: out of luck' >&2\nexit 1\n")
-    compiler.chmod(0o755)
-    monkeypatch.setenv("CXX", str(compiler))
-    with pytest.raises(library.NoLibrary, match=r"the C\+\+ compiler failed: .*out of luck"):
-        library._compile(tmp_path / "library.so")
 
 
 @pytest.mark.parametrize(

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from pathlib import Path
 
 import pytest
 
 from crosscheck.closed_loops.records import read
-from crosscheck.convergence import document, ladders
+from crosscheck.convergence import document
 from crosscheck.convergence.document import cell, order
 from crosscheck.convergence.ladders import (
     FILE,
     MECHANISMS,
     ROWS,
     VAIN,
-    Row,
     climb,
     fineness,
     in_vain,
     ladder,
 )
 from crosscheck.engine import engine
-from crosscheck.study.grid import Case, key
+from crosscheck.study.grid import Case
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "convergence.md"
 
@@ -93,47 +91,6 @@ def test_a_ladder_ends_where_finer_runs_are_in_vain_or_take_too_long() -> None:
 def test_rows_name_families_of_engines() -> None:
     assert all(row.family in engine(row.engine).families for row in ROWS)
     assert len({row.name for row in ROWS}) == len(ROWS)
-
-
-def test_measuring_stores_runs_and_refusals_and_resumes(tmp_path, monkeypatch) -> None:
-    made, lines, path = [], [], tmp_path / "records.jsonl"
-
-    def fourth(cases, executor, run) -> list[dict]:
-        [case] = cases
-        assert run is ladders.run_in_turn and executor is not None
-        made.append(case.setting.options["step"])
-        record = run_of(case, 1e4 * made[-1] ** 4 + 1e-10)
-        return [record]
-
-    def run_of(case: Case, error: float) -> dict:
-        found = run(case.setting.options["step"], error, 1e-5)
-        asked = {"options": dict(case.setting.options)}
-        named = {"key": key(case), "scene": case.scene.name, "engine": case.engine, "version": "1.0"}
-        rest = {"settings": {}, "asked": asked, "time_limit": 1.0, "message": "", "commit": "", "date": "d"}
-        metrics = found["metrics"] | {"violation_position": math.inf}
-        return found | named | rest | {"family": case.setting.family, "bodies": [], "metrics": metrics}
-
-    rows = [Row("mujoco", "stock", "RK4"), Row("mujoco", "nothing", "none"), Row("dart", "terms", "other")]
-    monkeypatch.setattr(ladders, "ROWS", rows)
-    monkeypatch.setattr(ladders, "MECHANISMS", MECHANISMS[2:3])
-    monkeypatch.setattr(ladders, "study", fourth)
-    monkeypatch.setattr(ladders, "made_by", lambda: {"date": "today"})
-    ladders.measure(["mujoco"], path, lines.append)
-    *runs, refused = read(path)
-    assert all(a == 2 * b for a, b in pairwise(made)) and len(runs) == len(made) == len(lines)
-    assert in_vain(runs) == VAIN and runs[0]["cost"].keys() == {"seconds", "steps"}
-    assert not {"settings", "commit", "bodies"} & runs[0].keys() and runs[0]["date"] == "d"
-    assert runs[0]["metrics"].keys() == {"error", "error_bound"}, "JSON has no infinite numbers"
-    assert lines[0] == f"mujoco stock four_bar_free: {made[0]:.2g}: {runs[0]['metrics']['error']:.1e}"
-    assert refused["message"] == "the family nothing does not serve this mechanism"
-    assert refused["key"] == "mujoco, nothing four_bar_free" and refused["engine"] == "mujoco"
-    assert refused["family"] == "nothing" and refused["scene"] == "four_bar_free"
-    assert refused["outcome"] == "REFUSED" and refused["owner"] == "missing in the adapter"
-    assert refused["version"] == engine("mujoco").version() and refused["date"] == "today"
-    stored, count = read(path), len(made)
-    ladders.measure(["mujoco"], path, lines.append)
-    assert len(made) == len(lines) == count, "runs of the file are not made again"
-    assert read(path) == stored, "a refusal is stored once"
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:

@@ -9,7 +9,6 @@ import mbref
 from crosscheck.conformance.geared_mechanisms import geared_mechanism
 from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
 from crosscheck.engine import Owner, Setting, engine
-from crosscheck.engines import terms
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss
@@ -116,19 +115,6 @@ def test_tree_engines_move_as_the_reference_or_refuse(name, make):
     found = measure(scene, run, truth_for(scene))
     assert found["error"] <= ENGINES and found["violation_position"] <= ENGINES, (found, run.message)
     assert found["reaction_error"] is None or found["reaction_error"] <= 1e-6, found
-
-
-@pytest.mark.parametrize("name", ["drake", "dart"])
-def test_a_coupling_of_another_ratio_or_a_lost_rotor_is_seen(name, monkeypatch):
-    """The terms of an engine with other ratios of couplings, or without armatures, move otherwise."""
-    pytest.importorskip(MODULES[name])
-    scene = planetary().with_(duration=0.2)
-    for part, wrong in (("_couplings", lambda rows: rows * [1.0, 1.1]), ("_rotors", np.zeros_like)):
-        usual = getattr(terms.Simulation, part)
-        with monkeypatch.context() as changed:
-            changed.setattr(terms.Simulation, part, lambda self, f=usual, g=wrong: g(f(self)))
-            run = engine(name).run(scene, np.array([0.0, 0.2]), FINE[name])
-        assert measure(scene, run, truth_for(scene))["error"] > 1e-3, part
 
 
 def test_drakes_own_steps_couple_and_turn_rotors():

@@ -12,7 +12,6 @@ from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Engine, Ow
 from crosscheck.engines.constraint_equations import Constraints
 from crosscheck.engines.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
-from mbref.cli.commands import BAD_INPUT, main
 from mbref.equations.joints import ROWS_OF, primitives_of
 from mbref.scene import JOINT_TYPES, Driver, JointFacts, Revolute, Scene
 from mbref.scene_joints import JointEntry
@@ -78,17 +77,6 @@ def test_an_undeclared_driven_coordinate_is_refused_by_name(name: str) -> None:
 def test_an_undeclared_load_type_is_refused_by_name(name: str) -> None:
     refusal = engine(name).cannot(with_unknown(load=(Magnet(),)))
     assert refusal is not None and "load[0]" in str(refusal) and "'magnet'" in str(refusal), refusal
-
-
-@pytest.mark.parametrize(
-    ("parts", "named"),
-    [({"joint": screwed().joint}, ("'thread'", "'screw'")), ({"load": (Magnet(),)}, ("load[0]", "'magnet'"))],
-)
-def test_mbref_run_refuses_them_too(parts: dict, named: tuple, monkeypatch, capsys) -> None:
-    monkeypatch.setattr("mbref.cli.options.find_scene", lambda name: with_unknown(**parts))
-    assert main(["run", "unknown"]) == BAD_INPUT
-    said = capsys.readouterr().err
-    assert all(word in said for word in named) and "Traceback" not in said, said
 
 
 class Bare(Engine):

@@ -64,17 +64,6 @@ def test_joint_coordinates_and_truth_agree(name: str):
     assert off < 1e-7, f"{name}: off by {off:.1e}"
 
 
-def test_one_step_onto_the_closures_leaves_the_square_of_their_errors():
-    equations = TreeEquations(SCENES["spatial_slider_crank"]())
-    left = []
-    for size in (1e-3, 1e-4):
-        q, v = np.split(equations.start, 2)
-        settled, rates = equations.settled(q + size, v, NUMBERS)
-        violation, _, _ = equations._closures(equations.frames(settled, rates, NUMBERS))
-        left.append(np.abs(violation.astype(float)).max())
-    assert left[0] < 1e-5 and left[1] < 0.02 * left[0], left
-
-
 @pytest.mark.parametrize(("name", "setting"), RUNS, ids=str)
 def test_generated_code_and_truth_agree(name: str, setting: Setting) -> None:
     scene = SCENES["spatial_slider_crank_gravity"]()
@@ -134,15 +123,6 @@ def test_scenes_are_refused_where_there_is_no_c_compiler(monkeypatch: pytest.Mon
     assert found is not None and found.reason == "no C compiler is installed (no-such-compiler)", found
 
 
-def test_a_compiler_that_fails_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    compiler = tmp_path / "cc"
-    compiler.write_text("#!/bin/sh\necho 'error: out of luck' >&2\nexit 1\n")
-    compiler.chmod(0o755)
-    monkeypatch.setenv("CC", str(compiler))
-    with pytest.raises(library.NoLibrary, match=r"the C compiler failed: .*out of luck"):
-        library._compile("int main;", tmp_path / "code.so")
-
-
 def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert kept.kept("folder", "origin", ".txt") is None
@@ -150,16 +130,6 @@ def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch:
     assert kept.kept("folder", "origin", ".txt") == path and kept.kept("folder", "other", ".txt") is None
     path.write_text("damaged")
     assert kept.kept("folder", "origin", ".txt") is None
-
-
-def test_the_oldest_files_are_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    monkeypatch.setattr(kept, "MOST", 2)  # bytes, of one each
-    paths = [
-        kept.keep("folder", f"origin{k}", ".txt", lambda target, k=k: target.write_text(str(k)))
-        for k in range(3)
-    ]
-    assert not paths[0].exists() and paths[1].exists() and paths[2].exists()
 
 
 def test_a_kept_library_serves_another_process_without_compiling(

@@ -270,23 +270,6 @@ def test_the_exact_reactions_of_a_comparison_are_found_once(monkeypatch):
     assert len(asked) == 5, "reactions of another motion at five samples; the poses are known"
 
 
-def test_exact_reactions_at_several_sets_of_times_are_kept(monkeypatch):
-    """Complete, failed and short runs of a comparison alternate; each set of times is solved once."""
-    scene = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.02)
-    truth, solved = truth_for(scene), []
-    runs = [with_exact_reactions(scene, truth.poses(np.linspace(0.0, 0.02, k))) for k in (3, 4)]
-    monkeypatch.setattr(metrics, "_with_reactions", {})
-    monkeypatch.setattr(
-        metrics, "with_exact_reactions", lambda *a: solved.append(1) or with_exact_reactions(*a)
-    )
-    errors = [[measure(scene, run, truth)["reaction_error"] for run in runs] for _ in range(3)]
-    assert len(solved) == 2 and errors[0] == errors[1] == errors[2]
-    monkeypatch.setattr(metrics, "KEPT", 2)
-    third = with_exact_reactions(scene, truth.poses(np.linspace(0.0, 0.02, 5)))
-    measure(scene, third, truth)
-    assert len(solved) == 3 and len(metrics._with_reactions) == 2, "the oldest motion is forgotten"
-
-
 def test_a_run_beyond_the_truth_is_judged_on_the_part_that_is_known():
     class Ending:
         """TRUTH, known up to 0.1 s."""

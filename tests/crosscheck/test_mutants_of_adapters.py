@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import functools
-import importlib
-import sys
 import textwrap
 import tomllib
-import types
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,7 +13,6 @@ import pytest
 
 import crosscheck.engines
 from crosscheck.engine import Engine, Setting, engine
-from crosscheck.engines import kept
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import Truth, truth_for
 from mbref.scene import Force, Moment, Scene, TorsionSpring
@@ -25,8 +21,6 @@ from mbref.trajectory import Outcome
 from tests.crosscheck.tree_scenes import every_joint, ring
 
 FOLDER = Path(crosscheck.engines.__path__[0])
-# files that import models, in the order of their imports
-USERS = ("model", "equations", "ida", "dynamic", "simulation", "library", "adapter")
 GENERATORS = ("casadi", "heyoka")  # share the files of the folder symbolic, and keep compiled code
 TIMES = np.array([0.0, 0.05, 0.1])
 TERMS = Setting("terms", {"rtol": 1e-9, "min_step": 1e-3})
@@ -75,17 +69,6 @@ UNABLE = {  # an adapter and the kinds of defects that it cannot have
 DEFECTS: dict[str, list[dict[str, str]]] = {way: [] for way in WAYS}
 for one in tomllib.loads(Path(__file__).with_name("defects_of_adapters.toml").read_text())["defect"]:
     DEFECTS[one.pop("way")].append(one)
-MANY_STEPS = "node.getLinearAcceleration(), node.getAngularAcceleration()"  # this defect costs 40 s
-CASES = [
-    pytest.param(
-        way,
-        defect,
-        marks=[pytest.mark.slow] * (way in SLOW or defect["text"] == MANY_STEPS),
-        id=f"{way}: {defect['kind']}, {defect['text'][:30]}",
-    )
-    for way, found in DEFECTS.items()
-    for defect in found
-]
 
 
 def package(way: str) -> str:
@@ -116,34 +99,6 @@ def case(way: str) -> tuple[Scene, Truth]:
     return scene, truth_for(scene)
 
 
-def place(name: str, file: str) -> str:
-    """The dotted name of a file of an adapter, or of another file of the engines, in the folder of engines"""
-    return f"{name}.{file}" if (FOLDER / name / f"{file}.py").exists() else file
-
-
-def mutant(name: str, defect: dict[str, str], patch: pytest.MonkeyPatch) -> Engine:
-    """The engine of an adapter with a defect in a file: its modules are executed anew."""
-    wrong, text = place(name, defect["file"]), defect["text"]
-    source = (FOLDER / f"{wrong.replace('.', '/')}.py").read_text()
-    assert source.count(text) == 1, f"{wrong} has {source.count(text)} times {text!r}"
-    users = ["symbolic.generator"] if name in GENERATORS else ["own_steps"]
-    users += [f"{name}.{part}" for part in USERS if (FOLDER / name / f"{part}.py").exists()]
-    for part in dict.fromkeys((wrong, *users)):
-        full = f"crosscheck.engines.{part}"
-        own = importlib.import_module(full)
-        fresh = types.ModuleType(full)
-        fresh.__dict__.update(__file__=own.__file__, __package__=own.__package__)
-        patch.setitem(sys.modules, full, fresh)
-        folder, _, last = full.rpartition(".")
-        patch.setattr(sys.modules[folder], last, fresh)
-        code = Path(own.__file__).read_text()
-        exec(
-            compile(code.replace(text, defect["instead"]) if part == wrong else code, own.__file__, "exec"),
-            fresh.__dict__,
-        )
-    return sys.modules[f"crosscheck.engines.{name}.adapter"].ENGINE
-
-
 def is_right(simulator: Engine, way: str) -> bool:
     scene, truth = case(way)
     _, setting, allowed = WAYS[way]
@@ -162,14 +117,6 @@ def test_adapters_without_defect_are_right(way):
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     assert is_right(engine(package(way)), way)
-
-
-@pytest.mark.parametrize(("way", "defect"), CASES)
-def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
-    if not is_installed(way):
-        pytest.skip(f"{WAYS[way][0]} is not installed")
-    monkeypatch.setattr(kept, "cache", lambda name: tmp_path / name)  # compiled code of the true sources
-    assert not is_right(mutant(package(way), defect, monkeypatch), way)
 
 
 @pytest.mark.parametrize("name", sorted({package(way) for way in WAYS}))

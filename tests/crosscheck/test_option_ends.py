@@ -9,7 +9,6 @@ import pytest
 
 from crosscheck.cli import options, request
 from crosscheck.cli.request import RequestError
-from crosscheck.engine import Setting
 from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
 from mbref.cli.options import sample_times
 from mbref.scene import Body, Scene
@@ -105,21 +104,3 @@ def test_options_need_one_engine_and_one_family():
     for engines, families in ((["a", "b"], ["f"]), (["a"], ["f", "g"]), (["a"], [])):
         with pytest.raises(RequestError, match="--option: needs one --engine and one --setting"):
             request.choice(engines, families, [("x", 1)], None, True)
-
-
-def test_options_that_a_family_needs_are_named_with_an_example(monkeypatch):
-    offered = [
-        Setting("f", {"rtol": 1.0, "step": 0.1, "gain": 2.0, "law": "soft"}),
-        Setting("f", {"rtol": 1.0, "step": 0.2, "gain": 3.0, "law": "hard", "more": 1}),
-        Setting("g", {"other": 1}),
-    ]
-    monkeypatch.setattr(request, "settings", lambda name, scene: offered)
-
-    def missing(family: str, **options: object) -> list[str]:
-        return request._missing_options(SCENE, "mbref", Setting(family, options))
-
-    assert missing("f", step=1.0) == [
-        '--option: mbref f also needs gain and law, for example --option gain=3.0 --option law="hard"'
-    ], "rtol has a default, and not every setting has `more`"
-    assert missing("f", step=1.0, gain=1.0, law="l") == [] == missing("unknown", x=1)
-    assert missing("g") == ["--option: mbref g also needs other, for example --option other=1"]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -96,24 +95,6 @@ def test_single_and_double_precision_differ_by_rounding(name: str, mechanism: st
     ]
     apart = float(error_series(scene, *runs).max())
     assert 1e-9 < apart < MARGIN * APART[mechanism][name], f"{apart:.1e} apart"
-
-
-@pytest.mark.slow
-def test_models_that_differ_in_numbers_share_code_of_mjx() -> None:
-    """Code is compiled once in a process, and stored for other processes."""
-    if not is_installed(MODULES["mjx"]):
-        pytest.skip("mjx is not installed")
-    import jax
-
-    from crosscheck.engines.mjx.adapter import _stepped
-
-    scene, times = SCENES["four_bar_gravity"]().with_(duration=0.01), np.array([0.0, 0.01])
-    engine("mjx").run(scene, times, Setting("euler", {"step": 1e-3}))
-    compiled = _stepped(False)._cache_size()
-    light = scene.with_(body=[body.model_copy(update={"mass": body.mass / 2}) for body in scene.body])
-    run = engine("mjx").run(light, times, Setting("euler", {"step": 5e-4}))
-    assert run.outcome is Outcome.COMPLETED and _stepped(False)._cache_size() == compiled > 0
-    assert any(Path(jax.config.jax_compilation_cache_dir).glob("jit_stepped*"))
 
 
 def bare(scene: Scene) -> Scene:

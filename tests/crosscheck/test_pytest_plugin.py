@@ -10,13 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.cli.commands import main
-from crosscheck.conformance import suite
 from crosscheck.conformance.findings import shrunk, violates
 from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.runners import InProcess
-from crosscheck.engine import engine as find_engine
-from mbref.scene import Scene
 from tests.zoo.defects import DEFECTS, SOURCE, engine
 
 ROOT = Path(__file__).parents[2]
@@ -75,23 +71,6 @@ def test_a_name_that_leads_to_no_engine_ends_before_any_test(tmp_path, name, say
     run = held(tmp_path, "free_fall", name=name)
     assert run.returncode == pytest.ExitCode.USAGE_ERROR, run.stdout[-1500:]
     assert f"--engine {name}: " in run.stderr and says in run.stderr, run.stderr
-
-
-def test_faulty_engine_and_its_finding(tmp_path, capsys, monkeypatch):
-    """A failing mechanism is kept as a scene file, and the command in its first lines fails again."""
-    defect = DEFECTS["a rod's speed of turning left out"]
-    (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text().replace(defect.old, defect.new))
-    run = held(tmp_path, "distance and joint and closure", "--findings", str(tmp_path / "found"))
-    assert run.returncode == 1 and "kept as" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
-    (path,) = (tmp_path / "found").glob("*.toml")
-    scene = Scene.from_file(path)
-    assert len(scene.joint) == 1 and not any(scene.gravity), f"not made small: {scene}"
-    command = path.read_text().splitlines()[1].removeprefix("# crosscheck ").split()
-    assert command == ["verify", "spatial_engine:ENGINE", "--scene", str(path)], command
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setattr(suite, "Isolated", lambda name, _: InProcess(find_engine(name), name))
-    assert main(command) == 1
-    assert "closure" in capsys.readouterr().out
 
 
 @pytest.mark.slow

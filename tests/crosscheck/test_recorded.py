@@ -7,9 +7,7 @@ import pytest
 
 from crosscheck.cli.commands import main
 from crosscheck.judge.constraints import scene_length
-from crosscheck.judge.reference.reference import NoReference, reference
 from crosscheck.judge.tolerances import FLOOR
-from crosscheck.recorded import exact as exactly
 from crosscheck.recorded.exact import reference_table, write
 from crosscheck.recorded.judgement import judge_motion
 from crosscheck.recorded.reading import read
@@ -286,15 +284,3 @@ def test_commands_write_and_judge(tmp_path, capsys):
     assert " off " in printed and "[bold]" not in printed and "quaternions in the order" in printed
     assert main(["judge", scene, str(tmp_path / "none.csv")]) == 2
     assert main(["judge", scene, out, "--column", "upper"]) == 2
-
-
-def test_a_reference_without_time_is_reported(monkeypatch):
-    found = reference(SCENE, TIMES.tolist())
-    part = NoReference("no time is left", 0.2, found.at(TIMES[:41]))
-    monkeypatch.setattr(exactly, "reference", lambda *_: part)
-    known = judge_motion(SCENE, {"time": TIMES[:41], "upper.position.x": found.position[:41, 0, 0]})
-    assert known.reason == "no time is left" and known.until == pytest.approx(0.2) and known.is_right
-    nothing = NoReference("no time is left", 0.0, found.at(TIMES[:0]))
-    monkeypatch.setattr(exactly, "reference", lambda *_: nothing)
-    with pytest.raises(SceneError, match="has no reference: no time is left"):
-        judge_motion(SCENE, {"time": TIMES, "upper.position.x": TIMES})

@@ -10,31 +10,28 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import mbref.equations.packing
 from crosscheck.cli.scene_request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
-from crosscheck.conformance.features import BODY, JOINTS, feature_scenes, massless, undetermined
+from crosscheck.conformance.features import BODY, feature_scenes, massless, undetermined
 from crosscheck.conformance.moving import moving_probes, several_springs
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import ASKEW, Isometry
-from crosscheck.engine import engine
 from crosscheck.judge import constraints, metrics
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.deadline import GivenUp, given_up
 from crosscheck.judge.energy import energy_series
 from crosscheck.judge.gauss_principle import gauss, stacked
-from crosscheck.judge.reference import cache, tree_loads
+from crosscheck.judge.reference import cache
 from crosscheck.judge.reference import reference as module
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.certify import NotCertified, certified, digest
 from crosscheck.judge.reference.isostatic import isostatic, replaced
-from crosscheck.judge.reference.natural import NaturalCoordinates
-from crosscheck.judge.reference.reference import NoReference, Reference, judged, reference, runs
+from crosscheck.judge.reference.reference import Reference, judged, reference, runs
 from crosscheck.judge.reference.saddle_point import SaddlePoint
-from crosscheck.judge.reference.taylor import Stepper, natural_motion
+from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
-from crosscheck.judge.truth import NoSolution, closed_form, truth_for
-from crosscheck.judge.truth.reference_truth import ReferenceTruth, trajectory
+from crosscheck.judge.truth import closed_form, truth_for
+from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.study.comparison import Wanted, collected
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene, Spring, TorsionSpring
@@ -169,22 +166,6 @@ def test_panels_of_stiff_motions_are_as_long_as_the_motion_is_smooth():
     motion = tree_motion(scene, times, EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 40
     assert differences(scene, natural_motion(scene, times, EXTENDED, seconds=SECONDS), motion).max() < 1e-15
-
-
-@pytest.mark.slow
-def test_where_one_formulation_is_slow_the_other_bounds_itself(monkeypatch):
-    scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 9)
-
-    def brief(*given, **options):
-        return natural_motion(*given, **options | {"seconds": 0.3})
-
-    monkeypatch.setattr(module, "natural_motion", brief)
-    one, twin, other = runs(scene, times, SECONDS)
-    found, reason = judged(scene, times, one, twin, other)
-    assert not reason and found.bound.max() <= SMOOTH
-    assert 0 < found.both.sum() == len(other.times) < len(times)
-    exact = natural_motion(scene, times, EXTENDED, seconds=SECONDS)
-    assert (np.abs(found.position - exact.position).max(axis=(1, 2)) <= found.bound).all()
 
 
 def test_other_rows_and_displaced_closures_show_contradictions():
@@ -382,13 +363,6 @@ def test_small_residuals_in_many_digits_are_no_ball_around_zero():
     assert not motion.reason and len(motion.times) == 1
 
 
-def test_states_that_are_not_finite_have_a_reason(monkeypatch):
-    right = Stepper._gaps
-    monkeypatch.setattr(Stepper, "_gaps", lambda *given: tuple(np.nan * gap for gap in right(*given)))
-    motion = natural_motion(SCENES["sarrus"](), [0.1], EXTENDED, seconds=SECONDS)
-    assert motion.reason == "a pivot of its equations is zero to the digits of the arithmetic"
-
-
 def test_contradicting_joints_are_replaced_before_digits_are_certified():
     """Bennett's rounded axes leave three rows that contradict each other by 1e-17 and more."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
@@ -475,49 +449,6 @@ def test_every_reference_is_within_its_bound_of_the_certified_table(name):
     assert_within_the_bound_of_its_table(name)
 
 
-# --- planted defects --------------------------------------------------------------------------------------
-def heavier(values):
-    return values * (1 + 1e-4)
-
-
-def plant_in_a(monkeypatch):
-    right = NaturalCoordinates._mass
-    monkeypatch.setattr(NaturalCoordinates, "_mass", lambda self: right(self) + 1e-6)
-
-
-def plant_in_b(monkeypatch):
-    right = tree_loads._inertias
-    monkeypatch.setattr(tree_loads, "_inertias", lambda tree: heavier(right(tree)))
-
-
-def plant_in_mbref(monkeypatch):
-    right = mbref.equations.packing._principal_axes
-
-    def wrong(body):
-        inertia, axes = right(body)
-        return heavier(np.array(inertia)), axes
-
-    monkeypatch.setattr(mbref.equations.packing, "_principal_axes", wrong)
-
-
-@pytest.mark.parametrize("plant", [plant_in_a, plant_in_b, plant_in_mbref])
-def test_a_planted_defect_is_seen_by_the_other_two(plant, monkeypatch):
-    """The two without the defect agree with each other, and neither agrees with the third."""
-    scene, times = random_mechanism(3).with_(duration=0.2), np.linspace(0.0, 0.2, 3)
-    plant(monkeypatch)
-    setting = engine("mbref").best_settings(scene)[-1]
-    found = {
-        plant_in_a: natural_motion(scene, times, EXTENDED, seconds=SECONDS),
-        plant_in_b: tree_motion(scene, times, EXTENDED, seconds=SECONDS),
-        plant_in_mbref: engine("mbref").run(scene, times, setting),
-    }
-    wrong = found.pop(plant)
-    one, other = found.values()
-    assert differences(scene, one, other).max() < 1e-8
-    assert differences(scene, one, wrong).max() > 1e-7
-    assert differences(scene, other, wrong).max() > 1e-7
-
-
 # --- what has none ----------------------------------------------------------------------------------------
 def test_a_start_in_a_singular_position_is_refused_with_the_remedy():
     times = np.linspace(0.0, 1e-4, 3)  # within the first step
@@ -561,35 +492,6 @@ def own_cache(tmp_path, monkeypatch):
     return tmp_path / "mbref" / "references"
 
 
-def never(*_):
-    raise AssertionError("computed again")
-
-
-def test_known_times_are_not_computed_again(own_cache, monkeypatch):
-    scene, _ = free_fall()
-    first = reference(scene, np.linspace(0.0, 0.5, 5))
-    monkeypatch.setattr(module, "runs", never)
-    again = reference(scene.with_(name="other"), [0.5, 0.25])
-    assert (again.times == [0.25, 0.5]).all()
-    assert (again.position == first.position[[2, 4]]).all()
-    with pytest.raises(AssertionError, match="computed again"):
-        reference(scene.with_(gravity=(0.0, -9.8, 0.0)), [0.5])
-
-
-def test_a_motion_that_ended_is_computed_again_only_in_more_time(own_cache, monkeypatch):
-    """Of a start in a singular position nothing becomes known in less time, or in as much."""
-    scene, given = SCENES["four_bar_straight"](), []
-
-    def counted(scene, times, seconds):
-        given.append(seconds)
-        return runs(scene, times, seconds)
-
-    monkeypatch.setattr(module, "runs", counted)
-    for seconds in (2.0, 2.0, 1.0, 4.0, 3.0):
-        assert isinstance(reference(scene, [0.1], seconds), NoReference)
-    assert given == [2.0, 4.0]
-
-
 def test_a_motion_that_is_given_up_ends_and_is_not_kept(own_cache):
     scene, times = SCENES["flyball_governor"]().with_(duration=1e4), np.linspace(0.0, 1e4, 11)
     with ThreadPoolExecutor(1) as beside:
@@ -612,14 +514,6 @@ def test_an_interrupt_does_not_wait_for_the_truth(own_cache):
     with ThreadPoolExecutor(1) as beside:
         command = beside.submit(collected, [scene], [], wanted, interrupt, print)
         assert isinstance(command.exception(timeout=60.0), KeyboardInterrupt)
-
-
-def test_new_times_keep_the_old_ones(own_cache, monkeypatch):
-    scene, _ = free_fall()
-    reference(scene, [0.1])
-    reference(scene, [0.2])
-    monkeypatch.setattr(module, "runs", never)
-    assert len(reference(scene, [0.1, 0.2]).times) == 2
 
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50] + b"x" + b[51:], lambda b: b""])
@@ -649,24 +543,3 @@ def test_truth_of_any_scene_is_its_reference(own_cache):
     assert truth.name == "reference" and truth.accuracy <= 1e-11
     assert metrics.measure(scene, motion, truth)["error"] < 1e-15
     assert truth_for(SCENES["four_bar"]()).name == "parallelogram"
-
-
-def test_truth_ends_with_the_reference(own_cache, monkeypatch):
-    found = reference(SCENES["four_bar_straight"](), [0.0, 0.1])
-    assert isinstance(found, NoReference) and found.until == 0.0
-    truth = ReferenceTruth(SCENES["four_bar_straight"](), 5.0)
-    with pytest.raises(NoSolution, match="singular position"):
-        truth.poses(np.array([0.05]))
-    monkeypatch.setattr(module, "runs", never)  # nor is it tried again
-    with pytest.raises(NoSolution, match="no reference after t = 0 s"):
-        truth.poses(np.array([0.05]))
-
-
-def test_defective_formulations_give_no_reference(monkeypatch):
-    plant_in_b(monkeypatch)
-    found, reason = samples(JOINTED, 0.2)
-    assert "differ by" in reason
-    assert (found.bound <= 1e-6).all()
-
-
-JOINTED = Scene(name="swing", gravity=(0.0, -9.81, 0.0), body=(BODY,), joint=(JOINTS["spherical"],))

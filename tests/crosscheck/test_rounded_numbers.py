@@ -11,8 +11,6 @@ from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
 from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank, singular_values
 from mbref import rotations, simulate
-from mbref.design.along_motion import general_pose
-from mbref.equations.model import Model
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import find_scene
@@ -109,17 +107,3 @@ def test_a_singular_start_is_not_taken_for_rounding():
     for name in ("four_bar_straight", "four_bar_gravity", "sarrus"):
         start = start_run(find_scene(name), Method.parse("taylor"), np.array([0.1]), Limits())
         assert advice(start) == "", name
-
-
-def test_a_mechanism_that_rounding_locks_is_diagnosed(monkeypatch):
-    """Newton's method for a pose near the start asks for no terms of scenes that no longer move."""
-    asked, terms = [], Model.terms
-
-    def counted(model, times, q, v=None):
-        asked.append((np.size(times), np.size(q) // (7 * model.nb)))
-        return terms(model, times, q, v)
-
-    monkeypatch.setattr(Model, "terms", counted)
-    general_pose(Model(turned("five_bar_gravity", 8)))
-    assert asked and all(times == states for times, states in asked), asked
-    assert (0, 0) in asked, "no step of Newton's method was too small"

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from crosscheck.cli.commands import main
-from crosscheck.engine import Cannot, Owner, engine
+from crosscheck.engine import engine
 from crosscheck.judge.constraints import closure
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.gauss_principle import gauss
@@ -18,7 +17,7 @@ from crosscheck.judge.small_motions.equilibria import steady_poses
 from crosscheck.judge.small_motions.turning import turning
 from crosscheck.linearising import Linearising
 from crosscheck.small_motions import document, records
-from crosscheck.small_motions.compare import ACCELERATIONS, at_pose, by_accelerations, error, of_engine
+from crosscheck.small_motions.compare import at_pose, by_accelerations, error
 from crosscheck.small_motions.mechanisms import (
     DAMPER,
     DIAGONAL,
@@ -157,20 +156,6 @@ def test_functions_of_engines_that_linearise():
     assert isinstance(exudyn, Linearising)
     assert np.abs(exudyn.own_eigenvalues(scene)).max() < 1e-6
     assert error(exudyn.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-6
-
-
-def test_engines_are_asked_for_their_function_at_rest_and_for_accelerations():
-    pytest.importorskip("exudyn")
-    [slides] = steady_poses(damped_slides(), starts=1)
-    ways = [each.way for each in of_engine(engine("exudyn"), damped_slides(), slides)]
-    assert ways == ["ComputeODE2Eigenvalues", ACCELERATIONS]
-    turning_one = steady_poses(turning_pendulum(), starts=1)[0]
-    assert [each.way for each in of_engine(engine("exudyn"), turning_pendulum(), turning_one)] == [
-        ACCELERATIONS
-    ]
-    without = SimpleNamespace(name="without", cannot=lambda scene: Cannot(Owner.ENGINE, "no slides"))
-    [refused] = of_engine(without, damped_slides(), slides)
-    assert refused.eigenvalues is None and refused.reason == "no slides"
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
@@ -12,9 +11,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.study import grid, progress, timings
-from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, run_in_turn, study
-from mbref.records import append
+from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, study
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
@@ -61,24 +58,6 @@ def test_stored_lines_and_returned_records_agree(tmp_path: Path):
     assert sorted(r["family"] for r in lines) == ["a", "b", "c"], "one line for each different case"
     assert all(r in records for r in lines), (lines, records)
     assert seen == [(1, 3), (2, 3), (3, 3)], seen
-
-
-def test_case_that_hangs_is_named_while_it_runs_and_ends_at_its_limit(tmp_path: Path, monkeypatch, capsys):
-    monkeypatch.setattr(progress, "QUIET", 0.0)
-    cases = [case("a"), case("hangs", "HANG", still(str(tmp_path / "pid")), limit=2.0), case("b")]
-    with progress.shown("runs", len(cases)) as shown:
-        named = shown.under_way.named(run_in_turn, lambda case: f"the run {case.setting.family}")
-        records = study(cases, None, None, shown, named)
-    assert [r["outcome"] for r in records] == ["COMPLETED", "TIMED_OUT", "COMPLETED"], records
-    lines = capsys.readouterr().err.splitlines()
-    assert any(re.search(r"of 3, \d+ s; now .*the run hangs, for \d+ s", line) for line in lines), lines
-
-
-def test_case_whose_measuring_ends_at_its_limit_has_no_error(monkeypatch):
-    """Its reference is not waited for any longer than that."""
-    monkeypatch.setattr(grid, "MEASURED", 0.0)
-    [record] = study([case("a", scene=SCENES["bennett"]())], None, None, None, run_in_turn)
-    assert record["outcome"] == "COMPLETED" and record["metrics"]["error"] is None, record["metrics"]
 
 
 def test_rerun_and_first_run_agree_without_running_again(tmp_path: Path):
@@ -187,33 +166,6 @@ def test_keys_of_different_cases_differ(other: Case, monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))
     assert key(other) == key(other._replace(time_limit=1.0)), "the time limit is no part of a result"
-
-
-def test_key_of_another_version_differs(monkeypatch: pytest.MonkeyPatch):
-    first = key(case("a"))
-    monkeypatch.setattr(grid, "_version", lambda engine: "another")
-    assert key(case("a")) != first
-
-
-def test_timing_goes_on_where_one_of_a_scene_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    cases = [case("a"), case("b")]
-    records = study(cases, ThreadPoolExecutor(1))
-    path = tmp_path / "timings.jsonl"
-    timing = {"median": 0.2, "repeats": 5}
-    append(path, {"key": key(cases[0]), "seconds": 0.1, "timing": timing})
-    asked = []
-
-    def timed(cases, records, repeats, notice):
-        asked.extend(case.setting.family for case in cases)
-        return [{**r, "cost": {**r["cost"], "seconds": 0.3}, "timing": timing} for r in records]
-
-    monkeypatch.setattr(timings, "timed", timed)
-    done = timings.with_timings(cases, records, path, lambda _: None)
-    assert asked == ["a", "b"], "runs of a scene take turns: all are timed where one is missing"
-    assert [r["timing"] for r in done] == [timing, timing]
-    asked.clear()
-    timings.with_timings(cases, records, path, lambda _: None)
-    assert asked == [], "a stored timing was repeated"
 
 
 def test_default_cases_are_the_settings_of_the_engines_that_can():

@@ -12,9 +12,7 @@ import pytest
 from crosscheck.cli.options import length
 from crosscheck.engine import Setting
 from crosscheck.study.between import STEP, between, coarser, longest_step, within, work
-from crosscheck.study.comparison import _with_coarser
 from crosscheck.study.grid import Case, key
-from crosscheck.study.ladder import beyond
 from crosscheck.study.tuning import by_closure, tuned
 from mbref import rotations
 from mbref.scene import Body, Scene
@@ -189,22 +187,6 @@ def test_a_gain_that_follows_a_longer_step_is_not_the_answer():
 def test_work_is_counted_where_it_can_be():
     costs = ({"rhs": 8, "steps": 2, "seconds": 0.5}, {"rhs": 0, "steps": 2, "seconds": 0.5}, {"seconds": 0.5})
     assert [work({"cost": cost}) for cost in costs] == [8, 2, 0.5]
-
-
-def test_a_sweep_that_begins_too_fine_is_continued_to_coarser_settings():
-    """Steps 0.01 and 0.005 of a fourth-order family: 0.32 ends them, as 0.16⁴ is below 1e-3 and 0.32⁴ not."""
-    engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
-    family = engine.cases(0.01, 0.005)
-    records = {key(case): engine.record(case) for case in family}
-    steps = []
-    while more := beyond(family, records):
-        family, records = [*more, *family], records | {key(c): engine.record(c) for c in more}
-        steps += [case.setting.options["step"] for case in more]
-    assert steps == [0.02, 0.04, 0.08, 0.16, 0.32], steps
-    assert not beyond(
-        family[1:], records | {key(family[1]): {**records[key(family[1])], "outcome": "STEP_FAILED"}}
-    )
-    assert _with_coarser([family], records, None) == ([family], records)
 
 
 def test_closure_gap_is_a_distance_of_points():

@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 
 from crosscheck.study import wording
-from crosscheck.study.timings import LONG, _is_short
 
 
 def test_lists_of_none_one_and_more():
@@ -39,9 +38,3 @@ def test_times_and_multiples_at_the_ends_of_their_units():
     assert [wording.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
     assert [wording.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
     assert (wording.span(2.0, 2.04), wording.span(1.5, 30.0)) == ("2.0 times", "1.5 to 30 times")
-
-
-@pytest.mark.parametrize(("seconds", "again"), [(LONG, True), (1.01 * LONG, False)])
-def test_completed_runs_up_to_half_a_second_are_timed_again(seconds, again):
-    record = {"outcome": "COMPLETED", "cost": {"seconds": seconds}}
-    assert _is_short(record, LONG) is again and not _is_short({**record, "outcome": "TIMED_OUT"}, LONG)

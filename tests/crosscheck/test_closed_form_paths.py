@@ -1,0 +1,378 @@
+"""Paths of closed forms / circles, signs of drivers, groups of bodies and refusals worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.constraints import closure
+from crosscheck.judge.truth import closed_form
+from crosscheck.judge.truth.free_body import free_body
+from crosscheck.judge.truth.locked import locked
+from crosscheck.judge.truth.one_dof import (
+    circle,
+    freedoms_at,
+    initial_rate,
+    one_dof,
+    trajectory,
+    turned,
+)
+from crosscheck.judge.truth.parallelogram import parallelogram, turning_driver, unit
+from crosscheck.judge.truth.slider import slider
+from crosscheck.judge.truth.spatial_slider_crank import is_along, spatial_slider_crank
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Coupling,
+    Cylindrical,
+    Driver,
+    Factor,
+    Fixed,
+    JointForce,
+    JointTorque,
+    Moment,
+    Revolute,
+    Scene,
+    Spherical,
+    Translational,
+    Universal,
+)
+
+X, Y, Z, O = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+
+
+def body(name: str, *place: float, **parts: Any) -> Body:
+    given = {"mass": 2.0, "inertia": (0.3, 0.4, 0.5), "position": place or X}
+    return Body(name=name, **{**given, **parts})
+
+
+def pin(name: str, first: str, second: str, *anchor: float, axis: tuple[float, ...] = Z) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), anchor=anchor, axis=axis)
+
+
+def scene(bodies: Any, joints: Any, **parts: Any) -> Scene:
+    return Scene(name="s", body=tuple(bodies), joint=tuple(joints), **{"gravity": O, **parts})
+
+
+PENDULUM = scene([body("bar", 0.0, -2.0, 0.5)], [pin("A", "ground", "bar", 0.0, 0.0, 0.5)])
+# cranks of 1 m at (0, 0, 0) and (3, 0, 0) that point upwards, and a coupler between their ends
+BOX = scene(
+    [body("left", 0.0, 0.5, 0.0), body("top", 1.5, 1.2, 0.0), body("right", 3.0, 0.5, 0.0)],
+    [
+        pin("A", "ground", "left", 0.0, 0.0, 0.0),
+        pin("B", "left", "top", 0.0, 1.0, 0.0),
+        pin("C", "top", "right", 3.0, 1.0, 0.0),
+        pin("D", "right", "ground", 3.0, 0.0, 0.0, axis=(0.0, 0.0, -2.0)),
+    ],
+)
+
+
+# --- circles and rotations --------------------------------------------------------------------------------
+def test_a_vector_on_a_circle():
+    """(1, 2, 3) by 90° about z is (-2, 1, 3); its derivatives by the angle turn by 90° each."""
+    now, rate, second = circle(np.array(Z), np.array([0.0, math.pi / 2]), np.array([1.0, 2.0, 3.0]))
+    assert now == pytest.approx(np.array([[1, 2, 3], [-2, 1, 3.0]]))
+    assert rate == pytest.approx(np.array([[-2, 1, 0], [-1, -2, 0.0]]))
+    assert second == pytest.approx(np.array([[-1, -2, 0], [2, -1, 0.0]]))
+
+
+@pytest.mark.parametrize("axis", [X, Y, Z, (1 / 3, 2 / 3, 2 / 3)])
+@pytest.mark.parametrize("angle", [0.0, 0.7, -2.1, math.pi])
+def test_rotation_matrices_about_an_axis(axis, angle):
+    wanted = rotations.to_matrix(rotations.from_vector(angle * np.array(axis)))
+    assert turned(np.array(axis), np.array([angle]))[0] == pytest.approx(wanted, abs=1e-14)
+
+
+def test_a_unit_vector_in_extended_precision():
+    assert unit((0.0, 3.0, -4.0)).dtype == np.longdouble
+    assert unit((0.0, 3.0, -4.0)).astype(float).tolist() == [0.0, 0.6, -0.8]
+
+
+# --- pendulums and parallelograms -------------------------------------------------------------------------
+def test_the_path_of_a_pendulum():
+    path = parallelogram(PENDULUM)
+    pose = path.poses(np.array([0.0, math.pi / 2]))
+    assert path.family == "pendulum"
+    assert pose.position[:, 0].astype(float) == pytest.approx(
+        np.array([[0, -2, 0.5], [2, 0, 0.5]]), abs=1e-15
+    )
+    assert pose.dposition[:, 0].astype(float) == pytest.approx(np.array([[2, 0, 0], [0, 2, 0.0]]), abs=1e-15)
+    assert pose.ddposition[:, 0].astype(float) == pytest.approx(
+        np.array([[0, 2, 0], [-2, 0, 0.0]]), abs=1e-15
+    )
+    assert pose.rotation[1, 0].astype(float) == pytest.approx(
+        np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), abs=1e-15
+    )
+    assert pose.turn[:, 0].tolist() == [0.0, math.pi / 2]
+    assert pose.spin[:, 0].tolist() == [list(Z)] * 2 and not pose.dspin.any()
+
+
+def test_the_path_of_a_parallelogram():
+    """After 90° both cranks point along -x; the coupler has moved by (-1, -1, 0) and has not turned."""
+    path = parallelogram(BOX)
+    pose = path.poses(np.array([math.pi / 2]))
+    assert path.family == "parallelogram"
+    wanted = np.array([[-0.5, 0, 0], [0.5, 0.2, 0], [2.5, 0, 0.0]])
+    assert pose.position[0].astype(float) == pytest.approx(wanted, abs=1e-15)
+    assert pose.turn[0].tolist() == [math.pi / 2, 0.0, math.pi / 2]
+    assert pose.rotation[0, 1].astype(float) == pytest.approx(np.eye(3))
+    assert pose.spin[0].tolist() == [list(Z), list(O), list(Z)]
+    assert one_dof(BOX, path).name == "parallelogram"
+
+
+@pytest.mark.parametrize(("joint", "sign"), [("A", 1.0), ("B", -1.0), ("C", 1.0), ("D", 1.0)])
+def test_drivers_of_a_parallelogram(joint, sign):
+    """The coupler turns by -q against the left crank, the right crank by q against the coupler; the ground
+    turns by -q against the right crank, about an axis that points downwards."""
+    assert parallelogram(BOX).driven_sign(Driver(joint=joint, polynomial=(0.0, 1.0))) == pytest.approx(sign)
+
+
+def test_drivers_that_do_not_turn_about_the_axis():
+    skew = pin("E", "ground", "left", 0.0, 0.0, 0.0, axis=(0.0, 0.1, 1.0))
+    slide = Translational(name="F", bodies=("ground", "left"), anchor=O, axis=Z)
+    screw = Cylindrical(name="G", bodies=("left", "ground"), anchor=O, axis=Z)
+    both = pin("H", "left", "right", 0.0, 0.0, 0.0)
+    path = parallelogram(BOX)
+    sign = turning_driver(
+        BOX.with_(joint=(*BOX.joint, skew, slide, screw, both)), path.axis, np.array([1.0, 0.0, 1.0])
+    )
+    found = [sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "EFGH"]
+    assert found == [None, None, -1.0, None]
+
+
+# --- sliders and crankshafts ------------------------------------------------------------------------------
+@pytest.mark.parametrize(("bodies", "sign"), [(("ground", "bar"), 1.0), (("bar", "ground"), -1.0)])
+def test_the_path_of_a_slider(bodies, sign):
+    guide = Translational(name="A", bodies=bodies, anchor=O, axis=(0.0, 3.0, 4.0))
+    sliding = scene([body("bar", 1.0, 2.0, 3.0)], [guide])
+    path = slider(sliding)
+    pose = path.poses(np.array([0.0, 5.0]))
+    assert pose.position[:, 0].astype(float).tolist() == [[1.0, 2.0, 3.0], [1.0, 5.0, 7.0]]
+    assert pose.dposition[:, 0].astype(float).tolist() == [[0.0, 0.6, 0.8]] * 2
+    assert not pose.ddposition.any() and not pose.spin.any() and not pose.turn.any() and not pose.dspin.any()
+    assert (pose.rotation[:, 0].astype(float) == np.eye(3)).all()
+    assert path.driven_sign(Driver(joint="A", polynomial=(0.0, 1.0))) == sign
+    assert slider(sliding.with_(joint=(guide, pin("B", "ground", "bar", *O)))) is None
+    assert slider(PENDULUM) is None and slider(sliding.with_(body=(body("bar"), body("other")))) is None
+
+
+# --- which scenes have a closed form ----------------------------------------------------------------------
+def test_initial_rates_along_a_path():
+    def rate(**parts: Any) -> Any:
+        moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, **parts),))
+        return initial_rate(moving, parallelogram(moving))
+
+    assert rate() == 0.0
+    assert rate(angular_velocity=(0.0, 0.0, -3.0)) == pytest.approx(-3.0)
+    assert rate(velocity=(5.0, 0.0, 0.0)) == pytest.approx(2.5)
+    assert rate(velocity=(5.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.5)) == pytest.approx(2.5)
+
+
+def test_freedoms_of_poses():
+    place = np.array([[0.0, -2.0, 0.5]]), np.array([[1.0, 0.0, 0.0, 0.0]])
+    assert freedoms_at(PENDULUM, *place) == 1
+    assert (
+        freedoms_at(
+            PENDULUM.with_(joint=(Spherical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5)),)),
+            *place,
+        )
+        == 3
+    )
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"load": (Moment(body="bar", moment=Z, factor=Factor(start=0.5)),)},
+        {"load": (JointTorque(joint="A", torque=1.0),)},
+        {"load": (Moment(body="bar", moment=Z), JointForce(joint="B", force=1.0))},
+        {"driver": (Driver(joint="A", table=((0.0, 0.0), (1.0, 1.0), (2.0, 0.0), (3.0, 1.0))),)},
+        {"joint": (PENDULUM.joint[0].model_copy(update={"armature": 0.5}),)},
+        {"coupling": (Coupling(name="G", joints=("B", "B"), ratio=1.0),)},
+    ],
+)
+def test_scenes_that_need_a_reference(parts):
+    sleeve = Cylindrical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5), axis=Z)
+    assert closed_form(PENDULUM).name == "pendulum"
+    given = PENDULUM.with_(joint=(*PENDULUM.joint, sleeve))
+    assert closed_form(given).name == "pendulum"
+    assert (
+        closed_form(
+            given.with_(**{**parts, **({"joint": (*parts["joint"], sleeve)} if "joint" in parts else {})})
+        )
+        is None
+    )
+
+
+def test_two_drivers_have_no_closed_form():
+    drivers = tuple(Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD")
+    assert closed_form(BOX.with_(driver=drivers[:1])).name == "parallelogram"
+    assert closed_form(BOX.with_(driver=drivers)) is None
+    plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
+    assert closed_form(BOX.with_(body=plain)) is None, "no masses and no driver"
+    assert closed_form(BOX.with_(body=plain, driver=drivers[:1])).name == "parallelogram"
+
+
+@pytest.mark.parametrize(("least", "has_truth"), [(0.9e-9, False), (1.1e-9, True)])
+def test_free_bodies(least, has_truth):
+    free = scene([body("bar", inertia=(least, 1.0, 1.0))], [])
+    assert (free_body(free) is not None) is has_truth
+    assert free_body(PENDULUM) is None
+    assert free_body(scene([body("a"), body("b")], [])) is None
+    assert free_body(scene([Body(name="a", position=X)], [])) is None
+
+
+def test_the_motion_of_a_free_body():
+    """It falls by half of g t² and turns about its principal axis z at 2 rad/s."""
+    falling = scene(
+        [body("bar", velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0))],
+        [],
+        gravity=(0.0, -10.0, 0.0),
+    )
+    found = free_body(falling).poses(np.array([0.0, 0.5]))
+    assert found.position[1, 0] == pytest.approx([1.5, -1.25, 0.0])
+    assert found.velocity[1, 0] == pytest.approx([1.0, -5.0, 0.0])
+    assert found.acceleration[1, 0] == pytest.approx([0.0, -10.0, 0.0])
+    assert found.angular_velocity[1, 0] == pytest.approx([0.0, 0.0, 2.0])
+    assert found.orientation[1, 0] == pytest.approx([math.cos(0.5), 0.0, 0.0, math.sin(0.5)])
+    pushed = falling.with_(load=(Moment(body="bar", moment=(0.0, 0.0, 1.5)),))
+    found = free_body(pushed).poses(np.array([0.5]))
+    assert found.angular_velocity[0, 0] == pytest.approx([0.0, 0.0, 3.5]), "1.5 N m on 0.5 kg m²"
+    assert found.angular_acceleration[0, 0] == pytest.approx([0.0, 0.0, 3.0])
+
+
+def test_mechanisms_that_cannot_move():
+    weld = Fixed(name="W", bodies=("ground", "bar"), anchor=O)
+    held = scene([body("bar", 1.0, 2.0, 3.0)], [weld])
+    found = locked(held).poses(np.array([0.0, 1.0]))
+    assert found.position.tolist() == [[[1.0, 2.0, 3.0]]] * 2 and not found.velocity.any()
+    assert found.orientation.tolist() == [[[1.0, 0.0, 0.0, 0.0]]] * 2 and not found.angular_acceleration.any()
+    assert found.t_end == 1.0 and found.method == "locked" and found.bodies == ("bar",)
+    assert locked(PENDULUM) is None
+    twice = held.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))
+    assert locked(twice) is None, "ten rows that leave one freedom"
+
+
+def test_a_trajectory_without_samples():
+    none, turn = np.zeros((0, 1, 3)), np.zeros((0, 1, 3, 3))
+    found = trajectory(PENDULUM, "f", np.zeros(0), none, turn, (none, none), (none, none))
+    assert found.t_end == 0.0 and found.method == "f" and found.engine == "truth"
+
+
+# --- slider-cranks in space -------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("cosine", "along"),
+    [(1 - 1e-6, False), (1 - 0.9e-6, True), (-1 + 0.9e-6, True), (-1 + 1.1e-6, False), (1 - 1.9e-6, False)],
+)
+def test_unit_vectors_that_span_no_plane(cosine, along):
+    vector = np.array([cosine, math.sqrt(1 - cosine**2), 0.0])
+    assert is_along(vector, np.array(X)) is along is is_along(np.array(X), vector)
+
+
+# crank of 0.4 m along x about y; the rod of 1.2, 0.3 and 0.5 m ends on a line along z or x
+def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, way: float = 1.0) -> Scene:
+    parts = {
+        "c": body("crank", 0.1, 0.05, 0.0, orientation=(0.8, 0.6, 0.0, 0.0)),
+        "r": body("rod", 0.9, 0.2, 0.3, orientation=(0.8, 0.0, 0.6, 0.0)),
+        "s": body("block", 1.5, 0.3, 0.7, orientation=(0.6, 0.0, 0.0, 0.8)),
+    }
+    bodies = ("rod", "crank") if reverse else ("crank", "rod")
+    axes = ((0.0, 1.2, 1.6), (0.3, -0.8 * way, 0.6 * way))
+    joints = (
+        pin("A", "ground", "crank", 0.0, 0.0, 0.0, axis=(0.0, 3.0, 0.0)),
+        Universal(name="B", bodies=bodies, anchor=(0.4, 0.0, 0.0), axes=axes[::-1] if reverse else axes),
+        Spherical(name="C", bodies=("rod", "block"), anchor=(1.6, 0.3, 0.5)),
+        Translational(name="D", bodies=("ground", "block"), anchor=(1.6, 0.3, 0.5), axis=line),
+    )
+    return scene([parts[name] for name in order], joints)
+
+
+@pytest.mark.parametrize("q", [-0.7, 0.0, 0.4])
+@pytest.mark.parametrize(
+    ("line", "order", "reverse", "way"),
+    [
+        ((2.0, 0.0, 0.0), "crs", False, 1.0),
+        ((-2.0, 0.0, 0.0), "src", True, 1.0),
+        ((0.0, 0.0, 1.0), "rcs", False, -1.0),
+        ((0.6, 0.0, 0.8), "scr", True, -1.0),
+    ],
+)
+def test_the_path_of_a_spatial_slider_crank(line, order, reverse, way, q):
+    """Its joints stay closed, and rates and second derivatives are differences of its poses."""
+    given = spatial(line, order, reverse, way)
+    path, h = spatial_slider_crank(given), 1e-4
+    places = q + h * np.arange(-2, 3)
+    pose = path.poses(places.astype(np.longdouble))
+    turns = rotations.from_matrix(pose.rotation.astype(float))
+    gaps = closure(given, np.zeros(5), pose.position.astype(float), turns)
+    assert max(np.abs(gap).max() for gap in gaps.values()) < 1e-13 and path.family == "spatial_slider_crank"
+    if q == 0.0:
+        starts = [[b.position for b in given.body], [b.orientation for b in given.body]]
+        assert pose.position[2].astype(float) == pytest.approx(np.array(starts[0]), abs=1e-15)
+        assert rotations.to_matrix(np.array(starts[1])) == pytest.approx(pose.rotation[2].astype(float))
+    weights = np.array([1, -8, 0, 8, -1]) / (12 * h)
+    slopes = [np.tensordot(weights, getattr(pose, name), 1) for name in ("position", "rotation", "spin")]
+    assert slopes[0].astype(float) == pytest.approx(pose.dposition[2].astype(float), rel=1e-8, abs=1e-8)
+    rate = slopes[1] @ np.swapaxes(pose.rotation[2], 1, 2)
+    spin = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
+    assert spin.astype(float) == pytest.approx(pose.spin[2].astype(float), rel=1e-8, abs=1e-8)
+    assert slopes[2].astype(float) == pytest.approx(pose.dspin[2].astype(float), rel=1e-8, abs=1e-8)
+    second = np.tensordot(weights, pose.dposition, 1)
+    assert second.astype(float) == pytest.approx(pose.ddposition[2].astype(float), rel=1e-8, abs=1e-8)
+    crank, rod, block = (order.index(name) for name in "crs")
+    assert pose.turn[2, [crank, block]].tolist() == [q, 0.0] and math.isnan(pose.turn[2, rod])
+    signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
+    assert signs == [1.0, None]
+
+
+# --- motions along a path ---------------------------------------------------------------------------------
+def test_a_pendulum_that_turns_freely():
+    """2 m at -3 rad/s without weight: 18 m/s² towards the hinge, at any time."""
+    moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
+    truth = one_dof(moving, parallelogram(moving))
+    found = truth.poses(np.array([0.0, math.pi / 6]))
+    assert found.position[:, 0] == pytest.approx(np.array([[0, -2, 0.5], [-2, 0, 0.5]]), abs=1e-12)
+    assert found.velocity[:, 0] == pytest.approx(np.array([[-6, 0, 0], [0, 6, 0.0]]), abs=1e-11)
+    assert found.acceleration[:, 0] == pytest.approx(np.array([[0, 18, 0], [18, 0, 0.0]]), abs=1e-11)
+    assert found.angular_velocity[:, 0] == pytest.approx(np.tile([0.0, 0.0, -3.0], (2, 1)))
+    assert found.angular_acceleration[:, 0] == pytest.approx(np.zeros((2, 3)), abs=1e-11)
+    assert truth.coordinate(np.array([0.0, 0.5])) == pytest.approx(np.array([[0.0, -3.0], [-1.5, -3.0]]))
+    assert truth.name == "pendulum" and truth.accuracy == 1e-12
+    late = truth.coordinate(np.array([100.0, 0.25, 40.0]))
+    assert late == pytest.approx(np.array([[-300.0, -3.0], [-0.75, -3.0], [-120.0, -3.0]])), "many turns"
+    forwards = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, 3.0)),))
+    late = one_dof(forwards, parallelogram(forwards)).coordinate(np.array([100.0, 0.0]))
+    assert late == pytest.approx(np.array([[300.0, 3.0], [0.0, 3.0]]))
+
+
+def test_a_driven_pendulum():
+    """q = t + t²/2 of a joint whose first body is the bar: it turns by -q; at 1 s 2 rad/s and 1 rad/s²."""
+    hinge = pin("A", "bar", "ground", 0.0, 0.0, 0.5)
+    driven = PENDULUM.with_(joint=(hinge,), driver=(Driver(joint="A", polynomial=(0.0, 1.0, 0.5)),))
+    truth = closed_form(driven)
+    found, (sine, cosine) = truth.poses(np.array([1.0])), (math.sin(1.5), math.cos(1.5))
+    assert found.position[0, 0] == pytest.approx([-2 * sine, -2 * cosine, 0.5])
+    assert found.velocity[0, 0] == pytest.approx([-4 * cosine, 4 * sine, 0.0])
+    wanted = [-2 * cosine + 8 * sine, 2 * sine + 8 * cosine, 0.0]
+    assert found.acceleration[0, 0] == pytest.approx(wanted)
+    assert found.angular_velocity[0, 0].tolist() == [0.0, 0.0, -2.0]
+    assert found.angular_acceleration[0, 0].tolist() == [0.0, 0.0, -1.0] and truth.accuracy == 1e-13
+    assert truth.coordinate(np.array([1.0, 0.0])).tolist() == [[-1.5, -2.0], [0.0, -1.0]]
+
+
+def test_a_pendulum_under_gravity():
+    """10 N/kg along y: I q'' = -40 sin q with I = 8.5; at 90° 6 rad/s need I ω² / 2 - 40 = 113 J."""
+    rate = 6.0
+    falling = PENDULUM.with_(
+        gravity=(0.0, -10.0, 0.0), body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, rate)),)
+    )
+    truth = one_dof(falling, parallelogram(falling))
+    times = np.linspace(0.0, 1.0, 9)
+    q, dq = truth.coordinate(times).T
+    assert 8.5 * dq**2 / 2 - 40 * np.cos(q) == pytest.approx(np.full(9, 8.5 * 18.0 - 40.0))
+    assert truth.poses(times).angular_acceleration[:, 0, 2] == pytest.approx(-40 / 8.5 * np.sin(q))
+    again = truth.coordinate(times[:1] + 20.0)
+    assert 8.5 * again[0, 1] ** 2 / 2 - 40 * np.cos(again[0, 0]) == pytest.approx(8.5 * 18.0 - 40.0)

@@ -1,0 +1,215 @@
+"""Equations that are derived as symbols, and forces on bodies / known equations and the judge's own."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.engines.constraint_equations import frames as body_frames
+from crosscheck.engines.generalised_forces import Forces
+from crosscheck.engines.symbolic.equations import TreeEquations, solved
+from crosscheck.engines.symbolic.frames import Turned, turn
+from crosscheck.engines.symbolic.symbols import NUMBERS
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Driver,
+    Force,
+    Moment,
+    Revolute,
+    Scene,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
+
+G = 9.0
+CART = Body(name="cart", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+ROD = Body(name="rod", mass=3.0, inertia=(0.25, 0.75, 0.5), position=(1.0, 0.0, 0.0))
+RAIL = Translational(name="S", bodies=("ground", "cart"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0))
+PIVOT = Revolute(name="H", bodies=("cart", "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+
+
+def crane(**parts: Any) -> Scene:
+    given = {
+        "name": "s",
+        "body": (CART, ROD),
+        "joint": (RAIL, PIVOT),
+        "duration": 1.0,
+        "gravity": (0.0, -G, 0.0),
+    }
+    return Scene(**{**given, **parts})
+
+
+def expected(angle: float, rate: float, moment: float = 0.0) -> np.ndarray:
+    """x'' and φ'' of a rod of 3 kg at 1 m, with 0.5 kg m², on a cart of 2 kg."""
+    s, c = math.sin(angle), math.cos(angle)
+    mass = np.array([[5.0, -3.0 * s], [-3.0 * s, 3.5]])
+    return np.linalg.solve(mass, [3.0 * c * rate**2, -3.0 * G * c + moment])
+
+
+@pytest.mark.parametrize("moment", [0.0, 7.0])
+def test_a_rod_on_a_cart(moment: float) -> None:
+    load = (Moment(body="rod", moment=(5.0, 6.0, moment)),) if moment else ()
+    equations = TreeEquations(crane(load=load))
+    assert equations.n == 2 and equations.rows == [] and equations.has_own_joints
+    assert equations.start.tolist() == [0.0] * 4
+    found = equations.accelerations([0.7, 0.3], [1.1, 1.2], NUMBERS, 0.5)
+    assert found.astype(float) == pytest.approx(expected(0.3, 1.2, moment))
+    q, v = equations.settled([0.7, 0.3], [1.1, 1.2], NUMBERS)
+    assert q.tolist() == [0.7, 0.3] and v.tolist() == [1.1, 1.2]
+
+
+def test_the_motion_of_links_of_a_rod_on_a_cart() -> None:
+    equations = TreeEquations(crane())
+    motion, closing = equations.link_motion(np.array([0.7, 0.3, 1.1, 1.2]))
+    a, phi = expected(0.3, 1.2)
+    s, c = math.sin(0.3), math.cos(0.3)
+    assert closing == [] and motion.position == pytest.approx(np.array([[0.7, 0, 0], [0.7 + c, s, 0]]))
+    assert motion.velocity == pytest.approx(np.array([[1.1, 0, 0], [1.1 - 1.2 * s, 1.2 * c, 0]]))
+    assert motion.angular_velocity == pytest.approx(np.array([[0, 0, 0], [0, 0, 1.2]]))
+    rod = [a - phi * s - 1.44 * c, phi * c - 1.44 * s, 0.0]
+    assert motion.acceleration == pytest.approx(np.array([[a, 0, 0], rod]))
+    assert motion.angular_acceleration == pytest.approx(np.array([[0, 0, 0], [0, 0, phi]]))
+    assert motion.rotation[1] == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
+
+
+def test_a_slide_on_a_rod_that_turns_has_a_coriolis_acceleration() -> None:
+    """A bead of 2 kg on a rod that turns about z: r'' = r w², and (4.5 + 2 r²) w' = -4 r r' w."""
+    rod = ROD.model_copy(update={"position": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 4.0)})
+    bead = CART.model_copy(update={"name": "bead", "position": (1.0, 0.0, 0.0), "inertia": (0.1, 0.2, 0.5)})
+    pivot = PIVOT.model_copy(update={"bodies": ("ground", "rod")})
+    rail = RAIL.model_copy(update={"bodies": ("rod", "bead"), "anchor": (1.0, 0.0, 0.0)})
+    given = crane(body=(rod, bead), joint=(pivot, rail), gravity=(0.0, 0.0, -G))
+    equations = TreeEquations(given)
+    found = equations.accelerations([0.4, 0.5], [1.2, 0.7], NUMBERS, 0.0).astype(float)
+    r = 1.5
+    assert found == pytest.approx([-4.0 * r * 0.7 * 1.2 / (4.5 + 2.0 * r**2), r * 1.44])
+
+
+@pytest.mark.parametrize(
+    ("parts", "says"),
+    [
+        ({"joint": (RAIL,)}, "its tree has free or ball joints"),
+        ({"driver": (Driver(joint="S"),)}, "it has drivers, or loads other than moments"),
+        (
+            {"load": (Force(body="rod", point=(0.0, 0.0, 0.0), force=(1.0, 0.0, 0.0)),)},
+            "it has drivers, or loads other than moments",
+        ),
+    ],
+)
+def test_scenes_without_derived_equations(parts: dict[str, Any], says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        TreeEquations(crane(**parts))
+
+
+def test_the_solution_of_a_symmetric_system() -> None:
+    matrix = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, 0.25], [0.5, 0.25, 2.0]])
+    right = np.array([1.0, -2.0, 3.0])
+    assert solved(matrix, right).astype(float) == pytest.approx(np.linalg.solve(matrix, right))
+
+
+def test_turns_about_an_axis_add_up() -> None:
+    z = np.array([0.0, 0.0, 1.0])
+    first = Turned(np.eye(3), z, 0.25)
+    for axis, angle in ((z, 0.75), (-z, -0.25)):
+        again = first.further(axis, 0.5)
+        assert again is not None and again.angle == angle and again.axis is z
+    assert first.further(np.array([0.0, 0.6, 0.8]), 0.5) is None
+    axis = np.array([0.6, 0.0, 0.8])
+    wanted = rotations.to_matrix(rotations.from_vector(0.7 * axis))
+    assert turn(axis, 0.7, NUMBERS).astype(float) == pytest.approx(wanted)
+
+
+# --- Forces on bodies -------------------------------------------------------------------------------------
+HALF = math.sqrt(0.5)
+TURNED = Body(
+    name="b",
+    mass=2.0,
+    inertia=(1.0, 2.0, 3.0),
+    position=(1.0, 0.0, 0.0),
+    orientation=(HALF, 0.0, 0.0, HALF),
+)
+HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
+
+
+def forces(
+    load: Any, omega: Any = (0.0, 0.0, 0.0), v: Any = (0.0, 0.0, 0.0), angle: float = 0.0
+) -> np.ndarray:
+    """Force (world) and moment (body axes) on a body that is turned by a quarter turn about z."""
+    scene = Scene(
+        name="s", body=(TURNED,), joint=(HINGE,), load=(load,), gravity=(0.0, 0.0, 0.0), duration=1.0
+    )
+    found = Forces(scene)
+    at = body_frames(
+        np.array([[1.0, 0.0, 0.0]]), np.array([TURNED.orientation]), np.array([v]), np.array([omega], float)
+    )
+    return found(at, np.array([omega], float), np.full(len(found.twists), angle))
+
+
+def test_weight_and_gyroscopic_moment() -> None:
+    scene = Scene(name="s", body=(TURNED,), gravity=(0.0, -G, 1.0), duration=1.0)
+    found = Forces(scene)
+    omega = np.array([[1.0, 2.0, 3.0]])
+    at = body_frames(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3)), omega)
+    momentum = np.array([1.0, 4.0, 9.0])
+    wanted = [0.0, -2.0 * G, 2.0, *-np.cross(omega[0], momentum)]
+    assert found(at, omega, np.zeros(0)) == pytest.approx(wanted)
+    assert (
+        np.diag(found.mass).tolist() == [2.0, 2.0, 2.0, 1.0, 2.0, 3.0] and np.count_nonzero(found.mass) == 6
+    )
+    bare = Forces(scene.with_(body=(TURNED.model_copy(update={"mass": None, "inertia": None}),)))
+    assert bare.mass.tolist() == np.eye(6).tolist() and not bare(at, omega * 0, np.zeros(0)).any()
+
+
+def test_moments_and_forces_in_the_axes_of_the_body() -> None:
+    """World x is -y of the body, and world y is x of the body."""
+    assert forces(Moment(body="b", moment=(1.0, 2.0, 3.0))) == pytest.approx([0, 0, 0, 2.0, -1.0, 3.0])
+    pull = Force(body="b", point=(1.0, 2.0, 0.0), force=(5.0, 0.0, 0.0))  # 2 m along world y: -10 N m about z
+    assert forces(pull) == pytest.approx([5.0, 0.0, 0.0, 0.0, 0.0, -10.0])
+
+
+def test_a_spring_pulls_its_ends_together() -> None:
+    """From (1, -3, 0) on the ground to the centre: 3 m long, and its rate is the velocity along y."""
+    spring = Spring(
+        bodies=("ground", "b"),
+        points=((1.0, -3.0, 0.0), (1.0, 0.0, 0.0)),
+        stiffness=4.0,
+        damping=0.5,
+        natural_length=1.0,
+    )
+    assert forces(spring, v=(9.0, 2.0, 9.0)) == pytest.approx([0.0, -(4.0 * 2.0 + 0.5 * 2.0), 0.0, 0, 0, 0])
+    back = spring.model_copy(update={"bodies": ("b", "ground"), "points": spring.points[::-1]})
+    assert forces(back, v=(9.0, 2.0, 9.0)) == pytest.approx([0.0, -9.0, 0.0, 0, 0, 0])
+
+
+@pytest.mark.parametrize(("turns", "angle"), [(0.0, 0.0), (6.0, 2 * math.pi), (-13.0, -4 * math.pi)])
+def test_a_torsion_spring_counts_turns(turns: float, angle: float) -> None:
+    """At its start the joint's angle is 0 up to full turns; the estimate says which."""
+    spring = TorsionSpring(joint="H", stiffness=4.0, damping=0.5, natural_angle=0.25)
+    found = forces(spring, omega=(7.0, 8.0, 3.0), angle=turns)
+    gyroscopic = -np.cross([7.0, 8.0, 3.0], [7.0, 16.0, 9.0])
+    wanted = [0.0, 0.0, -(4.0 * (angle - 0.25) + 0.5 * 3.0)]
+    assert found[3:] - gyroscopic == pytest.approx(wanted, rel=1e-9)
+    assert not found[:3].any()
+
+
+def test_a_spring_between_bodies_acts_on_both() -> None:
+    other = TURNED.model_copy(update={"name": "c", "orientation": (1.0, 0.0, 0.0, 0.0)})
+    joint = Revolute(name="J", bodies=("b", "c"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    ball = Spherical(name="B", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0))
+    spring = TorsionSpring(joint="J", stiffness=4.0, natural_angle=0.25)
+    scene = Scene(
+        name="s", body=(TURNED, other), joint=(ball, joint), load=(spring,), gravity=(0, 0, 0), duration=1.0
+    )
+    found = Forces(scene)
+    poses = np.array([TURNED.orientation, rotations.from_vector(np.array([0.0, 0.0, 0.5]))])
+    omega = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 3.0]])
+    at = body_frames(np.zeros((2, 3)), poses, np.zeros((2, 3)), omega)
+    assert found.angle(at, 0) == pytest.approx(0.5) and found.turning(at) == pytest.approx([2.0])
+    total = found(at, omega, np.array([0.4])).reshape(2, 6)
+    assert total[:, 5] == pytest.approx([1.0, -1.0]) and np.count_nonzero(np.abs(total) > 1e-12) == 2

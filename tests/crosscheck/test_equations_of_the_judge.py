@@ -1,0 +1,497 @@
+"""The judge's equations / residuals, rates, loads and terms written down, or found by differences."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from crosscheck.judge import joint_coordinates, time_functions
+from crosscheck.judge.gauss_motion import accelerations, applied, gauss_motion, kinetic, power
+from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
+from crosscheck.judge.joint_residuals import (
+    acceleration_rows,
+    are_lengths,
+    grounded,
+    joint_frames,
+    position_rows,
+    velocity_rows,
+    with_ground,
+    wrapped,
+)
+from crosscheck.judge.loads import Motion, wrenches
+from crosscheck.judge.terms import CHANGES, PARTS, terms_at, variants
+from crosscheck.judge.terms import accelerations as of_terms
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Cylindrical,
+    Distance,
+    Driver,
+    Fixed,
+    Force,
+    JointForce,
+    Moment,
+    Planar,
+    Revolute,
+    Scene,
+    Sine,
+    SlideSpring,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Translational,
+    Universal,
+)
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+GROUND_B = ("ground", "b")
+UNIT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+def body(name: str = "b", **parts: object) -> Body:
+    given = {"mass": 2.0, "inertia": (0.3, 0.4, 0.5), "position": (0.0, 0.0, 0.0), **parts}
+    return Body(name=name, **given)
+
+
+# --- functions of time ------------------------------------------------------------------------------------
+TABLE = ((0.0, 0.0), (0.3, 0.2), (0.5, -0.1), (0.9, 0.4), (1.4, 0.0))
+LAW = Driver(
+    joint="J",
+    polynomial=(-0.2 * math.sin(0.7), 0.5, -0.3, 0.2),
+    sine=Sine(amplitude=0.2, frequency=3.0, phase=0.7),
+)
+
+
+@pytest.mark.parametrize("derivative", range(5))
+def test_a_polynomial_with_a_sine_and_its_derivatives(derivative):
+    t = np.array([0.0, 0.4, 1.1])
+    smooth = np.polynomial.Polynomial((-0.2 * math.sin(0.7), 0.5, -0.3, 0.2))
+    wave = 0.2 * 3.0**derivative * np.sin(3.0 * t + 0.7 + derivative * math.pi / 2)
+    wanted = (smooth.deriv(derivative) if derivative else smooth)(t) + wave
+    assert time_functions.value(LAW, t, derivative) == pytest.approx(wanted, abs=1e-13)
+
+
+@pytest.mark.parametrize("derivative", range(4))
+@pytest.mark.parametrize("rows", [TABLE, TABLE[:4]])
+def test_a_table_is_joined_by_its_cubic_spline(derivative, rows):
+    """SciPy's spline whose third derivative is continuous at the second row from each end."""
+    law, spline = Driver(joint="J", table=rows), CubicSpline(*zip(*rows, strict=True))
+    t = np.array([0.01, 0.15, 0.3, 0.45, 0.5, 0.7, rows[-1][0] - 0.01])
+    assert time_functions.value(law, t, derivative) == pytest.approx(spline(t, derivative), abs=1e-11)
+    assert time_functions.ends(law) == tuple(time for time, _ in rows[1:-1])
+
+
+def test_ends_of_pieces_and_the_next_one():
+    scene = Scene(
+        name="s",
+        body=(body(),),
+        joint=(Revolute(name="J", bodies=GROUND_B, anchor=(0.0, 0.0, 0.0), axis=Z),),
+        driver=(Driver(joint="J", table=TABLE),),
+        load=(
+            Moment(body="b", moment=X, factor={"polynomial": [1.0, 2.0], "start": 0.4, "stop": 0.8}),
+            Moment(body="b", moment=Y),
+        ),
+    )
+    [_, factor] = time_functions.functions_of(scene)
+    assert time_functions.ends(factor) == (0.4, 0.8)
+    assert [time_functions.next_end(scene, t) for t in (0.0, 0.3, 0.4, 0.5, 0.85)] == [
+        0.3,
+        0.4,
+        0.5,
+        0.8,
+        0.9,
+    ]
+    assert time_functions.next_end(scene, 0.9) == math.inf
+    t = np.array([0.39, 0.4, 0.79, 0.8, 1.0])
+    assert time_functions.value(factor, t) == pytest.approx([0.0, 1.8, 2.58, 0.0, 0.0])
+    assert time_functions.value(factor, 0.8, since=0.4) == pytest.approx(2.6), "the piece before the end"
+    assert time_functions.value(factor, 0.5, derivative=1) == pytest.approx(2.0)
+
+
+# --- joints -----------------------------------------------------------------------------------------------
+ANCHOR = (0.1, -0.2, 0.3)
+JOINTS = {
+    "fixed": Fixed(name="J", bodies=("a", "b"), anchor=ANCHOR),
+    "revolute": Revolute(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.0, 0.6, 0.8)),
+    "universal": Universal(name="J", bodies=("a", "b"), anchor=ANCHOR, axes=(X, Y)),
+    "spherical": Spherical(name="J", bodies=("a", "b"), anchor=ANCHOR),
+    "translational": Translational(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.6, 0.0, 0.8)),
+    "cylindrical": Cylindrical(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.0, -0.6, 0.8)),
+    "planar": Planar(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.8, 0.0, 0.6)),
+    "distance": Distance(name="J", bodies=("a", "b"), anchors=(ANCHOR, (1.0, 0.5, 0.2))),
+}
+
+
+def two_bodies(joint, driver: tuple[Driver, ...] = ()) -> Scene:
+    turned = (0.8, 0.0, 0.6, 0.0)
+    bodies = body("a", position=(0.2, 0.1, -0.3), orientation=turned), body("b", position=(0.9, 0.3, 0.4))
+    return Scene(name="s", body=bodies, joint=(joint,), driver=driver)
+
+
+def motion_of(scene: Scene, t: float) -> tuple[np.ndarray, ...]:
+    """Position, orientation, velocity, spin, acceleration and angular acceleration of two bodies at t, which
+    turn about fixed axes and move on parabolas from their places in the scene."""
+    velocity = np.array([[0.3, -0.5, 0.2], [-0.4, 0.7, 0.9]])
+    second = np.array([[0.6, 0.2, -0.3], [0.5, -0.8, 0.1]])
+    axis = np.array([[0.6, 0.0, 0.8], [0.0, 0.8, -0.6]])
+    rate, growth = np.array([1.3, -0.9]), np.array([0.4, 0.7])
+    start = np.array([b.position for b in scene.body])
+    angle, spin = rate * t + growth * t**2 / 2, rate + growth * t
+    turn = np.concatenate([np.cos(angle / 2)[:, None], np.sin(angle / 2)[:, None] * axis], axis=1)
+    q = rotations.multiply(turn, np.array([b.orientation for b in scene.body]))
+    place = start + velocity * t + second * t**2 / 2
+    return place, q, velocity + second * t, spin[:, None] * axis, second, growth[:, None] * axis
+
+
+def packed(scene: Scene, t: float) -> tuple[np.ndarray, ...]:
+    r, q, *rest = motion_of(scene, t)
+    return *with_ground(r, q), *(grounded(part) for part in rest)
+
+
+def rows_at(scene: Scene, t: float, level: int) -> np.ndarray:
+    [joint], motion = joint_frames(scene), packed(scene, t)
+    kinds = position_rows, velocity_rows, acceleration_rows
+    return kinds[level](joint, np.asarray(t), *motion[: 2 + 2 * level])
+
+
+def slope(function, t: float, h: float = 1e-3) -> np.ndarray:
+    """Derivative by differences of fourth order."""
+    return (8 * (function(t + h) - function(t - h)) - function(t + 2 * h) + function(t - 2 * h)) / (12 * h)
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_acceleration_residuals_are_the_slopes_of_velocity_residuals(name):
+    """For any motion of two bodies, also one that the joint forbids."""
+    scene = two_bodies(JOINTS[name])
+    for t in (0.0, 0.35):
+        found = rows_at(scene, t, 2)
+        assert found == pytest.approx(slope(lambda s: rows_at(scene, s, 1), t), abs=1e-9)
+        assert len(found) == len(are_lengths(joint_frames(scene)[0]))
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_velocity_residuals_are_the_slopes_of_position_residuals_at_closed_joints(name):
+    scene = two_bodies(JOINTS[name])
+    assert rows_at(scene, 0.0, 0) == pytest.approx(0.0 * rows_at(scene, 0.0, 0), abs=1e-15)
+    assert rows_at(scene, 0.0, 1) == pytest.approx(slope(lambda s: rows_at(scene, s, 0), 0.0), abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ["revolute", "translational", "cylindrical"])
+def test_a_driver_adds_a_row_that_its_law_moves(name):
+    law = LAW.model_copy(update={"joint": "J"})
+    plain, driven = two_bodies(JOINTS[name]), two_bodies(JOINTS[name], (law,))
+    for t in (0.0, 0.2):
+        for level in (1, 2):
+            more = rows_at(driven, t, level)
+            assert more[:-1] == pytest.approx(rows_at(plain, t, level), abs=1e-14)
+        assert rows_at(driven, t, 2) == pytest.approx(slope(lambda s: rows_at(driven, s, 1), t), abs=1e-9)
+    assert rows_at(driven, 0.0, 1) == pytest.approx(slope(lambda s: rows_at(driven, s, 0), 0.0), abs=1e-9)
+    assert are_lengths(joint_frames(driven)[0])[-1] == (name == "translational")
+
+
+LENGTHS = {
+    "fixed": [1, 1, 1, 0, 0, 0],
+    "revolute": [1, 1, 1, 0, 0],
+    "universal": [1, 1, 1, 0],
+    "spherical": [1, 1, 1],
+    "translational": [1, 1, 0, 0, 0],
+    "cylindrical": [1, 1, 0, 0],
+    "planar": [1, 0, 0],
+    "distance": [1],
+}
+
+
+@pytest.mark.parametrize("name", JOINTS)
+def test_which_residuals_are_lengths(name):
+    assert are_lengths(joint_frames(two_bodies(JOINTS[name]))[0]).tolist() == [bool(x) for x in LENGTHS[name]]
+
+
+def residual(joint, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
+    """Residuals of a body on the ground, whose anchor is the origin, at a pose."""
+    scene = Scene(name="s", body=(body(),), joint=(joint,), driver=driver)
+    pose = with_ground(np.array([place], dtype=float), np.array([q], dtype=float))
+    return position_rows(joint_frames(scene)[0], np.asarray(t), *pose).tolist()
+
+
+def about(axis, angle: float) -> np.ndarray:
+    return np.concatenate([[math.cos(angle / 2)], math.sin(angle / 2) * np.array(axis)])
+
+
+def test_residuals_of_a_moved_and_turned_body():
+    """The first axis of a frame along z is y, the second -x."""
+    at = {"bodies": GROUND_B, "anchor": (0.0, 0.0, 0.0)}
+    moved = (0.1, 0.2, 0.3)
+    fixed, hinge = Fixed(name="J", **at), Revolute(name="J", axis=Z, **at)
+    assert residual(fixed, moved, about(Y, 0.4)) == pytest.approx([0.2, -0.1, 0.3, 0.4, 0.0, 0.0])
+    assert residual(fixed, moved, -about(X, 0.4))[3:] == pytest.approx([0.0, -0.4, 0.0])
+    assert residual(hinge, moved, about(Z, 2.0)) == pytest.approx([0.2, -0.1, 0.3, 0.0, 0.0])
+    assert residual(hinge, (0, 0, 0), about(Y, 2.0))[3:] == pytest.approx([2.0, 0.0])
+    assert residual(Spherical(name="J", **at), moved, about(X, 1.0)) == pytest.approx([0.2, -0.1, 0.3])
+    rail = Translational(name="J", axis=Z, **at)
+    assert residual(rail, moved, about(Z, 0.3)) == pytest.approx([0.2, -0.1, 0.0, 0.0, 0.3])
+    sleeve = Cylindrical(name="J", axis=Z, **at)
+    assert residual(sleeve, moved, about(X, 0.3)) == pytest.approx([0.2, -0.1, 0.0, -0.3])
+    assert residual(Planar(name="J", axis=Z, **at), moved, about(Y, -0.3)) == pytest.approx([0.3, -0.3, 0.0])
+    cross = Universal(name="J", axes=(X, Y), **at)
+    assert residual(cross, moved, about(Z, 0.3))[3] == pytest.approx(-0.3), "y turns away from x's plane"
+    law = (Driver(joint="J", polynomial=(0.0, 0.5)),)
+    assert residual(hinge, (0, 0, 0), about(Z, 2.0), law, 1.0)[-1] == pytest.approx(1.5)
+    assert residual(hinge, (0, 0, 0), about(Z, 0.3), law, 4 * math.pi)[-1] == pytest.approx(0.3)
+    assert residual(rail, moved, UNIT, law, 1.0)[-1] == pytest.approx(0.3 - 0.5)
+    rod = Distance(name="J", bodies=GROUND_B, anchors=((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)))
+    assert residual(rod, (-2.0, 3.0, 4.0)) == pytest.approx([3.0]), "5 m instead of 2 m"
+
+
+# --- coordinates ------------------------------------------------------------------------------------------
+def rates_at(joint, scene: Scene, t: float) -> np.ndarray:
+    return joint_coordinates.coordinate_rates(joint, *packed(scene, t)[:4])
+
+
+def test_coordinates_of_a_hinge_and_a_rail_and_their_rates():
+    for name in ("revolute", "translational", "cylindrical"):
+        scene = two_bodies(JOINTS[name])
+        [joint] = joint_frames(scene)
+        rates = partial(rates_at, joint, scene)
+        second = joint_coordinates.coordinate_accelerations(joint, *packed(scene, 0.3))
+        assert second == pytest.approx(slope(rates, 0.3), abs=1e-9)
+        row = joint_coordinates.coordinate_jacobian(scene, "J", *motion_of(scene, 0.3)[:2])
+        _, _, v, w, _, _ = motion_of(scene, 0.3)
+        assert row @ np.hstack([v, w]).ravel() == pytest.approx(rates(0.3), abs=1e-14)
+
+
+def test_full_turns_are_counted_by_the_rates():
+    """20 rad/s sampled each 0.2 s: 4 rad a step, more than half a turn."""
+    t = 0.2 * np.arange(6)
+    angle = joint_coordinates.counted(t, wrapped(20 * t), np.full(6, 20.0))
+    assert angle == pytest.approx(20 * t)
+    grown = joint_coordinates.counted(t, wrapped(20 * t**2), 40 * t)
+    assert np.isnan(grown[1:]).all() or grown == pytest.approx(20 * t**2)
+    slow = joint_coordinates.counted(t, wrapped(3 * t**2), 6 * t)
+    assert slow == pytest.approx(3 * t**2), "rates differ by up to 4.8 rad/s in five samples, 0.96 rad a step"
+    doubtful = joint_coordinates.counted(t, 0 * t, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 15.8]))
+    assert np.isnan(doubtful).tolist() == [False, False, False, True, True, True], "15.8 rad/s · 0.2 s > π"
+    sure = joint_coordinates.counted(t, 0 * t, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 15.6]))
+    assert not np.isnan(sure).any()
+    late = joint_coordinates.counted(np.array([0.2]), np.array([0.5]), np.array([15.6]))
+    assert late == pytest.approx([0.5]), "3.1 rad since t = 0 would be half of that by the trapezoidal rule"
+    assert np.isnan(joint_coordinates.counted(np.array([0.2]), np.array([0.5]), np.array([15.8]))).all()
+
+
+# --- loads ------------------------------------------------------------------------------------------------
+def at_state(
+    scene: Scene, *, turn=UNIT, place=None, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), angles=()
+):
+    places = [b.position for b in scene.body] if place is None else [place]
+    count = len(scene.body)
+    return (
+        np.array(places, dtype=float),
+        np.tile(turn, (count, 1)),
+        np.tile(velocity, (count, 1)).astype(float),
+        np.tile(spin, (count, 1)).astype(float),
+        np.array(angles, dtype=float),
+    )
+
+
+def test_gravity_forces_and_moments_of_one_body():
+    """A force at (1, 0, 0) of a body turned by 90° about z acts at (0, 1, 0)."""
+    load = (Force(body="b", point=X, force=(0.0, 0.0, 3.0)), Moment(body="b", moment=(5.0, 6.0, 7.0)))
+    scene = Scene(name="s", body=(body(),), gravity=(0.0, -10.0, 1.0), load=load)
+    found = applied(scene, 0.0, at_state(scene, turn=about(Z, math.pi / 2)))
+    assert found[0] == pytest.approx([0.0, -20.0, 5.0, 8.0, 6.0, 7.0])
+    spinning = applied(scene.with_(load=()), 0.0, at_state(scene, spin=(1.0, 2.0, 3.0)))
+    assert spinning[0] == pytest.approx([0.0, -20.0, 2.0, -0.6, 0.6, -0.2]), "-ω × Jω"
+    state = at_state(scene, velocity=(1.0, 2.0, 3.0), spin=(0.1, 0.2, 0.3))
+    assert power(scene, 0.0, state) == pytest.approx(-40.0 + 15.0 + 0.5 + 0.2 * (6.0 - 3.0) + 2.1)
+    assert kinetic(scene, state) == pytest.approx(14.0 + (0.3 * 0.01 + 0.4 * 0.04 + 0.5 * 0.09) / 2)
+
+
+def test_a_damped_spring_between_two_bodies():
+    """3 m longer at 10 N/m, and shorter by 3 · 0.6 m/s at 2 N s/m: 30 - 3.6 N along (0.6, 0.8)."""
+    first, second = body("a"), body("b", position=(3.0, 4.0, 0.0))
+    spring = Spring(
+        bodies=("a", "b"),
+        points=((0.0, 0.0, 0.0), (3.0, 4.0, 0.0)),
+        stiffness=10.0,
+        damping=2.0,
+        natural_length=2.0,
+    )
+    scene = Scene(name="s", body=(first, second), load=(spring,))
+    state = list(at_state(scene))
+    state[2] = np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 7.0]])
+    found = applied(scene, 0.0, tuple(state))
+    assert found[:, :2] == pytest.approx(26.4 * np.array([[0.6, 0.8], [-0.6, -0.8]]))
+    assert found[:, 2:] == pytest.approx(np.zeros((2, 4)))
+    away = spring.model_copy(update={"bodies": ("ground", "b"), "points": ((0.0, 0.0, 1.0), (3.0, 5.0, 1.0))})
+    alone = applied(scene.with_(load=(away,)), 0.0, at_state(scene))
+    size = math.hypot(3.0, 5.0)
+    pull = -10.0 * (size - 2.0) * np.array([3.0, 5.0, 0.0]) / size
+    assert alone[0] == pytest.approx(np.zeros(6))
+    assert alone[1] == pytest.approx([*pull, *np.cross([0.0, 1.0, 1.0], pull)])
+
+
+def hinged(load) -> Scene:
+    hinge = Revolute(name="J", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
+    return Scene(name="s", body=(body("a"), body("b")), joint=(hinge,), load=load)
+
+
+def test_a_torsion_spring_about_a_joint_and_about_a_common_axis():
+    """4 N m/rad · (0.7 - 0.2) rad + 0.5 N m s/rad · 3 rad/s = 3.5 N m."""
+    scene = hinged((TorsionSpring(joint="J", stiffness=4.0, damping=0.5, natural_angle=0.2),))
+    still = np.zeros((2, 3))
+    spins = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, 4.0]])
+    pose, twist = (still, np.tile(UNIT, (2, 1))), (still, spins)
+    found = joint_wrenches(scene, 0.0, pose, twist, np.array([0.7]))
+    wanted = np.zeros((2, 6))
+    wanted[:, 5] = 3.5, -3.5
+    assert found == pytest.approx(wanted) and len(turning_loads(scene)) == 1
+    turn = np.array([[0.3, 1.0]])
+    motion = Motion(still[None], np.tile(np.eye(3), (1, 2, 1, 1)), still[None], spins[None], turn)
+    for axis in (Z, (0.0, 0.0, -1.0)):
+        sense = axis[2]
+        along = motion.__class__(
+            motion.position, motion.rotation, motion.velocity, motion.angular_velocity, sense * turn
+        )
+        _, moment = wrenches(scene, along, np.array(axis))
+        assert moment[0, :, 2] == pytest.approx([3.5, -3.5])
+    _, moment = wrenches(scene, motion, np.zeros(3))
+    assert not moment.any(), "without an axis the loads of joints are left out"
+
+
+# --- terms ------------------------------------------------------------------------------------------------
+def pendulum() -> Scene:
+    hinge = Revolute(name="J", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    spring = TorsionSpring(joint="J", stiffness=3.0, damping=0.5, natural_angle=0.1)
+    pull = Force(body="b", point=(1.0, 0.0, 0.0), force=(0.0, 1.5, 0.0))
+    swung = body(
+        position=(1.0, 0.0, 0.0),
+        inertia=((0.3, 0.1, 0.0), (0.1, 0.4, 0.0), (0.0, 0.0, 0.5)),
+        angular_velocity=(0.0, 0.0, 2.0),
+        velocity=(0.0, 2.0, 0.0),
+    )
+    return Scene(
+        name="s", body=(swung,), joint=(hinge,), load=(pull, spring), gravity=(0.0, -9.0, 0.0), duration=0.1
+    )
+
+
+def test_terms_of_a_pendulum():
+    """At the start: 2 kg at 1 m, 2.5 kg m² about the hinge; moments -18 + 1.5 + 0.3 - 1.0 N m."""
+    scene = pendulum()
+    motion = gauss_motion(scene, (0.0, 0.05))
+    terms = terms_at(scene, motion, 0)
+    assert list(terms.forces) == [
+        "gravity",
+        "the gyroscopic moments ω × Jω",
+        "load[0] (force)",
+        "the damping of load[1] (torsion_spring)",
+        "load[1] (torsion_spring)",
+    ]
+    wanted = (
+        [0, -18, 0, 0, 0, 0],
+        [0] * 6,
+        [0, 1.5, 0, 0, 0, 0],
+        [0, 0, 0, 0, 0, -1.0],
+        [0, 0, 0, 0, 0, 0.3],
+    )
+    for force, expected in zip(terms.forces.values(), wanted, strict=True):
+        assert force == pytest.approx(np.array(expected, dtype=float), abs=1e-14)
+    assert np.diag(terms.mass) == pytest.approx([2, 2, 2, 0.3, 0.4, 0.5]) and terms.mass[3, 4] == 0.1
+    assert terms.joints == ("J",) * 5 and terms.rows.shape == (5, 6) and not terms.of_drivers.any()
+    assert np.linalg.norm(terms.of_velocities) == pytest.approx(4.0), "ω² r towards the hinge"
+    found = of_terms(scene, terms)
+    assert found[5] == pytest.approx((-18 + 1.5 + 0.3 - 1.0) / 2.5)
+    assert found[:3] == pytest.approx([-4.0, found[5], 0.0])
+    later = terms_at(scene, motion, 1)
+    angle = 2 * math.atan2(motion.orientation[1, 0, 3], motion.orientation[1, 0, 0])
+    assert later.forces["load[1] (torsion_spring)"][5] == pytest.approx(-3.0 * (angle - 0.1))
+    direct = np.hstack([motion.acceleration[1, 0], motion.angular_acceleration[1, 0]])
+    assert of_terms(scene, later) == pytest.approx(direct, abs=1e-9)
+
+
+def test_variants_of_the_terms_of_a_driven_pendulum():
+    scene = pendulum().with_(driver=(Driver(joint="J", polynomial=(0.0, 2.0, 3.0)),))
+    motion = gauss_motion(scene, (0.0, 0.05))
+    terms = terms_at(scene, motion, 0)
+    found = list(variants(scene, motion, 0))
+    assert [v.part for v in found[:3]] == ["mass matrix"] * 3
+    parts = [PARTS.index(v.part) for v in found]
+    assert {name: parts.count(k) for k, name in enumerate(PARTS)} == {
+        "mass matrix": 3,
+        "gravity": 3,
+        "velocity terms": 6,
+        "loads": 9,
+        "constraints": 1,
+        "drivers": 3,
+    }
+    by_name = {v.change: v.terms for v in found}
+    assert not by_name["gravity left out"].forces["gravity"].any()
+    assert by_name["gravity of opposite sign"].forces["gravity"][1] == 18.0
+    assert by_name["gravity counted twice"].forces["gravity"][1] == -36.0
+    assert by_name["gravity left out"].forces["load[0] (force)"][1] == 1.5
+    doubled = by_name["the velocity part of γ in J a = γ counted twice"]
+    assert doubled.of_velocities == pytest.approx(2 * terms.of_velocities)
+    assert len(by_name["joint 'J' left out"].rows) == len(by_name["joint 'J' left out"].joints) == 0
+    assert terms.of_drivers == pytest.approx([0, 0, 0, 0, 0, 6.0])
+    assert by_name["the drivers' accelerations in γ of opposite sign"].of_drivers[5] == pytest.approx(-6.0)
+    assert CHANGES == {"{} left out": 0.0, "{} of opposite sign": -1.0, "{} counted twice": 2.0}
+    turned = list(variants(scene, motion, 1))
+    own = np.array(scene.body[0].inertia)
+    q = rotations.to_matrix(motion.orientation[1, 0])
+    for variant, inertia in zip(turned, (own, q.T @ own @ q, q @ np.diag(np.diag(own)) @ q.T), strict=False):
+        assert variant.terms.mass[3:, 3:] == pytest.approx(inertia, abs=1e-14), variant.change
+
+
+def test_accelerations_of_bodies_on_joints_and_with_massless_links():
+    """A pendulum of 2 kg and 0.5 kg m² at 1 m falls with 18 / 2.5 rad/s²; a massless link before it changes
+    nothing."""
+    scene = pendulum().with_(load=())
+    state = at_state(scene)
+    assert accelerations(scene, 0.0, state)[0] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)
+    link = body("link", mass=0.0, inertia=(0.0, 0.0, 0.0), position=(0.0, 0.0, 0.0))
+    weld = Fixed(name="W", bodies=("link", "b"), anchor=(0.5, 0.0, 0.0))
+    pivot = Revolute(name="P", bodies=("ground", "link"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    longer = scene.with_(body=(link, scene.body[0]), joint=(pivot, weld))
+    found = accelerations(longer, 0.0, at_state(longer))
+    assert found[1] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)
+
+
+def test_springs_and_forces_along_a_slide():
+    """4 N/m · (0.3 - 0.1) m + 0.5 N s/m · 2 m/s = 1.8 N back, and 3 N times 1 + 2 t at 1 s."""
+    rail = Translational(name="J", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 5.0, 0.0))
+    spring = SlideSpring(joint="J", stiffness=4.0, damping=0.5, natural_displacement=0.1)
+    push = JointForce(joint="J", force=3.0, factor={"polynomial": [1.0, 2.0]})
+    scene = Scene(name="s", body=(body("a"), body("b")), joint=(rail,), load=(spring, push))
+    pose = np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]]), np.tile(UNIT, (2, 1))
+    twist = np.array([[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]), np.zeros((2, 3))
+    found = joint_wrenches(scene, 1.0, pose, twist, np.zeros(0))
+    assert found[:, 1] == pytest.approx([1.8 - 9.0, 9.0 - 1.8]) and not turning_loads(scene)
+    assert found[1, 3:] == pytest.approx(np.zeros(3)), "the force acts at the second body's anchor"
+
+
+def test_an_armature_resists_the_second_derivative_of_its_coordinate():
+    """0.25 kg m² about a hinge adds to 2.5 kg m²: the pendulum falls with 18 / 2.75 rad/s².
+
+    r = 2 m along an axis that turns at ω = 3 rad/s: (r · e)'' = 2 v · e' + r · e'' = 2 · 6 · 3 - 9 · 2 m/s².
+    """
+    scene = pendulum().with_(load=())
+    geared = scene.with_(joint=(scene.joint[0].model_copy(update={"armature": 0.25}),))
+    assert accelerations(geared, 0.0, at_state(geared))[0, 5] == pytest.approx(-18 / 2.75)
+    arm = Revolute(name="H", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=Z)
+    rail = Translational(name="J", bodies=("a", "b"), anchor=(2.0, 0.0, 0.0), axis=X, armature=0.4)
+    turning = Scene(name="s", body=(body("a"), body("b", position=(2.0, 0.0, 0.0))), joint=(arm, rail))
+    spin = np.array([[0.0, 0.0, 3.0]] * 2)
+    velocity = np.array([[0.0, 0.0, 0.0], [0.0, 6.0, 0.0]])
+    pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), np.tile(UNIT, (2, 1))
+    found = joint_coordinates.reflected(turning, *pose, velocity, spin)
+    assert found.joints == ("J",) and found.inertia.tolist() == [0.4]
+    row = np.zeros(12)
+    row[[0, 6]] = -1.0, 1.0
+    assert found.jacobian[0] == pytest.approx(row) and found.drift == pytest.approx([18.0])
+    outer = joint_coordinates.reflected(turning, *pose, velocity * [[0], [0]], spin)
+    assert outer.drift == pytest.approx([-18.0]), "at rest only the axis turns: -ω² r"
+    assert outer.force == pytest.approx(0.4 * 18.0 * row) and outer.mass == pytest.approx(
+        0.4 * np.outer(row, row)
+    )

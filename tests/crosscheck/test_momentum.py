@@ -1,0 +1,139 @@
+"""Momentum, sentences on truths, and stored violations / two free bodies and plain records, by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from crosscheck.conformance import findings
+from crosscheck.conformance.suite import FAIL, Verdict
+from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.momentum import momentum_series
+from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherical, Spring
+from mbref.trajectory import Trajectory
+
+FIRST = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 2.0), position=(0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0))
+SECOND = Body(
+    name="b", mass=4.0, inertia=(3.0, 3.0, 5.0), position=(3.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0)
+)
+PIN = Distance(name="D", bodies=("a", "b"), anchors=((0.0, 0.0, 0.0), (3.0, 0.0, 0.0)))
+SCENE = Scene(name="free", body=(FIRST, SECOND), duration=1.0)
+TIMES = np.array([0.0, 0.5, 1.0])
+
+
+def motion() -> Trajectory:
+    """The first body moves at 3 m/s, the second turns in place at 2 rad/s about z."""
+    place, rate = np.zeros((3, 2, 3)), np.zeros((3, 2, 3))
+    place[:, 0, 0], place[:, 1, 0], rate[:, 0, 0] = 3.0 * TIMES, 3.0, 3.0
+    turn = np.tile([1.0, 0.0, 0.0, 0.0], (3, 2, 1))
+    turn[:, 1] = np.stack([np.cos(TIMES), 0 * TIMES, 0 * TIMES, np.sin(TIMES)], axis=1)
+    spin = np.zeros((3, 2, 3))
+    spin[:, 1, 2] = 2.0
+    return Trajectory("free", "e", "1", "m", {}, TIMES, ("a", "b"), place, turn, rate, spin)
+
+
+def test_drift_of_momentum_over_the_sum_of_momenta():
+    """2 kg at 3 m/s have 6 kg m/s; 0.3 m/s more are a tenth."""
+    run = motion()
+    assert momentum_series(SCENE, run).max() < 1e-15
+    run.velocity[2, 0] += (0.0, 0.0, 0.3)
+    assert momentum_series(SCENE, run)[:2].max() < 1e-15
+    assert momentum_series(SCENE, run)[2] == pytest.approx(0.6 / (2.0 * math.hypot(3.0, 0.3)))
+
+
+def test_drift_of_angular_momentum_over_both_parts():
+    """5 kg m² at 2 rad/s have 10; 0.7 rad/s more are 3.5 of 13.5 and 6 kg m/s times the length."""
+    run = motion()
+    run.angular_velocity[1, 1, 2] += 0.7
+    found = momentum_series(SCENE, run)
+    assert found[1] == pytest.approx(3.5 / (13.5 + 6.0 * scene_length(SCENE))) and found[2] < 1e-15
+
+
+def test_turning_in_place_has_no_momentum_of_its_own():
+    still = SCENE.with_(body=(FIRST.model_copy(update={"velocity": None}), SECOND), joint=(PIN,))
+    run = motion()
+    run.position[:, 0, 0], run.velocity[:] = 0.0, 0.0
+    assert momentum_series(still, run).max() < 1e-15
+    run.angular_velocity[2, 1, 2] += 1.0
+    assert momentum_series(still, run)[2] == pytest.approx(5.0 / 15.0)
+
+
+def test_impulses_of_gravity_forces_and_moments_are_taken_off():
+    """Gravity of 1 m/s² gives each body a velocity t; a moment of 5 N m gives the second one a spin t."""
+    run = motion()
+    fall = np.zeros((3, 2, 3))
+    fall[:, :, 2] = -TIMES[:, None]
+    run = replace(run, velocity=run.velocity + fall, position=run.position + fall * TIMES[:, None, None] / 2)
+    assert momentum_series(SCENE.with_(gravity=(0.0, 0.0, -1.0)), run).max() < 1e-15
+    assert momentum_series(SCENE, run).max() > 0.1
+    pushed = SCENE.with_(gravity=(0.0, 0.0, -1.0), load=(Moment(body="b", moment=(0.0, 0.0, 5.0)),))
+    run.angular_velocity[:, 1, 2] += TIMES
+    assert momentum_series(pushed, run).max() < 1e-15
+    forced = pushed.with_(load=(Force(body="a", force=(0.0, 6.0, 0.0), point=(0.0, 0.0, 0.0)),))
+    run.velocity[:, 0, 1] += 3.0 * TIMES
+    assert momentum_series(forced, run).max() < 1e-15, "angular momentum is not judged with a force"
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"joint": (Spherical(name="S", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0)),)},
+        {
+            "load": (
+                Spring(
+                    bodies=("ground", "a"),
+                    points=((1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+                    stiffness=1.0,
+                    natural_length=1.0,
+                ),
+            )
+        },
+        {"load": (Moment(body="b", moment=(0.0, 0.0, 1.0), factor={"polynomial": [0.0, 1.0]}),)},
+        {"body": tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in (FIRST, SECOND))},
+    ],
+    ids=["joint to the ground", "spring to the ground", "load over time", "no masses"],
+)
+def test_scenes_without_a_balance(change):
+    assert momentum_series(SCENE.with_(**change), motion()) is None
+
+
+def test_nothing_moves():
+    run = motion()
+    run.velocity[:], run.angular_velocity[:] = 0.0, 0.0
+    assert momentum_series(SCENE, run) is None
+
+
+def test_a_stored_violation_has_its_numbers_and_its_command(tmp_path):
+    verdict = Verdict("truth", "free", FAIL, 0.25, 1e-5, "off")
+    path = findings.keep(SCENE, verdict, "my engine", tmp_path / "new")
+    lines = path.read_text().splitlines()
+    assert path.name == "my_engine_truth_free.toml"
+    assert lines[0] == "# my engine: truth/2 fails 0.25, allowed 1e-05 off"
+    assert lines[1] == f"# crosscheck verify my engine --scene {path}" and Scene.from_file(path) == SCENE
+    path = findings.keep(SCENE, Verdict("run", "free", FAIL), "e", tmp_path / "new", "heavy top")
+    lines = path.read_text().splitlines()
+    assert lines[:2] == ["# e: run/1 fails", "# crosscheck verify e --scene 'heavy top'"]
+
+
+def test_a_violation_is_reduced_to_what_it_needs():
+    """The check fails where body b is there and gravity is not zero."""
+    hinge = Revolute(name="H", bodies=("a", "b"), anchor=(1.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    scene = SCENE.with_(
+        joint=(hinge,), gravity=(0.0, 0.0, -9.81), load=(Moment(body="a", moment=(0.0, 0.0, 1.0)),)
+    )
+    tried: list[Scene] = []
+
+    def fails(smaller: Scene) -> bool:
+        tried.append(smaller)
+        return any(body.name == "b" for body in smaller.body) and any(smaller.gravity)
+
+    small = findings.shrunk(scene, fails, 40)
+    assert [body.name for body in small.body] == ["b"] and not small.joint and not small.load
+    assert small.gravity == scene.gravity and small.body[0].angular_velocity is None and small.duration < 0.1
+    assert len(tried) <= 40 and findings.shrunk(scene, lambda smaller: False) is scene
+    tried.clear()
+    findings.shrunk(scene, fails, 3)
+    assert len(tried) == 3

@@ -1,0 +1,363 @@
+"""A scene as a model of MuJoCo, and one simulation of it / numbers worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from crosscheck.engine import Setting
+from crosscheck.engines.mujoco import model as built
+from crosscheck.engines.mujoco.adapter import ENGINE as MUJOCO
+from crosscheck.engines.mujoco.model import compiled
+from crosscheck.engines.mujoco.simulation import Simulation
+from crosscheck.engines.sampling import Failed
+from mbref.scene import (
+    Body,
+    Coupling,
+    Cylindrical,
+    Driver,
+    Fixed,
+    Force,
+    JointForce,
+    JointTorque,
+    Moment,
+    Revolute,
+    Scene,
+    SlideSpring,
+    Spherical,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
+from mbref.trajectory import Outcome
+
+BODY = Body(name="b", mass=4.0, inertia=(1.0, 2.0, 2.5), position=(1.0, 0.0, 0.0))
+HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
+SLIDE = Translational(name="S", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 3.0, 0.0))
+RISING = {"polynomial": (1.0, 2.0)}  # 1 + 2 t
+
+
+def scene(**parts: Any) -> Scene:
+    given = {"name": "s", "body": (BODY,), "joint": (HINGE,), "duration": 2.0, "gravity": (0.0, 0.0, 0.0)}
+    return Scene(**{**given, **parts})
+
+
+def simulation(family: str = "defaults", given: Scene | None = None, **options: Any) -> Simulation:
+    return Simulation(given or scene(), Setting(family, options))
+
+
+# --- Bodies and joints ------------------------------------------------------------------------------------
+def test_a_hinge_carries_its_body() -> None:
+    found = compiled(scene(gravity=(1.0, 2.0, 3.0)))
+    model, data = found.model, mujoco.MjData(found.model)
+    mujoco.mj_forward(model, data)
+    assert model.opt.gravity.tolist() == [1.0, 2.0, 3.0] and found.links.tolist() == [1]
+    assert data.xanchor.tolist() == [[0.0, 0.0, 0.0]] and data.xaxis.tolist() == [[0.0, 0.0, 1.0]]
+    assert (
+        model.jnt_type.tolist() == [int(mujoco.mjtJoint.mjJNT_HINGE)] and model.joint(0).name == "joint 0.0"
+    )
+    assert data.xpos[1].tolist() == [1.0, 0.0, 0.0] and data.M.tolist() == pytest.approx([2.5 + 4.0])
+    assert found.single == (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    assert found.rates.tolist() == [0.0] and found.drivers == [] and found.timed == []
+
+
+def test_masses_are_the_scene_s_and_the_constants_follow() -> None:
+    """The inertia has no eigenvectors along the axes; the body's frame has world axes."""
+    inertia = ((2.0, 0.5, 0.0), (0.5, 3.0, 0.25), (0.0, 0.25, 4.0))
+    turned = BODY.model_copy(update={"inertia": inertia, "orientation": (0.0, 1.0, 0.0, 0.0)})
+    model = compiled(scene(body=(turned,))).model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    axes = data.ximat[1].reshape(3, 3)
+    half_turn = np.diag([1.0, -1.0, -1.0])
+    assert axes @ np.diag(model.body_inertia[1]) @ axes.T == pytest.approx(half_turn @ inertia @ half_turn)
+    assert np.linalg.det(axes) == pytest.approx(1.0) and model.body_mass.tolist() == [0.0, 4.0]
+    assert data.xipos[1].tolist() == [1.0, 0.0, 0.0] and model.body_subtreemass[0] == 4.0
+    assert model.dof_M0.tolist() == pytest.approx([4.0 + 4.0])
+
+
+def test_joints_in_a_row_and_kinds_of_joints() -> None:
+    kinds = mujoco.mjtJoint
+    sleeve = Cylindrical(name="C", bodies=("ground", "b"), anchor=(1.0, 1.0, 0.0), axis=(0.0, 0.0, 2.0))
+    ball = Spherical(name="B", bodies=("b", "c"), anchor=(1.0, 0.0, 1.0))
+    second = BODY.model_copy(update={"name": "c", "position": (1.0, 0.0, 2.0)})
+    third = BODY.model_copy(update={"name": "d", "position": (5.0, 6.0, 7.0)})
+    found = compiled(scene(body=(BODY, second, third), joint=(sleeve, ball)))
+    model, data = found.model, mujoco.MjData(found.model)
+    mujoco.mj_forward(model, data)
+    wanted = [kinds.mjJNT_SLIDE, kinds.mjJNT_HINGE, kinds.mjJNT_BALL, kinds.mjJNT_FREE]
+    assert model.jnt_type.tolist() == [int(kind) for kind in wanted]
+    assert [model.joint(k).name for k in range(4)] == ["joint 0.0", "joint 0.1", "joint 1.0", "free 2"]
+    assert data.xanchor[:3].tolist() == [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]
+    assert data.xpos[1:].tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 2.0], [5.0, 6.0, 7.0]]
+    assert model.nv == 11 and found.links.tolist() == [1, 2, 3]
+
+
+def test_armatures_and_couplings_are_of_the_coordinates() -> None:
+    """The equality is S = 3 H, with the coordinates' joints by name."""
+    geared = HINGE.model_copy(update={"armature": 0.75})
+    other = BODY.model_copy(update={"name": "c"})
+    slide = SLIDE.model_copy(update={"bodies": ("ground", "c")})
+    coupling = Coupling(name="K", joints=("H", "S"), ratio=3.0)
+    model = compiled(scene(body=(BODY, other), joint=(geared, slide), coupling=(coupling,))).model
+    assert model.dof_armature.tolist() == [0.75, 0.0] and model.neq == 1
+    assert model.equality(0).name == built.COUPLING + "K"
+    assert (model.eq_obj1id.tolist(), model.eq_obj2id.tolist()) == ([1], [0])
+    assert model.eq_data[0, :5].tolist() == [0.0, 3.0, 0.0, 0.0, 0.0]
+    assert model.eq_type.tolist() == [int(mujoco.mjtEq.mjEQ_JOINT)]
+
+
+def test_drivers_are_equalities_with_nothing_to_add() -> None:
+    driver = Driver(joint="H", polynomial=(0.0, 2.0))
+    found = compiled(scene(driver=(driver,)))
+    assert found.drivers == [(0, driver)] and found.model.equality(0).name == "driver H"
+    assert found.model.eq_data[0, :5].tolist() == [0.0] * 5
+    assert (found.model.eq_obj1id.tolist(), found.model.eq_obj2id.tolist()) == ([0], [-1])
+    assert found.rates.tolist() == [2.0]
+
+
+def test_closures_join_the_places_of_the_scene() -> None:
+    """A body on a hinge and a ball joint is closed at the ball; on two hinges it is welded to its share."""
+    ball = Spherical(name="B", bodies=("ground", "b"), anchor=(2.0, 3.0, 4.0))
+    found = compiled(scene(joint=(HINGE, ball)))
+    model, data = found.model, mujoco.MjData(found.model)
+    mujoco.mj_forward(model, data)
+    [closure] = found.tree.closures
+    assert model.equality(0).name == "closure 0" and model.neq == 1
+    wanted = (2.0, 3.0, 4.0) if closure.kind == "point" else (1.0, 0.0, 0.0)
+    assert [data.site(f"closure 0.{i}").xpos.tolist() for i in range(2)] == [list(wanted)] * 2
+    kind = mujoco.mjtEq.mjEQ_CONNECT if closure.kind == "point" else mujoco.mjtEq.mjEQ_WELD
+    assert model.eq_type.tolist() == [int(kind)]
+    assert model.eq_objtype.tolist() == [int(mujoco.mjtObj.mjOBJ_SITE)]
+    again = HINGE.model_copy(update={"name": "I", "anchor": (0.0, 0.0, 1.0)})
+    found = compiled(scene(joint=(HINGE, again)))
+    data = mujoco.MjData(found.model)
+    mujoco.mj_forward(found.model, data)
+    assert found.model.eq_type.tolist() == [int(mujoco.mjtEq.mjEQ_WELD)]
+    assert [data.site(f"closure 0.{i}").xpos.tolist() for i in range(2)] == [[1.0, 0.0, 0.0]] * 2
+    assert found.model.body_mass.tolist() == [0.0, 2.0, 2.0]
+
+
+# --- Loads ------------------------------------------------------------------------------------------------
+def test_a_force_acts_at_its_point_and_a_moment_on_the_body() -> None:
+    """A force of 6 N along y at x = 3 m turns the hinge with 18 N m, the moment with 5 N m."""
+    force = Force(body="b", point=(3.0, 0.0, 0.0), force=(0.0, 6.0, 0.0))
+    moment = Moment(body="b", moment=(1.0, 2.0, 5.0))
+    found = compiled(scene(load=(force, moment)))
+    model, data = found.model, mujoco.MjData(found.model)
+    found.apply(data, 0.0)
+    mujoco.mj_forward(model, data)
+    assert data.qacc == pytest.approx([23.0 / 6.5])
+    assert found.applied[model.body("force 0").id].tolist() == [0.0, 6.0, 0.0, 0.0, 0.0, 0.0]
+    assert found.applied[1].tolist() == [0.0, 0.0, 0.0, 1.0, 2.0, 5.0]
+    assert model.body_mass[model.body("force 0").id] == 0.0
+    assert data.xpos[model.body("force 0").id].tolist() == [3.0, 0.0, 0.0]
+
+
+def test_loads_over_time_are_added_at_the_time_of_the_data() -> None:
+    force = Force(body="b", point=(3.0, 0.0, 0.0), force=(0.0, 6.0, 0.0), factor=RISING)
+    torque = JointTorque(joint="H", torque=7.0, factor=RISING)
+    steady = JointTorque(joint="H", torque=0.5)
+    still = Moment(body="b", moment=(1.0, 0.0, 0.0))
+    found = compiled(scene(load=(force, torque, steady, still)))
+    data = mujoco.MjData(found.model)
+    for _ in range(2):  # forces do not add up from call to call
+        data.time = 1.5
+        found.apply(data, 0.0)
+        place = found.model.body("force 0").id
+        assert data.xfrc_applied[place].tolist() == [0.0, 24.0, 0.0, 0.0, 0.0, 0.0]
+        assert data.xfrc_applied[1].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
+        assert data.qfrc_applied.tolist() == [28.5]
+    assert found.pushed.tolist() == [0.5] and found.applied[place].tolist() == [0.0] * 6
+    assert [(number, force.tolist()) for _, number, force in found.timed] == [
+        (place, [0.0, 6.0, 0.0, 0.0, 0.0, 0.0]),
+        (0, 7.0),
+    ]
+
+
+def test_the_piece_of_a_function_is_the_one_that_begins() -> None:
+    torque = JointTorque(joint="H", torque=7.0, factor={"stop": 1.0})
+    found = compiled(scene(load=(torque,)))
+    data = mujoco.MjData(found.model)
+    data.time = 1.0
+    for since, wanted in ((0.5, 7.0), (1.0, 0.0)):
+        found.apply(data, since)
+        assert data.qfrc_applied.tolist() == [wanted]
+
+
+def test_springs_along_a_joint_are_one_spring() -> None:
+    """2 N m/rad at 0.1 rad and 6 N m/rad at 0.5 rad are 8 N m/rad at 0.4 rad."""
+    loads = (
+        TorsionSpring(joint="H", stiffness=2.0, damping=0.25, natural_angle=0.1),
+        TorsionSpring(joint="H", stiffness=0.0, damping=1.0, natural_angle=9.0),
+        TorsionSpring(joint="H", stiffness=6.0, damping=0.5, natural_angle=0.5),
+    )
+    model = compiled(scene(load=loads)).model
+    assert model.jnt_stiffness.tolist() == [8.0] and model.dof_damping.tolist() == [1.75]
+    assert model.qpos_spring.tolist() == pytest.approx([0.4])
+
+
+def test_loads_of_a_sleeve_are_along_its_two_coordinates() -> None:
+    sleeve = Cylindrical(name="C", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    loads = (
+        SlideSpring(joint="C", stiffness=3.0),
+        TorsionSpring(joint="C", stiffness=5.0),
+        JointForce(joint="C", force=7.0),
+        JointTorque(joint="C", torque=11.0),
+    )
+    found = compiled(scene(joint=(sleeve,), load=loads))
+    assert found.model.jnt_stiffness.tolist() == [3.0, 5.0] and found.pushed.tolist() == [7.0, 11.0]
+
+
+def test_a_spring_between_two_points() -> None:
+    spring = Spring(
+        bodies=("ground", "b"),
+        points=((1.0, 0.0, 2.0), (1.0, 0.0, 0.5)),
+        natural_length=0.25,
+        stiffness=8.0,
+        damping=0.75,
+    )
+    model = compiled(scene(load=(spring,))).model
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    assert data.ten_length.tolist() == [1.5] and model.tendon_lengthspring.tolist() == [[0.25, 0.25]]
+    assert model.tendon_stiffness.tolist() == [8.0] and model.tendon_damping.tolist() == [0.75]
+    assert [data.site(f"spring 0.{i}").xpos.tolist() for i in range(2)] == [[1, 0, 2], [1, 0, 0.5]]
+
+
+def test_a_description_has_its_forces_by_joint() -> None:
+    given = scene(load=(JointTorque(joint="H", torque=7.0), TorsionSpring(joint="H", stiffness=1.0)))
+    spec, pushed = built.description(given, compiled(given).tree)
+    assert pushed == [("joint 0.0", 7.0, None)] and spec.body("link 0").mass == 1.0
+
+
+# --- Settings ---------------------------------------------------------------------------------------------
+WELDED = (HINGE, HINGE.model_copy(update={"name": "I", "anchor": (0.0, 0.0, 1.0)}))
+BITS = mujoco.mjtDisableBit
+
+
+def test_a_tuned_model_without_options_is_hard_and_does_not_decay() -> None:
+    found, plain = simulation("tuned", scene(joint=WELDED)), compiled(scene(joint=WELDED)).model
+    assert np.abs(found.model.eq_solref[0]).max() == 0.0
+    assert found.model.body_invweight0 == pytest.approx(1e-7 * plain.body_invweight0)
+    with pytest.raises(ValueError, match="mujoco has no family of settings 'quick'"):
+        simulation("quick")
+
+
+def test_compiled_families_leave_unused_features_out() -> None:
+    found = simulation("forward, compiled", rtol=1e-6, min_step=1e-9)
+    assert found.model.opt.disableflags & BITS.mjDSBL_CONTACT and not hasattr(found, "adaptive")
+    assert not simulation("forward", rtol=1e-6, min_step=1e-9).model.opt.disableflags & BITS.mjDSBL_CONTACT
+
+
+def test_what_the_adapter_serves_and_refuses() -> None:
+    bare = scene(body=(BODY.model_copy(update={"mass": None, "inertia": None}),))
+    assert MUJOCO.refuses(scene()) is None and MUJOCO.refuses(bare) is not None
+    assert (
+        MUJOCO.serves(bare, "tuned")
+        and not MUJOCO.serves(scene(), "quick")
+        and MUJOCO.serves(scene(), "euler")
+    )
+    text = MUJOCO.own_code(scene(), Setting("as in file, finer", {"step": 0.5}))
+    assert text == '<option timestep="0.5"/>'
+    assert MUJOCO.own_code(scene(), Setting("defaults", {"step": 0.5})).startswith(
+        '<option timestep="0.5"><flag'
+    )
+
+
+def test_runs_name_their_engine_and_setting() -> None:
+    found = MUJOCO.run(scene(), np.array([0.0, 0.5]), Setting("euler", {"step": 0.25}))
+    assert (found.engine, found.method, found.settings) == ("mujoco", "euler", {"step": 0.25})
+    assert (
+        found.version == mujoco.__version__ and found.cost.steps == 2 and found.outcome is Outcome.COMPLETED
+    )
+
+
+# --- One run ----------------------------------------------------------------------------------------------
+def test_a_run_begins_with_the_rates_and_loads_of_the_scene() -> None:
+    moving = BODY.model_copy(update={"velocity": (0.0, 3.0, 0.0), "angular_velocity": (0.0, 0.0, 3.0)})
+    loads = (JointTorque(joint="H", torque=7.0), Moment(body="b", moment=(1.0, 0.0, 0.0)))
+    found = simulation(given=scene(body=(moving,), load=loads))
+    assert found.data.qvel == pytest.approx([3.0]) and found.data.qfrc_applied.tolist() == [7.0]
+    assert found.data.xfrc_applied[1].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0] and found.since == 0.0
+
+
+@pytest.mark.parametrize(("family", "rhs"), [("stock", 4), ("euler", 1)])
+def test_fixed_steps_fill_the_interval_and_are_counted(family: str, rhs: int) -> None:
+    """A torque of 6.5 N m accelerates the hinge by 1 rad/s²: at rest, 0.5 s give 0.5 rad/s."""
+    found = simulation(family, scene(load=(JointTorque(joint="H", torque=6.5),)), step=0.15)
+    found.advance(0.0, 0.5)
+    assert (found.counts.steps, found.counts.rhs) == (4, 4 * rhs) and found.data.time == 0.5
+    assert found.data.qvel == pytest.approx([0.5])
+    found.advance(0.5, 0.75)
+    assert found.counts.steps == 6 and found.data.qvel == pytest.approx([0.75])
+
+
+def test_pieces_of_a_function_of_time_are_steps_of_their_own() -> None:
+    """1 rad/s² until 0.25 s, then nothing."""
+    torque = JointTorque(joint="H", torque=6.5, factor={"stop": 0.25})
+    found = simulation("stock", scene(load=(torque,)), step=0.5)
+    with found.installed():
+        found.advance(0.0, 1.0)
+    assert found.data.qvel == pytest.approx([0.25]) and found.data.qpos == pytest.approx([0.03125 + 0.1875])
+    assert found.counts.steps == 3 and found.since == 1.0
+
+
+def test_a_state_that_is_not_finite_ends_the_run() -> None:
+    for name in ("qpos", "qvel"):
+        found = simulation("stock", step=0.5)
+        getattr(found.data, name)[0] = math.nan
+        with pytest.raises(Failed, match=r"infinite or NaN between 0\.25 s and 0\.75 s") as failed:
+            found.advance(0.25, 0.75)
+        assert failed.value.outcome is Outcome.NOT_FINITE and failed.value.t == 0.25
+
+
+def test_callbacks_are_there_only_where_a_function_of_time_acts() -> None:
+    for given, is_there in (
+        (scene(), False),
+        (scene(driver=(Driver(joint="H"),)), True),
+        (scene(load=(JointTorque(joint="H", torque=1.0, factor=RISING),)), True),
+    ):
+        with simulation(given=given).installed():
+            assert (mujoco.get_mjcb_control() is not None) is is_there
+        assert mujoco.get_mjcb_control() is None
+
+
+def test_a_sample_has_poses_velocities_and_reactions_in_world_axes() -> None:
+    """The body turns with 3 rad/s at a quarter turn; the weight is -2 N/kg along z, in MuJoCo upward."""
+    turned = BODY.model_copy(
+        update={
+            "orientation": (0.0, 1.0, 0.0, 0.0),
+            "velocity": (0.0, 3.0, 0.0),
+            "angular_velocity": (0, 0, 3.0),
+        }
+    )
+    found = simulation("tuned", scene(body=(turned,), gravity=(0.0, 0.0, -2.0)))
+    found.data.qpos[0] = math.pi / 2
+    sample = found.sample(0.25)
+    half = math.sqrt(0.5)
+    assert found.since == 0.25 and sample.position == pytest.approx(np.array([[0.0, 1.0, 0.0]]), abs=1e-15)
+    assert sample.orientation == pytest.approx(np.array([[0.0, half, half, 0.0]]), abs=1e-15)
+    assert sample.velocity == pytest.approx(np.array([[-3.0, 0.0, 0.0]]), abs=1e-15)
+    assert sample.angular_velocity == pytest.approx(np.array([[0.0, 0.0, 3.0]]))
+    assert sample.acceleration == pytest.approx(np.array([[0.0, -9.0, 0.0]]), abs=1e-12)
+    assert sample.angular_acceleration == pytest.approx(np.zeros((1, 3)), abs=1e-12)
+    force = sample.reactions["H"][:3]
+    assert force == pytest.approx([0.0, -36.0, 8.0], abs=1e-12)
+
+
+def test_a_body_that_hangs_on_two_hinges_has_a_wrench_of_its_weld() -> None:
+    """The halves of a body of 4 kg in a weightless corner with 10 N on the first half pull at each other."""
+    fixed = Fixed(name="F", bodies=("ground", "b"), anchor=(1.0, 0.0, 0.0))
+    pull = Force(body="b", point=(1.0, 0.0, 0.0), force=(0.0, 10.0, 0.0))
+    found = simulation("tuned", scene(joint=(HINGE, fixed), load=(pull,)), beta=1.0)
+    found.link_motion()
+    wrenches = found.closing()
+    assert len(wrenches) == len(found.compiled.tree.closures) == 1
+    reactions = found.sample(0.0).reactions
+    total = sum(np.array(reactions[name][:3]) for name in ("H", "F"))
+    assert total == pytest.approx([0.0, -10.0, 0.0], abs=1e-5)

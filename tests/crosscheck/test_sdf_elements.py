@@ -1,0 +1,267 @@
+"""SDF files read / one link or joint each, with every number and sentence worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from crosscheck.engines.sdf import reading
+from mbref.formats import Imported, ImportOptions
+from mbref.scene import SceneError
+
+MASS = (
+    "<inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz>"
+    "<ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>"
+)
+LINK = f'<link name="b"><pose>1 2 3 0 0 0</pose>{MASS}</link>'
+GRAVITY = "<gravity>0 0 -9</gravity>"
+
+
+def read(tmp_path: Path, inside: str, gravity: str = GRAVITY, **options: Any) -> Imported:
+    text = f'<sdf version="1.11"><world name="w">{gravity}<model name="m">{inside}</model></world></sdf>'
+    (tmp_path / "m.sdf").write_text(text)
+    return reading.read(tmp_path / "m.sdf", ImportOptions(**options))
+
+
+def hinge(more: str = "", kind: str = "revolute", ends: str = "", name: str = "j", axes: str = "axis") -> str:
+    ends = ends or "<parent>world</parent><child>b</child>"
+    tags = "".join(
+        f"<{a}><xyz>{'1 0 0' if a == 'axis2' else '0 0 1'}</xyz>{more}</{a}>" for a in axes.split()
+    )
+    return f'<joint name="{name}" type="{kind}">{ends}{tags}</joint>'
+
+
+# --- Links ------------------------------------------------------------------------------------------------
+def test_a_link_has_its_mass_and_inertia_at_its_centre(tmp_path: Path) -> None:
+    """The inertial pose moves the centre and turns the moments by a quarter turn about z."""
+    moved = MASS.replace("<inertial>", f"<inertial><pose>0.5 0 0 0 0 {math.pi / 2!r}</pose>")
+    link = f'<link name="b"><pose>1 2 3 0 0 {math.pi / 2!r}</pose>{moved}</link>'
+    [body] = read(tmp_path, link).scene.body
+    half = math.sqrt(0.5)
+    assert (body.name, body.mass) == ("b", 2.0) and body.position == pytest.approx((1.0, 2.5, 3.0))
+    assert body.orientation == pytest.approx((half, 0.0, 0.0, half))
+    assert body.inertia == pytest.approx((2.0, 1.0, 2.5))
+
+
+def test_defaults_of_the_format(tmp_path: Path) -> None:
+    bare = '<link name="b"/><link name="c"><inertial/></link>'
+    bare += '<link name="d"><inertial><inertia/></inertial></link>'
+    found = read(tmp_path, bare, gravity="")
+    assert [(body.mass, body.inertia) for body in found.scene.body] == [(1.0, (1.0, 1.0, 1.0))] * 3
+    assert found.notes == (
+        "link 'b' has no inertial: 1 kg and 1 kg m², the defaults of SDF",
+        "gravity is 9.8 m/s² downwards, the default of SDF",
+    )
+    assert found.scene.gravity == (0.0, 0.0, -9.8) and read(tmp_path, LINK).scene.gravity == (0.0, 0.0, -9.0)
+    assert read(tmp_path, LINK).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "kind", "sentence"),
+    [
+        ("</inertial>", "<fluid_added_mass/></inertial>", "fluid", "the added mass of link 'b' in a fluid"),
+        ("</link>", "<gravity>false</gravity></link>", "gravity-compensation", "link 'b' without weight"),
+        ("</link>", "<gravity>0</gravity></link>", "gravity-compensation", "link 'b' without weight"),
+        ("</link>", "<velocity_decay/></link>", "damping", "velocity_decay of link 'b'"),
+    ],
+)
+def test_parts_of_links_that_change_the_motion(
+    old: str, new: str, kind: str, sentence: str, tmp_path: Path
+) -> None:
+    with pytest.raises(
+        SceneError, match=f"{sentence}: it changes the motion; --without {kind} leaves it out"
+    ):
+        read(tmp_path, LINK.replace(old, new))
+    found = read(tmp_path, LINK.replace(old, new), without=[kind])
+    assert found.left_out == (f"{sentence} (--without {kind})",)
+
+
+@pytest.mark.parametrize("text", ["true", " True ", "1"])
+def test_links_with_weight(text: str, tmp_path: Path) -> None:
+    assert read(tmp_path, LINK.replace("</link>", f"<gravity>{text}</gravity></link>")).left_out == ()
+
+
+@pytest.mark.parametrize(
+    ("inside", "says"),
+    [
+        (LINK.replace("<inertial>", '<inertial auto="true">'), "link 'b': inertial auto='true' is not read"),
+        (LINK.replace("<inertial>", '<inertial auto="1">'), "link 'b': inertial auto='true' is not read"),
+        (LINK.replace("<mass>2", "<mass>0"), "link 'b': mass must be positive, got 0"),
+        (LINK.replace("<mass>2", "<mass>-1"), "link 'b': mass must be positive, got -1"),
+        (LINK + hinge(kind="ballscrew"), "joint 'j': type 'ballscrew' is none of"),
+        (
+            LINK + hinge(ends="<parent>c</parent><child>b</child>"),
+            "joint 'j': the file has no link or frame 'c'",
+        ),
+        (LINK + hinge(ends="<parent>b</parent><child>b</child>"), "joint 'j': both sides are on link 'b'"),
+        (LINK + hinge(kind="universal", axes="axis"), "the axes of a universal joint must be perpendicular"),
+        (LINK + hinge(kind="screw"), r"joint 'j': a screw needs screw_thread_pitch \(m a turn\)"),
+        (LINK + hinge().replace("0 0 1", "0 0 0"), "joint 'j': axis: has no length"),
+        (
+            LINK + hinge('<mimic joint="k"><multiplier>2</multiplier><offset>0.5</offset></mimic>'),
+            "joint 'j': mimic: its offset contradicts the poses of the file",
+        ),
+        (
+            LINK + hinge(kind="gearbox", axes="axis axis2"),
+            "joint 'j': a gearbox needs gearbox_reference_body",
+        ),
+        ("<static>true</static>" + LINK, "has no body that moves"),
+    ],
+)
+def test_faults_of_a_file(inside: str, says: str, tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=says):
+        read(tmp_path, inside)
+
+
+@pytest.mark.parametrize("options", [{"keyframe": "k"}, {"pose": {"j": 1.0}}, {"close": ["a=b"]}])
+def test_options_that_an_sdf_file_does_not_have(options: dict[str, Any], tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="--keyframe, --pose, --close: an SDF file gives the poses"):
+        read(tmp_path, LINK, **options)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("<sdf", "m.sdf: is no XML"),
+        ("<robot><model/></robot>", "m.sdf: has no model"),
+        ("<sdf><world/></sdf>", "m.sdf: has no model"),
+        ("<sdf/>", "m.sdf: has no model"),
+    ],
+)
+def test_files_that_are_no_sdf(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "m.sdf").write_text(text)
+    with pytest.raises(SceneError, match=says):
+        reading.read(tmp_path / "m.sdf", ImportOptions())
+
+
+# --- Joints -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("kind", ["revolute", "prismatic", "ball", "fixed", "universal", "continuous"])
+def test_joints_are_at_the_child_with_their_axes(kind: str, tmp_path: Path) -> None:
+    found = read(tmp_path, LINK + hinge(kind=kind, axes="axis axis2" if kind == "universal" else "axis"))
+    [joint] = found.scene.joint
+    assert joint.bodies == ("ground", "b") and joint.anchor_pair[0] == (1.0, 2.0, 3.0)
+    wanted = {"universal": [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)], "ball": [], "fixed": []}
+    assert [tuple(axis) for axis in joint.directions] == wanted.get(kind, [(0.0, 0.0, 1.0)])
+
+
+def test_axes_are_of_length_one_in_the_frame_that_is_named(tmp_path: Path) -> None:
+    """The link is turned by a quarter turn about x, so that its z axis is the world's -y."""
+    turned = LINK.replace("1 2 3 0 0 0", f"1 2 3 {math.pi / 2!r} 0 0")
+    long = hinge().replace("<xyz>0 0 1", "<xyz>0 0 4")
+    assert read(tmp_path, turned + long).scene.joint[0].directions[0] == pytest.approx(
+        (0.0, -1.0, 0.0), abs=1e-15
+    )
+    own = long.replace("<xyz>", '<xyz expressed_in="__model__">')
+    assert read(tmp_path, turned + own).scene.joint[0].directions[0] == (0.0, 0.0, 1.0)
+    without = hinge(axes="").replace("</joint>", "<axis/></joint>")
+    assert read(tmp_path, turned + without).scene.joint[0].directions[0] == pytest.approx(
+        (0, -1, 0), abs=1e-15
+    )
+
+
+DYNAMICS = (
+    "<dynamics><damping>0.5</damping><friction>0</friction><spring_reference>0.25</spring_reference>"
+    "<spring_stiffness>3</spring_stiffness></dynamics>"
+)
+
+
+def test_springs_of_hinges_and_slides(tmp_path: Path) -> None:
+    [spring] = read(tmp_path, LINK + hinge(DYNAMICS)).scene.load
+    assert (spring.type, spring.joint, spring.stiffness, spring.damping) == ("torsion_spring", "j", 3.0, 0.5)
+    assert spring.natural_angle == 0.25
+    [spring] = read(tmp_path, LINK + hinge(DYNAMICS, "prismatic")).scene.load
+    assert (spring.type, spring.natural_displacement) == ("slide_spring", 0.25)
+    for left in ("damping>0.5", "spring_stiffness>3"):
+        [spring] = read(tmp_path, LINK + hinge(DYNAMICS.replace(left, f"{left.split('>')[0]}>0"))).scene.load
+        assert {spring.stiffness, spring.damping} in ({3.0, 0.0}, {0.5, 0.0})
+    still = DYNAMICS.replace("0.5", "0").replace(">3<", ">0<")
+    assert read(tmp_path, LINK + hinge(still)).scene.load == ()
+
+
+def test_friction_and_springs_of_other_joints_are_parts(tmp_path: Path) -> None:
+    rough = DYNAMICS.replace("<friction>0", "<friction>7")
+    found = read(tmp_path, LINK + hinge(rough), without=["friction"])
+    assert (
+        found.left_out == ("dry friction of joint 'j' (--without friction)",) and len(found.scene.load) == 1
+    )
+    with pytest.raises(SceneError) as refused:
+        read(tmp_path, LINK + hinge(DYNAMICS, "ball"))
+    assert [fault.partition(":")[0] for fault in refused.value.faults] == [
+        "damping of joint 'j'",
+        "springs of joint 'j'",
+    ]
+    damped = DYNAMICS.replace(">3<", ">0<")
+    found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
+    assert found.left_out == ("damping of joint 'j' (--without damping)",)
+
+
+def test_screws_advance_by_their_pitch_in_a_turn(tmp_path: Path) -> None:
+    screw = hinge(kind="screw").replace("</joint>", "<screw_thread_pitch>0.5</screw_thread_pitch></joint>")
+    found = read(tmp_path, LINK + screw).scene
+    [coupling] = found.coupling
+    assert (coupling.name, coupling.joints) == ("j thread", ("j", "j")) and found.joint[
+        0
+    ].type == "cylindrical"
+    assert coupling.ratio == pytest.approx(0.5 / (2 * math.pi))
+
+
+def test_mimic_joints_follow_by_their_multiplier(tmp_path: Path) -> None:
+    other = LINK.replace('"b"', '"c"') + hinge(name="k", ends="<parent>world</parent><child>c</child>")
+    mimic = '<mimic joint="k"><multiplier>2</multiplier><offset>1</offset><reference>0.5</reference></mimic>'
+    [coupling] = read(tmp_path, LINK + other + hinge(mimic)).scene.coupling
+    assert (coupling.name, coupling.joints, coupling.ratio) == ("j mimics k", ("k", "j"), 2.0)
+    [coupling] = read(tmp_path, LINK + other + hinge('<mimic joint="k"/>')).scene.coupling
+    assert coupling.ratio == 1.0
+
+
+@pytest.mark.parametrize(("ratio", "wanted"), [("<gearbox_ratio>3</gearbox_ratio>", -3.0), ("", -1.0)])
+def test_a_gearbox_couples_two_hinges(ratio: str, wanted: float, tmp_path: Path) -> None:
+    other = LINK.replace('"b"', '"c"') + hinge(name="k", ends="<parent>world</parent><child>c</child>")
+    gear = hinge(kind="gearbox", name="g", ends="<parent>b</parent><child>c</child>", axes="axis axis2")
+    gear = gear.replace("1 0 0", "0 0 1").replace(
+        "</joint>", f"{ratio}<gearbox_reference_body>world</gearbox_reference_body></joint>"
+    )
+    [coupling] = read(tmp_path, LINK + other + hinge() + gear).scene.coupling
+    assert (coupling.name, coupling.joints, coupling.ratio) == ("g", ("j", "k"), wanted)
+    zero = (
+        gear.replace("</joint>", "<gearbox_ratio>0</gearbox_ratio></joint>")
+        if not ratio
+        else gear.replace(">3<", ">0<")
+    )
+    with pytest.raises(SceneError, match="joint 'g': gearbox_ratio must not be 0"):
+        read(tmp_path, LINK + other + hinge() + zero)
+
+
+def test_links_that_are_held_or_fixed(tmp_path: Path) -> None:
+    found = read(tmp_path, LINK, hold=["b"]).scene
+    [joint] = found.joint
+    assert (joint.name, joint.type, joint.bodies, joint.anchor) == (
+        "hold b",
+        "fixed",
+        ("ground", "b"),
+        (1, 2, 3),
+    )
+    with pytest.raises(SceneError, match="--hold x: no such link that moves; known: b"):
+        read(tmp_path, LINK, hold=["b", "x"])
+    base = '<link name="base"/><joint name="f" type="fixed"><parent>world</parent><child>base</child></joint>'
+    assert [j.bodies for j in read(tmp_path, LINK + base).scene.joint] == [("ground", "base")]
+    loop = hinge(ends="<parent>world</parent><child>world</child>")
+    assert "joint 'j': both sides are fixed to the ground" in read(tmp_path, LINK + loop).notes
+
+
+def test_parts_without_effect_are_counted(tmp_path: Path) -> None:
+    limits = "<limit><lower>0</lower></limit>"
+    found = read(tmp_path, LINK.replace("</link>", "<light/><light/><sensor/></link>") + hinge(limits))
+    assert found.left_out == ("2 lights", "1 sensor", "1 limit of a joint")
+    assert read(tmp_path, LINK + hinge("<limit><effort>1</effort></limit>")).left_out == ()
+
+
+def test_sdf_is_read_only(tmp_path: Path) -> None:
+    (tmp_path / "m.sdf").write_text(f'<sdf version="1.11"><model name="m">{LINK}</model></sdf>')
+    assert reading.FORMAT.read(tmp_path / "m.sdf", ImportOptions()).scene.name == "m"
+    with pytest.raises(SceneError, match=r"SDF: is read only; export as \.xml"):
+        reading.FORMAT.write(read(tmp_path, LINK).scene)
+    assert reading.FORMAT.reads == (".sdf",) and reading.FORMAT.writes == ()

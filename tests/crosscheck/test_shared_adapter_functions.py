@@ -1,0 +1,361 @@
+"""Parts that adapters share / steps, samples, frames, coordinates and refusals worked out by hand."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.engines import driver_motion, sampling
+from crosscheck.engines.compiler import Compiler, NoLibrary
+from crosscheck.engines.fixed_steps import held_points, steps, unended_piece
+from crosscheck.engines.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
+from crosscheck.engines.joint_coordinates import JointCoordinates
+from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through, step_count
+from crosscheck.engines.spanning_tree import Closure
+from crosscheck.engines.written import Written
+from crosscheck.judge.constraints import scene_length
+from crosscheck.refusals import Owner
+from mbref import rotations
+from mbref.scene import (
+    Body,
+    Driver,
+    Factor,
+    Force,
+    JointTorque,
+    Moment,
+    Revolute,
+    Scene,
+    Sine,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+    Translational,
+)
+from mbref.trajectory import Outcome
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+HALF = math.sqrt(0.5)
+HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
+
+
+def body(name: str = "b", **parts: Any) -> Body:
+    return Body(
+        **{"name": name, "mass": 4.0, "inertia": (1.0, 2.0, 3.0), "position": (1.0, 2.0, 3.0), **parts}
+    )
+
+
+def scene(*bodies: Body, **parts: Any) -> Scene:
+    return Scene(**{"name": "s", "body": bodies or (body(),), "joint": (HINGE,), "duration": 2.0, **parts})
+
+
+# --- frames -----------------------------------------------------------------------------------------------
+def test_vectors_and_matrices():
+    assert unit((0.0, 3.0, -4.0)).tolist() == [0.0, 0.6, -0.8]
+    assert (cross_matrix(np.array([1.0, 2.0, 3.0])) @ [4.0, 5.0, 6.0]).tolist() == [-3.0, 6.0, -3.0]
+
+
+@pytest.mark.parametrize("axis", [X, Y, Z, (1.0, 2.0, 2.0), (-3.0, 0.1, 4.0)])
+def test_a_joint_frame_has_its_axis_last(axis):
+    frame = joint_frame(axis)
+    assert frame[:, 2] == pytest.approx(np.array(axis) / np.linalg.norm(axis))
+    assert frame.T @ frame == pytest.approx(np.eye(3)) and np.linalg.det(frame) == pytest.approx(1.0)
+    least = np.argmin(np.abs(axis))
+    assert frame[least, 0] == pytest.approx(0.0, abs=1e-15), "the first column is across the least component"
+
+
+def test_world_vectors_in_the_axes_of_a_body():
+    """The body is turned by 90° about z: X of the world is -y of the body, Y is x."""
+    turned = scene(body(orientation=(HALF, 0.0, 0.0, HALF)))
+    assert in_body(turned, "b", np.array([X, Y])) == pytest.approx(np.array([[0, -1, 0], [1, 0, 0.0]]))
+    assert point_in_body(turned, "b", (2.0, 2.0, 4.0)) == pytest.approx([0.0, -1.0, 1.0])
+    assert in_body(turned, "ground", np.array([X])).tolist() == [list(X)]
+    assert point_in_body(turned, "ground", (2.0, 2.0, 4.0)).tolist() == [2.0, 2.0, 4.0]
+
+
+# --- steps ------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize(
+    ("t0", "t1", "step", "count"),
+    [
+        (0.0, 1.0, 0.25, 4),
+        (0.0, 1.0, 0.3, 4),
+        (1.0, 2.0, 5.0, 1),
+        (0.0, 0.3, 0.1, 3),
+        (0.0, 1.0, 0.25 - 1e-8, 5),
+    ],
+)
+def test_equal_steps_between_samples(t0, t1, step, count):
+    assert step_count(t0, t1, step) == count
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_the_classical_runge_kutta_method(count):
+    """One step of y' = y multiplies by 1 + h + h²/2 + h³/6 + h⁴/24; a step of y' = 3 t² is exact."""
+    counts, h = Counts(), 0.5 / count
+    found = rk4(lambda t, y: y, lambda t, y: y, np.ones(1), 0.0, 0.5, 0.5 / count, counts)
+    assert found[0] == pytest.approx((1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24) ** count, rel=1e-14)
+    assert (counts.steps, counts.rhs, counts.rejected) == (count, 4 * count, 0)
+    asked: list[float] = []
+    found = rk4(
+        lambda t, y: asked.append(t) or 3 * t**2 + 0 * y, lambda t, y: y, np.ones(1), 1.0, 2.0, 1.0, counts
+    )
+    assert found[0] == pytest.approx(8.0) and asked == [1.0, 1.5, 1.5, 2.0]
+
+
+def test_each_state_is_settled_and_must_be_finite():
+    settled: list[float] = []
+
+    def settle(t: float, y: np.ndarray) -> np.ndarray:
+        settled.append(t)
+        return y + 1.0
+
+    assert rk4(lambda t, y: 0 * y, settle, np.zeros(1), 0.0, 1.0, 0.5, Counts())[0] == 2.0
+    assert settled == [0.5, 1.0]
+    with pytest.raises(Failed, match=r"not finite after the step from 0\.5 s") as caught:
+        rk4(
+            lambda t, y: y + (math.inf if t > 0.5 else 0.0),
+            lambda t, y: y,
+            np.ones(1),
+            0.0,
+            1.0,
+            0.5,
+            Counts(),
+        )
+    assert caught.value.outcome is Outcome.NOT_FINITE and caught.value.t == 0.5
+
+
+def test_steps_of_a_scene():
+    """Angles of 0.15 to 0.0015 rad at 3 rad/s; a run takes at most 250 000 steps."""
+    assert steps(scene(), 3.0) == [0.05, 0.017, 0.005, 0.0017, 0.0005]
+    assert steps(scene(), 3.0, most=400) == [0.05, 0.017, 0.005] and steps(scene(), 3.0, most=1) == [0.05]
+    assert steps(scene(), 3.0, finer=2)[-2:] == [0.00017, 5.6e-05]
+    assert steps(scene(duration=500.0), 3.0) == [0.05, 0.017, 0.005]
+    assert steps(scene(duration=1250.0), 3.0) == [0.05, 0.017, 0.005], "250 000 steps of 5 ms"
+    assert steps(scene(duration=1251.0), 3.0) == [0.05, 0.017]
+    assert steps(scene(duration=1e6), 3.0) == [0.05], "one step is kept in any case"
+
+
+def test_loads_that_change_between_steps():
+    table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
+    smooth = Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0)))
+    switched = Force(body="b", point=X, force=Z, factor=Factor(start=0.5))
+    assert unended_piece(scene(load=(smooth, Moment(body="b", moment=Z)))) is None
+    for load in (switched, Moment(body="b", moment=Z, factor=table)):
+        found = unended_piece(scene(load=(smooth, load)))
+        assert found.owner is Owner.ADAPTER and found.reason.startswith(
+            "load[1] follows a table or is switched"
+        )
+
+
+def test_points_that_close_a_loop():
+    """One of a ball, two at 0.1 of the scene's length from the anchor of a hinge, three of a weld."""
+    given = scene()
+    arm = 0.1 * scene_length(given)
+    place = np.array([1.0, 2.0, 3.0])
+
+    def points(kind: str) -> list[list[float]]:
+        closure = Closure(kind, 0, (0, 1), place)
+        return [list(point - place) for point in held_points(given, closure)]
+
+    assert points("point") == [[0.0, 0.0, 0.0]]
+    assert np.array(points("revolute")) == pytest.approx(np.array([[0, 0, -arm], [0, 0, arm]]))
+    assert np.array(points("weld")) == pytest.approx(arm * np.eye(3))
+
+
+# --- samples ----------------------------------------------------------------------------------------------
+def sampled(t: float, **parts: Any) -> Sample:
+    zero = np.zeros((1, 3))
+    given = {"position": zero + t, "orientation": np.array([[1.0, 0, 0, 0]]), "acceleration": zero}
+    made = {"velocity": zero, "angular_velocity": zero, "angular_acceleration": zero, **given, **parts}
+    return Sample(**made)
+
+
+LABELS = {"engine": "e", "version": "1", "method": "m", "settings": {}}
+
+
+def test_a_run_from_sample_to_sample():
+    moved: list[tuple[float, float]] = []
+    found = run_through(
+        scene(),
+        np.array([0.0, 0.5, 2.0]),
+        lambda t0, t1: moved.append((t0, t1)),
+        lambda t: sampled(t, reactions={"H": np.full(6, t)}),
+        Counts(3, 2, 1),
+        0.25,
+        LABELS,
+    )
+    assert moved == [(0.0, 0.5), (0.5, 2.0)], "nothing is advanced to the start"
+    assert found.outcome is Outcome.COMPLETED and (found.t_end, found.message) == (2.0, "")
+    assert found.position[:, 0, 0].tolist() == [0.0, 0.5, 2.0] and found.bodies == ("b",)
+    assert found.reactions["H"][:, 5].tolist() == [0.0, 0.5, 2.0]
+    cost = found.cost
+    assert (cost.build_seconds, cost.steps, cost.rejected, cost.rhs) == (0.25, 3, 2, 1) and cost.seconds >= 0
+
+
+def test_a_run_that_ends_early_keeps_its_samples():
+    def advance(t0: float, t1: float) -> None:
+        if t1 > 1.0:
+            raise Failed(Outcome.STEP_FAILED, 0.75, "no step")
+
+    times = np.array([0.0, 0.5, 2.0])
+    found = run_through(scene(), times, advance, sampled, Counts(), 0.0, LABELS)
+    assert (found.outcome, found.t_end, found.message) == (Outcome.STEP_FAILED, 0.75, "no step")
+    assert (
+        found.times.tolist() == [0.0, 0.5] and found.position.shape == (2, 1, 3) and found.reactions is None
+    )
+    lost = run_through(
+        scene(), times, lambda *_: None, lambda t: sampled(math.nan if t > 1 else t), Counts(), 0.0, LABELS
+    )
+    assert (lost.outcome, lost.t_end, len(lost.times)) == (Outcome.NOT_FINITE, 0.5, 2)
+    assert lost.message == "the motion is not finite at 2 s"
+
+
+def test_accelerations_that_an_engine_does_not_give():
+    without = run_through(
+        scene(),
+        np.array([0.0]),
+        lambda *_: None,
+        lambda t: sampled(t, acceleration=sampling.UNKNOWN, angular_acceleration=sampling.UNKNOWN),
+        Counts(),
+        0.0,
+        LABELS,
+    )
+    assert without.acceleration is None and without.angular_acceleration is None
+    empty = run_through(scene(), np.zeros(0), lambda *_: None, sampled, Counts(), 0.0, LABELS)
+    assert empty.position.shape == (0, 1, 3) and empty.orientation.shape == (0, 1, 4)
+
+
+def one_ball(in_child: bool, places: tuple[Any, ...] = ()) -> JointCoordinates:
+    none = np.zeros(0, dtype=int)
+    return JointCoordinates(3, 4, none, none, ((0, 0),), places, in_child)
+
+
+@pytest.mark.parametrize("in_child", [True, False])
+def test_rates_of_a_quaternion(in_child):
+    """Half of the product with the angular velocity, in the axes of the child or of the parent."""
+    q, spin = np.array([HALF, HALF, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
+    other = rotations.multiply
+    wanted = other(q, np.array([0.0, *spin])) / 2 if in_child else other(np.array([0.0, *spin]), q) / 2
+    assert one_ball(in_child).rates(3 * q, spin) == pytest.approx(wanted), "of a unit quaternion"
+    moved = one_ball(in_child).moved(q, np.array([0.0, math.pi / 2, 0.0]))
+    turn = np.array([HALF, 0.0, HALF, 0.0])
+    assert moved == pytest.approx(other(q, turn) if in_child else other(turn, q))
+    assert one_ball(in_child).normalised(5 * q) == pytest.approx(q)
+
+
+def test_a_free_link_turns_about_axes_of_the_world():
+    none = np.zeros(0, dtype=int)
+    free = JointCoordinates(6, 7, none, none, ((3, 3),), ((0, 0),), True)
+    q = np.array([1.0, 2.0, 3.0, HALF, HALF, 0.0, 0.0])
+    v = np.array([4.0, 5.0, 6.0, 0.0, 2.0, 0.0])
+    spin = np.array([0.0, 0.0, 2.0, 0.0])
+    assert free.rates(q, v)[:3].tolist() == [4.0, 5.0, 6.0]
+    assert free.rates(q, v)[3:] == pytest.approx(rotations.multiply(spin, q[3:]) / 2)
+    assert free.moved(q, v)[:3].tolist() == [5.0, 7.0, 9.0]
+    line = JointCoordinates(1, 1, np.array([0]), np.array([0]), (), (), False)
+    same = np.array([3.0])
+    assert line.normalised(same) is same and line.moved(same, np.array([0.5])).tolist() == [3.5]
+
+
+# --- drivers ----------------------------------------------------------------------------------------------
+def test_value_rate_and_acceleration_of_a_driver():
+    """1 + 2 t + 3 t² + t³, and 0.5 sin(4 t + 0.3), at 2 s."""
+    wave = Sine(amplitude=0.5, frequency=4.0, phase=0.3)
+    factor = Factor(polynomial=(1.0, 2.0, 3.0, 1.0), sine=wave, start=1.0, stop=3.0)
+    s, c = math.sin(8.3), math.cos(8.3)
+    wanted = (25.0 + 0.5 * s, 26.0 + 2.0 * c, 18.0 - 8.0 * s)
+    assert driver_motion.motion(factor, 2.0) == pytest.approx(wanted)
+    assert driver_motion.motion(factor, 0.999) == driver_motion.motion(factor, 3.0) == (0.0, 0.0, 0.0)
+    assert driver_motion.motion(factor, 3.0, since=2.0)[0] > 0, "the piece before acts until its end"
+    cubic = Driver(joint="H", table=tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0)))
+    assert driver_motion.motion(cubic, 1.5) == pytest.approx((3.375, 6.75, 9.0))
+    assert driver_motion.mean_rate(cubic, 1.0, 0.5) == pytest.approx(4.75)
+    at = driver_motion.moving(cubic)
+    assert at(1.5) is at(1.5) and at(1.0) == pytest.approx((1.0, 3.0, 6.0))
+
+
+@pytest.mark.parametrize(
+    ("parts", "rate"),
+    [
+        ({}, 0.5),
+        ({"driver": (Driver(joint="H", polynomial=(0.0, 0.0, -2.0)),)}, 8.0),
+        ({"driver": (Driver(joint="H", sine=Sine(amplitude=0.01, frequency=-9.0)),)}, 9.0),
+        ({"load": (Spring(bodies=("b", "ground"), points=(X, Y), stiffness=36.0, natural_length=1.0),)}, 3.0),
+        (
+            {
+                "load": (
+                    Spring(
+                        bodies=("b", "ground"), points=(X, Y), stiffness=0.0, damping=8.0, natural_length=1.0
+                    ),
+                )
+            },
+            2.0,
+        ),
+        ({"load": (TorsionSpring(joint="H", stiffness=18.0),)}, 3.0),
+        ({"load": (TorsionSpring(joint="H", stiffness=0.0, damping=8.0),)}, 4.0),
+        ({"load": (SlideSpring(joint="S", stiffness=36.0),)}, 3.0),
+        (
+            {"load": (Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0, frequency=-7.0))),)},
+            7.0,
+        ),
+        ({"load": (JointTorque(joint="H", torque=99.0),)}, 0.5),
+    ],
+)
+def test_the_fastest_rate_that_is_stated(parts, rate):
+    """One over the duration of 2 s; springs act on the least mass, 4 kg, or middle moment, 2 kg m²."""
+    slide = Translational(name="S", bodies=("ground", "c"), anchor=(1.0, 2.0, 3.0), axis=X)
+    given = scene(body(), body("c", mass=5.0, inertia=(9.0, 9.0, 9.0)), joint=(HINGE, slide), **parts)
+    assert driver_motion.stated_rate(given) == pytest.approx(rate)
+    turning = given.with_(body=(body(angular_velocity=(6.0, 0.0, 8.0)), given.body[1]))
+    assert driver_motion.stated_rate(turning) == pytest.approx(10.0)
+
+
+def test_scenes_without_masses_have_a_rate_too():
+    """A driver alone turns the four-bar, with 2 pi times one over its duration at least."""
+    from mbref.scenes import SCENES
+
+    given = SCENES["four_bar"]()
+    assert driver_motion.stated_rate(given) >= 1 / given.duration
+
+
+def test_pieces_of_switched_tables_at_their_ends():
+    """The cubic through 0, 1, 8, 27 starts at 1 s where it is switched on, and is zero before."""
+    rows = tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0))
+    factor = Factor(table=rows, start=1.0, stop=2.5)
+    assert driver_motion.motion(factor, 0.999) == (0.0, 0.0, 0.0)
+    assert driver_motion.motion(factor, 1.0) == pytest.approx((1.0, 3.0, 6.0))
+    assert driver_motion.motion(factor, 2.5) == (0.0, 0.0, 0.0)
+    assert driver_motion.motion(factor, 2.5, since=2.0) == pytest.approx((15.625, 18.75, 15.0))
+    assert driver_motion.motion(factor, 1.0, since=0.5) == (0.0, 0.0, 0.0)
+
+
+# --- compilers and code -----------------------------------------------------------------------------------
+def test_the_compiler_that_is_installed(monkeypatch):
+    compiler = Compiler("C", "CC", ("one", "two"))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("shutil.which", lambda name: None if name == "one" else f"/bin/{name}")
+    assert compiler.path() == "/bin/two"
+    monkeypatch.setenv("CC", "mine")
+    assert compiler.path() == "/bin/mine"
+    monkeypatch.setenv("CC", "one")
+    with pytest.raises(NoLibrary, match=r"no C compiler is installed \(one\)"):
+        compiler.path()
+    monkeypatch.setenv("CC", "")
+    assert compiler.path() == "/bin/two", "an empty variable names none"
+
+
+def test_a_compiler_that_cannot_be_run():
+    with pytest.raises(NoLibrary, match="the C compiler could not be run"):
+        Compiler("C", "CC", ()).run(["/nowhere/compiler"])
+
+
+def test_assignments_become_code():
+    lines: list[str] = []
+    model = Written("model", lines)
+    model.opt.timestep = 0.5
+    model.name = "a"
+    assert lines == ["model.opt.timestep = 0.5", "model.name = 'a'"] and repr(model.opt) == "model.opt"
+    with pytest.raises(AttributeError):
+        _ = model.__length__

@@ -1,0 +1,112 @@
+"""Reactions of joints / wrenches of rows, of couplings and of redundant joints worked out by hand."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.judge import joint_reactions
+from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
+from crosscheck.judge.loads import Motion, wrenches
+from mbref.scene import Body, Coupling, Revolute, Scene, TorsionSpring, Translational
+from mbref.trajectory import Trajectory
+
+O, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def body(name: str, x: float, **parts: Any) -> Body:
+    return Body(name=name, **{"mass": 2.0, "inertia": (1.0, 1.0, 1.0), "position": (x, 0.0, 0.0), **parts})
+
+
+def hinge(name: str, first: str, second: str, x: float = 0.0, z: float = 0.0) -> Revolute:
+    return Revolute(name=name, bodies=(first, second), anchor=(x, 0.0, z), axis=Z)
+
+
+PAIR = Scene(
+    name="pair",
+    body=(body("a", 1.0), body("b", 3.0)),
+    joint=(
+        hinge("A", "ground", "a"),
+        Translational(name="T", bodies=("ground", "b"), anchor=(2.0, 0.0, 0.0), axis=X),
+    ),
+    coupling=(Coupling(name="G", joints=("A", "T"), ratio=0.5, coordinates=("angle", "displacement")),),
+    gravity=O,
+)
+POSE = initial_poses(PAIR)
+
+
+def test_a_coupling_acts_along_both_coordinates():
+    """The unit multiplier of x = θ / 2 is a force of 1 N along x and a moment of -1/2 N m about z."""
+    rows, _ = jacobian(PAIR, 0.0, *POSE)
+    found = {joint.name: wrench for joint, wrench in joint_reactions.of_multipliers(PAIR, rows, *POSE)}
+    assert found["A"].shape == found["T"].shape == (6, 11)
+    assert found["A"][:, -1] == pytest.approx([0, 0, 0, 0, 0, -0.5], abs=1e-14)
+    assert found["T"][:, -1] == pytest.approx([1, 0, 0, 0, 0, 0], abs=1e-14)
+    assert not found["A"][:, 5:10].any() and not found["T"][:, :5].any(), "rows of the other joint"
+    own = found["A"][:, :5]
+    assert np.linalg.matrix_rank(own) == 5 and not own[5].any(), "no moment about the axis"
+
+
+@pytest.mark.parametrize(("bodies", "sign"), [(("ground", "a"), 1.0), (("a", "ground"), -1.0)])
+def test_a_wrench_acts_on_the_second_body_at_its_anchor(bodies, sign):
+    """A row of velocity along y at 2 m and a spin of 5 about z: a force along y, a moment of 5 + 1 N m."""
+    scene = Scene(name="s", body=(body("a", 3.0),), joint=(hinge("A", *bodies, x=2.0),))
+    rows = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 5.0]])
+    found = joint_reactions.on_second(scene, scene.joint[0], rows, *initial_poses(scene))
+    assert found[:, 0] == pytest.approx(sign * np.array([0, 1, 0, 0, 0, 6.0]))
+    along = joint_reactions.along_coordinate(scene, scene.joint[0], "angle", *initial_poses(scene))
+    assert along == pytest.approx([0, 0, 0, 0, 0, 1.0], abs=1e-14)
+
+
+def run(**forces: tuple[float, ...]) -> Trajectory:
+    """Both bodies at rest at three times; joints with the given wrenches."""
+    place, turn = np.stack([POSE[0]] * 3), np.stack([POSE[1]] * 3)
+    still, times = np.zeros((3, 2, 3)), np.array([0.0, 0.5, 1.0])
+    reactions = {name: np.tile(wrench, (3, 1)).astype(float) for name, wrench in forces.items()} or None
+    made = Trajectory("pair", "e", "1", "m", {}, times, ("a", "b"), place, turn, still, still)
+    return made if reactions is None else Trajectory(**{**vars(made), "reactions": reactions})
+
+
+DOOR = PAIR.with_(
+    body=(body("a", 1.0), body("b", 3.0)),
+    joint=(hinge("A", "ground", "a"), hinge("B", "ground", "a", z=2.0), hinge("C", "a", "b", x=2.0)),
+    coupling=(),
+)
+
+
+def test_shared_components_side_by_side():
+    """The hinges of a door share the force along their axis; a run without reactions is left out."""
+    one = run(A=(0, 0, 3, 0, 0, 0), B=(0, 0, 1, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
+    other = run(A=(0, 0, 1, 0, 0, 0), B=(0, 0, 3, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
+    found = joint_reactions.side_by_side(DOOR, {"one": one, "none": run(), "other": other}, 1)
+    assert set(found) == {"A", "B"}, "the reaction of C is unique"
+    assert {label: round(size, 9) for label, size in found["A"].items()} == {"one": 3.0, "other": 1.0}
+    compared = joint_reactions.compare(DOOR, one, other)
+    assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0
+    assert compared.joints["A"].chosen == pytest.approx(2 / 7) and compared.resultant == pytest.approx(0.0)
+
+
+def test_the_least_scale_of_reactions_counts_masses_or_kilograms():
+    bare = [Body(name=b.name, position=b.position) for b in DOOR.body]
+    quiet = run(A=(0,) * 6)
+    least = joint_reactions.LEAST
+    assert joint_reactions.largest_reaction(DOOR, quiet) == pytest.approx(4 * least)
+    assert joint_reactions.largest_reaction(DOOR.with_(body=bare), quiet) == pytest.approx(2 * least)
+    assert joint_reactions.largest_reaction(DOOR, run(A=(0, 3, 4, 0, 0, 0), B=(2, 0, 0, 0, 0, 0))) == 5.0
+    length = scene_length(DOOR)
+    twisted = run(A=(0, 0, 0, 0, 0, 6 * length), B=(0, 0, 8, 6 * length, 0, 0))
+    assert length > 1 and joint_reactions.largest_reaction(DOOR, twisted) == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("kind", [np.float64, np.longdouble])
+def test_a_torsion_spring_has_the_precision_of_the_motion(kind):
+    """4 N m/rad times (1.5 - 0.5 - 0.25) rad, on both bodies."""
+    spring = TorsionSpring(joint="H", stiffness=4.0, natural_angle=0.25)
+    scene = PAIR.with_(joint=(hinge("H", "a", "b"),), coupling=(), load=(spring,))
+    zero = np.zeros((2, 2, 3), kind)
+    turn = np.array([[0.5, 1.5]] * 2, kind)
+    eye = np.tile(np.eye(3, dtype=kind), (2, 2, 1, 1))
+    _, moment = wrenches(scene, Motion(zero, eye, zero, zero, turn), np.array(Z, kind))
+    assert moment.dtype == kind and moment[:, :, 2].astype(float).tolist() == [[3.0, -3.0]] * 2
