@@ -37,18 +37,6 @@ def cells(blocks: list[Block], table: int = 0) -> list[list[str]]:
     return [list(row) for row in [b for b in blocks if isinstance(b, Table)][table].rows]
 
 
-def test_reaction_table_and_differences_put_in(monkeypatch):
-    """Both engines have equal sample times, so that the exact reactions are found once."""
-    group, solved = runs_of("spatial_slider_crank_gravity"), []
-    of_exact = reactions.with_exact_reactions
-    monkeypatch.setattr(reactions, "with_exact_reactions", lambda *a: solved.append(1) or of_exact(*a))
-    rows = cells(reactions.render(group))
-    assert [row[0] for row in rows] == [*(j.name for j in group.scene.joint), "on a body"], rows
-    assert max(float(row[3]) for row in rows[:-1]) == 1e-2, f"1 % put in, shown {rows}"
-    assert {row[1] for row in rows} == {"0"}, f"no redundancy, open dimensions {rows}"
-    assert len(solved) == 1
-
-
 def test_choices_shown_where_joints_are_redundant():
     group = runs_of("five_bar")
     blocks = reactions.render(group)

@@ -44,39 +44,6 @@ def test_checks_of_every_engine_and_their_counts(verified):
     assert rows["closure/1"][1:] == rows[VERDICTS[3].check()][1:] == ("0 of 0", "none")
 
 
-def test_a_violation_has_numbers_cause_and_remedy(verified, monkeypatch):
-    numbers, check = ("2.0e-03", "1.0e-06"), VERDICTS[1].check()
-    [row] = violations(verified).rows
-    assert row == ("MuJoCo", f"{check} (1)", "pendulum", *numbers, conformance.UNEXPLAINED, "–")
-    known = {("mujoco", "truth", "pendulum"): explained.Explanation("It slips.", "Hold it.")}
-    monkeypatch.setattr(conformance, "explanations", lambda: known)
-    assert violations(verified).rows[0][-2:] == ("It slips.", "Hold it.")
-    single = conformance.render(verified)[-2]
-    assert isinstance(single, Table) and single.folded and single.caption.startswith("The 1 violated")
-    assert single.rows == [("MuJoCo", "pendulum", check, *numbers)]
-
-
-def test_a_cause_is_stated_once_for_each_engine(monkeypatch):
-    """Three violations of two checks by one cause, one by another cause, and one of another engine."""
-    found = [("truth", "a", 4e-6), ("truth", "b", 2e-6), ("closure", "b", 5e-6), ("energy", "a", 1.0)]
-    known = {
-        ("mujoco", check, scene): explained.Explanation("It slips.", "Hold it.") for check, scene, _ in found
-    }
-    known["mujoco", "energy", "a"] = explained.Explanation("It leaks.", "Plug it.")
-    known["exudyn", "truth", "a"] = known["mujoco", "truth", "a"]
-    monkeypatch.setattr(conformance, "explanations", lambda: known)
-    records = [
-        Conformance(name, "1.0", [Verdict(c, s, "fail", n, 1e-6) for c, s, n in own]).to_record()
-        for name, own in (("mujoco", found), ("exudyn", found[:1]))
-    ]
-    truth, closure, energy = (Verdict(name, "", "fail").check() for name in ("truth", "closure", "energy"))
-    assert [(*row[:4], row[5]) for row in violations(records).rows] == [
-        ("MuJoCo", f"{closure} (1), {truth} (2)", "b", "5.0e-06", "It slips."),
-        ("MuJoCo", f"{energy} (1)", "a", "1.0e+00", "It leaks."),
-        ("Exudyn", f"{truth} (1)", "a", "4.0e-06", "It slips."),
-    ]
-
-
 def violations(verified) -> Table:
     [found] = [b for b in conformance.render(verified) if isinstance(b, Table) and "Remedy" in b.header]
     return found
@@ -84,33 +51,6 @@ def violations(verified) -> Table:
 
 def test_without_records_there_is_no_section(tmp_path):
     assert conformance.render(stored.verified(tmp_path)) == []
-
-
-def test_methods_have_a_row_each_with_what_they_violate(tmp_path, monkeypatch):
-    (tmp_path / "conformance").mkdir()
-    record = Conformance("mbref", "1.0", VERDICTS, "lm2+none").to_record()
-    (tmp_path / "conformance" / "mbref_lm2.json").write_text(json.dumps(record))
-    known = {("mbref lm2+none", "truth", "pendulum"): explained.Explanation("It drifts.", "Project.")}
-    monkeypatch.setattr(conformance, "explanations", lambda: known)
-    [table] = [
-        b
-        for b in conformance.render(stored.verified(tmp_path))
-        if isinstance(b, Table) and b.header[0] == "Method"
-    ]
-    assert table.rows[0][:5] == ("lm2+none", "1", "1", "1", "1")
-    assert table.rows[0][5:] == (f"{VERDICTS[1].check()} on pendulum", "It drifts. Project.")
-
-
-def test_drawn_mechanisms_have_counts_and_violations_a_cause(tmp_path, monkeypatch):
-    (tmp_path / "conformance").mkdir()
-    tally = Tally(Plan("mujoco", 2))
-    tally.add({"version": "1.0", "verdicts": list(map(record_of, VERDICTS))})
-    (tmp_path / "conformance" / "mujoco_drawn.json").write_text(json.dumps(tally.to_record()))
-    known = {("mujoco", "truth", conformance.ANY_RANDOM): explained.Explanation("It slips.", "Hold it.")}
-    monkeypatch.setattr(conformance, "explanations", lambda: known)
-    _, _, checks, violated, *_ = conformance.render(stored.verified(tmp_path))
-    assert {row[0]: row[2] for row in checks.rows}[VERDICTS[1].check()] == "1 of 2"
-    assert violated.rows[0][2:] == ("1", "pendulum", "2.0e-03", "1.0e-06", "It slips.", "Hold it.")
 
 
 def test_explanations_are_of_engines_and_checks_that_exist():

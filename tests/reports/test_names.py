@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from mbref.files import file_name
 from reports.blocks import Heading, Table
-from reports.render import file_name, html, markdown
+from reports.render import html, markdown
 
 
 def test_plain_names_are_file_names():

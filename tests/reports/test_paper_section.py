@@ -17,7 +17,7 @@ from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs, store
 from crosscheck.paper.cells import CELLS
-from crosscheck.paper.illustration import DISTANCES, GAMMA_ERRORS, illustration
+from crosscheck.paper.illustration import illustration
 from crosscheck.paper.runs import Label, Records
 from crosscheck.study.grid import Case, key
 from mbref.records import append
@@ -29,7 +29,6 @@ from reports.sections import (
     paper,
     paper_cranks,
     paper_methods,
-    paper_misprints,
     paper_sweep,
     paper_teaching,
 )
@@ -147,16 +146,6 @@ def test_every_cell_and_a_row_of_its_table(blocks):
     assert len(marks) == len(CELLS), f"{len(marks)} marked cells of {len(CELLS)}"
 
 
-def test_printed_times_and_later_digits(records):
-    label = Label("I", "MPI (SVD)", "θ₂ = π/2")
-    [cell] = [c for c in CELLS if (c.table, c.row, c.column) == label[:3]]
-    marks = {}
-    for t in (0.037, 0.0376, 0.0385, 0.0395):
-        run = Run({**records[label], "outcome": "VIOLATION", "t_end": t})
-        marks[t] = paper._mark(cell, run)
-    assert list(marks.values()) == ["=", "=", "= within 2 ms:", "≈"], marks
-
-
 def test_tables_and_figures_without_the_studies(records, blocks):
     needed = runs.cases() | runs.timed()
     some = {label: record for label, record in records.items() if label in needed}
@@ -194,12 +183,6 @@ def test_growth_of_a_violation_and_its_exponent(records, power):
     run = Run({**records[label], "times": t.tolist(), "violation": (1e-8 * t**power).tolist()})
     assert paper_teaching.exponent(run) == pytest.approx(power, rel=1e-9)
     assert math.isnan(paper_teaching.exponent(Run({**run.record, "violation": [1e-16] * len(t)})))
-
-
-def test_contradictions_and_the_numbers_of_the_tables():
-    said = {row[1]: row[2] for row in paper_misprints._contradictions()}
-    assert "by 37 to 77 %" in said["partitioning lengthens steps by 30 %"], said
-    assert "17 % more" in said["the costs of Gram–Schmidt and SVD do not differ"], said
 
 
 def test_ratios_of_steps_and_the_paper(blocks):
@@ -247,20 +230,6 @@ def test_digits_of_an_exact_record(records):
     )
     other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0]), "no accelerations, and yet an error"
-
-
-def test_illustration_is_stored_and_its_tables_are_rendered_from_it(blocks, tmp_path, monkeypatch):
-    path = tmp_path / "illustration.jsonl"
-    found = illustration(path)
-    monkeypatch.setattr("crosscheck.paper.illustration._computed", lambda: pytest.fail("computed twice"))
-    assert illustration(path) == found, "the stored record differs from the computed one"
-    [crossings] = tables(blocks, "The fold")
-    assert [row[2] for row in crossings.rows] == ["0", "-π", "0", "-π", "-2π", "0", "-π"], crossings.rows
-    assert {row[3] for row in crossings.rows} == {"17"}, crossings.rows
-    [iterations] = tables(blocks, "Distance")
-    assert len(iterations.rows) == len(DISTANCES), iterations.rows
-    assert [len(row) - 1 for row in iterations.rows] == [len(GAMMA_ERRORS)] * len(DISTANCES)
-    assert iterations.rows[0][1] == str(found["alf_iterations"][0][0]), (iterations.rows[0], found)
 
 
 def test_figures_and_no_simulation(blocks, monkeypatch):

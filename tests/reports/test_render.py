@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import html
-import json
 import re
-import shlex
-import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from synthetic import groups
 
-from crosscheck.cli import collection
-from crosscheck.cli import main as command_line
 from crosscheck.engine import Setting
-from crosscheck.judge.reference.cache import mechanism
 from crosscheck.study import sweep as sweeps
 from crosscheck.study.grid import default_cases, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import render, stored
+from reports import render
 from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
 
@@ -125,84 +118,6 @@ def still(name: str) -> Scene:
 
 def few(scenes, engines) -> sweeps.Sweep:
     return default_cases(scenes[0], engines, None, np.linspace(0, 0.5, 4))
-
-
-@pytest.fixture
-def of_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    _use_fakes(monkeypatch)
-
-
-@pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A quick report of the fake engine; tests that write into it copy it."""
-    out = tmp_path_factory.mktemp("made")
-    with pytest.MonkeyPatch.context() as patch:
-        _use_fakes(patch)
-        assert program.main(["--quick", "--out", str(out)]) == 0
-    return out
-
-
-def _use_fakes(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(collection, "find_engines", lambda names, notice: [FAKE])
-    monkeypatch.setattr(sweeps, "quick", few)
-    monkeypatch.setattr(sweeps, "QUICK_LONG", LONG)
-    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still")])
-
-
-def test_program_and_a_report_that_is_not_run_twice(tmp_path, of_fakes, capsys):
-    out = tmp_path / "report"
-    assert program.main(["--quick", "--out", str(out)]) == 0
-    names = ("records.jsonl", "timings.jsonl", "scenes/still.toml", "truths.jsonl", "motions.jsonl")
-    before = [(out / name).read_text() for name in names]
-    assert "fake plain" in (out / "index.html").read_text()
-    assert len(before[0].splitlines()) == 4, "three runs and the gate"
-    assert "The same mechanism in fake" in (out / "index.html").read_text()
-    assert Scene.from_file(out / "scenes" / "still.toml") == still("still")
-    assert program.main(["--quick", "--out", str(out), "--section", "provenance"]) == 0
-    assert [(out / name).read_text() for name in names] == before, "a stored run was run or timed again"
-    page = (out / "index.html").read_text()
-    assert "Provenance" in page and "Speed against error" not in page
-    assert "written" in capsys.readouterr().err
-
-
-def test_pasted_commands_of_a_page_and_the_same_errors(made, of_fakes, tmp_path, capsys, monkeypatch):
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
-    page = (tmp_path / "index.html").read_text()
-    commands = [html.unescape(c) for c in re.findall(r'<pre class="command">([^<]*)</pre>', page)]
-    [group] = stored.groups(tmp_path)
-    assert len(commands) == len(group.runs) == 3, commands
-    monkeypatch.chdir(tmp_path)
-    errors = {str(run.record["settings"]): run.error for run in group.runs}
-    for line in commands:
-        capsys.readouterr()
-        assert command_line([*shlex.split(line)[1:], "--json"]) == 0, line
-        [again] = json.loads(capsys.readouterr().out)["records"]
-        assert again["metrics"]["error"] == errors.pop(str(again["settings"])), (line, again["metrics"])
-    assert not errors, f"no command for {errors}"
-
-
-def test_rendering_again_and_nothing_is_run(made, tmp_path, of_fakes, capsys, monkeypatch):
-    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
-    first = (tmp_path / "index.html").read_text()
-    monkeypatch.setattr(collection, "comparison", None)
-    assert program.main(["--render", str(tmp_path)]) == 0
-    again = (tmp_path / "index.html").read_text()
-    assert again.count('class="command"') == first.count('class="command"') == 3
-    assert program.main(["--render", str(tmp_path / "none")]) == 2
-    assert "has no records.jsonl and scenes/" in capsys.readouterr().err
-
-
-def test_records_of_a_scene_before_it_was_edited_are_not_rendered(tmp_path, of_fakes, monkeypatch):
-    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still").with_(gravity=(0.0, -1.62, 0.0))])
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
-    monkeypatch.setattr(sweeps, "quick_scenes", lambda: [still("still")])
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 0
-    assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 8, "of two mechanisms"
-    [group] = stored.groups(tmp_path)
-    assert len(group.runs) == 3 and {run.record["mechanism"] for run in group.runs} == {
-        mechanism(group.scene)
-    }
-    assert group.truth["mechanism"] == mechanism(group.scene)
 
 
 def test_short_runs_and_interleaved_times(tmp_path):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,8 +10,8 @@ import pytest
 from crosscheck.cli import collection
 from mbref.scene import Body, Scene
 from reports import __main__ as program
-from reports import mechanisms, sections, stored
 from reports import render as writing
+from reports import sections, stored
 from reports.blocks import Heading
 from reports.sections import NAMES, closed_loops, paper, stability
 
@@ -119,75 +118,12 @@ def test_stored_records_are_rendered_by_section(calls, tmp_path):
     assert not {"comparison", "ladders", "paper"} & calls.keys(), "nothing runs"
 
 
-def test_a_folder_without_records_is_named(calls, tmp_path, capsys, monkeypatch):
-    def missing(folder: Path) -> None:
-        raise FileNotFoundError(f"{folder}: has no records")
-
-    monkeypatch.setattr(stored, "groups", missing)
-    assert program.main(["--render", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == f"{tmp_path}: has no records\n" and "write" not in calls
-
-
-def test_faults_and_an_interrupt_set_the_exit_status(calls, tmp_path, capsys, monkeypatch):
-    def raising(error: BaseException):
-        def comparison(*_: Any) -> None:
-            raise error
-
-        monkeypatch.setattr(collection, "comparison", comparison)
-
-    raising(KeyboardInterrupt())
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 130
-    resumes = "the same command resumes from there"
-    assert capsys.readouterr().err == f"interrupted; the finished runs are in {tmp_path}, {resumes}\n"
-    raising(program.RequestError("no engine", "no scene"))
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == "no engine\nno scene\n" and "write" not in calls
-    raising(OSError(28, "No space left on device", "a file"))
-    assert program.main(["--quick", "--out", str(tmp_path)]) == 2
-    assert capsys.readouterr().err == "a file: No space left on device\n" and "write" not in calls
-    raising(OSError("no file is named"))
-    with pytest.raises(OSError, match="no file is named"):
-        program.main(["--quick", "--out", str(tmp_path)])
-    assert program.main([str(tmp_path / "none.toml"), "--out", str(tmp_path)]) == 2
-    assert "none.toml" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(("asked", "given"), [(["four_bar"], "scenes"), (["--engine", "mbref"], "engines")])
 def test_sections_with_scenes_of_their_own_take_no_others(calls, tmp_path, capsys, asked, given):
     folder = tmp_path / "report"
     assert program.main([*asked, "--section", "paper", "--depth", "whole", "--out", str(folder)]) == 2
     assert f"--section paper: has {given} of its own; leave them out" in capsys.readouterr().err
     assert not folder.exists() and not calls, "something was run"
-
-
-@pytest.mark.parametrize(("depth", "is_whole"), [("quick", False), ("whole", True)])
-def test_section_of_the_paper_prints_its_score(tmp_path, capsys, monkeypatch, depth, is_whole):
-    asked = []
-
-    def found(out, whole, notice):
-        asked.append((out, whole))
-        return collection.Paper({}, {})
-
-    monkeypatch.setattr(collection, "paper", found)
-    monkeypatch.setattr(paper, "score", lambda records: f"{len(records)} cells")
-    monkeypatch.setattr(paper, "render", lambda *_: [Heading("Its tables")])
-    assert program.main(["--section", "paper", "--depth", depth, "--out", str(tmp_path)]) == 0
-    assert asked == [(tmp_path, is_whole)] and capsys.readouterr().out == "0 cells\n"
-    page = (tmp_path / "index.html").read_text()
-    assert "Its tables" in page and f"<title>{program.TITLES['paper',]}</title>" in page
-
-
-def test_animated_picture_of_the_readme(tmp_path, capsys, monkeypatch):
-    made = SimpleNamespace(scene=still("s"), exact="exact", records=[{"scene": "s"}], singular=[0.25])
-    monkeypatch.setattr(program, "moving_picture", lambda: made)
-    monkeypatch.setattr(
-        mechanisms,
-        "compared",
-        lambda scene, exact, runs, singular: f"{scene.name} {exact} {runs[0].scene} {singular}",
-    )
-    assert program.main(["--picture", str(tmp_path / "a.svg")]) == 0
-    assert (tmp_path / "a.svg").read_text() == "s exact s [0.25]"
-    assert capsys.readouterr().err == f"written: {tmp_path / 'a.svg'}\n"
 
 
 def test_a_scene_that_is_no_scene_is_refused_by_its_faults(tmp_path, capsys):

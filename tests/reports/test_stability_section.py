@@ -4,7 +4,6 @@ import math
 
 import pytest
 
-from crosscheck.engine import engine_names
 from crosscheck.judge.truth import closed_form
 from crosscheck.study import stability
 from mbref.records import append
@@ -33,16 +32,6 @@ def test_every_rung_has_an_exact_motion_and_a_place():
         ladder, difficulty = stability.place(scene.name)
         assert stability.scene_name(ladder, difficulty) == scene.name
         assert closed_form(scene) is not None, f"{scene.name} has no closed form"
-
-
-def test_cases_are_mbrefs_methods_and_a_fine_setting_of_the_engines(monkeypatch):
-    first = stability.scenes()[:1]
-    monkeypatch.setattr(stability, "scenes", lambda: first)
-    cases = stability.cases(["pinocchio"])
-    assert [c.setting.family for c in cases] == [*stability.METHODS, stability.FAMILIES["pinocchio"]]
-    for case in cases[:-1]:
-        assert case.setting.options["rtol"] == stability.RTOL
-    assert set(stability.FAMILIES) <= set(engine_names())
 
 
 def test_counts_tell_right_ended_and_false():
