@@ -1,0 +1,140 @@
+"""Tests go through doors: no private names, few patches at listed seams, no stand-ins, clear names."""
+
+from __future__ import annotations
+
+import ast
+import functools
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+from imports import parsed
+
+ROOT = Path(__file__).parents[2]
+PRODUCT = ("mbref", "crosscheck", "reports")
+TESTS = sorted(path for path in (ROOT / "tests").rglob("*.py") if "meta" not in path.parts)
+STAND_INS = ("SimpleNamespace", "Mock", "MagicMock", "__new__")
+MOST_PATCHES = 60
+MOST_RATIO = 0.55  # lines of tests over lines of the product
+VAGUE = ("by_hand", "_parts", "details", "seldom", "rare", "interpreted", "limits_of", "misc")
+# Seams at which tests may patch the product: what a machine, a clock or an outside package does.
+SEAMS = {
+    "crosscheck.engine.installed": "an engine that is not installed",
+    "crosscheck.cli.request.missing_package": "an engine that is not installed",
+    "crosscheck.cli.certifying.importlib.util.find_spec": "a package that is not installed",
+    "reports.__main__.find_spec": "a package that is not installed",
+    "mbref.formats.entry_points": "formats of installed packages",
+    "crosscheck.processes.pool.READY_SECONDS": "a time limit",
+}
+
+
+def name_of(path: Path) -> str:
+    """Return a file's path from the root."""
+    return path.relative_to(ROOT).as_posix()
+
+
+def is_private(name: str) -> bool:
+    """Return whether a name is private; names that also end with an underscore belong to protocols."""
+    return name.startswith("_") and not name.endswith("_")
+
+
+@functools.cache
+def private_names() -> frozenset[str]:
+    """Return the private names of functions, classes, constants and attributes of the product."""
+    found = set()
+    for package in PRODUCT:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(parsed(path)):
+                if isinstance(node, ast.FunctionDef | ast.ClassDef):
+                    found.add(node.name)
+                elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+                    found.add(node.id)
+                elif isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store):
+                    found.add(node.attr)
+    return frozenset(name for name in found if is_private(name))
+
+
+def imported_from_product(path: Path) -> dict[str, str]:
+    """Return local name → dotted name of everything that a file imports from the product."""
+    found = {}
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] in PRODUCT:
+            found |= {alias.asname or alias.name: f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            found |= {
+                alias.asname or alias.name.partition(".")[0]: alias.name
+                for alias in node.names
+                if alias.name.partition(".")[0] in PRODUCT
+            }
+    return found
+
+
+def private_uses(path: Path) -> Iterator[str]:
+    """Yield private names of the product that a test file imports or reads from an object."""
+    own = {node.name for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    for name, full in imported_from_product(path).items():
+        if is_private(full.rpartition(".")[2]):
+            yield name
+    for node in ast.walk(parsed(path)):
+        if isinstance(node, ast.Attribute) and node.attr in private_names() - own:
+            yield node.attr
+
+
+def test_no_private_name_of_the_product():
+    found = {name_of(path): names for path in TESTS if (names := sorted(set(private_uses(path))))}
+    assert not found, found
+
+
+def patches(path: Path) -> Iterator[str]:
+    """Yield the dotted names of the product that a test file replaces by ``monkeypatch``."""
+    product = imported_from_product(path)
+    for node in ast.walk(parsed(path)):
+        if not (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Attribute)
+            and node.func.attr == "setattr"
+        ):
+            continue
+        target = node.args[0] if node.args else None
+        if isinstance(target, ast.Constant) and str(target.value).partition(".")[0] in PRODUCT:
+            yield str(target.value)
+        elif target is not None:
+            root = target
+            while isinstance(root, ast.Attribute):
+                root = root.value
+            if isinstance(root, ast.Name) and root.id in product:
+                last = node.args[1].value if isinstance(node.args[1], ast.Constant) else "?"
+                yield f"{product[root.id]}.{ast.unparse(target).partition('.')[2]}.{last}".replace("..", ".")
+
+
+def test_patches_of_the_product_only_at_seams():
+    found = {name_of(path): list(patches(path)) for path in TESTS}
+    beside = {path: names for path, each in found.items() if (names := [n for n in each if n not in SEAMS])}
+    assert not beside, beside
+    assert sum(map(len, found.values())) <= MOST_PATCHES
+
+
+def test_no_stand_ins_of_objects():
+    """A stand-in of a product's object repeats its fields, and stays as it was when they change."""
+    found: Counter[str] = Counter()
+    for path in TESTS:
+        for node in ast.walk(parsed(path)):
+            name = node.id if isinstance(node, ast.Name) else getattr(node, "attr", "")
+            if name in STAND_INS:
+                found[name_of(path)] += 1
+    assert not found, found
+
+
+def test_file_names_say_behaviours():
+    vague = [name_of(path) for path in TESTS if any(word in path.stem.split("test_")[-1] for word in VAGUE)]
+    assert not vague, vague
+
+
+def lines(folders: tuple[str, ...]) -> int:
+    """Return the number of lines of Python in folders."""
+    return sum(path.read_text().count("\n") for folder in folders for path in (ROOT / folder).rglob("*.py"))
+
+
+def test_tests_are_shorter_than_the_product():
+    ratio = lines(("tests",)) / lines(PRODUCT)
+    assert ratio <= MOST_RATIO, f"{ratio:.2f} lines of tests for a line of the product"
