@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import compileall
 import contextlib
-import ctypes
 import hashlib
 import json
 import os
@@ -33,7 +32,6 @@ OPTIONS = ("-q", "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestAssertRew
 KILLED, SURVIVED, UNREACHED, OUT_OF_TIME = "killed", "survived", "not run by any test", "out of time"
 WAITING = 20.0  # wall time / CPU time, after which a test waits for something that does not come
 HANGS = 3.0  # CPU time / that without the mutant, beyond which a mutant has caused an endless loop
-PR_SET_PDEATHSIG = 1  # of Linux: the fork ends with its parent
 NO_TESTS = pytest.ExitCode.NO_TESTS_COLLECTED
 
 
@@ -68,7 +66,6 @@ class Copy:
             if not path.exists():
                 answer = _forked(self.place, lambda out, file=file: _record(file, out), 20 * self.limit)
                 path.write_text(json.dumps(answer or {"seconds": 0.0, "failed": [file], "lines": {}}))
-                print(f"recorded {file}", flush=True)
             self._reached[file] = found = Recorded(**json.loads(path.read_text()))
             for test in found.failed:
                 print(f"left out, since it fails without a mutant: {test}", flush=True)
@@ -140,8 +137,6 @@ def _forked(place: Path, work: Callable[[Path], None], limit: float) -> dict[str
 def _enter(place: Path, folder: Path, limit: float) -> None:
     """Let this process run the copy: its modules, its folder, caches of its own, no output, a limit."""
     resource.setrlimit(resource.RLIMIT_CPU, (int(limit), int(limit) + 2))
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     null = os.open(os.devnull, os.O_RDWR)
     for stream in range(3):
         os.dup2(null, stream)
