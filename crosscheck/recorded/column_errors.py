@@ -111,29 +111,24 @@ class Compared:
 def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, BSpline]) -> Compared:
     """Return the comparison at times within the rounding ``half`` (k,) of the written times.
 
-    Evenly spaced times stay evenly spaced: only the last one is moved within its rounding. Other times are
-    moved one by one. All columns of a sample are compared at one time. The sum of the parts of errors that
-    exceed their bounds, relative to the bounds, is least. The motion near a sample is a parabola, by the
-    derivatives of the splines ``later``.
+    Evenly spaced times count as exact. Other times are moved one by one. All columns of a sample are compared
+    at one time. The sum of the parts of errors that exceed their bounds, relative to the bounds, is least.
+    The motion near a sample is a parabola, by the derivatives of the splines ``later``.
     """
     times, names = compared.times, list(compared.recorded)
-    if (half <= 8 * np.finfo(float).eps * times[-1]).all() or not names or not times[-1]:
+    even = np.abs(times - np.linspace(times[0], times[-1], len(times))) <= EVEN * half
+    if (half <= 8 * np.finfo(float).eps * times[-1]).all() or not names or even.all():
         return compared
     bound = np.array([compared.allowed(n) for n in names])
     left = np.array([compared.recorded[n] - compared.exact[n] for n in names])
     rate, curve = (np.array([later[n](times, order) for n in names]) for order in (1, 2))
-    is_even = bool((np.abs(times - np.linspace(times[0], times[-1], len(times))) <= EVEN * half).all())
-    parts = times / times[-1] if is_even else np.ones_like(times)
     low, high = np.where(times > half, -half, 0.0), half.copy()
-    if is_even:
-        low, high = low[-1:], high[-1:]
 
     def moved(shift: np.ndarray) -> np.ndarray:
-        return rate * (parts * shift) + curve * (parts * shift) ** 2 / 2
+        return rate * shift + curve * shift**2 / 2
 
     def excess(shift: np.ndarray) -> np.ndarray:
-        found = np.maximum(np.abs(left - moved(shift)) / bound - CLOSE, 0.0).sum(axis=0)
-        return found.sum(keepdims=True) if is_even else found
+        return np.asarray(np.maximum(np.abs(left - moved(shift)) / bound - CLOSE, 0.0).sum(axis=0))
 
     shift = np.zeros_like(high)
     if excess(shift).any():
@@ -143,7 +138,7 @@ def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, BSpline]) 
             low, high = np.where(is_left, low, low + third), np.where(is_left, high - third, high)
         shift = (low + high) / 2
     change = dict(zip(names, moved(shift), strict=True))
-    free = dict(zip(names, np.abs(rate) * (np.abs(parts * shift) if is_even else half), strict=True))
+    free = dict(zip(names, np.abs(rate) * half, strict=True))
     return replace(
         compared,
         exact={n: compared.exact[n] + change[n] for n in names},
