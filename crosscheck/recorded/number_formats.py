@@ -121,7 +121,7 @@ def half_units(table: Mapping[str, Sequence[str]]) -> dict[str, np.ndarray]:
     found = {}
     for name, cells in columns.items():
         kept = cells.keeps_zeros or (cells.is_regular and not table_strips)
-        own = cells.longest if name not in stripped else (0, 0)
+        own = _longest(list(columns.values())) if name == "time" else cells.longest
         shared = (max(longest[0], own[0]), max(longest[1], own[1]))
         places = cells.shown if kept else cells.full(cells.longest if cells.shows_own_format else shared)
         half = 0.5 * 10.0 ** -np.clip(places, -EXACT, EXACT).astype(float)
