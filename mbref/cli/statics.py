@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 
 MOST_STARTS = 10_000
 PUSHING = ("moment", "force", "joint_torque", "joint_force")  # loads that do not change with the pose
-SINGULAR = "at a singular position, where the number of freedoms, stability and reactions are not defined"
-ROUNDED = 1e-9  # part of the largest number below which a number is printed as zero
+AT_SINGULAR_POSITION = (
+    "at a singular position, where the number of freedoms, stability and reactions are not defined"
+)
+PRINTED_AS_ZERO = 1e-9  # part of the largest number below which a number is printed as zero
 LIMITS = "Other equilibria may exist: the search begins at the scene's pose and follows the constraints."
 
 
@@ -127,7 +129,7 @@ def _lines(number: int, each: Equilibrium) -> list[str]:
 
 def _title(number: int, each: Equilibrium) -> str:
     """Return the heading of an equilibrium, or of a steady motion with its rate."""
-    kind = SINGULAR if each.is_singular else each.stability
+    kind = AT_SINGULAR_POSITION if each.is_singular else each.stability
     if each.rate:
         return f"steady motion {number}: {kind}, turns at {each.rate:.9g} rad/s"
     return f"equilibrium {number}: {kind}"
@@ -135,7 +137,7 @@ def _title(number: int, each: Equilibrium) -> str:
 
 def _three(vector: Any, size: float) -> str:
     """Return three numbers, where numbers that are rounding of a size are zero."""
-    return "(" + ", ".join(f"{x if abs(x) > ROUNDED * size else 0.0:.6g}" for x in vector) + ")"
+    return "(" + ", ".join(f"{x if abs(x) > PRINTED_AS_ZERO * size else 0.0:.6g}" for x in vector) + ")"
 
 
 def _record(each: Equilibrium) -> dict[str, Any]:

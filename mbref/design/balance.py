@@ -17,15 +17,15 @@ from mbref.design.linearisation import EPSILON, OffConstraints, Tangent
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism, or rad
 LONGEST_STEP = 0.3  # largest step towards an equilibrium / length of the mechanism, or rad
 MOST_NEWTON_STEPS = 60  # largest number of Newton steps from a start
-SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a Newton step that are tried
+STEP_SHARES = (1.0, 0.5, 0.25, 0.1, 0.02)  # of a Newton step that are tried
 # largest acceleration at an equilibrium / acceleration that the forces on the bodies give without cancelling
 BALANCED = 1e-11
-ROUNDED = 1e-15  # the same for accelerations that are rounding alone
+BALANCE_ROUNDING = 1e-15  # the same for accelerations that are rounding alone
 PLACED = 64.0 * EPSILON  # rounding of a pose / length: stiff springs accelerate by it
 LEAST_GAIN = 0.01  # least relative decrease of the displacement by a whole step, which may be a limited one
 BETTER = 0.9  # largest ratio of displacements of successive refinements
 UNDECIDED = 1e-4  # largest distance that is tried of an equilibrium without stiffness / length, or rad
-SAME = 1e-6  # distance / length, or rad, below which two poses are one
+ONE_POSE = 1e-6  # distance / length, or rad, below which two poses are one
 LINKS = 40  # largest number of steps between two poses of one family
 
 
@@ -39,7 +39,7 @@ class Newton:
         self.sizes = np.linalg.norm(tangent.basis @ self.directions, axis=0)
         forces = np.abs(self.left.T) @ tangent.pushes
         placed = PLACED * self.stiffness / self.sizes
-        self.bound, self.rounding = BALANCED * forces + placed, ROUNDED * forces + placed / 16
+        self.bound, self.rounding = BALANCED * forces + placed, BALANCE_ROUNDING * forces + placed / 16
 
     def parts(self, off: np.ndarray) -> np.ndarray:
         """Return the accelerations (f,) along u of x'' (n,)."""
@@ -82,7 +82,7 @@ class Newton:
         """Return a displacement y (f,) as far as the equilibrium may be from the pose."""
         parts = np.maximum(np.abs(self.parts(self.off)), self.rounding)
         moves = np.minimum(parts / np.maximum(self.stiffness, 1e-300), UNDECIDED / self.sizes)
-        return np.asarray(self.directions @ np.where(moves * self.sizes > SAME**1.5, moves, 0.0))
+        return np.asarray(self.directions @ np.where(moves * self.sizes > ONE_POSE**1.5, moves, 0.0))
 
     @property
     def is_isolated(self) -> bool:
@@ -112,7 +112,7 @@ def balanced(tangent: Tangent, freedoms: int) -> Newton | None:
 def _ahead(here: Newton, freedoms: int) -> Tangent | None:
     """Return the pose after a share of the Newton step that brings the balance nearer."""
     step, level = here.step(), here.level(here.off)
-    for share in SHARES:
+    for share in STEP_SHARES:
         moved = here.tangent.moved(share * step)
         if moved is not None and here.level(moved.off_balance()) < (1 - LEAST_GAIN * share) * level:
             return moved
@@ -142,7 +142,7 @@ def are_one(first: Newton, second: Newton) -> bool:
     for _ in range(LINKS):
         apart = here.to(target)
         distance = float(np.abs(apart).max(initial=0.0))
-        if distance < SAME:
+        if distance < ONE_POSE:
             return True
         if first.is_isolated or not distance < before:
             return False

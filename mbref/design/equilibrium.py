@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mbref import rotations
-from mbref.design.balance import SAME, Newton, are_one, balanced, starts_from
+from mbref.design.balance import ONE_POSE, Newton, are_one, balanced, starts_from
 from mbref.design.joint_angles import slots, spring_angles
 from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.placed import placed_with_springs
@@ -27,7 +27,7 @@ from mbref.scenes import find_scene
 
 STARTS = 24  # number of poses from which an equilibrium is searched
 # smallest singular value / its largest value at the starts, below which a pose is a singular position
-SINGULAR = 1e-5
+SINGULAR_POSE = 1e-5
 # distance, lengths or rad, of random displacements that show the number of freedoms; their number
 ASIDE, TRIALS = 0.02, 4
 # displayed vibration: largest displacement / length of the mechanism, and number of samples
@@ -147,7 +147,9 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
         settled = _settled(tangent, freedoms)
         if settled is not None and not any(_is_known(settled, other) for other in found):
             found.append(settled)
-    return [_equilibrium(each, each.tangent.conditioning < SINGULAR * regular, freedoms) for each in found]
+    return [
+        _equilibrium(each, each.tangent.conditioning < SINGULAR_POSE * regular, freedoms) for each in found
+    ]
 
 
 def _freedoms(first: Tangent) -> int:
@@ -181,7 +183,7 @@ def _settled(tangent: Tangent, freedoms: int) -> Newton | None:
 def _is_known(settled: Newton, other: Newton) -> bool:
     """Return whether two equilibria are one, or of one family."""
     if settled.tangent.freedoms != other.tangent.freedoms:
-        return bool(np.abs(settled.tangent.to(other.tangent)).max() < np.sqrt(SAME))
+        return bool(np.abs(settled.tangent.to(other.tangent)).max() < np.sqrt(ONE_POSE))
     return are_one(other, settled)
 
 

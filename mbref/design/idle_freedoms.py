@@ -18,7 +18,7 @@ from mbref.scene import Scene
 FREE = 1e-9  # singular value of a link's columns of unit rows / largest one, below which it moves alone
 AXIAL = 1e-6  # pitch of a screw, or distance of a joint from its axis / length of the mechanism: rounding
 FEWEST_JOINTS = 2  # a link with fewer joints moves alone as the last of a chain
-MOST_ROWS = 300  # constraint rows; for more, singular values take too long
+MOST_LINKED_ROWS = 300  # constraint rows; for more, singular values take too long
 
 
 def idle_freedoms(scene: Scene) -> list[str]:
@@ -28,7 +28,7 @@ def idle_freedoms(scene: Scene) -> list[str]:
     satisfies all rows of joints, couplings and drivers at the start and at a general pose.
     """
     model = Model(without_armatures(scene))
-    if not 0 < model.m <= MOST_ROWS:
+    if not 0 < model.m <= MOST_LINKED_ROWS:
         return []
     q, general = consistent_start(model).q, general_pose(model)
     found = [

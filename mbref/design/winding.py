@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.design.balance import SAME, STRIDE
+from mbref.design.balance import ONE_POSE, STRIDE
 from mbref.design.joint_angles import angles_at
 from mbref.design.linearisation import Tangent
 from mbref.equations.model import displaced
@@ -30,7 +30,7 @@ def wound(first: Tangent) -> Tangent:
         if moved is None or moved.freedoms != first.freedoms:
             return here
         left = natural - moved.angles[slots]
-        if not np.linalg.norm(left) < (1 - SAME) * np.linalg.norm(twist):
+        if not np.linalg.norm(left) < (1 - ONE_POSE) * np.linalg.norm(twist):
             return here
         here, twist = moved, left
     return here

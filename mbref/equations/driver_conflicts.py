@@ -16,13 +16,18 @@ from mbref.equations.units import unit_rows
 from mbref.linear_algebra.least_norm import least_norm
 from mbref.scene import Scene, SceneError
 
-TIMES = 101  # number of times over the motion at which drivers are compared
-DEPENDENT = 1e-9  # singular value of unit rows / largest one, below which a combination of rows vanishes
-TAKES_PART = 1e-6  # weight of a driver's row in such a combination above which the driver takes part
+COMPARED_TIMES = 101  # number of times over the motion at which drivers are compared
+DEPENDENT_DRIVER = (
+    1e-9  # singular value of unit rows / largest one, below which a combination of rows vanishes
+)
+DRIVER_WEIGHT = 1e-6  # weight of a driver's row in such a combination above which the driver takes part
 # difference of the motions of drivers, lengths of the mechanism or rad, that is no rounding
 CONFLICT = 1e-9
-MOST_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
-STEPS, LAST = 20, 1e-15  # largest number of Newton steps to a pose; change of the last one, lengths or rad
+MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
+POSE_STEPS, LAST_MOVE = (
+    20,
+    1e-15,
+)  # largest number of Newton steps to a pose; change of the last one, lengths or rad
 
 
 class Conflict(NamedTuple):
@@ -56,7 +61,7 @@ def conflict_of_drivers(scene: Scene, until: float | None = None) -> Conflict | 
     if len(scene.driver) < 2:
         return None
     model = Model(scene)
-    if model.m > MOST_ROWS:
+    if model.m > MOST_DRIVER_ROWS:
         return None
     found = _first_conflict(model, scene.duration if until is None else until)
     model.release()
@@ -77,7 +82,7 @@ def _first_conflict(model: Model, until: float) -> Conflict | None:
     if not dropped:
         return None
     kept = np.setdiff1d(np.arange(model.m), list(dropped))
-    for time in np.linspace(0.0, until, TIMES):
+    for time in np.linspace(0.0, until, COMPARED_TIMES):
         q, terms = _posed(model, float(time), q, kept)
         gaps = np.abs(terms.phi) / lengths_of_rows(terms.blocks, model.length)
         if gaps[kept].max(initial=0.0) > CONFLICT:
@@ -122,21 +127,21 @@ def _place(model: Model, joint: str) -> int:
 
 def _combination(rows: np.ndarray, row: np.ndarray) -> np.ndarray | None:
     """Return which rows (k, n) take part in the combination that equals a row (n,); None if none does."""
-    weights = np.linalg.lstsq(rows.T, row, rcond=DEPENDENT)[0]
-    if np.abs(rows.T @ weights - row).max() > DEPENDENT:
+    weights = np.linalg.lstsq(rows.T, row, rcond=DEPENDENT_DRIVER)[0]
+    if np.abs(rows.T @ weights - row).max() > DEPENDENT_DRIVER:
         return None
-    return np.asarray(np.abs(weights) > TAKES_PART)
+    return np.asarray(np.abs(weights) > DRIVER_WEIGHT)
 
 
 def _posed(model: Model, time: float, q: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, Terms]:
     """Return the pose (7 nb,) nearest to q that satisfies the kept rows at a time (s), and its terms."""
     terms = model.terms(time, q)
-    for _ in range(STEPS):
+    for _ in range(POSE_STEPS):
         rows = terms.jacobian[kept] * model.units
         lengths = np.linalg.norm(rows, axis=1)
-        step = least_norm(rows / lengths[:, None], -terms.phi[kept] / lengths, DEPENDENT)
+        step = least_norm(rows / lengths[:, None], -terms.phi[kept] / lengths, DEPENDENT_DRIVER)
         q = displaced(q, model.units * step)
         terms = model.terms(time, q)
-        if np.abs(step).max(initial=0.0) < LAST:
+        if np.abs(step).max(initial=0.0) < LAST_MOVE:
             break
     return q, terms

@@ -30,7 +30,7 @@ REPORTED = 1e-9  # gap, or wrong velocity / largest velocity, from which a corre
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
 # weight of open velocities / weight of given velocities; number of compensating iterations
 OPEN_WEIGHT, REPEATS = 1e-4, 5
-ALONG = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
+ON_BRANCH = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
@@ -167,7 +167,7 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
     """Return the first of velocities (6 nb,) along branches if all satisfy Φ_q v = ν, otherwise the most
     accurate velocities, corrected to rounding."""
     off = [rate_violation(model, q, w) for w in along]
-    best = along[int(np.argmin(off)) if max(off) > ALONG else 0]
+    best = along[int(np.argmin(off)) if max(off) > ON_BRANCH else 0]
     terms = model.terms(0.0, q, best)
     jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
     return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=NEAR_SINGULAR_RANK)[0]
