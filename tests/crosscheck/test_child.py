@@ -70,12 +70,6 @@ def test_late_call_and_its_child(child: Child):
     assert not child.is_alive
 
 
-def test_a_call_on_a_loaded_machine_has_its_cpu_time(child: Child, monkeypatch):
-    child.call(operator.add, (2, 3), 60.0)  # it has started
-    monkeypatch.setattr(child, "_cpu_seconds", lambda: time.monotonic() / 1000)  # others have the cores
-    child.call(time.sleep, (1.5,), 1.0)
-
-
 @pytest.mark.parametrize("in_copy", [False, True])
 def test_a_busy_call_is_late(child: Child, in_copy: bool):
     child.call(operator.add, (2, 3), 60.0)

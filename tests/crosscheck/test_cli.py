@@ -12,20 +12,17 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from crosscheck.cli import certifying, request, tables
+from crosscheck.cli import certifying, tables
 from crosscheck.cli.commands import main
 from crosscheck.cli.parser import parser
-from crosscheck.engine import BUILT_IN, engine
+from crosscheck.engine import engine
 from crosscheck.study import grid
 from crosscheck.study.command import command
 from crosscheck.study.hurried import NOT_STARTED, Hurried
-from crosscheck.study.record_view import PUBLIC, is_judged
-from crosscheck.study.truth_sentences import unknown
+from crosscheck.study.record_view import PUBLIC
 from crosscheck.study.tuning import by_error
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.scenes.four_bar import four_bar_gravity
-from mbref.trajectory import Cost
 
 FAKE = "fake_engines:FAKE"
 COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
@@ -109,17 +106,6 @@ def test_a_scene_without_a_truth_and_why(capsys, tmp_path, monkeypatch):
     for reference_time, times in (("0", 1), ("20", 0)):
         out = run_main(capsys, "run", scene, *asked, "--reference-time", reference_time)[1]
         assert out.count(sentence) == times
-
-
-def test_a_truth_that_ends_before_the_runs():
-    scene = four_bar_gravity(0.3).with_(duration=0.5)
-    known = {"kind": "reference", "reason": "it stops", "until": 0.25}
-    expected = "The motion of four_bar_gravity is known up to t = 0.25 s of 0.5 s (it stops), and errors are"
-    assert unknown(scene, known) == f"{expected} of this part."
-    assert unknown(scene, {**known, "reason": ""}) == ""
-    run = {"outcome": "COMPLETED", "t_end": 0.5, "times": [0.0, 0.25, 0.5]}
-    for until, judged in ((0.25, False), (0.5, True)):
-        assert is_judged({**run, "metrics": {"error": 0.0, "error_until": until}}) is judged
 
 
 def test_json_of_several_scenes_and_a_list_in_the_order_asked(capsys, tmp_path):
@@ -312,20 +298,6 @@ def test_certify_tells_its_progress_and_looks_for_its_folder_first(capsys, tmp_p
         assert f"formulation {name}: 100 of 100" in err and "t = 0.002 s" in err, err
 
 
-def test_the_time_limit_of_tune_is_one_number(capsys):
-    _, out, _ = run_main(capsys, "tune", "--help")
-    assert f"without computing; at most 1e+07; default: {grid.TIME_LIMIT:g} --reference-time" in " ".join(
-        out.split()
-    ), out
-
-
-def test_times_that_end_early_and_the_scene_planned_for_them(still):
-    scene = Scene.from_file(still)
-    assert request.lasting(scene, [0.0, 0.2], None).duration == 0.2, "settings are of the motion asked for"
-    assert request.lasting(scene, [0.0, 0.2], 0.4).duration == 0.4
-    assert request.lasting(scene, None, None) is scene
-
-
 def test_one_option_and_the_run_it_names(capsys, still):
     asked = ("--engine", FAKE, "--setting", "plain", "--option", "seconds=0.125", "--json")
     status, out, err = run_main(capsys, "run", still, *asked)
@@ -409,24 +381,9 @@ def test_an_error_that_no_setting_reaches_or_nothing_tells(more, says):
     assert says in shown.file.getvalue(), shown.file.getvalue()
 
 
-def test_a_motion_without_a_truth_is_told_by_tune(capsys, tmp_path, monkeypatch):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    asked = ("tune", FAKE, two_blocks(tmp_path), "--reference-time", "0")
-    status, out, _ = run_main(capsys, *asked)
-    assert status == 1 and "There is no reference for two: no reference was requested." in out, out
-
-
 def test_versions_of_engines(capsys):
     status, out, _ = run_main(capsys, "--version")
     assert status == 0 and out.startswith("crosscheck ") and "\nmujoco " in out, out
-
-
-def test_every_family_and_option_of_an_engine_is_explained():
-    for name in BUILT_IN:
-        simulator = engine(name)
-        for setting in simulator.settings(SCENES["four_bar_gravity"]().with_(duration=0.01)):
-            assert setting.family in simulator.families, (name, setting)
-            assert set(setting.options) <= set(simulator.options), (name, setting)
 
 
 def test_comparison_and_interleaved_times(capsys, still):
@@ -509,7 +466,3 @@ def test_other_families_are_tried_before_an_engine_is_said_to_complete_no_run(ca
 def test_fewer_than_five_repeats_is_a_fault(capsys, still):
     status, _, err = run_main(capsys, "compare", still, "--engine", FAKE, "--repeats", "2")
     assert status == 2 and "--repeats: must be a whole number from 5 to 1000, got 2" in err, err
-
-
-def test_cost_fields_and_the_trajectory_s():
-    assert set(Cost.__dataclass_fields__) == COST

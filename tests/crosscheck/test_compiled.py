@@ -222,22 +222,6 @@ def test_mujoco_compiled_and_in_python_with_every_joint_and_load() -> None:
     assert worst < 1e-3 * max(abs(force).max() for force in plain.reactions.values()), f"{worst:.1e}"
 
 
-def test_mujoco_compiled_on_a_free_body_and_truth() -> None:
-    pytest.importorskip("mujoco")
-    body = Body(
-        name="stone",
-        mass=2.0,
-        inertia=(0.1, 0.2, 0.3),
-        position=(0, 0, 0),
-        angular_velocity=(0.1, 5.0, 0.1),
-        velocity=(1.0, 0.0, 0.0),
-    )
-    scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
-    run = simulate("mujoco", scene, 5, FAMILY, rtol=1e-10, min_step=1e-12, beta=1.0, hard=1e-9)
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * ALONE, f"{error:.1e} from the free body's motion"
-
-
 def test_mujoco_compiled_meets_a_driver_with_any_motion() -> None:
     pytest.importorskip("mujoco")
     driver = Driver(joint="A", polynomial=(0.0, 3.0, -20.0), sine=Sine(amplitude=0.4, frequency=30.0))

@@ -36,7 +36,6 @@ TURNED = tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist())
 ACCELERATION = 2.7e-8  # measured errors: of the largest
 TURNING, TUMBLING, BEFORE = 8.2e-10, 6.1e-10, 7.2e-6  # rad; of the scene's length or rad
 DRIVEN, OPEN = (2.4e-11, 2.9e-10), (5.7e-14, 2.3e-12)  # m or rad, and their rates
-DYNAMIC = ("defaults", "tuned", "trapezoidal", "alpha")
 
 
 def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory:
@@ -271,18 +270,6 @@ def test_scene_without_masses_is_driven_or_refused():
     times = np.linspace(0, 0.02, 5)
     with_mass, without = run(scene, times, "static", 1e-3), run(bare, times, "static", 1e-3)
     assert np.array_equal(with_mass.position, without.position), "masses took part in kinematics"
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_sweep_offers_every_family_that_applies(name: str):
-    scene = SCENES[name]()
-    settings = ENGINE.settings(scene)
-    fully_driven = bool(scene.driver) and name != "four_bar_straight"  # that one starts singular
-    assert {s.family for s in settings} == {*DYNAMIC, *(["static"] if fully_driven else [])}
-    for family in {s.family for s in settings}:
-        steps = [s.options["step"] for s in settings if s.family == family]
-        assert len(steps) >= 3, (family, steps)
-        assert steps == sorted(steps, reverse=True), f"coarse to fine: {steps}"
 
 
 def test_nothing_is_printed_or_written(

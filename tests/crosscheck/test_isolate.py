@@ -119,13 +119,6 @@ def test_observed_run_that_hangs_is_killed_with_all_it_started(tmp_path: Path):
     assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
-def test_hang_is_killed_with_all_it_started(tmp_path: Path):
-    pid = tmp_path / "pid"
-    ended = run("HANG", still(str(pid)), time_limit=2.0)
-    assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
-    assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
-
-
 def test_printing_and_files_of_an_engine_leave_no_trace(
     capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

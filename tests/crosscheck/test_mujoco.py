@@ -13,7 +13,7 @@ from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library
-from crosscheck.engines.mujoco.families import ADAPTIVE, HARD, INTEGRATED_HERE, NEWTON
+from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
 from crosscheck.judge.truth import truth_for
@@ -166,20 +166,6 @@ def test_a_thin_disc_that_rounding_puts_beyond_the_triangle_is_accepted() -> Non
     assert error(run, scene) < MARGIN * 1.7e-13, f"{error(run, scene):.2e} rad from the free body's motion"
 
 
-@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
-def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
-    scene = SCENES[name]()
-    sweep = engine("mujoco").settings(scene)
-    here = [family for family in INTEGRATED_HERE if scene.driver or family != NEWTON]
-    families = ["defaults", "stock", "euler", "implicit", "tuned", "stiff", *here]
-    assert list(dict.fromkeys(s.family for s in sweep)) == families, f"families of {sweep}"
-    assert any(s.options.get("step") == 2e-3 for s in sweep if s.family == "defaults"), "no default step"
-    for family in families:
-        option = {NEWTON: "tolerance"}.get(family, "rtol" if family in INTEGRATED_HERE else "step")
-        knob = [s.options[option] for s in sweep if s.family == family]
-        assert knob == sorted(set(knob), reverse=True) and len(knob) > 3, f"{family} sweeps {knob}"
-
-
 def test_stiff_closures_through_singular_positions_and_truth_agree() -> None:
     """Four passages of the swinging four-bar."""
     scene = SCENES["four_bar_gravity"]()
@@ -208,11 +194,6 @@ def test_a_duplicate_joint_changes_no_projected_motion() -> None:
     tight = {"rtol": 1e-8, "min_step": 6e-3, "beta": 25.0, "hard": ADAPTIVE["projected"]}
     run, again = (simulate(s, 0.02, "projected", **tight) for s in (scene, twice))
     assert float(error_series(scene, run, again).max()) < 1e-9
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        simulate(SCENES["four_bar"](), 0.1, "best")
 
 
 def test_rows_that_come_and_go_and_their_drivers():

@@ -11,7 +11,6 @@ import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco import model as built
-from crosscheck.engines.mujoco.adapter import ENGINE as MUJOCO
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.simulation import Simulation
 from crosscheck.engines.sampling import Failed
@@ -19,7 +18,6 @@ from mbref.scene import (
     Body,
     Coupling,
     Cylindrical,
-    Driver,
     Fixed,
     Force,
     JointForce,
@@ -28,7 +26,6 @@ from mbref.scene import (
     Revolute,
     Scene,
     SlideSpring,
-    Spherical,
     Spring,
     TorsionSpring,
     Translational,
@@ -80,23 +77,6 @@ def test_masses_are_the_scene_s_and_the_constants_follow() -> None:
     assert model.dof_M0.tolist() == pytest.approx([4.0 + 4.0])
 
 
-def test_joints_in_a_row_and_kinds_of_joints() -> None:
-    kinds = mujoco.mjtJoint
-    sleeve = Cylindrical(name="C", bodies=("ground", "b"), anchor=(1.0, 1.0, 0.0), axis=(0.0, 0.0, 2.0))
-    ball = Spherical(name="B", bodies=("b", "c"), anchor=(1.0, 0.0, 1.0))
-    second = BODY.model_copy(update={"name": "c", "position": (1.0, 0.0, 2.0)})
-    third = BODY.model_copy(update={"name": "d", "position": (5.0, 6.0, 7.0)})
-    found = compiled(scene(body=(BODY, second, third), joint=(sleeve, ball)))
-    model, data = found.model, mujoco.MjData(found.model)
-    mujoco.mj_forward(model, data)
-    wanted = [kinds.mjJNT_SLIDE, kinds.mjJNT_HINGE, kinds.mjJNT_BALL, kinds.mjJNT_FREE]
-    assert model.jnt_type.tolist() == [int(kind) for kind in wanted]
-    assert [model.joint(k).name for k in range(4)] == ["joint 0.0", "joint 0.1", "joint 1.0", "free 2"]
-    assert data.xanchor[:3].tolist() == [[1.0, 1.0, 0.0], [1.0, 1.0, 0.0], [1.0, 0.0, 1.0]]
-    assert data.xpos[1:].tolist() == [[1.0, 0.0, 0.0], [1.0, 0.0, 2.0], [5.0, 6.0, 7.0]]
-    assert model.nv == 11 and found.links.tolist() == [1, 2, 3]
-
-
 def test_armatures_and_couplings_are_of_the_coordinates() -> None:
     """The equality is S = 3 H, with the coordinates' joints by name."""
     geared = HINGE.model_copy(update={"armature": 0.75})
@@ -109,37 +89,6 @@ def test_armatures_and_couplings_are_of_the_coordinates() -> None:
     assert (model.eq_obj1id.tolist(), model.eq_obj2id.tolist()) == ([1], [0])
     assert model.eq_data[0, :5].tolist() == [0.0, 3.0, 0.0, 0.0, 0.0]
     assert model.eq_type.tolist() == [int(mujoco.mjtEq.mjEQ_JOINT)]
-
-
-def test_drivers_are_equalities_with_nothing_to_add() -> None:
-    driver = Driver(joint="H", polynomial=(0.0, 2.0))
-    found = compiled(scene(driver=(driver,)))
-    assert found.drivers == [(0, driver)] and found.model.equality(0).name == "driver H"
-    assert found.model.eq_data[0, :5].tolist() == [0.0] * 5
-    assert (found.model.eq_obj1id.tolist(), found.model.eq_obj2id.tolist()) == ([0], [-1])
-    assert found.rates.tolist() == [2.0]
-
-
-def test_closures_join_the_places_of_the_scene() -> None:
-    """A body on a hinge and a ball joint is closed at the ball; on two hinges it is welded to its share."""
-    ball = Spherical(name="B", bodies=("ground", "b"), anchor=(2.0, 3.0, 4.0))
-    found = compiled(scene(joint=(HINGE, ball)))
-    model, data = found.model, mujoco.MjData(found.model)
-    mujoco.mj_forward(model, data)
-    [closure] = found.tree.closures
-    assert model.equality(0).name == "closure 0" and model.neq == 1
-    wanted = (2.0, 3.0, 4.0) if closure.kind == "point" else (1.0, 0.0, 0.0)
-    assert [data.site(f"closure 0.{i}").xpos.tolist() for i in range(2)] == [list(wanted)] * 2
-    kind = mujoco.mjtEq.mjEQ_CONNECT if closure.kind == "point" else mujoco.mjtEq.mjEQ_WELD
-    assert model.eq_type.tolist() == [int(kind)]
-    assert model.eq_objtype.tolist() == [int(mujoco.mjtObj.mjOBJ_SITE)]
-    again = HINGE.model_copy(update={"name": "I", "anchor": (0.0, 0.0, 1.0)})
-    found = compiled(scene(joint=(HINGE, again)))
-    data = mujoco.MjData(found.model)
-    mujoco.mj_forward(found.model, data)
-    assert found.model.eq_type.tolist() == [int(mujoco.mjtEq.mjEQ_WELD)]
-    assert [data.site(f"closure 0.{i}").xpos.tolist() for i in range(2)] == [[1.0, 0.0, 0.0]] * 2
-    assert found.model.body_mass.tolist() == [0.0, 2.0, 2.0]
 
 
 # --- Loads ------------------------------------------------------------------------------------------------
@@ -177,16 +126,6 @@ def test_loads_over_time_are_added_at_the_time_of_the_data() -> None:
         (place, [0.0, 6.0, 0.0, 0.0, 0.0, 0.0]),
         (0, 7.0),
     ]
-
-
-def test_the_piece_of_a_function_is_the_one_that_begins() -> None:
-    torque = JointTorque(joint="H", torque=7.0, factor={"stop": 1.0})
-    found = compiled(scene(load=(torque,)))
-    data = mujoco.MjData(found.model)
-    data.time = 1.0
-    for since, wanted in ((0.5, 7.0), (1.0, 0.0)):
-        found.apply(data, since)
-        assert data.qfrc_applied.tolist() == [wanted]
 
 
 def test_springs_along_a_joint_are_one_spring() -> None:
@@ -229,52 +168,7 @@ def test_a_spring_between_two_points() -> None:
     assert [data.site(f"spring 0.{i}").xpos.tolist() for i in range(2)] == [[1, 0, 2], [1, 0, 0.5]]
 
 
-def test_a_description_has_its_forces_by_joint() -> None:
-    given = scene(load=(JointTorque(joint="H", torque=7.0), TorsionSpring(joint="H", stiffness=1.0)))
-    spec, pushed = built.description(given, compiled(given).tree)
-    assert pushed == [("joint 0.0", 7.0, None)] and spec.body("link 0").mass == 1.0
-
-
 # --- Settings ---------------------------------------------------------------------------------------------
-WELDED = (HINGE, HINGE.model_copy(update={"name": "I", "anchor": (0.0, 0.0, 1.0)}))
-BITS = mujoco.mjtDisableBit
-
-
-def test_a_tuned_model_without_options_is_hard_and_does_not_decay() -> None:
-    found, plain = simulation("tuned", scene(joint=WELDED)), compiled(scene(joint=WELDED)).model
-    assert np.abs(found.model.eq_solref[0]).max() == 0.0
-    assert found.model.body_invweight0 == pytest.approx(1e-7 * plain.body_invweight0)
-    with pytest.raises(ValueError, match="mujoco has no family of settings 'quick'"):
-        simulation("quick")
-
-
-def test_compiled_families_leave_unused_features_out() -> None:
-    found = simulation("forward, compiled", rtol=1e-6, min_step=1e-9)
-    assert found.model.opt.disableflags & BITS.mjDSBL_CONTACT and not hasattr(found, "adaptive")
-    assert not simulation("forward", rtol=1e-6, min_step=1e-9).model.opt.disableflags & BITS.mjDSBL_CONTACT
-
-
-def test_what_the_adapter_serves_and_refuses() -> None:
-    bare = scene(body=(BODY.model_copy(update={"mass": None, "inertia": None}),))
-    assert MUJOCO.refuses(scene()) is None and MUJOCO.refuses(bare) is not None
-    assert (
-        MUJOCO.serves(bare, "tuned")
-        and not MUJOCO.serves(scene(), "quick")
-        and MUJOCO.serves(scene(), "euler")
-    )
-    text = MUJOCO.own_code(scene(), Setting("as in file, finer", {"step": 0.5}))
-    assert text == '<option timestep="0.5"/>'
-    assert MUJOCO.own_code(scene(), Setting("defaults", {"step": 0.5})).startswith(
-        '<option timestep="0.5"><flag'
-    )
-
-
-def test_runs_name_their_engine_and_setting() -> None:
-    found = MUJOCO.run(scene(), np.array([0.0, 0.5]), Setting("euler", {"step": 0.25}))
-    assert (found.engine, found.method, found.settings) == ("mujoco", "euler", {"step": 0.25})
-    assert (
-        found.version == mujoco.__version__ and found.cost.steps == 2 and found.outcome is Outcome.COMPLETED
-    )
 
 
 # --- One run ----------------------------------------------------------------------------------------------
@@ -314,17 +208,6 @@ def test_a_state_that_is_not_finite_ends_the_run() -> None:
         with pytest.raises(Failed, match=r"infinite or NaN between 0\.25 s and 0\.75 s") as failed:
             found.advance(0.25, 0.75)
         assert failed.value.outcome is Outcome.NOT_FINITE and failed.value.t == 0.25
-
-
-def test_callbacks_are_there_only_where_a_function_of_time_acts() -> None:
-    for given, is_there in (
-        (scene(), False),
-        (scene(driver=(Driver(joint="H"),)), True),
-        (scene(load=(JointTorque(joint="H", torque=1.0, factor=RISING),)), True),
-    ):
-        with simulation(given=given).installed():
-            assert (mujoco.get_mjcb_control() is not None) is is_there
-        assert mujoco.get_mjcb_control() is None
 
 
 def test_a_sample_has_poses_velocities_and_reactions_in_world_axes() -> None:

@@ -73,12 +73,6 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
     assert engine("newton").serves(chain(), "defaults")
 
 
-def test_settings_are_coarse_to_fine_and_have_their_options():
-    found = engine("newton").settings(SCENES["bennett"]())
-    for family in {s.family for s in found}:
-        steps = [s.options["step"] for s in found if s.family == family]
-        assert steps == sorted(steps, reverse=True) and len(set(steps)) == len(steps)
-        assert all(("alpha" in s.options) is (family in ALPHAS) for s in found if s.family == family)
 
 
 @INSTALLED

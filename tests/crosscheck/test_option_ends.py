@@ -10,7 +10,6 @@ import pytest
 from crosscheck.cli import options, request
 from crosscheck.cli.request import RequestError
 from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
-from mbref.cli.options import sample_times
 from mbref.scene import Body, Scene
 
 BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
@@ -37,51 +36,6 @@ def test_numbers_at_the_ends_of_what_an_option_takes(parse, good, bad):
     for text in bad:
         with pytest.raises(argparse.ArgumentTypeError, match="must be"):
             parse(text)
-
-
-def asked(**given: object) -> argparse.Namespace:
-    return argparse.Namespace(**{"times": None, "samples": None, "duration": None, **given})
-
-
-def test_sample_times_of_mbref_by_hand():
-    assert np.array_equal(sample_times(asked(), SCENE), np.linspace(0.0, 2.0, 101))
-    assert np.array_equal(sample_times(asked(samples=2), SCENE), [0.0, 2.0])
-    assert np.array_equal(sample_times(asked(samples=3, duration=1.0), SCENE), [0.0, 0.5, 1.0])
-    assert np.array_equal(sample_times(asked(times="0,0.5,3"), SCENE), [0.0, 0.5, 3.0])
-    assert np.array_equal(sample_times(asked(times="0,0.5,3", duration=0.5), SCENE), [0.0, 0.5])
-    assert np.array_equal(sample_times(asked(times="0.1", duration=0.1), SCENE), [0.1])
-
-
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ({"samples": 1}, "--samples: must be at least 2, got 1"),
-        ({"duration": 0.0}, "--duration: must be positive, got 0"),
-        ({"duration": np.inf}, "--duration: must be positive, got inf"),
-        ({"times": "0,0"}, "increasing"),
-        ({"times": "-1e-9,1"}, "not negative"),
-        ({"times": "0,inf"}, "finite"),
-        ({"times": "1,x"}, "must be numbers separated by commas, got '1,x'"),
-        ({"times": "1", "duration": 0.5}, "--times: none is within --duration 0.5"),
-    ],
-)
-def test_sample_times_that_mbref_refuses(given, says):
-    with pytest.raises(ValueError, match=says):
-        sample_times(asked(**given), SCENE)
-
-
-def test_sample_times_of_crosscheck_by_hand():
-    assert np.array_equal(request.sample_times(SCENE, None, 2), [0.0, 2.0])
-    assert np.array_equal(request.sample_times(SCENE, [0.0, 0.5], 9), [0.0, 0.5])
-    refused = {
-        (0.0,): "must have a time after 0",
-        (0.5, 0.5): "must increase, got 0.5 after 0.5",
-        (-0.1, 1.0): "not negative, got -0.1",
-        (0.0, np.inf): "must be finite",
-    }
-    for times, says in refused.items():
-        with pytest.raises(RequestError, match=says):
-            request.sample_times(SCENE, list(times), 2)
 
 
 def test_the_end_of_a_motion_by_hand():

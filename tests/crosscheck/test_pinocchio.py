@@ -9,8 +9,6 @@ from crosscheck.conformance.moving import moving_probes
 from crosscheck.conformance.rewritings import duplicated
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.pinocchio.adapter import ENGINE
-from crosscheck.engines.pinocchio.families import COMPILED
-from crosscheck.engines.pinocchio.library import why_not
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
@@ -185,30 +183,6 @@ def test_an_adaptive_run_without_an_end_is_refused_or_fails_clearly() -> None:
     run = simulate(scene, 0.2, "tuned", rtol=1e-6, min_step=1e-4)
     assert run.outcome in (Outcome.NOT_CONVERGED, Outcome.NOT_FINITE), f"{run.outcome.label} {run.message}"
     assert run.message and 0 < len(run.times) < 11, f"{len(run.times)} samples, message {run.message!r}"
-
-
-@pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_gravity"])
-def test_each_family_is_swept_from_coarse_to_fine(name: str) -> None:
-    sweep = engine("pinocchio").settings(SCENES[name]())
-    families = {
-        "defaults": "step",
-        "proximal": "step",
-        "baumgarte": "step",
-        "dop853": "rtol",
-        "tuned": "rtol",
-    }
-    python = [s for s in sweep if s.family not in COMPILED]
-    assert {s.family for s in python} == set(families), f"families of {sweep}"
-    compiled = {s.family for s in sweep} - set(families)
-    assert compiled == (set() if why_not() else set(COMPILED)), f"families of {sweep}"
-    for family, knob in families.items():
-        values = [s.options[knob] for s in sweep if s.family == family]
-        assert values == sorted(set(values), reverse=True) and len(values) > 3, f"{family} sweeps {values}"
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        simulate(SCENES["four_bar"](), 0.1, "best")
 
 
 def test_closures_that_the_tree_satisfies_by_itself():

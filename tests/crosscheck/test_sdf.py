@@ -187,13 +187,6 @@ def test_static_models_links_without_inertial_and_several_models(tmp_path):
     assert found.scene.joint[0].bodies == (GROUND, "m::a")
 
 
-def test_a_link_is_held_on_request(tmp_path):
-    held = read(tmp_path, pair(), hold=["b"]).scene
-    assert held.joint[-1].type == "fixed" and held.joint[-1].bodies == (GROUND, "b")
-    with pytest.raises(SceneError, match="--hold c: no such link that moves; known: a, b"):
-        read(tmp_path, pair(), hold=["c"])
-
-
 @pytest.mark.parametrize(
     ("text", "says"),
     [

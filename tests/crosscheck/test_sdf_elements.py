@@ -84,38 +84,6 @@ def test_links_with_weight(text: str, tmp_path: Path) -> None:
     assert read(tmp_path, LINK.replace("</link>", f"<gravity>{text}</gravity></link>")).left_out == ()
 
 
-@pytest.mark.parametrize(
-    ("inside", "says"),
-    [
-        (LINK.replace("<inertial>", '<inertial auto="true">'), "link 'b': inertial auto='true' is not read"),
-        (LINK.replace("<inertial>", '<inertial auto="1">'), "link 'b': inertial auto='true' is not read"),
-        (LINK.replace("<mass>2", "<mass>0"), "link 'b': mass must be positive, got 0"),
-        (LINK.replace("<mass>2", "<mass>-1"), "link 'b': mass must be positive, got -1"),
-        (LINK + hinge(kind="ballscrew"), "joint 'j': type 'ballscrew' is none of"),
-        (
-            LINK + hinge(ends="<parent>c</parent><child>b</child>"),
-            "joint 'j': the file has no link or frame 'c'",
-        ),
-        (LINK + hinge(ends="<parent>b</parent><child>b</child>"), "joint 'j': both sides are on link 'b'"),
-        (LINK + hinge(kind="universal", axes="axis"), "the axes of a universal joint must be perpendicular"),
-        (LINK + hinge(kind="screw"), r"joint 'j': a screw needs screw_thread_pitch \(m a turn\)"),
-        (LINK + hinge().replace("0 0 1", "0 0 0"), "joint 'j': axis: has no length"),
-        (
-            LINK + hinge('<mimic joint="k"><multiplier>2</multiplier><offset>0.5</offset></mimic>'),
-            "joint 'j': mimic: its offset contradicts the poses of the file",
-        ),
-        (
-            LINK + hinge(kind="gearbox", axes="axis axis2"),
-            "joint 'j': a gearbox needs gearbox_reference_body",
-        ),
-        ("<static>true</static>" + LINK, "has no body that moves"),
-    ],
-)
-def test_faults_of_a_file(inside: str, says: str, tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match=says):
-        read(tmp_path, inside)
-
-
 @pytest.mark.parametrize("options", [{"keyframe": "k"}, {"pose": {"j": 1.0}}, {"close": ["a=b"]}])
 def test_options_that_an_sdf_file_does_not_have(options: dict[str, Any], tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="--keyframe, --pose, --close: an SDF file gives the poses"):
@@ -168,19 +136,6 @@ DYNAMICS = (
 )
 
 
-def test_springs_of_hinges_and_slides(tmp_path: Path) -> None:
-    [spring] = read(tmp_path, LINK + hinge(DYNAMICS)).scene.load
-    assert (spring.type, spring.joint, spring.stiffness, spring.damping) == ("torsion_spring", "j", 3.0, 0.5)
-    assert spring.natural_angle == 0.25
-    [spring] = read(tmp_path, LINK + hinge(DYNAMICS, "prismatic")).scene.load
-    assert (spring.type, spring.natural_displacement) == ("slide_spring", 0.25)
-    for left in ("damping>0.5", "spring_stiffness>3"):
-        [spring] = read(tmp_path, LINK + hinge(DYNAMICS.replace(left, f"{left.split('>')[0]}>0"))).scene.load
-        assert {spring.stiffness, spring.damping} in ({3.0, 0.0}, {0.5, 0.0})
-    still = DYNAMICS.replace("0.5", "0").replace(">3<", ">0<")
-    assert read(tmp_path, LINK + hinge(still)).scene.load == ()
-
-
 def test_friction_and_springs_of_other_joints_are_parts(tmp_path: Path) -> None:
     rough = DYNAMICS.replace("<friction>0", "<friction>7")
     found = read(tmp_path, LINK + hinge(rough), without=["friction"])
@@ -196,25 +151,6 @@ def test_friction_and_springs_of_other_joints_are_parts(tmp_path: Path) -> None:
     damped = DYNAMICS.replace(">3<", ">0<")
     found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
     assert found.left_out == ("damping of joint 'j' (--without damping)",)
-
-
-def test_screws_advance_by_their_pitch_in_a_turn(tmp_path: Path) -> None:
-    screw = hinge(kind="screw").replace("</joint>", "<screw_thread_pitch>0.5</screw_thread_pitch></joint>")
-    found = read(tmp_path, LINK + screw).scene
-    [coupling] = found.coupling
-    assert (coupling.name, coupling.joints) == ("j thread", ("j", "j")) and found.joint[
-        0
-    ].type == "cylindrical"
-    assert coupling.ratio == pytest.approx(0.5 / (2 * math.pi))
-
-
-def test_mimic_joints_follow_by_their_multiplier(tmp_path: Path) -> None:
-    other = LINK.replace('"b"', '"c"') + hinge(name="k", ends="<parent>world</parent><child>c</child>")
-    mimic = '<mimic joint="k"><multiplier>2</multiplier><offset>1</offset><reference>0.5</reference></mimic>'
-    [coupling] = read(tmp_path, LINK + other + hinge(mimic)).scene.coupling
-    assert (coupling.name, coupling.joints, coupling.ratio) == ("j mimics k", ("k", "j"), 2.0)
-    [coupling] = read(tmp_path, LINK + other + hinge('<mimic joint="k"/>')).scene.coupling
-    assert coupling.ratio == 1.0
 
 
 @pytest.mark.parametrize(("ratio", "wanted"), [("<gearbox_ratio>3</gearbox_ratio>", -3.0), ("", -1.0)])
@@ -233,23 +169,6 @@ def test_a_gearbox_couples_two_hinges(ratio: str, wanted: float, tmp_path: Path)
     )
     with pytest.raises(SceneError, match="joint 'g': gearbox_ratio must not be 0"):
         read(tmp_path, LINK + other + hinge() + zero)
-
-
-def test_links_that_are_held_or_fixed(tmp_path: Path) -> None:
-    found = read(tmp_path, LINK, hold=["b"]).scene
-    [joint] = found.joint
-    assert (joint.name, joint.type, joint.bodies, joint.anchor) == (
-        "hold b",
-        "fixed",
-        ("ground", "b"),
-        (1, 2, 3),
-    )
-    with pytest.raises(SceneError, match="--hold x: no such link that moves; known: b"):
-        read(tmp_path, LINK, hold=["b", "x"])
-    base = '<link name="base"/><joint name="f" type="fixed"><parent>world</parent><child>base</child></joint>'
-    assert [j.bodies for j in read(tmp_path, LINK + base).scene.joint] == [("ground", "base")]
-    loop = hinge(ends="<parent>world</parent><child>world</child>")
-    assert "joint 'j': both sides are fixed to the ground" in read(tmp_path, LINK + loop).notes
 
 
 def test_parts_without_effect_are_counted(tmp_path: Path) -> None:

@@ -8,15 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.engines import driver_motion, sampling
+from crosscheck.engines import driver_motion
 from crosscheck.engines.compiler import Compiler, NoLibrary
-from crosscheck.engines.fixed_steps import held_points, steps, unended_piece
-from crosscheck.engines.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
+from crosscheck.engines.fixed_steps import unended_piece
+from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
 from crosscheck.engines.joint_coordinates import JointCoordinates
-from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through, step_count
-from crosscheck.engines.spanning_tree import Closure
+from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through
 from crosscheck.engines.written import Written
-from crosscheck.judge.constraints import scene_length
 from crosscheck.refusals import Owner
 from mbref import rotations
 from mbref.scene import (
@@ -52,9 +50,6 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
 
 
 # --- frames -----------------------------------------------------------------------------------------------
-def test_vectors_and_matrices():
-    assert unit((0.0, 3.0, -4.0)).tolist() == [0.0, 0.6, -0.8]
-    assert (cross_matrix(np.array([1.0, 2.0, 3.0])) @ [4.0, 5.0, 6.0]).tolist() == [-3.0, 6.0, -3.0]
 
 
 @pytest.mark.parametrize("axis", [X, Y, Z, (1.0, 2.0, 2.0), (-3.0, 0.1, 4.0)])
@@ -76,32 +71,6 @@ def test_world_vectors_in_the_axes_of_a_body():
 
 
 # --- steps ------------------------------------------------------------------------------------------------
-@pytest.mark.parametrize(
-    ("t0", "t1", "step", "count"),
-    [
-        (0.0, 1.0, 0.25, 4),
-        (0.0, 1.0, 0.3, 4),
-        (1.0, 2.0, 5.0, 1),
-        (0.0, 0.3, 0.1, 3),
-        (0.0, 1.0, 0.25 - 1e-8, 5),
-    ],
-)
-def test_equal_steps_between_samples(t0, t1, step, count):
-    assert step_count(t0, t1, step) == count
-
-
-@pytest.mark.parametrize("count", [1, 2, 4])
-def test_the_classical_runge_kutta_method(count):
-    """One step of y' = y multiplies by 1 + h + h²/2 + h³/6 + h⁴/24; a step of y' = 3 t² is exact."""
-    counts, h = Counts(), 0.5 / count
-    found = rk4(lambda t, y: y, lambda t, y: y, np.ones(1), 0.0, 0.5, 0.5 / count, counts)
-    assert found[0] == pytest.approx((1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24) ** count, rel=1e-14)
-    assert (counts.steps, counts.rhs, counts.rejected) == (count, 4 * count, 0)
-    asked: list[float] = []
-    found = rk4(
-        lambda t, y: asked.append(t) or 3 * t**2 + 0 * y, lambda t, y: y, np.ones(1), 1.0, 2.0, 1.0, counts
-    )
-    assert found[0] == pytest.approx(8.0) and asked == [1.0, 1.5, 1.5, 2.0]
 
 
 def test_each_state_is_settled_and_must_be_finite():
@@ -126,17 +95,6 @@ def test_each_state_is_settled_and_must_be_finite():
     assert caught.value.outcome is Outcome.NOT_FINITE and caught.value.t == 0.5
 
 
-def test_steps_of_a_scene():
-    """Angles of 0.15 to 0.0015 rad at 3 rad/s; a run takes at most 250 000 steps."""
-    assert steps(scene(), 3.0) == [0.05, 0.017, 0.005, 0.0017, 0.0005]
-    assert steps(scene(), 3.0, most=400) == [0.05, 0.017, 0.005] and steps(scene(), 3.0, most=1) == [0.05]
-    assert steps(scene(), 3.0, finer=2)[-2:] == [0.00017, 5.6e-05]
-    assert steps(scene(duration=500.0), 3.0) == [0.05, 0.017, 0.005]
-    assert steps(scene(duration=1250.0), 3.0) == [0.05, 0.017, 0.005], "250 000 steps of 5 ms"
-    assert steps(scene(duration=1251.0), 3.0) == [0.05, 0.017]
-    assert steps(scene(duration=1e6), 3.0) == [0.05], "one step is kept in any case"
-
-
 def test_loads_that_change_between_steps():
     table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
     smooth = Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0)))
@@ -147,21 +105,6 @@ def test_loads_that_change_between_steps():
         assert found.owner is Owner.ADAPTER and found.reason.startswith(
             "load[1] follows a table or is switched"
         )
-
-
-def test_points_that_close_a_loop():
-    """One of a ball, two at 0.1 of the scene's length from the anchor of a hinge, three of a weld."""
-    given = scene()
-    arm = 0.1 * scene_length(given)
-    place = np.array([1.0, 2.0, 3.0])
-
-    def points(kind: str) -> list[list[float]]:
-        closure = Closure(kind, 0, (0, 1), place)
-        return [list(point - place) for point in held_points(given, closure)]
-
-    assert points("point") == [[0.0, 0.0, 0.0]]
-    assert np.array(points("revolute")) == pytest.approx(np.array([[0, 0, -arm], [0, 0, arm]]))
-    assert np.array(points("weld")) == pytest.approx(arm * np.eye(3))
 
 
 # --- samples ----------------------------------------------------------------------------------------------
@@ -210,21 +153,6 @@ def test_a_run_that_ends_early_keeps_its_samples():
     )
     assert (lost.outcome, lost.t_end, len(lost.times)) == (Outcome.NOT_FINITE, 0.5, 2)
     assert lost.message == "the motion is not finite at 2 s"
-
-
-def test_accelerations_that_an_engine_does_not_give():
-    without = run_through(
-        scene(),
-        np.array([0.0]),
-        lambda *_: None,
-        lambda t: sampled(t, acceleration=sampling.UNKNOWN, angular_acceleration=sampling.UNKNOWN),
-        Counts(),
-        0.0,
-        LABELS,
-    )
-    assert without.acceleration is None and without.angular_acceleration is None
-    empty = run_through(scene(), np.zeros(0), lambda *_: None, sampled, Counts(), 0.0, LABELS)
-    assert empty.position.shape == (0, 1, 3) and empty.orientation.shape == (0, 1, 4)
 
 
 def one_ball(in_child: bool, places: tuple[Any, ...] = ()) -> JointCoordinates:
@@ -310,14 +238,6 @@ def test_the_fastest_rate_that_is_stated(parts, rate):
     assert driver_motion.stated_rate(given) == pytest.approx(rate)
     turning = given.with_(body=(body(angular_velocity=(6.0, 0.0, 8.0)), given.body[1]))
     assert driver_motion.stated_rate(turning) == pytest.approx(10.0)
-
-
-def test_scenes_without_masses_have_a_rate_too():
-    """A driver alone turns the four-bar, with 2 pi times one over its duration at least."""
-    from mbref.scenes import SCENES
-
-    given = SCENES["four_bar"]()
-    assert driver_motion.stated_rate(given) >= 1 / given.duration
 
 
 def test_pieces_of_switched_tables_at_their_ends():

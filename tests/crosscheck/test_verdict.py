@@ -19,7 +19,6 @@ from crosscheck.study.sentences import breaks, headline, right, verdict
 from crosscheck.study.speed_sentences import ADAPTERS, CLOCK, WITHOUT_PYTHON, fast
 from crosscheck.study.truth_sentences import truth
 from crosscheck.study.verdict import Grade, Judged, grade, judged
-from crosscheck.study.wording import multiple, span
 from mbref.records import append
 from mbref.scenes import SCENES
 from reports.runs import Run
@@ -264,14 +263,6 @@ def test_a_best_setting_beside_one_that_ran_out_of_time():
     )
 
 
-def test_no_truth_and_no_claim_of_right():
-    still = [record(name, "tuned", None, times=[0.0]) for name in ("mbref", "exudyn")]
-    unknown = group(still, kind="", reason="two ways", bound=None)
-    assert "no reference for this motion" in headline([unknown])
-    assert fast([unknown]) == "Without a truth no error is known, so speeds are not compared."
-    assert "There is no reference for planar_slider_crank: two ways." in truth([unknown])
-
-
 def test_engines_without_a_truth_are_compared_at_the_same_times():
     """Two motions that are 1e-3 of the scene's length apart, and one at other times."""
     first, second = (synthetic.record(name, "x", error, 0.1) for name, error in (("a", 1e-3), ("b", 2e-3)))
@@ -280,59 +271,11 @@ def test_engines_without_a_truth_are_compared_at_the_same_times():
     assert found == {("a", "b"): pytest.approx(1e-3, rel=1e-9)}, found
 
 
-def test_multiples():
-    assert (multiple(3.24), multiple(139.6), span(1.5, 20.2)) == ("3.2 times", "140 times", "1.5 to 20 times")
-
-
-def test_differences_of_errors_below_the_bound_are_shown_by_it():
-    rough = {"metrics": {"error": 1e-13, "error_bound": 2e-9}}
-    runs = [record("a", "x", 0.0) | rough, record("a", "x", 1e-6), record("a", "x", 0.0) | rough]
-    old, new, same = ({"run": {**r, "repeated": False}} for r in runs)
-    assert changes(old, new)[0].sentences == ["error < 2e-09 → 1.00e-06"]
-    assert not changes(old, same)[0].sentences
-
-
 def saved(folder: Path, records: list[dict]) -> Path:
     folder.mkdir()
     for one in records:
         append(folder / "records.jsonl", one)
     return folder
-
-
-def test_differences_beyond_noise(tmp_path):
-    known = (("x", 1e-5, 0.1), ("y", 1e-5, 0.2), ("z", 1e-15, 0.3), ("gone", 0.0, 0.4))
-    old = [record("a", family, e, s) for family, e, s in known]
-    lost = failed("a", "y", 0.5) | {"asked": old[1]["asked"]}
-    slow = record("a", "x", 1e-5, 0.1, version="2", cost={"seconds": 0.25})
-    new = [slow, lost, record("a", "z", 9e-14, 0.3)]
-    before, after = (load(saved(tmp_path / name, records)) for name, records in (("old", old), ("new", new)))
-    found = {change.identity[2]: change.sentences for change in changes(before, after)}
-    assert found == {
-        "x": ["time 1.00e-01 s → 2.50e-01 s"],
-        "y": ["outcome completed → not finite at 0.5 s"],
-        "z": [],
-        "gone": ["only in the old set"],
-    }, found
-    assert circumstances(before, after) == ["a: 1 → 1, 2"], circumstances(before, after)
-    assert not any(change.sentences for change in changes(before, before))
-
-
-def test_a_failure_that_comes_earlier_and_a_measure_beside_the_error():
-    early = failed("a", "x", 0.5)
-    moved = record("a", "y", 1e-5, 0.1)
-    measured = [
-        moved | {"metrics": {"error": 1e-5, "reaction_error": e, "energy_error": None}} for e in (1e-9, 1e-3)
-    ]
-    worse = moved | {"metrics": {"error": 1e-2, "reaction_error": 1.0}}
-    for before, after, expected in (
-        (early, early | {"t_end": 0.02}, ["end not finite at 0.5 s → not finite at 0.02 s"]),
-        (early, early | {"t_end": 0.49}, []),
-        (early | {"t_end": 0.0}, early | {"t_end": -1e-8}, []),
-        (*measured, ["reactions 1.00e-09 → 1.00e-03"]),
-        (measured[0], worse, ["error 1.00e-05 → 1.00e-02"]),
-    ):
-        named = [{"run": {**r, "repeated": False}} for r in (before, after)]
-        assert changes(*named)[0].sentences == expected
 
 
 def test_runs_of_another_mechanism_are_not_compared(tmp_path):
@@ -375,13 +318,6 @@ def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
     assert "b: 2 runs only in the old set" in said[0] and "runs\nscene" not in said[0]
     assert said[0].count("only in the old set") == 1 and said[1].count("only in the old set") == 2
     assert "0 of 1 runs of both sets changed." in said[0]
-
-
-def test_times_of_other_machines_are_not_compared():
-    slow = record("a", "x", 1e-5, 0.1, machine={"cpu": "b"}, cost={"seconds": 9.0})
-    named = [{"run": {**r, "repeated": False}} for r in (record("a", "x", 1e-5, 0.1), slow)]
-    assert not changes(*named)[0].sentences
-    assert circumstances(*named)[-1] == "Times of 1 run are not compared: the machines differ."
 
 
 def test_errors_are_drawn_no_lower_than_they_are_known():

@@ -113,6 +113,9 @@ class Exudyn(Linearising, Engine):
         return np.asarray(found)
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        """Simulate a scene; raises ValueError for an unknown family."""
+        if setting.family not in self.families:
+            raise ValueError(f"{self.name} has no family of settings {setting.family!r}")
         exu = _exudyn()
         times, step = np.array(times, dtype=float), float(setting.options["step"])
         with _warnings(exu) as warnings:

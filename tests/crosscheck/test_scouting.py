@@ -1,1 +1,0 @@
-"""Settings of engines for scenes: the order in which engines are asked."""
