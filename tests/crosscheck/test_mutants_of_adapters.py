@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import functools
+import importlib
+import shutil
 import textwrap
 import tomllib
 from importlib.util import find_spec
@@ -71,6 +73,26 @@ for one in tomllib.loads(Path(__file__).with_name("defects_of_adapters.toml").re
     DEFECTS[one.pop("way")].append(one)
 
 
+IN_GATE = ("mujoco", "pinocchio", "exudyn")
+
+
+def is_slow(way: str, defect: dict[str, str]) -> bool:
+    """Return whether a defect is left to `make deep`: all except the first signs of loads in some adapters."""
+    return way not in IN_GATE or defect != next(one for one in DEFECTS[way] if one["kind"] == LOAD)
+
+
+CASES = [
+    pytest.param(
+        way,
+        defect,
+        marks=[pytest.mark.slow] * is_slow(way, defect),
+        id=f"{way}: {defect['kind']}, {defect['text'][:30]}",
+    )
+    for way, found in DEFECTS.items()
+    for defect in found
+]
+
+
 def package(way: str) -> str:
     return way.removesuffix("'s steps")
 
@@ -117,6 +139,29 @@ def test_adapters_without_defect_are_right(way):
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     assert is_right(engine(package(way)), way)
+
+
+def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
+    """Return the engine of an adapter with a defect, from a copy of all adapters under another name."""
+    copy = folder / f"planted_{abs(hash((name, *defect.values())))}"
+    shutil.copytree(FOLDER, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in copy.rglob("*.py"):
+        path.write_text(path.read_text().replace("crosscheck.engines", copy.name))
+    own = copy / name / f"{defect['file']}.py"
+    path = own if own.exists() else copy / f"{defect['file']}.py"
+    source, text = path.read_text(), defect["text"]
+    assert source.count(text) == 1, f"{path.name} has {source.count(text)} times {text!r}"
+    path.write_text(source.replace(text, defect["instead"]))
+    return importlib.import_module(f"{copy.name}.{name}.adapter").ENGINE
+
+
+@pytest.mark.parametrize(("way", "defect"), CASES)
+def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
+    if not is_installed(way):
+        pytest.skip(f"{WAYS[way][0]} is not installed")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))  # code compiled from the true sources
+    assert not is_right(planted(package(way), defect, tmp_path), way)
 
 
 @pytest.mark.parametrize("name", sorted({package(way) for way in WAYS}))

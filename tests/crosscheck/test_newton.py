@@ -73,8 +73,6 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
     assert engine("newton").serves(chain(), "defaults")
 
 
-
-
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ERRORS)
