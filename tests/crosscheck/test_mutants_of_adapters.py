@@ -77,7 +77,7 @@ IN_GATE = ("mujoco", "pinocchio", "exudyn")
 
 
 def is_slow(way: str, defect: dict[str, str]) -> bool:
-    """Return whether a defect is left to `make deep`: all except the first signs of loads in some adapters."""
+    """Return whether a defect is left to `make deep`: all except a sign of a load in three adapters."""
     return way not in IN_GATE or defect != next(one for one in DEFECTS[way] if one["kind"] == LOAD)
 
 
