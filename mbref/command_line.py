@@ -76,7 +76,7 @@ class _Command(Parser):
 def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
     """Return the exit status of a program. Its faults are printed on standard error, one line for each.
 
-    The status is that of ``action``; 2 if it raises InputError, SceneError, a ``refused`` exception or
+    ``action`` returns the status, which is 2 if it raises InputError, SceneError, a ``refused`` exception or
     OSError, or if standard output cannot be written; 130 after an interrupt. Control characters in printed
     texts are escaped.
     """

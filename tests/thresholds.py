@@ -85,7 +85,7 @@ COSTS = {
     "INSTANTS",
     "STARTS",
     "STRIDE",
-    "SHARES",
+    "STEP_SHARES",
 }
 HEAD = """# Thresholds
 

@@ -129,7 +129,7 @@ def _paper(arguments: argparse.Namespace) -> int:
 
 
 def _rendered(options: Sequence[str]) -> int:
-    """Run `reports` as a program: a part of this package in a wheel, a folder beside it in a checkout.
+    """Run `reports` as a program: a part of this package in a wheel, a folder in a checkout.
 
     This package must not import `reports`, which depends on it.
     """

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import argparse
 from textwrap import fill
-from typing import Any
 
+from crosscheck.cli.commands_of_motions import Commands, add_certify, add_command, add_judge, add_reference
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
-    DIGITS,
     MOST_MECHANISMS,
     MOST_REPEATS,
     MOST_SEED,
@@ -19,22 +18,16 @@ from crosscheck.cli.options import (
     add_limits,
     add_reading,
     add_reference_time,
-    add_samples,
     add_selection,
     add_stored_runs,
-    digits,
     length,
-    not_negative,
-    numbers,
     positive,
 )
 from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
-from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.timings import REPEATS
 from mbref.command_line import Parser, add_output, commands, record_file, whole
 
-Commands = Any  # the object that argparse adds subcommands to; its type is private
 FIRST = """\
 first steps:
   mbref new my.toml                         a commented mechanism to start from
@@ -76,102 +69,30 @@ def parser() -> argparse.ArgumentParser:
         _add_report,
         _add_paper,
         _add_diff,
-        _add_certify,
-        _add_judge,
-        _add_reference,
+        add_certify,
+        add_judge,
+        add_reference,
     ):
         add(known)
     return found
 
 
-def _add(commands: Commands, name: str, about: str, example: str) -> argparse.ArgumentParser:
-    return commands.add_parser(
-        name,
-        help=about,
-        description=fill(about, 79),
-        epilog=f"example:\n  {example}",
-        allow_abbrev=False,
-    )
-
-
-def _add_certify(commands: Commands) -> None:
-    example = "crosscheck certify four_bar_gravity --digits 20 --duration 0.1 --out four_bar_gravity.json"
-    about = "the motion of a scene to many digits, on which two formulations agree (needs python-flint)"
-    parser = _add(commands, "certify", about, example)
-    parser.add_argument("scene", metavar="SCENE", help="a built-in name, a .toml file, or random_N")
-    parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
-    add_samples(parser, 3)
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    add_output(parser, "--out", metavar="FILE", help="default: standard output")
-
-
-def _add_judge(commands: Commands) -> None:
-    example = "crosscheck judge four_bar.toml run.csv --unit mm --unit deg --column coupler.position.x=2"
-    about = (
-        "compare a motion recorded by any tool with the reference: print the error of each column, its "
-        "bound, its begin and likely causes; exit status 0 if all columns are right, otherwise 1"
-    )
-    parser = _add(commands, "judge", about, example)
-    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
-    parser.add_argument("table", metavar="TABLE", help="a table with a column of times, such as run.csv")
-    parser.add_argument(
-        "--column",
-        action="append",
-        default=[],
-        metavar="NAME=PLACE[:UNIT]",
-        help="a column of the scene or `time`, and its number (from 1) or header in the table; may repeat",
-    )
-    parser.add_argument(
-        "--unit",
-        action="append",
-        default=[],
-        metavar="U",
-        help="unit of all columns of its quantity, such as mm, deg, mm/s or rpm; may repeat; default: SI",
-    )
-    parser.add_argument(
-        "--tolerance",
-        type=not_negative,
-        default=FLOOR,
-        metavar="E",
-        help="largest error of a right column, relative to the mechanism's length, 1 rad, or the largest "
-        "velocity of a body (default: %(default)g); 0: the bound on the reference alone",
-    )
-    parser.add_argument(
-        "--quaternion", choices=("wxyz", "xyzw"), default="wxyz", help="order of quaternion columns"
-    )
-    add_reference_time(parser)
-    parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
-
-
-def _add_reference(commands: Commands) -> None:
-    example = "crosscheck reference four_bar.toml --out ref.csv --samples 201"
-    about = "write the reference motion with the bound on its error as a table for other tools"
-    parser = _add(commands, "reference", about, example)
-    parser.add_argument("scene", metavar="SCENE", help="a built-in name or a .toml file")
-    add_output(parser, "--out", required=True, metavar="FILE", help="the .csv file")
-    when = parser.add_mutually_exclusive_group()
-    when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
-    add_samples(when, 101)
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
-    add_reference_time(parser)
-
-
 def _add_list(commands: Commands) -> None:
     about = "print the known scenes, engines, methods, settings, metrics and the support matrix"
-    parser = _add(commands, "list", about, "crosscheck list engines")
+    parser = add_command(commands, "list", about, "crosscheck list engines")
     parser.add_argument("what", nargs="?", choices=tuple(TABLES), help="the table to print; default: all")
 
 
 def _add_run(commands: Commands) -> None:
     example = "crosscheck run four_bar --engine mujoco --engine exudyn --samples 21 --json"
     about = "run scenes in engines, one record for every engine and setting"
-    add_selection(_add(commands, "run", about, example))
+    add_selection(add_command(commands, "run", about, example))
 
 
 def _add_compare(commands: Commands) -> None:
     example = "crosscheck compare my.toml\n  crosscheck compare robot.xml --hold trunk --duration 0.5"
     about = "compare engines on a mechanism: which are right, how accurate and how fast, and why others fail"
-    parser = _add(commands, "compare", about, example)
+    parser = add_command(commands, "compare", about, example)
     add_selection(parser)
     parser.add_argument(
         "--repeats",
@@ -185,7 +106,7 @@ def _add_compare(commands: Commands) -> None:
 def _add_tune(commands: Commands) -> None:
     example = "crosscheck tune mujoco my.toml --error 1e-6\n  crosscheck tune mujoco my.toml --closure 1mm"
     about = "find the cheapest settings of an engine that reach an error or a closure gap on a mechanism"
-    parser = _add(commands, "tune", about, example)
+    parser = add_command(commands, "tune", about, example)
     parser.add_argument("engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`)")
     parser.add_argument("scene", metavar="SCENE", help="a built-in scene, a .toml, MJCF (.xml) or URDF file")
     goal = parser.add_mutually_exclusive_group()
@@ -204,7 +125,7 @@ def _add_tune(commands: Commands) -> None:
 
 def _add_verify(commands: Commands) -> None:
     about = "test an engine by the conformance suite: every property on every scene of the suite"
-    parser = _add(commands, "verify", about, "crosscheck verify mujoco")
+    parser = add_command(commands, "verify", about, "crosscheck verify mujoco")
     parser.add_argument(
         "engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`), or module:attribute"
     )
@@ -246,7 +167,7 @@ def _add_verify(commands: Commands) -> None:
 
 def _add_findings(commands: Commands) -> None:
     about = "violations found in engines, each with a proof; --recheck asks the installed versions"
-    parser = _add(commands, "findings", about, "crosscheck findings --recheck")
+    parser = add_command(commands, "findings", about, "crosscheck findings --recheck")
     parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
     parser.add_argument(
         "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
@@ -258,7 +179,7 @@ def _add_closed_loops(commands: Commands) -> None:
         "show engines on closed-loop mechanisms, each hard in one way, from stored records; "
         "--run measures installed engines again"
     )
-    parser = _add(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")
+    parser = add_command(commands, "closed-loops", about, "crosscheck closed-loops --run --engine drake")
     add_stored_runs(parser, FILE)
     parser.add_argument("--family", action="append", metavar="F", help="measure this family only; may repeat")
 
@@ -268,7 +189,7 @@ def _add_convergence(commands: Commands) -> None:
         "show least errors and orders of convergence of engines from stored records; "
         "--run makes the missing runs of installed engines at halved steps"
     )
-    parser = _add(commands, "convergence", about, "crosscheck convergence --run --engine drake")
+    parser = add_command(commands, "convergence", about, "crosscheck convergence --run --engine drake")
     add_stored_runs(parser, LADDERS)
 
 
@@ -277,7 +198,7 @@ def _add_modes(commands: Commands) -> None:
         "compare equilibria, steady motions and the eigenvalues of small motions: the judge's own equations, "
         "mbref, and engines; without a scene show the stored table of mechanisms with closed forms"
     )
-    parser = _add(commands, "modes", about, "crosscheck modes my.toml --engine mujoco --engine exudyn")
+    parser = add_command(commands, "modes", about, "crosscheck modes my.toml --engine mujoco --engine exudyn")
     parser.add_argument("scene", nargs="?", metavar="SCENE", help="a built-in name or a .toml file")
     parser.add_argument(
         "--engine", action="append", metavar="E", help="ask this engine only; may repeat; default: installed"
@@ -297,7 +218,7 @@ def _add_modes(commands: Commands) -> None:
 def _add_report(commands: Commands) -> None:
     example = "crosscheck report my.toml --out report"
     about = "make the missing records and render the report; resumes where it was interrupted"
-    parser = _add(commands, "report", about, example)
+    parser = add_command(commands, "report", about, example)
     parser.add_argument(
         "scene",
         nargs="*",
@@ -326,7 +247,7 @@ def _add_paper(commands: Commands) -> None:
         "run the tables and figures of Neto & Ambrósio (2003) and render them beside the printed ones; "
         "resumes where it was interrupted"
     )
-    parser = _add(commands, "paper", about, example)
+    parser = add_command(commands, "paper", about, example)
     parser.add_argument(
         "--depth",
         choices=("quick", "whole"),
@@ -339,7 +260,7 @@ def _add_paper(commands: Commands) -> None:
 def _add_diff(commands: Commands) -> None:
     example = "crosscheck diff report-before report-after"
     about = "list what changed beyond noise between two sets of records: versions, settings or machines"
-    parser = _add(commands, "diff", about, example)
+    parser = add_command(commands, "diff", about, example)
     parser.add_argument("old", metavar="OLD", help="a records.jsonl, or the folder of a report")
     parser.add_argument("new", metavar="NEW", help="the same")
     parser.add_argument("--all", action="store_true", help="also list the runs that did not change")

@@ -13,7 +13,7 @@ import numpy as np
 
 from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
-from crosscheck.conformance.trial import Specimen, specimens
+from crosscheck.conformance.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
 from crosscheck.study.grid import MOST_SECONDS, Case, default_cases
 from crosscheck.study.scouting import of_file, scout, settings, shown_name

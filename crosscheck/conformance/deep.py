@@ -17,8 +17,9 @@ from crosscheck.conformance import suite
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.random_scenes import floating, mechanism, rotor, without_masses
 from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.specimens import Specimen
 from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
-from crosscheck.conformance.trial import Bench, Broken, Specimen, difference, set_up
+from crosscheck.conformance.trial import Bench, Broken, difference, set_up
 from crosscheck.engine import engine
 from mbref.records import append, opened
 from mbref.scene import Scene

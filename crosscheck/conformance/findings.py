@@ -13,7 +13,8 @@ from typing import Any
 from crosscheck.conformance import suite
 from crosscheck.conformance.changes import replaced
 from crosscheck.conformance.runners import Runner
-from crosscheck.conformance.trial import Bench, Specimen, set_up
+from crosscheck.conformance.specimens import Specimen
+from crosscheck.conformance.trial import Bench, set_up
 from mbref.files import file_name
 from mbref.scene import GROUND, Joint, Load, Scene, SceneError
 

@@ -15,7 +15,8 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.conformance.runners import Runner
-from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, Specimen, set_up
+from crosscheck.conformance.specimens import Specimen
+from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, set_up
 from crosscheck.judge.constraints import initial_twists, scene_length
 from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants
 from crosscheck.judge.tolerances import GRAINS

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from crosscheck.conformance.features import feature_scenes
-from crosscheck.conformance.trial import Specimen
+from crosscheck.conformance.specimens import Specimen
 from crosscheck.engine import Engine
 from mbref.scene import (
     Body,

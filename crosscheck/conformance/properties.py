@@ -10,16 +10,14 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from crosscheck.conformance.precise import double_precision, refined, settled, smooth
-from crosscheck.conformance.relations import RELATIONS, Relation
+from crosscheck.conformance.related import related
+from crosscheck.conformance.relations import RELATIONS
 from crosscheck.conformance.trial import (
     NEIGHBOURS,
-    OWN_ACCURACY,
     Bench,
-    Broken,
     Finding,
     Outside,
     Specimen,
-    completed,
     difference,
 )
 from crosscheck.conformance.vanishing import vanishing
@@ -30,7 +28,6 @@ from crosscheck.judge.gauss_principle import stacked
 from crosscheck.judge.metrics import in_scene_order, violation_series
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.precision import motion_rate
-from crosscheck.judge.push_difference import pushes_apart
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import (
     GRAINS,
@@ -42,7 +39,7 @@ from crosscheck.judge.tolerances import (
 )
 from crosscheck.refusals import shortened
 from mbref import rotations
-from mbref.scene import Moment, Scene, SceneError
+from mbref.scene import Moment, Scene
 from mbref.trajectory import Outcome, Trajectory
 
 SECOND = ("acceleration", "angular_acceleration")
@@ -265,40 +262,6 @@ def other_times(bench: Bench) -> Finding:
         difference(bench.scene, _at(bench.motion, slice(-1, None)), alone),
     )
     return Finding(apart, bench.own_accuracy, bench.floors)
-
-
-def related(name: str, bench: Bench) -> Finding | Cannot | Outside:
-    """Compare motion, accelerations and unique reactions of the changed scene with the expected ones."""
-    relation = RELATIONS[name]
-    scene = changed(relation, bench)
-    if isinstance(scene, Outside):
-        return scene
-    if cannot := bench.refuses(scene):
-        return cannot
-    expected = in_scene_order(scene, relation.expect(bench.scene, bench.motion))
-    found = bench.run(scene, expected.times)
-    poses = Finding(difference(scene, expected, found), bench.own_accuracy, bench.floors)
-    if poses.measured > poses.allowed:
-        poses = poses._replace(allowed=max(poses.allowed, _accuracy_of(bench, scene, found)))
-    apart, of = pushes_apart(scene, expected, found, bench.rank)
-    pushes = Finding(apart, bench.own_pushes, f"of {of}")
-    return max(poses, pushes, key=lambda finding: finding.measured / finding.allowed)
-
-
-def _accuracy_of(bench: Bench, scene: Scene, run: Trajectory) -> float:
-    """Return `Bench.own_accuracy` of a changed scene from its two finest settings; 0 for only one setting."""
-    if len(bench.settings) < 2:
-        return 0.0
-    coarser = bench.observed(scene, run.times, bench.settings[-2]).value
-    return OWN_ACCURACY * difference(scene, run, completed(scene, coarser, len(run.times)))
-
-
-def changed(relation: Relation, bench: Bench) -> Scene | Outside:
-    """Return the changed scene; raises Broken if its initial state is not valid."""
-    try:
-        return relation.change(bench.scene, bench.motion)
-    except (SceneError, ValueError) as fault:
-        raise Broken(f"its motion makes no valid scene: {fault}") from None
 
 
 def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:

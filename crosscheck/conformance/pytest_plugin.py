@@ -64,8 +64,8 @@ class Session:
         from crosscheck.conformance.features import undetermined
         from crosscheck.conformance.planar import is_planar, planar_specimens
         from crosscheck.conformance.random_mechanisms import random_mechanism
+        from crosscheck.conformance.specimens import Specimen, specimens
         from crosscheck.conformance.suite import runner
-        from crosscheck.conformance.trial import Specimen, specimens
         from crosscheck.engine import engine
 
         self.config, self.name = config, config.getoption("engine")

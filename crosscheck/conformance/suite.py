@@ -17,7 +17,8 @@ from crosscheck.conformance.features import is_undetermined, undetermined
 from crosscheck.conformance.hint import Failure, hint
 from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
-from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, Specimen, set_up
+from crosscheck.conformance.specimens import Specimen
+from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, set_up
 from crosscheck.engine import engine
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import ChildFailed

@@ -8,35 +8,35 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref import rotations
 from mbref.equations.branches import MOST_BRANCHED_ROWS, velocities_along
 from mbref.equations.coordinates import displace_all
-from mbref.equations.driver_conflicts import conflict_of_drivers
-from mbref.equations.gaps import CLOSED, gaps, lengths_of_rows
+from mbref.equations.gaps import CLOSED, gaps
+from mbref.equations.initial_velocities import (
+    GROSS,
+    START_RANK_TOLERANCE,
+    Rates,
+    dense_velocities,
+    given_velocities,
+    joint_fault,
+    sparse_velocities,
+)
 from mbref.equations.model import Model, Terms
-from mbref.equations.units import row_lengths
-from mbref.linear_algebra.least_norm import least_norm, least_norm_and_null_space
+from mbref.equations.units import unit_equations
+from mbref.linear_algebra.least_norm import least_norm
 from mbref.linear_algebra.minimum_norm import MinimumNorm
 from mbref.scene import Body, SceneError
 
-START_RANK_TOLERANCE = 1e-5  # smaller singular values stay uncorrected: the rank may drop at the start
 LARGE = 40  # rows; for more, dense singular values take longer than sparse factors
-GROSS = 0.05  # violation / scene's length, or violation / given velocities, above which the data are faulty
-# violation by drivers / speed, above which drivers contradict the joints; rounding leaves less
-CONTRADICTED = 1e-3
 MET = 1e-14  # gap relative to the largest coordinate that is rounding
 SHORTEST_MOVE = 1e-15  # displacement of a Newton step (lengths or rad) that is rounding
 REPORTED = 1e-9  # gap, or wrong velocity / largest velocity, from which a correction is reported
 MOST_ITERATIONS = 30  # largest number of Newton steps from the given pose
-# weight of open velocities / weight of given velocities; number of compensating iterations
-OPEN_WEIGHT, REPEATS = 1e-4, 5
 ON_BRANCH = 1e-13  # residual of Φ_q v = ν / largest velocity; a larger residual belongs to another branch
 NEAR_SINGULAR_RANK = 1e-9  # singular values below which they are not corrected
 BRANCH = (
     "initial velocities that the scene does not give belong, at a singular position, to the branch with the "
     "least kinetic energy"
 )
-LEAST_WEIGHT = 1e-6  # weight of a rotation without inertia / largest mass or inertia
 
 
 @dataclass(frozen=True)
@@ -117,28 +117,16 @@ def consistent_starts(scenes: Alike) -> list[Start | SceneError]:
     by_body[:, :, 1] = 1 / scenes.length[:, None, None]
     scale = by_body.reshape(v.shape)
     jacobian = terms.blocks if model.m > LARGE else terms.jacobian * scale[:, None]
-    rates = map(Rates, v, given, terms.nu, scale, jacobian)
+    rates = map(Rates, v, given, terms.nu, scale, jacobian, scenes.mass, scenes.length)
     states = enumerate(zip(q, before.tolist(), rates, strict=True))
     return [faults.get(k) or _start(scenes, k, *state) for k, state in states]
 
 
-class Rates(NamedTuple):
-    """The velocity equations of a scene: the given velocities (n,), their mask, ν, and Φ_q.
-
-    Φ_q (m, n) refers to velocities over their ``scale`` (n,); a large scene has blocks (m, 12) of Φ_q itself.
-    """
-
-    v: np.ndarray
-    given: np.ndarray
-    nu: np.ndarray
-    scale: np.ndarray
-    jacobian: np.ndarray
-
-
 def _start(scenes: Alike, k: int, q: np.ndarray, before: float, rates: Rates) -> Start | SceneError:
     """Return the start of one of the scenes from its corrected coordinates q."""
+    solve = sparse_velocities if scenes.model.m > LARGE else dense_velocities
     try:
-        v, off, is_open = (_sparse_velocities if scenes.model.m > LARGE else _velocities)(scenes, k, rates)
+        v, off, is_open = solve(scenes.model, rates)
     except SceneError as fault:
         return fault
     along = _along_branch(scenes.model_of(k), q, v, rates.given) if is_open and np.any(v) else None
@@ -159,7 +147,7 @@ def _along_branch(model: Model, q: np.ndarray, v: np.ndarray, given: np.ndarray)
 def rate_violation(model: Model, q: np.ndarray, v: np.ndarray) -> float:
     """Return the largest |Φ_q v - ν| of unit rows at t = 0, over the largest of the velocities v (6 nb,)."""
     terms = model.terms(0.0, q, v)
-    jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
+    jacobian, nu = unit_equations(terms.jacobian, terms.nu)
     return float(np.abs(jacobian @ v - nu).max() / np.abs(v).max())
 
 
@@ -169,23 +157,8 @@ def _best_met(model: Model, q: np.ndarray, along: list[np.ndarray]) -> np.ndarra
     off = [rate_violation(model, q, w) for w in along]
     best = along[int(np.argmin(off)) if max(off) > ON_BRANCH else 0]
     terms = model.terms(0.0, q, best)
-    jacobian, nu = _unit_rows(terms.jacobian, terms.nu)
+    jacobian, nu = unit_equations(terms.jacobian, terms.nu)
     return best + np.linalg.lstsq(jacobian, nu - jacobian @ best, rcond=NEAR_SINGULAR_RANK)[0]
-
-
-def _fault(model: Model, row: int, what: str) -> SceneError:
-    return SceneError([f"joint[{model.row_joint[row]}]: {what}"])
-
-
-def _contradiction(model: Model, row: int) -> SceneError:
-    """Return the fault of drivers whose velocities at t = 0 are impossible; ``row`` has the largest
-    residual."""
-    if (conflict := conflict_of_drivers(model.scene)) is not None:
-        return SceneError([conflict.fault])
-    names = [driver.joint for driver in model.scene.driver]
-    who = f"the drivers of {', '.join(names)} contradict" if len(names) > 1 else "contradicts"
-    where = f"at t = 0, most of all at joint {model.row_joint[row]!r}"
-    return SceneError([f"driver[{names[0]}]: {who} the joints {where}"])
 
 
 def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, SceneError], Terms]:
@@ -200,11 +173,11 @@ def _corrected(scenes: Alike, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, di
     for k in np.flatnonzero(first > GROSS).tolist():
         row = int(np.argmax(opened[k]))
         what = f"positions given to bodies violate it by {abs(before.phi[k, row]):.3g} m or rad"
-        faults[k] = _fault(scenes.model, row, what)
+        faults[k] = joint_fault(scenes.model, row, what)
     for k in np.flatnonzero((last > CLOSED) & (first <= GROSS)).tolist():
         row = int(np.argmax(left[k]))
         what = f"no nearby positions satisfy it; {abs(terms.phi[k, row]):.3g} m or rad remain"
-        faults[k] = _fault(scenes.model, row, what)
+        faults[k] = joint_fault(scenes.model, row, what)
     return q, first, faults, terms
 
 
@@ -258,7 +231,7 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
         rows = zip(blocks, mass, rhs, strict=True)
         return np.array([MinimumNorm(model.structure.sparse(block), own)(b) for block, own, b in rows])
     inverse_root = 1 / np.sqrt(mass)
-    unit, rhs = _unit_rows(model.structure.dense(blocks) * inverse_root[:, None], rhs)
+    unit, rhs = unit_equations(model.structure.dense(blocks) * inverse_root[:, None], rhs)
     return inverse_root * least_norm(unit, rhs, START_RANK_TOLERANCE)
 
 
@@ -269,87 +242,3 @@ def _weights(scenes: Alike, places: np.ndarray) -> np.ndarray:
     if scenes.model.kinematic:
         return alike
     return np.where(mass > 0, mass, mass[:, ::6].max(axis=1, keepdims=True) * alike)
-
-
-def given_velocities(bodies: Sequence[Sequence[Body]], q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the velocities (s, 6 nb) that scenes give to their bodies (zero elsewhere), and the mask of the
-    given entries, from coordinates (s, 7 nb)."""
-    shape = len(q), len(bodies[0]), 6
-    v, given = np.zeros(shape), np.zeros(shape, dtype=bool)
-    for k, own in enumerate(bodies):
-        for b, body in enumerate(own):
-            if body.velocity is not None:
-                v[k, b, :3], given[k, b, :3] = body.velocity, True
-            if body.angular_velocity is not None:
-                v[k, b, 3:], given[k, b, 3:] = body.angular_velocity, True
-    if v[..., 3:].any():
-        turning = v[..., 3:].any(axis=2)
-        to_body = rotations.to_matrix(q.reshape(*shape[:2], 7)[turning, 3:]).swapaxes(1, 2)
-        v[turning, 3:] = (to_body @ v[turning, 3:, None])[..., 0]
-    return v.reshape(len(q), -1), given.reshape(len(q), -1)
-
-
-def _velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Return velocities of a scene that satisfy Φ_q v = ν, the residual of the given velocities, and whether
-    some velocities may be undetermined.
-
-    Among the solutions the result is nearest to the given velocities (angular velocities times the scene's
-    length); undetermined velocities are least in the metric of M.
-    """
-    v, given, nu, scale, jacobian = rates
-    wanted = v[given] / scale[given]
-    if not (wanted.any() or nu.any()):
-        return np.zeros(scenes.model.n), 0.0, not given.all()
-    unit, rhs = _unit_rows(jacobian, nu)
-    x, open_ = least_norm_and_null_space(unit, rhs, START_RANK_TOLERANCE)
-    off = np.abs(unit @ x - rhs)
-    if off.max(initial=0.0) > CONTRADICTED * np.abs(x).max(initial=0.0):
-        raise _contradiction(scenes.model, int(np.argmax(off)))
-    if open_.size and wanted.size:
-        step, still_open = least_norm_and_null_space(open_[given], wanted - x[given], START_RANK_TOLERANCE)
-        x, open_ = x + open_ @ step, open_ @ still_open
-    as_given = x.copy()
-    as_given[given] = wanted
-    residual = np.abs(jacobian @ as_given - nu)
-    if np.abs(x[given] - wanted).max(initial=0.0) > GROSS * np.abs(wanted).max(initial=0.0):
-        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
-        raise _fault(scenes.model, int(np.argmax(residual)), what)
-    if open_.size:
-        weight = np.sqrt(scenes.mass[k]) * scale
-        x = x - open_ @ np.linalg.lstsq(weight[:, None] * open_, weight * x, rcond=START_RANK_TOLERANCE)[0]
-    size = max(np.abs(x).max(), np.abs(as_given).max())
-    return x * scale, float(np.abs(unit @ as_given - rhs).max(initial=0.0) / size), bool(open_.size)
-
-
-def _sparse_velocities(scenes: Alike, k: int, rates: Rates) -> tuple[np.ndarray, float, bool]:
-    """Return velocities by sparse solutions: nearest to the given velocities first, then of least norm."""
-    from scipy.sparse import csr_array, vstack
-
-    model, mass, (v, given, nu, scale, blocks) = scenes.model, scenes.mass[k], rates
-    jacobian = model.structure.sparse(blocks)
-    x = MinimumNorm(jacobian, scale**-2)(nu)
-    off = np.abs(jacobian @ x - nu)
-    if np.max(off) > CONTRADICTED * np.max(np.abs(x / scale)):
-        raise _contradiction(model, int(np.argmax(off)))
-    nearest, x, aim = MinimumNorm(jacobian, np.where(given, 1.0, OPEN_WEIGHT) / scale**2), v, v
-    for _ in range(REPEATS):
-        x = aim + nearest(nu - jacobian @ aim)
-        aim = aim + np.where(given, v - x, 0.0)
-    chosen = np.flatnonzero(given)
-    selection = csr_array((np.ones(chosen.size), (np.arange(chosen.size), chosen)), (chosen.size, model.n))
-    weight = np.where(mass > 0, mass, LEAST_WEIGHT * np.max(mass))
-    x = MinimumNorm(csr_array(vstack([jacobian, selection])), weight)(np.append(nu, x[given]))
-    residual = np.abs(jacobian @ np.where(given, v, x) - nu)
-    miss, wanted = np.abs((x - v) / scale)[given], np.abs(v / scale)[given]
-    if np.max(miss, initial=0.0) > GROSS * np.max(wanted, initial=0.0):
-        what = f"velocities given to bodies violate it by {residual.max():.3g} m/s or rad/s"
-        raise _fault(model, int(np.argmax(residual)), what)
-    size = max(np.abs(x / scale).max(), np.abs(v / scale).max())
-    share = residual / (lengths_of_rows(blocks, scenes.length[k]) * size)
-    return x, float(np.max(share, initial=0.0)), not given.all()
-
-
-def _unit_rows(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the equations with rows of unit length, so that their rank does not depend on units."""
-    lengths = row_lengths(matrix)
-    return matrix / lengths[..., None], rhs / lengths

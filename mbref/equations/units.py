@@ -43,6 +43,12 @@ def unit_rows(matrix: np.ndarray) -> np.ndarray:
     return matrix / row_lengths(matrix)[..., None]
 
 
+def unit_equations(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return equations (…, m, n), (…, m) with rows of unit length: their rank does not depend on units."""
+    lengths = row_lengths(matrix)
+    return matrix / lengths[..., None], rhs / lengths
+
+
 def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """Return the length (…, nb) of every body (m).
 

@@ -106,9 +106,8 @@ def _matching(cell: Cell, records: Records, parts: Sequence[str]) -> list[str]:
 
 def _settings() -> Table:
     rows = list(settings.REASONS.items())
-    return Table(
-        "The settings of all runs, none chosen for a cell.", ("Setting", "Meaning"), rows, folded=True
-    )
+    caption = "The settings of all runs, none chosen for a cell."
+    return Table(caption, ("Setting", "Meaning"), rows, folded=True)
 
 
 def _table(name: str, records: Records) -> list[Block]:

@@ -18,7 +18,7 @@ from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.relations import shaken
 from crosscheck.conformance.runners import InProcess, Isolated
-from crosscheck.conformance.trial import specimens
+from crosscheck.conformance.specimens import specimens
 from crosscheck.engine import engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion

@@ -10,8 +10,8 @@ import pytest
 
 from crosscheck.conformance.hint import Failure, hint, parts_of
 from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.specimens import specimens
 from crosscheck.conformance.suite import held_against
-from crosscheck.conformance.trial import specimens
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.terms import accelerations, terms_at, variants

@@ -9,13 +9,14 @@ import pytest
 
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.specimens import specimens
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.precision import grain, not_finite, single_precision
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from tests.zoo.defects import DEFECTS, engine
 
-SPECIMENS = {specimen.scene.name: specimen for specimen in trial.specimens()}
+SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 ARRAYS = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 
 

@@ -9,9 +9,10 @@ import pytest
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.geared_forms import GEARED
 from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.specimens import RELATED, specimens
 from crosscheck.engine import BUILT_IN, engine
 
-SPECIMENS = {specimen.scene.name: specimen for specimen in trial.specimens()}
+SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 QUICK = ("heavy top", "universal joint", "cylindrical driver", "door", "floating pair", "two drivers")
 KNOWN: dict[tuple[str, str, str], str] = {  # (engine, scene, check): why it fails
     ("pinocchio", "drawn loop", "in millimetres"): "mu of the proximal solver is absolute, chosen for metres",
@@ -50,6 +51,6 @@ def test_engine_and_couplings(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_engine_and_relations(name):
-    scenes = trial.RELATED
+    scenes = RELATED
     found = violations(name, scenes, related=True)
     assert set(found) == known(name, scenes), found

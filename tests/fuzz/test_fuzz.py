@@ -22,8 +22,7 @@ def test_random_command_lines_end_as_documented(tmp_path, monkeypatch):
     assert len({ending for _, ending, _ in endings}) > 10, "few commands were tried"
 
 
-def test_an_undocumented_error_is_a_defect(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("mbref.scene_fields.LARGEST", "not a number")
-    found = [defect for seed in range(20) if (defect := targets.case("scene_data", seed)[1])]
-    assert found and all("TypeError" in defect and "scene_fields.py" in defect for defect in found), found
+def test_an_undocumented_error_is_a_defect(monkeypatch):
+    monkeypatch.setitem(targets.TARGETS, "faulty", lambda seed: str(targets.diagnose(seed)))
+    defect = targets.case("faulty", 7)[1]
+    assert "SceneError" in defect and "diagnosis.py" in defect, defect

@@ -71,11 +71,13 @@ def imported_from_product(path: Path) -> dict[str, str]:
 
 def private_uses(path: Path) -> Iterator[str]:
     """Yield private names of the product that a test file imports or reads from an object."""
-    own = {node.name for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    nodes = list(ast.walk(parsed(path)))
+    own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    own |= {n.attr for n in nodes if isinstance(n, ast.Attribute) and isinstance(n.ctx, ast.Store)}
     for name, full in imported_from_product(path).items():
         if is_private(full.rpartition(".")[2]):
             yield name
-    for node in ast.walk(parsed(path)):
+    for node in nodes:
         if isinstance(node, ast.Attribute) and node.attr in private_names() - own:
             yield node.attr
 

@@ -13,10 +13,11 @@ from crosscheck.conformance import suite, trial
 from crosscheck.conformance.features import undetermined
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.runners import InProcess
+from crosscheck.conformance.specimens import Specimen, specimens
 from tests.zoo.defects import DEFECTS, engine
 from tests.zoo.table import FOR_REPORTS, data, page
 
-SPECIMENS = {s.scene.name: s for s in [trial.Specimen(undetermined()), *trial.specimens()]}
+SPECIMENS = {s.scene.name: s for s in [Specimen(undetermined()), *specimens()]}
 
 
 @functools.cache
@@ -54,7 +55,7 @@ def test_every_scene_of_a_defect_and_the_suite():
 
 @pytest.mark.slow
 def test_sound_engine_and_the_whole_suite():
-    found = suite.held_against(InProcess(engine()), trial.specimens(deep=True))
+    found = suite.held_against(InProcess(engine()), specimens(deep=True))
     failed = [v for v in found.verdicts if v.status == suite.FAIL]
     assert found.conforms, failed
 

@@ -177,8 +177,8 @@ def _unit(rows: np.ndarray, least: float) -> np.ndarray:
 def _ranks(ours: np.ndarray, theirs: np.ndarray) -> tuple[int, int, int]:
     """Return the ranks of both sets of rows, of length one at most, and of all rows together.
 
-    Axes that are parallel but for rounding leave singular values of the size of the rounding, which differ
-    between both sets. Therefore one limit serves all three ranks: the middle of the widest gap between the
+    Axes that rounding alone turns out of parallel leave singular values of its size, which differ between
+    both sets. Therefore one limit serves all three ranks: the middle of the widest gap between the
     singular values near RANK.
     """
     values = [np.linalg.svd(m, compute_uv=False) if m.size else np.zeros(0) for m in (ours, theirs)]

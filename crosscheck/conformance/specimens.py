@@ -1,0 +1,53 @@
+"""Scenes of the conformance suite, with their exact motions where a formula is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
+from crosscheck.conformance.features import feature_scenes
+from crosscheck.conformance.geared_forms import GEARED
+from crosscheck.conformance.moving import dead_end, moving_probes
+from crosscheck.conformance.random_scenes import mechanism
+from crosscheck.judge.reference.reference import SECONDS
+from mbref.scene import Scene
+from mbref.scenes import SCENES
+
+SHORT = {  # built-in scenes with a truth, and end times (s) before their first singular position
+    "four_bar": 0.01,
+    "four_bar_gravity": 0.12,
+    "planar_slider_crank": 0.1,
+    "spatial_slider_crank": 0.02,
+    "spatial_slider_crank_driven": 0.02,
+}
+DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of the random mechanisms that belong to the suite
+RELATED = (  # scenes to which the metamorphic relations are applied at quick depth
+    "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
+    "cylindrical driver", "force load", "tumbling body", *DRAWN,
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """A scene of the suite. ``exact`` returns its poses if a formula is known. ``related`` applies the
+    metamorphic relations. ``reference_time`` is the CPU time (s) of a reference if no closed form exists. A
+    ``dead_end`` has drivers that the mechanism cannot follow to the end."""
+
+    scene: Scene
+    exact: Exact | None = None
+    related: bool = False
+    reference_time: float = SECONDS
+    dead_end: bool = False
+
+
+@cache
+def specimens(deep: bool = False) -> tuple[Specimen, ...]:
+    """Return all scenes of the suite; ``deep`` applies the metamorphic relations to all without couplings."""
+    forms = [Specimen(*make(), deep or make.__name__ in RELATED) for make in CLOSED_FORMS]
+    scenes = [SCENES[name]().with_(duration=end) for name, end in SHORT.items()]
+    features = {n: s.with_(name=n) for n, s in feature_scenes().items() if s.name not in SHORT}
+    drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
+    scenes += [*(features | moving_probes()).values(), *drawn]
+    forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
+    return (*forms, *(Specimen(*make()) for make in GEARED), Specimen(dead_end(), dead_end=True))
