@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import shlex
 from dataclasses import replace
 
 import numpy as np
@@ -110,9 +111,11 @@ def test_a_stored_violation_has_its_numbers_and_its_command(tmp_path):
     verdict = Verdict("truth", "free", FAIL, 0.25, 1e-5, "off")
     path = findings.keep(SCENE, verdict, "my engine", tmp_path / "new")
     lines = path.read_text().splitlines()
-    assert path.name == "my_engine_truth_free.toml"
-    assert lines[0] == "# my engine: truth/2 fails 0.25, allowed 1e-05 off"
-    assert lines[1] == f"# crosscheck verify my engine --scene {path}" and Scene.from_file(path) == SCENE
+    assert path.parent == tmp_path / "new" and path.suffix == ".toml" and " " not in path.name
+    assert lines[0].startswith("# my engine: truth/") and lines[0].endswith(" fails 0.25, allowed 1e-05 off")
+    command = shlex.split(lines[1].removeprefix("# "))
+    assert command == ["crosscheck", "verify", "my engine", "--scene", str(path)]
+    assert Scene.from_file(path) == SCENE
     path = findings.keep(SCENE, Verdict("run", "free", FAIL), "e", tmp_path / "new", "heavy top")
     lines = path.read_text().splitlines()
     assert lines[:2] == ["# e: run/1 fails", "# crosscheck verify e --scene 'heavy top'"]

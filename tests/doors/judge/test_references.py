@@ -1,0 +1,245 @@
+"""References of short motions against stored states, and the laws of mechanics that the judge must obey."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from crosscheck import measure, truth_for
+from crosscheck.judge import constraints
+from crosscheck.judge.energy import energy_series
+from crosscheck.judge.reference.reference import Reference, reference
+from crosscheck.judge.truth import closed_form
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
+from tests.helpers.errors import pose_error, rate_error, turned_between
+from tests.helpers.exact_motions import stored
+from tests.helpers.short_motions import CROSSED, MOTIONS, times_of
+
+ROUNDING = 2.2e-16
+LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
+TURN = rotations.from_vector(np.array([0.7, -0.4, 1.1]))
+SHIFT = np.array([0.3, -0.5, 0.2])  # m
+
+
+EXPENSIVE = {  # more than 0.8 CPU s each
+    "spatial_slider_crank",
+    "planar_slider_crank",
+    "planar_slider_crank_equal",
+    "five_bar_gravity",
+    "five hinges",
+    "two loops on one crank",
+}
+
+
+def a_few(names: list[str], step: int, first: int = 0) -> list[object]:
+    """Return the names as cases: each one of ``step`` for the gate, the rest for the slow suite."""
+    return [
+        name
+        if k % step == first % step and name not in EXPENSIVE
+        else pytest.param(name, marks=pytest.mark.slow)
+        for k, name in enumerate(names)
+    ]
+
+
+SMOOTH = [name for name in MOTIONS if name not in CROSSED]
+
+
+@pytest.fixture(autouse=True)
+def _no_motion_is_known(tmp_path, monkeypatch):
+    """References are computed anew, and none is read from the user's cache."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+
+
+def motion_of(scene: Scene, times: np.ndarray | None = None) -> Trajectory:
+    """Return the judge's motion of a scene at the times of a short motion, or at others."""
+    truth = truth_for(scene, reference_time=LIMIT)
+    assert truth is not None
+    return truth.poses(times_of(scene) if times is None else times)
+
+
+def referred(scene: Scene, times: np.ndarray) -> Reference:
+    """Return the reference of a scene at times, also where a closed form is known."""
+    found = reference(scene, times, LIMIT)
+    assert isinstance(found, Reference), found
+    return found
+
+
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 5))
+def test_judge_finds_the_stored_states_again(name):
+    """Natural coordinates and the tree of joints agree at each sample of a reference."""
+    scene, exact = MOTIONS[name](), stored()[name]
+    found = motion_of(scene)
+    bound = max(exact["bound"], 20 * ROUNDING)
+    assert pose_error(found, exact) <= bound
+    assert rate_error(found, exact) <= 10 * bound
+    if exact["by"] == "reference":
+        assert referred(scene, times_of(scene)).both.all()
+
+
+CLOSED = [name for name in MOTIONS if closed_form(MOTIONS[name]()) is not None]
+
+
+@pytest.mark.parametrize("name", a_few(CLOSED, 3))
+def test_references_are_the_closed_forms(name):
+    scene = MOTIONS[name]()
+    found, exact = referred(scene, times_of(scene)), closed_form(scene).poses(times_of(scene))
+    assert found.both.all()
+    allowed = found.bound.max() + closed_form(scene).accuracy
+    length = constraints.scene_length(scene)
+    assert np.linalg.norm(found.position - exact.position, axis=-1).max() <= allowed * length
+    assert turned_between(found.orientation, exact.orientation).max() <= allowed
+
+
+# --- one mechanism, written otherwise ---------------------------------------------------------------------
+def assert_alike(found: Trajectory, wanted: Trajectory, bound: float) -> None:
+    """Assert that positions, rotations and rates are equal up to a bound relative to their sizes."""
+    order = [found.bodies.index(name) for name in wanted.bodies]
+    states = {
+        name: getattr(wanted, name) for name in ("position", "orientation", "velocity", "angular_velocity")
+    }
+    arrays = {name: getattr(found, name)[:, order] for name in states}
+    length = np.abs(wanted.position).max()
+    assert np.abs(arrays["position"] - wanted.position).max() <= bound * length
+    assert turned_between(arrays["orientation"], wanted.orientation).max() <= bound
+    spin, speed = np.abs(wanted.angular_velocity).max(), np.abs(wanted.velocity).max()
+    fastest = max(spin, speed / length)
+    assert np.abs(arrays["angular_velocity"] - wanted.angular_velocity).max() <= 10 * bound * fastest
+    assert np.abs(arrays["velocity"] - wanted.velocity).max() <= 10 * bound * fastest * length
+
+
+def exact_motion(name: str) -> Trajectory:
+    """Return the stored states of a short motion as a trajectory."""
+    scene, exact = MOTIONS[name](), stored()[name]
+    states = {
+        field: np.array(exact[field]) for field in ("position", "orientation", "velocity", "angular_velocity")
+    }
+    names = tuple(body.name for body in scene.body)
+    return Trajectory(scene.name, "truth", "", exact["by"], {}, times_of(scene), names, **states)
+
+
+def bound_of(name: str) -> float:
+    """Return the bound on both motions; a singular position magnifies the rounding of the scene's numbers."""
+    return (100.0 if name in CROSSED else 2.0) * max(stored()[name]["bound"], 20 * ROUNDING)
+
+
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 2))
+def test_motion_in_grams_millimetres_and_tenths_of_seconds(name):
+    scene = in_other_units(MOTIONS[name](), 1e3, 1e3, 10.0)
+    exact = exact_motion(name)
+    wanted = Trajectory(
+        **{
+            **vars(exact),
+            "times": 10 * exact.times,
+            "position": 1e3 * exact.position,
+            "velocity": 1e2 * exact.velocity,
+            "angular_velocity": exact.angular_velocity / 10,
+        }
+    )
+    assert_alike(motion_of(scene), wanted, bound_of(name))
+
+
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 5))
+def test_motion_in_another_frame(name):
+    exact = exact_motion(name)
+    wanted = Trajectory(
+        **{
+            **vars(exact),
+            "position": rotations.rotate(TURN, exact.position) + SHIFT,
+            "orientation": rotations.multiply(TURN, exact.orientation),
+            "velocity": rotations.rotate(TURN, exact.velocity),
+            "angular_velocity": rotations.rotate(TURN, exact.angular_velocity),
+        }
+    )
+    found = motion_of(in_another_frame(MOTIONS[name](), TURN, SHIFT))
+    assert_alike(found, wanted, 10 * bound_of(name))
+
+
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 8))
+def test_motion_of_parts_in_another_order(name):
+    scene = in_another_order(MOTIONS[name]())
+    assert_alike(motion_of(scene), exact_motion(name), bound_of(name))
+
+
+@pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
+def test_samples_do_not_change_a_reference(name):
+    """The states at the stored times, where three times as many are asked for."""
+    scene = MOTIONS[name]()
+    times = np.union1d(times_of(scene), scene.duration * np.array([0.05, 0.11, 0.5, 0.52, 0.9, 0.99]))
+    found = motion_of(scene, times)
+    chosen = np.isin(times, times_of(scene))
+    exact = stored()[name]
+    assert np.abs(found.position[chosen] - exact["position"]).max() <= 2 * bound_of(name)
+    assert turned_between(found.orientation[chosen], np.array(exact["orientation"])).max() <= bound_of(name)
+
+
+# --- laws that every motion obeys -------------------------------------------------------------------------
+@pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 4))
+def test_joints_stay_closed_at_three_levels(name):
+    scene = MOTIONS[name]()
+    found = measure(scene, motion_of(scene))
+    spin = max(1.0, np.abs(stored()[name]["angular_velocity"]).max())
+    sharp = 1e4 if name in CROSSED else 1.0
+    assert found["violation_position"] <= 1e-13 * sharp
+    assert found["violation_velocity"] <= 1e-13 * sharp * spin
+    assert found["violation_acceleration"] <= 1e-12 * sharp * spin**2
+
+
+def keeps_energy(scene: Scene) -> bool:
+    """Return whether gravity and elastic springs alone do work."""
+    kinds = {load.type for load in scene.load}
+    undamped = all(getattr(load, "damping", 0.0) == 0.0 for load in scene.load)
+    return not scene.driver and kinds <= {"spring", "torsion_spring", "slide_spring"} and undamped
+
+
+@pytest.mark.parametrize("name", a_few([n for n in MOTIONS if keeps_energy(MOTIONS[n]())], 8))
+def test_energy_is_kept(name):
+    scene = MOTIONS[name]()
+    drift = energy_series(scene, motion_of(scene, np.linspace(0.0, scene.duration, 5)))
+    assert drift is not None
+    assert drift.max() <= (1e-9 if name in CROSSED else 1e-12)
+
+
+@pytest.mark.parametrize("name", a_few(SMOOTH, 12, 7))
+def test_velocities_and_accelerations_are_the_rates_of_poses(name):
+    """Central differences of fourth order, at steps of a thousandth of the duration."""
+    scene = MOTIONS[name]()
+    h = 1e-3 * scene.duration
+    run = motion_of(scene, 0.43 * scene.duration + h * np.arange(-2, 3))
+    weights = np.array([1.0, -8.0, 0.0, 8.0, -1.0]) / (12 * h)
+    middle = rotations.conjugate(run.orientation[2])
+    relative = rotations.multiply(run.orientation, middle)
+    turned = 2 * relative[..., 1:] * np.sign(relative[..., :1])  # rad, of small rotations
+    pairs = (
+        (run.position, run.velocity),
+        (turned, run.angular_velocity),
+        (run.velocity, run.acceleration),
+        (run.angular_velocity, run.angular_acceleration),
+    )
+    for values, rates in pairs:
+        scale = np.abs(rates).max() + np.abs(run.angular_velocity).max() * np.abs(values).max() + 1e-3
+        assert np.abs(np.tensordot(weights, values, 1) - rates[2]).max() <= 1e-7 * scale
+
+
+@pytest.mark.parametrize("name", a_few(SMOOTH, 6, 1))
+def test_jacobian_is_the_difference_of_residuals(name):
+    """Residuals of the joints at poses that single velocities reach after 1e-5 s, about the start."""
+    scene = MOTIONS[name]()
+    place, turn = constraints.initial_poses(scene)
+    rows, rates = constraints.jacobian(scene, 0.0, place, turn)
+    h, size = 1e-5, len(scene.body)
+    names = [joint.name for joint in scene.joint]
+    twist = np.random.default_rng(len(name)).normal(size=(size, 6))
+
+    def residuals(sign: float) -> np.ndarray:
+        step = sign * h * twist
+        moved = rotations.multiply(rotations.from_vector(step[:, 3:]), turn)
+        found = constraints.closure(scene, sign * h, place + step[:, :3], moved)
+        return np.concatenate([np.zeros(0), *(found[joint] for joint in names)])
+
+    slope = (residuals(1.0) - residuals(-1.0)) / (2 * h)
+    count = len(slope)  # rows of couplings follow
+    wanted = (rows @ twist.ravel() - rates)[:count]
+    assert slope == pytest.approx(wanted, abs=1e-8)
