@@ -1,4 +1,4 @@
-"""A mechanism in other units, in another frame, or in another order: its motion follows from the first one."""
+"""A mechanism in other units, in another frame, or in another order: its motion follows."""
 
 from __future__ import annotations
 
