@@ -12,6 +12,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mbref import rotations
+from mbref.design.joint_angles import sprung
 from mbref.design.linearisation import EPSILON, OffConstraints, Tangent
 
 STRIDE = 0.35  # distance of neighbouring starts / length of the mechanism, or rad
@@ -136,7 +137,7 @@ def _refined(here: Newton, freedoms: int) -> Newton:
 
 def are_one(first: Newton, second: Newton) -> bool:
     """Return whether poses between two equilibria are equilibria too, so that both belong to one family."""
-    if np.abs(first.tangent.angles - second.tangent.angles).max(initial=0.0) > np.pi:
+    if np.abs(_twists(first.tangent) - _twists(second.tangent)).max(initial=0.0) > np.pi:
         return False
     here, target, before = first.tangent, second.tangent, np.inf
     for _ in range(LINKS):
@@ -153,6 +154,12 @@ def are_one(first: Newton, second: Newton) -> bool:
             return False
         here, before = moved, distance
     return False
+
+
+def _twists(tangent: Tangent) -> np.ndarray:
+    """Return the angles (k,), rad, of torsion springs; full turns of other joints leave a pose as it is."""
+    model = tangent.model
+    return np.asarray(tangent.angles[model.data.loads.angle[sprung(model)].astype(int)])
 
 
 def _is_still(tangent: Tangent, near: Newton) -> bool:

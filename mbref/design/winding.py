@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mbref.design.balance import ONE_POSE, STRIDE
-from mbref.design.joint_angles import angles_at
+from mbref.design.joint_angles import angles_at, sprung
 from mbref.design.linearisation import Tangent
 from mbref.equations.model import displaced
 
@@ -38,8 +38,7 @@ def wound(first: Tangent) -> Tangent:
 
 def _springs(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
     """Return places (k,) of the angles of torsion springs, and their natural angles (k,), rad."""
-    loads = tangent.model.data.loads
-    acting = np.flatnonzero((loads.angle >= 0) & (loads.stiffness > 0.0))
+    loads, acting = tangent.model.data.loads, sprung(tangent.model)
     return loads.angle[acting].astype(int), loads.natural[acting]
 
 

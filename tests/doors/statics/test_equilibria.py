@@ -87,6 +87,14 @@ def test_stiff_springs_hide_no_equilibrium(stiffness):
     assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=1e-9)
 
 
+def test_a_pose_that_is_reached_by_turns_both_ways_is_one():
+    """A free hinge that is turned by a full turn has its old pose; starts lead past both sides to the bottom."""
+    for angle in np.linspace(0.1, 3.0, 6):
+        place = (ARM * np.sin(angle), ARM * np.cos(angle), 0.0)
+        found = equilibria(pendulum(place))
+        assert sorted(each.stability for each in found) == ["stable", "unstable"]
+
+
 def test_a_tackle_in_balance_is_indifferent_at_every_height():
     """Weights of 2 and 1 that move by 1 and 2: exactly zero, and one family of equilibria."""
     bodies = [rod("load", (0.0, -1.0, 0.0), 2.0), rod("weight", (0.5, -0.3, 0.0), 1.0)]
