@@ -88,8 +88,8 @@ def test_stiff_springs_hide_no_equilibrium(stiffness):
 
 
 def test_a_pose_that_is_reached_by_turns_both_ways_is_one():
-    """A free hinge that is turned by a full turn has its old pose; starts lead past both sides to the bottom."""
-    for angle in np.linspace(0.1, 3.0, 6):
+    """A free hinge that is turned by a full turn has its old pose; starts reach it from both sides."""
+    for angle in (0.3, 2.0):
         place = (ARM * np.sin(angle), ARM * np.cos(angle), 0.0)
         found = equilibria(pendulum(place))
         assert sorted(each.stability for each in found) == ["stable", "unstable"]
