@@ -39,7 +39,7 @@ def qr_pivoted(tolerance, scratch):
     for i in range(n):
         for j in range(m):
             norms[0, j] += b[i, j] * b[i, j]
-    largest = norms[0, largest_from(norms[0], 0, m)]
+    largest = norms[0, largest_from(norms[0], 0, m)] if m > 0 else 0.0
     copy(norms[0], norms[1])
     for k in range(min(m, n)):
         best = largest_from(norms[0], k, m)

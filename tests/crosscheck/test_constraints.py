@@ -23,7 +23,7 @@ from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 from tests.crosscheck.truth_scenes import CLOSED
-from tests.strategies import DRIVABLE, one_joint_scenes
+from tests.helpers.joint_strategies import DRIVABLE, one_joint_scenes
 
 SPACES, ACCELERATIONS = 2.1e-14, 8e-13  # measured differences, of the largest acceleration
 QUOTIENT = 1.7e-7  # relative, of difference quotients over 2e-6 s

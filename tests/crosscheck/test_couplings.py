@@ -18,7 +18,7 @@ from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import closed_form, truth_for
-from tests.coupled_scenes import EVERY, gear_pair, pendulum, planetary, spatial_chain
+from tests.helpers.coupled_mechanisms import EVERY, gear_pair, pendulum, planetary, spatial_chain
 
 TIMES = np.array([0.0, 0.2, 0.5, 0.8])
 ENGINES = 1e-8  # at best settings

@@ -22,8 +22,8 @@ from crosscheck.judge.reference.tree import tree_motion
 from mbref.formats import ImportOptions
 from mbref.scene import Factor, Scene, SceneError, TorsionSpring
 from mbref.scenes import SCENES
-from tests import loads_over_time as scenes
-from tests.loads_over_time import AXIS, WAVY
+from tests.helpers import loads_over_time as scenes
+from tests.helpers.loads_over_time import AXIS, WAVY
 
 TIMES = np.array([0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0])
 FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, seconds=100.0)}

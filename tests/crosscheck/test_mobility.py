@@ -7,7 +7,7 @@ import pytest
 from crosscheck.judge.mobility import mobility
 from mbref.scene import GROUND, Body, Distance, Revolute, Scene
 from mbref.scenes import SCENES
-from tests.coupled_scenes import coupled_loops, gear_pair, pendulum, screw
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, pendulum, screw
 
 NAMES = ("planar_slider_crank", "four_bar", "bennett", "sarrus", "five_bar_gravity", "andrews_squeezer")
 

@@ -19,7 +19,7 @@ from crosscheck.recorded.judgement import judge_motion
 from mbref import formats
 from mbref.scene import Scene, SceneError
 from mbref.scene_services import SERVICES
-from tests.coupled_scenes import coupled_loops, gear_pair, rack, screw, spatial_chain
+from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, rack, screw, spatial_chain
 
 TIMES = np.array([0.0, 0.2, 0.4])
 OFFSETS = (

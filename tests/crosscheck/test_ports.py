@@ -21,9 +21,9 @@ from mbref import rotations
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
-from tests.coupled_scenes import EVERY as COUPLED
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.side_by_side import side_by_side
+from tests.helpers.coupled_mechanisms import EVERY as COUPLED
 
 MODULES = {"mjx": "mujoco.mjx", "warp": "mujoco_warp"}
 IN_C = 8.2e-9  # error of MuJoCo in C over 0.05 s at a step of 1 ms

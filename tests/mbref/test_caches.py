@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import multiprocessing
 import os
-import shutil
-import signal
 import subprocess
 import sys
 import threading
@@ -16,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from mbref.kernels import checked_file, disk_cache
+from mbref.kernels import checked_file
 from mbref.simulation.simulate import simulate
 
 ROOT = Path(__file__).parents[2]
@@ -38,15 +36,6 @@ print(shifted(3.0))
 """
 COUNT_COMPILATIONS = """
 print(shifted.pointer.stats.cache_misses.total())
-"""
-FOREIGN = """
-from typing import NamedTuple
-
-class Pair(NamedTuple):
-    first: int
-    second: int
-
-PAIR = Pair(1, 2)
 """
 SCENE = """
 import sys
@@ -124,24 +113,6 @@ def forked(work: Callable[[], None]) -> BaseProcess:
     return process
 
 
-def test_a_disk_that_fills_up_leaves_no_part_of_a_file(tmp_path: Path, capfd):
-    """The limit of a file's size stands for a full disk."""
-    resource = pytest.importorskip("resource")
-    path = tmp_path / "a"
-    checked_file.write(path, b"data")
-
-    def fill() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
-        checked_file.write(path, b"x" * 100_000)
-
-    process = forked(fill)
-    process.join()
-    assert process.exitcode == 0
-    assert capfd.readouterr().err.count("cannot write to") == 1
-    assert os.listdir(tmp_path) == ["a"] and checked_file.read(path) == b"data"
-
-
 def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
     path = tmp_path / "a"
     checked_file.write(path, b"0" * 1_000_000)
@@ -215,24 +186,6 @@ def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_
     assert out == says and "cannot write to" in error and "Traceback" not in error, error
 
 
-def test_kernels_are_not_kept_on_a_disk_that_is_nearly_full(tmp_path: Path, monkeypatch, capsys):
-    usage = shutil.disk_usage(tmp_path)
-    for free, kept_there in ((disk_cache.LEAST_FREE, True), (disk_cache.LEAST_FREE - 1, False)):
-        monkeypatch.setattr(shutil, "disk_usage", lambda _, free=free: usage._replace(free=free))
-        disk_cache.is_writable.cache_clear()
-        assert disk_cache.is_writable(tmp_path) is kept_there
-    disk_cache.is_writable.cache_clear()
-    assert capsys.readouterr().err.count("(No space left on device)") == 1
-
-
-def test_compiled_code_is_found_again(tmp_path: Path):
-    cache = tmp_path / "cache"
-    ran(SMALL_KERNEL, tmp_path, cache)
-    before = {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")}
-    ran(SMALL_KERNEL, tmp_path, cache)
-    assert {file: file.stat().st_mtime_ns for file in kept(cache, "*.nbc")} == before != {}
-
-
 def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
     """The other one waits, and loads it."""
     cache, program = tmp_path / "cache", tmp_path / "program.py"
@@ -243,46 +196,6 @@ def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
     both = [subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True) for _ in range(2)]
     said = [process.communicate()[0] for process in both]
     assert sorted(said) == ["7.0\n0\n", "7.0\n1\n"]
-
-
-def test_a_helper_compiled_for_a_foreign_type_leaves_the_cache_readable(tmp_path: Path):
-    """The second program lacks the module of the type with which the first one calls a helper."""
-    call = "import sys\nsys.path.insert(0, {root!r})\nfrom mbref.integrators.dop853 import no_stage\n"
-    foreign = f"{call}from foreign import PAIR\nprint(no_stage(0, 0.0, 0.0, 0, 0, 0, PAIR)){SMALL_KERNEL}"
-    for name in ("first", "second"):
-        (tmp_path / name).mkdir()
-    (tmp_path / "first" / "foreign.py").write_text(FOREIGN)
-    assert ran(foreign, tmp_path / "first", tmp_path / "cache")[0] == "0\n7.0\n"
-    own = f"{call}print(no_stage(0, 0.0, 0.0, 0, 0, 0, 0))"
-    assert ran(own, tmp_path / "second", tmp_path / "cache")[0] == "0\n"
-
-
-@pytest.mark.parametrize("damage", DAMAGES)
-def test_damage_to_every_file_of_the_cache_costs_time_alone(damage, tmp_path: Path):
-    """Checksums too: kernels without one are compiled again."""
-    cache = tmp_path / "cache"
-    ran(SMALL_KERNEL, tmp_path, cache)
-    files = [path for path in kept(cache, "*") if path.is_file()]
-    assert {path.suffix for path in files if path.parent.name != "locks"} == {".nbi", ".nbc", ".txt"}
-    for path in files:
-        path.write_bytes(damage(path.read_bytes()))
-    assert ran(SMALL_KERNEL, tmp_path, cache)[0] == "7.0\n"
-    assert "damaged" not in ran(SMALL_KERNEL, tmp_path, cache)[1]
-
-
-def test_one_changed_byte_of_machine_code_is_found(tmp_path: Path):
-    cache = tmp_path / "cache"
-    ran(SMALL_KERNEL, tmp_path, cache)
-    (file,) = kept(cache, "*.shifted*.nbc")
-    data = file.read_bytes()
-    file.write_bytes(data[:-1000] + bytes([data[-1000] ^ 1]) + data[-999:])
-    out, error = ran(SMALL_KERNEL, tmp_path, cache)
-    assert (out, f"{file} is damaged" in error) == ("7.0\n", True), error
-
-
-def test_other_functions_are_cached_where_numba_keeps_them(tmp_path: Path):
-    program = f"{SMALL_KERNEL}\nimport numba\nprint(numba.config.CACHE_DIR)\n"
-    assert ran(program, tmp_path, tmp_path / "cache")[0] == f"7.0\n{tmp_path / 'cache'}\n"
 
 
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])

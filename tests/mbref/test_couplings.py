@@ -7,13 +7,11 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import mbref
-from mbref.ensembles.simulate_all import simulate_all
 from mbref.equations.along_trajectory import violations
 from mbref.equations.model import Model, displaced
 from mbref.scene import JOINT_TYPES, Scene, SceneError
-from mbref.simulation.simulate import Limits
-from tests import coupled_scenes
-from tests.coupled_scenes import EVERY, G, gear_pair, pendulum, rack, screw, slide_with_motor
+from tests.helpers import coupled_mechanisms
+from tests.helpers.coupled_mechanisms import EVERY, G, gear_pair, pendulum, rack, screw, slide_with_motor
 
 METHODS = ("taylor", "alf-dual+projection/dop853")
 NO_SLIDE = "is revolute, which has no displacement to be coupled"
@@ -85,14 +83,8 @@ def test_reflected_mass_slows_a_slide(method):
     agree(coordinates(slide_with_motor(), method, "A", times)[1], exact)
 
 
-def test_armature_of_zero_changes_nothing():
-    plain, none = pendulum().with_("joint[A].armature", 0.0), pendulum(0.0)
-    assert plain == none
-    assert mbref.diagnose(none).counts.rows == 5
-
-
 def test_counts_have_couplings_and_rotors():
-    counts = mbref.diagnose(coupled_scenes.planetary()).counts
+    counts = mbref.diagnose(coupled_mechanisms.planetary()).counts
     assert counts.rows_by_joint == {"A": 5, "B": 5, "armature of A": 6, "armature of B": 6, "mesh": 1}
     assert counts.degrees_of_freedom == 1
 
@@ -113,17 +105,6 @@ def test_jacobian_and_gamma_are_derivatives_of_phi_anywhere(make):
     assert np.abs((ahead - behind) / (2 * e) + found.gamma).max() < 2e-8
 
 
-@pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
-def test_methods_agree_and_keep_the_energy(make):
-    scene = make().with_(duration=0.5)
-    runs = [mbref.simulate(scene, method=method, times=[0.0, 0.2, 0.5], rtol=1e-11) for method in METHODS]
-    assert np.abs(runs[0].position - runs[1].position).max() < 1e-10
-    assert np.abs(runs[0].acceleration - runs[1].acceleration).max() < 1e-7
-    if not scene.load:
-        energies = runs[0].kinetic_energy + runs[0].potential_energy
-        assert np.ptp(energies) < 1e-11 * max(1.0, np.abs(energies).max())
-
-
 def test_teeth_carry_the_torque_that_turns_the_wheel():
     motion = mbref.simulate(gear_pair(), times=[0.0, 1.0])
     change = 2.0 / (0.03 + 0.5**2 * 0.2)
@@ -135,15 +116,6 @@ def test_armature_acts_on_its_joint():
     motion = mbref.simulate(pendulum(), times=[0.0])
     change = motion.angular_acceleration[0, 0, 2]
     assert motion.joint("A").moment[0, 2] == pytest.approx(-0.3 * change, rel=1e-12)
-
-
-def test_ensemble_of_ratios_and_armatures():
-    scenes = [gear_pair().with_("coupling[teeth].ratio", ratio) for ratio in (-0.5, -1.0, 2.0)]
-    angles = [mbref.simulate(s, times=[0.0, 1.0], rtol=1e-12).joint("A").angle[-1] for s in scenes]
-    together = simulate_all(scenes, "taylor", np.array([0.0, 1.0]), Limits(rtol=1e-12))
-    assert [run.joint("A").angle[-1] for run in together] == pytest.approx(angles, rel=1e-12)
-    for angle, ratio in zip(angles, (-0.5, -1.0, 2.0), strict=True):
-        assert angle == pytest.approx(1.0 / (0.03 + ratio**2 * 0.2), rel=1e-9)
 
 
 @pytest.mark.parametrize(

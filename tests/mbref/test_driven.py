@@ -8,13 +8,11 @@ import pytest
 
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
-from mbref.method import Method
 from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, Sine, Spherical, Universal
 from mbref.scenes import SCENES
 from mbref.scenes.links import CRANK_RATE, about_z, link, midpoint
 from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.start_run import start_run
 
 LINKAGES = ("four_bar", "five_bar")
 ROUNDING = 1e-12  # of positions, over the scene's length
@@ -101,20 +99,6 @@ def test_an_order_that_is_asked_for_is_kept():
         assert error(scene, run) < ROUNDING
         steps[order] = run.cost.steps
     assert steps[10] > steps[12] > steps[24]
-
-
-def natural(name):
-    run = start_run(SCENES[name](), Method.parse("taylor"), np.array([0.01]), Limits())
-    return run.stepper.geometry.natural
-
-
-@pytest.mark.parametrize("name", LINKAGES)
-def test_two_links_are_left_of_a_driven_linkage(name):
-    driven, free = natural(name), natural(f"{name}_gravity")
-    assert len(driven.kept) == 4 < len(free.kept)
-    prescribed = [row for row in driven.rows if set(driven.given) & {v for pair in row for v in pair}]
-    assert len(prescribed) == 2
-    assert all(len(row) == 2 and all(i == -1 for i, _ in row) for row in prescribed), prescribed
 
 
 @pytest.mark.parametrize("bodies", [("ground", "bar"), ("bar", "ground")])

@@ -7,12 +7,9 @@ from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, OK, SINGULAR
-from mbref.method import Method
 from mbref.scenes import SCENES, find_scene
-from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.start_run import start_run
-from mbref.trajectory import Outcome
-from tests.one_system import solve
+from mbref.simulation.simulate import simulate
+from tests.helpers.formulations import solve
 
 
 def system(m, n, redundant, seed=20031):
@@ -162,23 +159,6 @@ def unchanged(formulation, system, acceleration, reaction, what):
         assert change < 1e-9, f"{formulation.name}, {what}: {name} changed by {change:.1e}"
 
 
-def test_rows_known_to_be_independent_need_one_iteration_and_no_alpha():
-    scene, times = SCENES["spatial_slider_crank_gravity"](), [0.0, 0.01]
-    plain = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-10))
-    weak = simulate(scene, "alf-dual[alpha=10,iterations=1]+projection", times, Limits(rtol=1e-10))
-    assert weak.outcome is Outcome.COMPLETED, weak.message
-    assert np.array_equal(weak.acceleration, plain.acceleration)
-    dense = simulate(scene, "lm2+projection", times, Limits(rtol=1e-10))
-    size = np.abs(dense.acceleration).max()
-    assert np.abs(plain.acceleration - dense.acceleration).max() < 1e-8 * size
-
-
-@pytest.mark.parametrize(("name", "independent"), [("bennett", False), ("spatial_slider_crank", True)])
-def test_alpha_is_left_out_for_independent_rows_alone(name, independent):
-    run = start_run(SCENES[name](), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
-    assert run.memory.equations.system.settings.independent == independent
-
-
 def test_long_chains_need_one_iteration_to_rounding():
     """Rows of a chain are nearer to dependent the longer it is; a second iteration would change rounding."""
     scene, times = find_scene("four_bar_chain[10]"), [0.0, 0.1]
@@ -186,17 +166,3 @@ def test_long_chains_need_one_iteration_to_rounding():
     dense = simulate(scene, "mpi-qr+none/rk4[step=0.05]", times)
     size = np.abs(dense.acceleration).max()
     assert np.abs(sparse.acceleration - dense.acceleration).max() < 1e-12 * size
-
-
-@pytest.mark.parametrize("stabilisation", ["none", "baumgarte"])
-def test_only_coordinates_that_move_are_integrated(stabilisation):
-    scene, sizes = find_scene("four_bar_chain[3]"), []
-    for formulation in ("alf-dual", "mpi-qr"):
-        method = Method.parse(f"{formulation}+{stabilisation}/rk4[step=0.01]")
-        run = start_run(scene, method, np.array([0.1]), Limits())
-        run.stepper.advance(None)
-        sizes.append(int(run.memory.loop.clock.y_size))
-        turns = run.memory.state.coordinates.reshape(-1, 7)[:, 3:]
-        assert np.allclose(np.linalg.norm(turns, axis=1), 1.0, rtol=0, atol=1e-15)
-    bodies = len(scene.body)
-    assert sizes == [(4 + 3) * bodies, (7 + 6) * bodies]

@@ -20,13 +20,10 @@ from mbref.kernels.layout import OK
 from mbref.method import Method
 from mbref.scene import Driver
 from mbref.scenes import SCENES
-from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.simulate import Limits, simulate
 from mbref.simulation.start_run import start_run
-from mbref.taylor.generated import build
 from mbref.trajectory import Outcome
 
-TAYLOR = Method.parse("taylor")
 ORDER_16 = Method.parse("taylor[order=16]")
 MECHANISMS = (
     "planar_slider_crank",
@@ -57,14 +54,6 @@ def agree(scene):
     return np.abs(found - expected)[:, lanes].max() <= 1e-11 * np.abs(expected).max()
 
 
-def in_motion(scene, duration):
-    """Coordinates and velocities of all bodies after a time (s)."""
-    run = start_run(scene, TAYLOR, np.array([duration]), Limits(rtol=1e-10, code="generic"))
-    run.stepper.advance(None)
-    samples = run.memory.loop.samples
-    return samples.coordinates[0].copy(), samples.velocities[0].copy()
-
-
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_terms_are_those_of_the_kernels(name):
     assert agree(SCENES[name]())
@@ -91,36 +80,6 @@ def test_terms_of_random_mechanisms_are_those_of_the_kernels(seed):
     scene = random_mechanism(seed)
     scene = scene.with_(load=tuple(load for load in scene.load if not hasattr(load, "stiffness")))
     assert agree(scene)
-
-
-@pytest.mark.parametrize(
-    ("name", "duration"),
-    (
-        ("spatial_slider_crank", 0.02),
-        ("spatial_slider_crank_gravity", 0.1),
-        ("four_bar_gravity", 0.05),
-        ("sarrus", 0.05),
-        ("bricard", 0.05),
-        ("bennett", 0.05),
-    ),
-)
-def test_power_gives_the_terms_of_one_freedom(name, duration):
-    """With constant moments, rows that depend on others, variables in several blocks; most start at rest, the
-    duration ago, which is how far the terms can be told."""
-    scene, found = SCENES[name](), []
-    state = in_motion(scene, duration)
-    for code in ("generic", "generated"):
-        run = start_run(scene, ORDER_16, np.array([0.1]), Limits(code=code))
-        run.memory.state.coordinates[:], run.memory.state.velocities[:] = state
-        run.memory.loop.clock.length = duration
-        assert run.stepper.expand() == OK
-        taylor = run.stepper.taylor
-        found.append(taylor.series.terms[:17, : taylor.solver.pivot_columns.size].copy())
-    assert run.stepper.taylor.step.deceleration > 0.0, "by power"
-    sizes = np.abs(found[0]).max(axis=1)
-    time = min(duration, (sizes[2:] ** (-1.0 / np.arange(2, 17))).min())
-    off = np.abs(found[0] - found[1]).max(axis=1) * time ** np.arange(17)
-    assert off.max() <= 1e-14 and (sizes * time ** np.arange(17))[2:].max() > 1e-4
 
 
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
@@ -159,39 +118,6 @@ def _reactions(one, other):
     return [(one.reactions[joint], other.reactions[joint]) for joint in one.reactions or ()]
 
 
-def test_auto_takes_the_code_where_many_steps_are_ahead():
-    scene, times = SCENES["planar_slider_crank"](), np.array([0.4])
-    limits = Limits(rtol=1e-9, largest_step=1.2e-5)
-    run = start_run(scene, TAYLOR, times, limits)
-    auto = trajectory_of(run, *run.stepper.advance(None), 0.0)
-    assert run.stepper.taylor.code.expand != 0
-    generic = simulate(scene, "taylor", times, Limits(rtol=1e-9, code="generic"))
-    assert np.abs(auto.position - generic.position).max() < 1e-6
-    short = start_run(scene, TAYLOR, np.array([0.1]), limits)
-    short.stepper.advance(None)
-    assert short.stepper.taylor.code.expand == 0, "a short run does not make code"
-
-
-def test_one_process_loads_the_code_of_a_scene_once():
-    crank = SCENES["planar_slider_crank"]()
-    first, again = (start_run(crank, TAYLOR, np.array([0.1]), Limits(code="generated")) for _ in "ab")
-    assert first.stepper.taylor.code.expand == again.stepper.taylor.code.expand != 0
-    finer = start_run(crank, TAYLOR, np.array([0.1]), Limits(rtol=1e-12, code="generated"))
-    assert finer.stepper.taylor.mode.order > first.stepper.taylor.mode.order
-    assert finer.stepper.taylor.code.expand == first.stepper.taylor.code.expand, "one code serves all orders"
-
-
-def test_springs_are_left_to_the_kernels_and_long_eliminations_too():
-    names = {}
-    for scene in ("planar_slider_crank", "andrews_squeezer", "bricard"):
-        run = start_run(SCENES[scene](), TAYLOR, np.array([0.01]), Limits(code="generated"))
-        names[scene] = {name for name in build.CODE_NAMES if run.stepper.taylor.code[name]}
-    corrections = {"violation", "close", "close_rate"}
-    assert names["planar_slider_crank"] == {"expand", "factorise", *corrections}
-    assert names["andrews_squeezer"] == {"factorise", *corrections}
-    assert names["bricard"] == {"expand_by_power", "expand", *corrections}
-
-
 @pytest.mark.parametrize("order", (4, 5, 12, 13, 30))
 def test_every_order_is_that_of_the_kernels(order):
     method = Method.parse(f"taylor[order={order}]")
@@ -205,17 +131,6 @@ def test_every_order_is_that_of_the_kernels(order):
     assert np.abs(expected[order]).max() > 0.0
     size = np.abs(expected).max(axis=1, keepdims=True)
     assert (np.abs(found - expected) <= 1e-9 * size).all()
-
-
-@pytest.mark.parametrize("name", ("andrews_squeezer", "flyball_governor"))
-def test_springs_with_code_move_as_by_the_kernels(name):
-    times = np.linspace(0.0, 0.02, 5)
-    generic, own = (
-        simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
-        for code in ("generic", "generated")
-    )
-    assert generic.outcome == own.outcome and len(own.times) == len(times), own.message
-    assert np.abs(generic.position - own.position).max() < 1e-9
 
 
 WITHOUT = """

@@ -1,10 +1,5 @@
 """Integrators against closed forms, truths, SciPy's Adams codes, and themselves without the JIT."""
 
-import json
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 import scipy.integrate
@@ -14,13 +9,10 @@ from scipy.special import ellipj, ellipk
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.study import stability
-from mbref.integrators.dop853 import sum_with
 from mbref.integrators.dop853_tableau import ERROR3, ERROR5, STAGES, A, B, C
-from mbref.method import Method
 from mbref.scene import Body, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.simulation.start_run import start_run
 from mbref.stepping.control import STEPS_PER_CALL
 
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.7)}
@@ -123,10 +115,6 @@ def test_adams_error_is_proportional_to_the_tolerance(name, end, method):
     assert np.all(errors < 500 * tolerances), f"errors {errors} at tolerances {tolerances}"
 
 
-CRANK = SCENES["planar_slider_crank_gravity"]()
-CRANK_TRUTH = truth_for(CRANK)
-
-
 # error of a method, the same problem as one second-order equation, its start, its end, what it ends at
 REDUCED = {
     "oscillator": (oscillator_error, lambda x, _: -4 * (x - 0.7), (1.0, 0.0), 20.0, displacement(20.0)),
@@ -194,60 +182,10 @@ def test_adams_under_every_stabilisation_and_truth(method, name, end, allowed):
         assert error < allowed * rtol, f"{name}, {method}, rtol {rtol:g}: error {error:.2e}"
 
 
-def test_adams_forgets_its_past_where_coordinates_change():
-    name = "spatial_slider_crank"
-    method = Method.parse("lm1+partitioning/adams")
-    run = start_run(SCENES[name](), method, np.array([0.02]), Limits(rtol=1e-9))
-    memory, past = run.memory, run.memory.integrator.values
-    memory.control.steps_per_call = 1
-    counts, clock, order = memory.equations.system.counts, memory.loop.clock, memory.chart.values.column_order
-    before, mismatches, changes, orders = [order.copy(), 0], [], 0, []
-
-    def watch(t):
-        nonlocal changes
-        now = [order.copy(), int(clock.restart)]
-        changed = np.any(now[0] != before[0])
-        changes += changed
-        if changed != (now[1] != before[1]):
-            mismatches.append(t)
-        if clock.restart == counts.steps - 1 and counts.steps > 1:
-            orders.append((int(past.progress.restart - clock.restart), int(past.progress.order)))
-        before[:] = now
-
-    run.stepper.advance(watch)
-    assert changes > 0, f"{name}: no new coordinates"
-    assert not mismatches, f"{name}: {changes} changes; not (only) there forgotten: t = {mismatches} s"
-    assert orders and set(orders) == {(0, 1)}, f"{name}: Adams went on at orders {orders}"
-
-
-@pytest.mark.parametrize("method", ["lm1+projection/adams", "lm1+partitioning/adams[max_order=5]"])
-def test_adams_is_the_same_without_the_jit(method):
-    scene = "spatial_slider_crank"
-    command = [sys.executable, "-m", "mbref", "run", scene, "--method", method, "--times", "0.002", "--json"]
-    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    finished = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-    plain = json.loads(finished.stdout)["records"][0]
-    compiled = ran(SCENES[scene](), method, [0.002])
-    assert plain["cost"]["steps"] == compiled.cost.steps, f"{plain['cost']} and {compiled.cost}"
-    for b, body in enumerate(compiled.bodies):
-        for key in ("position", "orientation", "velocity", "angular_velocity"):
-            mine, theirs = getattr(compiled, key)[:, b], np.array(plain["bodies"][body][key])
-            error = np.max(np.abs(mine - theirs)) / max(1.0, np.max(np.abs(mine)))
-            assert error < 1e-12, f"{method}: {body}, {key} differs by {error:.2e}"
-
-
 @pytest.mark.parametrize("order", [0, 2.5, 13])
 def test_an_order_that_adams_does_not_have_is_refused(order):
     with pytest.raises(ValueError, match=r"max_order must be 1 to 12"):
         simulate(OSCILLATOR, f"lm1+none/adams[max_order={order}]", [1.0])
-
-
-@pytest.mark.parametrize("weights", [*A[1:], B, ERROR3, ERROR5])
-def test_sums_of_stages_have_all_coefficients(weights):
-    k = np.random.default_rng(4).normal(size=(STAGES, 7))
-    weighted = sum_with(weights)
-    found = [weighted(k, i) for i in range(7)]
-    np.testing.assert_allclose(found, weights @ k[: len(weights)], rtol=1e-13, atol=1e-13)
 
 
 def test_coefficients_are_those_of_scipy():
@@ -272,26 +210,6 @@ def test_short_first_steps_do_not_make_a_run_long():
     end = 0.1 * scene.duration  # before its first singular position
     run = simulate(scene, "alf-dual+projection", [end], Limits(most_steps=2000))
     assert run.outcome.label == "COMPLETED"
-
-
-def proposed(ratios, lengths):
-    """The step that DOP853 proposes after two steps of these lengths (s) and error ratios."""
-    run = start_run(PENDULUM, Method.parse("alf-dual+projection"), np.array([1.0]), Limits())
-    memory = run.memory
-    clock, y = memory.loop.clock, memory.loop.y[: memory.loop.clock.y_size]
-    memory.equations.system.counts.steps = 2
-    (clock.past_length, clock.length), (clock.past_ratio, clock.ratio) = lengths, ratios
-    propose = run.method.integrator.propose.callable
-    return propose(clock.length, clock.length, clock.ratio, y, np.zeros(y.size), run.packed.argument)
-
-
-def test_steps_of_growing_errors_are_shortened_by_their_trend():
-    steady, growing = proposed((0.5, 0.5), (0.1, 0.1)), proposed((0.5 / 2**8, 0.5), (0.1, 0.1))
-    assert abs(growing - 0.5 * steady) < 1e-12 * steady, (growing, steady)
-    longer = proposed((0.5 / 2**8, 0.5), (0.05, 0.1))
-    assert abs(longer - steady) < 1e-12 * steady, "a longer step explains its larger error"
-    assert proposed((0.5, 0.5 / 2**8), (0.1, 0.1)) > steady, "falling errors do not shorten a step"
-    assert proposed((1e-300, 1.0), (0.1, 0.1)) > 0.1 * steady, "a step without error tells no trend for long"
 
 
 def test_few_steps_of_a_crank_that_spins_up_are_refused():

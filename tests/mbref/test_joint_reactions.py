@@ -199,37 +199,6 @@ def test_reactions_are_open_at_a_singular_position_only():
     assert vanishing.shape == (3, 6, 1) and not vanishing[[0, 2]].any(), "zeros where no combination vanishes"
 
 
-# --- what a motion has ------------------------------------------------------------------------------------
-def lazy(scene: Scene, rows: int) -> dict[str, Any]:
-    return joint_reactions.lazy_reactions(scene, np.zeros(1), np.zeros((1, 1, 7)), np.zeros((1, rows)))
-
-
-@pytest.mark.parametrize(("rows", "has_open"), [(120, True), (121, False)])
-def test_open_reactions_are_found_of_up_to_120_rows(rows, has_open):
-    joint = (Revolute(name="J", bodies=("ground", "b"), anchor=ORIGIN, axis=Z),)
-    scene = Scene(name="s", body=(body("b", X),), joint=joint)
-    assert set(lazy(scene, rows)) == {"reactions"} | ({"open_reactions"} if has_open else set())
-    assert list(lazy(scene, rows)["reactions"]) == ["J"], "the names are known before the values"
-    massless = scene.with_(body=(Body(name="b", position=X),))
-    assert lazy(massless, 5) == {}
-
-
-def test_reactions_at_two_times():
-    """The body is 1 m from the axis and 0.5 m along it; 20 N pull it down, then towards the axis."""
-    joint = (Revolute(name="J", bodies=("ground", "b"), anchor=ORIGIN, axis=Z),)
-    system = model(body("b", (1.0, 0.0, 0.5)), joint=joint)
-    q = np.array([[[0.0, -1.0, 0.5, HALF, 0.0, 0.0, -HALF]], [[1.0, 0.0, 0.5, *ONE]]])
-    jacobians = system.structure.dense(system.terms(np.zeros(2), q).blocks)
-    forces = np.array([[0.0, -20.0, 0.0, 0.0, 0.0, 0.0], [-20.0, 0.0, 0.0, 0.0, 0.0, 0.0]])
-    multipliers = np.array(
-        [np.linalg.lstsq(j.T, f, rcond=None)[0] for j, f in zip(jacobians, forces, strict=True)]
-    )
-    found = joint_reactions.lazy_reactions(system.scene, np.zeros(2), q, multipliers)
-    wanted = np.array([[0, 20, 0, -10, 0, 0], [20, 0, 0, 0, 10, 0.0]])
-    assert found["reactions"]["J"] == pytest.approx(wanted, abs=1e-12)
-    assert found["open_reactions"]["J"].tolist() == [0, 0]
-
-
 def test_a_body_without_joints_has_no_reactions():
     free = model(body("b", X), joint=())
     blocks = free.terms(np.zeros(1), poses(free)).blocks

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import mbref
-from mbref.equations.model import Model
-from mbref.scene import Factor, JointForce, Scene, SceneError, Sine
-from tests import loads_over_time as scenes
-from tests.loads_over_time import AXIS, CUBIC, WAVY
+from mbref.scene import Factor, JointForce, Scene, SceneError
+from tests.helpers import loads_over_time as scenes
+from tests.helpers.loads_over_time import AXIS, CUBIC, WAVY
 
 METHODS = ("taylor", "alf-dual+projection/dop853", "lm1+none/adams")
 CLOSED_FORM = 1e-12  # relative to the largest value
@@ -58,15 +57,6 @@ def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
     agree(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES))
 
 
-@pytest.mark.parametrize("make", (scenes.arm, scenes.driven_arm), ids=lambda make: make.__name__)
-def test_methods_agree_on_loads_of_every_kind_over_time(make):
-    times = [0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0]
-    runs = [run(make(), method, times) for method in ("taylor", "mpi-qr+projection/dop853")]
-    assert np.abs(runs[0].position - runs[1].position).max() < 1e-11
-    assert np.abs(runs[0].acceleration - runs[1].acceleration).max() < 1e-9
-    assert np.abs(runs[0].reactions["R"] - runs[1].reactions["R"]).max() < 1e-9
-
-
 def test_acceleration_at_a_time_of_switching_is_that_after_it():
     for method in METHODS:
         motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])
@@ -85,14 +75,6 @@ def test_a_load_that_acts_late_moves_what_rests_until_then():
         scene = scenes.pushed(Factor(start=start)).with_(duration=2.0)
         moved = run(scene, "taylor", [0.0, 2.0]).joint("J").displacement[-1]
         assert moved == pytest.approx((2.0 - start) ** 2 / 2, rel=1e-9)
-
-
-def test_terms_are_of_the_piece_at_their_time():
-    model = Model(scenes.pushed(Factor(table=WAVY, start=0.5)))
-    q, v = model.start(), np.zeros(model.n)
-    for t in (1.2, 0.1, 0.5, 0.7):
-        factor = Factor(table=WAVY, start=0.5).values(np.array([t]))[0]
-        assert model.terms(t, q, v).force[:3] @ AXIS == pytest.approx(2.0 * factor, abs=1e-14)
 
 
 def test_table_is_a_twice_differentiable_spline_through_its_rows():
@@ -115,25 +97,6 @@ def test_load_numbers_are_of_the_joint():
     assert np.allclose(motion.load_at(2).torque, -0.3)
     spring, joint = motion.load_at(1), motion.joint("C")
     assert np.allclose(spring.force, -30.0 * (joint.displacement - 0.05) - 0.7 * joint.displacement_rate)
-
-
-def test_work_of_loads_over_time_is_the_change_of_energy():
-    times = np.linspace(0.0, 2.0, 4001)
-    scene = scenes.arm()
-    scene = scene.with_(load=[load for load in scene.load if hasattr(load, "joint")])
-    motion = mbref.simulate(scene, method="taylor", times=times)
-    springs = [k for k, load in enumerate(scene.load) if load.action.stiffness]
-    dampers = sum(
-        -scene.load[k].damping
-        * np.asarray(
-            motion.load_at(k).displacement_rate if motion.load_at(k).rate is None else motion.load_at(k).rate
-        )
-        ** 2
-        for k in springs
-    )
-    power = dampers + sum(motion.load_at(k).power for k in range(len(scene.load)) if k not in springs)
-    work = np.concatenate([[0.0], np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(times))])
-    assert np.abs(motion.energy - motion.energy[0] - work).max() < 2e-6 * np.abs(work).max()
 
 
 def test_equilibrium_refuses_what_varies_and_measures_slide_springs_from_its_pose():
@@ -175,11 +138,6 @@ def test_faulty_functions_are_refused_by_path_and_line(message, tmp_path):
     assert fault.startswith("load[0].factor") and message in fault and fault.endswith(f"(line {line})")
 
 
-def test_table_that_is_switched_off_needs_no_rows_there():
-    rows = [[0.5, 0.0], [1.0, 1.0], [1.2, 2.0], [1.5, 2.0]]
-    assert scenes.pushed(Factor(table=rows, start=0.5, stop=1.5)).load[0].factor.table is not None
-
-
 def test_driver_by_a_table_begins_at_zero():
     with pytest.raises(SceneError, match="value at t = 0 must be 0"):
         scenes.wheel().with_(driver=[{"joint": "J", "table": scenes.TABLE}])
@@ -194,8 +152,3 @@ def test_functions_are_kept_by_a_file(tmp_path):
     for scene in (scenes.arm(), scenes.driven_arm()):
         scene.save(tmp_path / "arm.toml")
         assert Scene.from_file(tmp_path / "arm.toml") == scene
-
-
-def test_sine_of_zero_amplitude_is_constant():
-    assert Factor(sine=Sine(), polynomial=(2.0,)).is_constant
-    assert not Factor(start=1.0).is_constant

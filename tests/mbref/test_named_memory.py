@@ -17,7 +17,6 @@ from mbref.kernels.named_memory import (
     opener,
     packed,
 )
-from mbref.kernels.records import record
 
 TWICE = FLOAT(FLOAT)
 
@@ -96,11 +95,3 @@ def test_kernels_read_and_write_every_kind_of_field():
 def test_a_packing_mistake_names_the_field(field, value, fault):
     with pytest.raises(TypeError, match=fault):
         packed(whole(**{field: value}))
-
-
-def test_a_record_cannot_have_a_name_that_numpy_has_taken():
-    class Bad(NamedTuple):
-        size: int = 0
-
-    with pytest.raises(TypeError, match="attributes called size"):
-        record(Bad())

@@ -12,7 +12,15 @@ from mbref.ensembles.simulate_all import simulate_all
 from mbref.equations.model import Model
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits
-from tests.coupled_scenes import G, coupled_loops, gear_pair, planetary, rack, screw, spatial_chain
+from tests.helpers.coupled_mechanisms import (
+    G,
+    coupled_loops,
+    gear_pair,
+    planetary,
+    rack,
+    screw,
+    spatial_chain,
+)
 
 METHODS = ("taylor", "alf-dual+projection/dop853")
 CLOSED_FORM = 1e-12  # of the largest value

@@ -17,8 +17,8 @@ from mbref.scene_paths import replaced_at
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
 from mbref.variation import Variation, variants
-from tests.coupled_scenes import gear_pair
-from tests.mbref.scenes_of_one_structure import CRANK, NUMBERS_DECIDE, results
+from tests.helpers.batches import CRANK, NUMBERS_DECIDE, results
+from tests.helpers.coupled_mechanisms import gear_pair
 
 METHOD, TIMES = "taylor", np.linspace(0.0, 0.05, 4)
 LIMITS = Limits(rtol=1e-6)

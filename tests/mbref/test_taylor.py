@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from numba import njit
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
-from mbref.kernels.compilation import PLAIN
 from mbref.method import Method, MethodError
 from mbref.scene import (
     Body,
@@ -22,8 +20,6 @@ from mbref.scene import (
 )
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.taylor.expressions import ONE, Elimination, independent
-from mbref.taylor.simd import gather, load, padded_size, store
 
 FIELDS = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
 ROD = {"mass": 2.0, "inertia": (0.1, 0.7, 0.8)}
@@ -67,44 +63,11 @@ def assert_alike(a, b, tolerance):
         assert apart <= max(tolerance, 1e-5) * size  # redundant rows share reactions in another way
 
 
-@pytest.mark.parametrize(
-    ("name", "end"),
-    [
-        ("four_bar_gravity", 0.15),
-        ("five_bar_gravity", 0.15),
-        ("four_bar", 0.01),
-        ("five_bar", 0.01),
-        ("spatial_slider_crank", 0.02),
-        ("spatial_slider_crank_driven", 0.1),
-        ("planar_slider_crank", 0.1),
-        ("andrews_squeezer", 0.03),
-        ("bricard", 1.0),
-        ("bennett", 0.5),
-        ("sarrus", 0.3),
-        ("heavy_top", 0.2),
-        ("flyball_governor", 0.2),
-        ("h_frame", 0.5),
-    ],
-)
-def test_a_scene_as_by_the_general_kernels(name, end):
-    scene, times = SCENES[name](), np.linspace(0.0, end, 7)
-    general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
-    assert_alike(general, simulate(scene, "taylor", times, Limits(rtol=1e-12)), 2e-7)
-
-
 @pytest.mark.parametrize("seed", [*range(8), 21, 23, 24, 29])
 def test_a_random_mechanism_as_by_the_general_kernels(seed):
     scene, times = random_mechanism(seed), np.linspace(0.0, 0.1, 4)
     general = simulate(scene, "alf-dual+projection", times, Limits(rtol=1e-11))
     assert_alike(general, simulate(scene, "taylor", times, Limits(rtol=1e-11)), 1e-7)
-
-
-def test_springs_dampers_and_torsion_springs_in_three_dimensions():
-    times = np.linspace(0.0, SCREW.duration, 6)
-    general = simulate(SCREW, "alf-dual+projection", times, Limits(rtol=1e-11))
-    turned = general.orientation[:, 0, 3]
-    assert (np.diff(np.sign(turned)) != 0).any(), "the first joint is to turn beyond π"
-    assert_alike(general, simulate(SCREW, "taylor", times, Limits(rtol=1e-12)), 1e-7)
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank_gravity"])
@@ -158,38 +121,6 @@ def test_names_and_what_does_not_go_together():
 def test_most_steps_end_a_run():
     run = simulate(SCENES["planar_slider_crank"](), "taylor", [0.1], Limits(most_steps=3))
     assert (run.outcome.name, run.cost.steps) == ("STEP_FAILED", 3)
-
-
-def test_elimination_keeps_equations_that_would_multiply_products():
-    solve = Elimination(lambda variable, others: others <= 1)
-    solve.add({0: 2.0, 1: -1.0, ONE: 3.0})
-    solve.add({1: 1.0, 2: 1.0, 3: 1.0})
-    assert solve({0: 1.0}) == {1: 0.5, ONE: -1.5} or solve({1: 1.0}) == {0: 2.0, ONE: 3.0}
-    assert len(solve.left) == 1
-    solve.add({3: 1.0, ONE: -4.0})
-    solve.settle()
-    assert not solve.left and solve({3: 2.0}) == {ONE: 8.0}
-
-
-def test_polynomials_that_follow_from_others_are_left_out():
-    first, second = {(0, 0): 1.0, (ONE, ONE): -1.0}, {(0, 1): 1.0, (ONE, 2): 2.0}
-    mixed = {(0, 0): 2.0, (ONE, ONE): -2.0, (0, 1): -3.0, (ONE, 2): -6.0}
-    assert independent([mixed, second, first]) == [second, first]
-
-
-def block_sum(factor, a, b, lanes, out):
-    """out[8 …] := factor a[8 …] + b's numbers in lanes, times a's first block, minus b[8 …]."""
-    total = factor * load(a, 8) + gather(b, 16, lanes, 0) * load(a, 0)
-    store(total - load(b, 8), out, 8)
-
-
-def test_blocks_are_added_multiplied_and_gathered():
-    rng = np.random.default_rng(5)
-    a, b, lanes, out = rng.random((2, 8)), rng.random((3, 8)), rng.permutation(8), np.zeros(16)
-    expected = 0.7 * a[1] + b[2, lanes] * a[0]
-    (block_sum if PLAIN else njit(block_sum))(0.7, a, b, lanes, out)
-    assert np.allclose(out[8:], expected - b[1], rtol=1e-14, atol=1e-15) and not out[:8].any()
-    assert [padded_size(size) for size in (0, 1, 8, 9)] == [0, 8, 8, 16]
 
 
 @pytest.mark.parametrize("length", [0.05, 1.0, 30.0])

@@ -18,7 +18,7 @@ from mbref.linear_algebra.orthogonal_factorisations import (
     qr_pivoted,
     svd_solve,
 )
-from tests.one_system import solve
+from tests.helpers.formulations import solve
 
 RATIO = 30.0  # LAPACK's customary bound for ‖residual‖ / (ε n ‖…‖) of a stable algorithm
 

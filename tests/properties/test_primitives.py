@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from mbref.equations.model import Model, displaced
 from mbref.scene import JOINT_TYPES
-from tests.strategies import DRIVABLE, one_joint_scenes, states
+from tests.helpers.joint_strategies import DRIVABLE, one_joint_scenes, states
 
 KINDS = list(JOINT_TYPES.values())
 CASES = [(kind, False) for kind in KINDS] + [(kind, True) for kind in DRIVABLE]
