@@ -83,7 +83,7 @@ def in_another_frame(scene: Scene, turn: np.ndarray, shift: np.ndarray) -> Scene
     """Return the scene turned by a unit quaternion (4,) and then shifted by a vector (3,), m."""
 
     def vector(value: np.ndarray) -> np.ndarray:
-        return rotations.rotate(turn, value)
+        return rotations.rotate(turn, value) if value.ndim else value  # the force along a joint is a number
 
     changes: dict[str, Change] = dict.fromkeys(VECTORS, vector)
     changes |= dict.fromkeys(POINTS, lambda value: vector(value) + shift)

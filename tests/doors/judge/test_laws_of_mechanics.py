@@ -1,0 +1,157 @@
+"""Laws of mechanics that motions, loads, reactions and drivers of the judge obey at a moment."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from crosscheck import measure, truth_for
+from crosscheck.judge import constraints
+from crosscheck.judge.driver_forces import driver_forces
+from crosscheck.judge.energy import energy_series, kinetic_energy
+from crosscheck.judge.gauss_motion import accelerations, power
+from crosscheck.judge.joint_loads import turning_loads
+from crosscheck.judge.model_identity import along
+from crosscheck.judge.reaction_balance import with_exact_reactions
+from crosscheck.judge.time_functions import value
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+from tests.helpers.newton_euler import unbalanced
+from tests.helpers.short_motions import CROSSED, MOTIONS
+
+LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
+STEP = 1e-3  # between five samples, of the duration: differences of fourth order are exact to about 1e-8
+QUICK = (  # one for each kind of joint, load, driver and coupling
+    "arm with planar",
+    "arm with distance, bodies exchanged",
+    "arm with translational",
+    "loop with inline",
+    "loop with cylindrical",
+    "pendulum with spring with damping",
+    "pendulum with torsion spring",
+    "pendulum with slide spring",
+    "pendulum with moment",
+    "pendulum with force over time",
+    "pendulum with joint torque",
+    "driven slide",
+    "driven angle of the second joint",
+    "driven gears",
+    "planet with armatures",
+    "coupled displacements",
+    "screw with armature",
+    "free bodies and a spring",
+    "doubled hinge",
+)
+ALL = [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MOTIONS if n not in CROSSED]
+
+
+@functools.cache
+def at_one_moment(name: str) -> tuple[Scene, Trajectory]:
+    """Return a short motion by the judge at five neighbouring times."""
+    scene = MOTIONS[name]()
+    truth = truth_for(scene, reference_time=LIMIT)
+    assert truth is not None
+    return scene, truth.poses(scene.duration * (0.43 + STEP * np.arange(-2, 3)))
+
+
+def slope(run: Trajectory, values: np.ndarray) -> np.ndarray:
+    """Return the rate of values (5, …) at the middle sample by a difference of fourth order."""
+    return np.tensordot(np.array([1, -8, 0, 8, -1]) / (12 * (run.times[1] - run.times[0])), values, 1)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_joints_stay_closed_at_three_levels(name):
+    scene, run = at_one_moment(name)
+    found = measure(scene, run)
+    spin = max(1.0, np.abs(run.angular_velocity).max())
+    assert found["violation_position"] <= 1e-13
+    assert found["violation_velocity"] <= 1e-13 * spin
+    assert found["violation_acceleration"] <= 1e-12 * spin**2
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_velocities_and_accelerations_are_the_rates_of_poses(name):
+    _, run = at_one_moment(name)
+    relative = rotations.multiply(run.orientation, rotations.conjugate(run.orientation[2]))
+    turned = 2 * relative[..., 1:] * np.sign(relative[..., :1])  # rad, of small rotations
+    pairs = (
+        (run.position, run.velocity),
+        (turned, run.angular_velocity),
+        (run.velocity, run.acceleration),
+        (run.angular_velocity, run.angular_acceleration),
+    )
+    for values, rates in pairs:
+        scale = np.abs(rates).max() + np.abs(run.angular_velocity).max() * np.abs(values).max() + 1e-3
+        assert np.abs(slope(run, values) - rates[2]).max() <= 1e-7 * scale
+
+
+def state_of(scene: Scene, run: Trajectory, k: int) -> tuple[np.ndarray, ...]:
+    """Return position, orientation, velocities and the angles of turning loads at a sample."""
+    angles = constraints.joint_coordinates(
+        scene, run.times, run.position, run.orientation, run.angular_velocity
+    )
+    turned = np.array([angles[load.joint][k, 0] for load in turning_loads(scene)])
+    return run.position[k], run.orientation[k], run.velocity[k], run.angular_velocity[k], turned
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_accelerations_obey_gauss_principle(name):
+    """Bodies without mass have accelerations that the joints alone determine."""
+    scene, run = at_one_moment(name)
+    found = accelerations(scene, float(run.times[2]), state_of(scene, run, 2))
+    wanted = np.hstack([run.acceleration[2], run.angular_acceleration[2]])
+    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
+    assert along(scene, run) is None
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_power_of_loads_and_drivers_is_the_rate_of_the_kinetic_energy(name):
+    scene, run = at_one_moment(name)
+    rates = run.position, run.orientation, run.velocity, run.angular_velocity
+    kinetic = kinetic_energy(scene, *rates)
+    supplied = power(scene, float(run.times[2]), state_of(scene, run, 2))
+    for joint, forces in (driver_forces(scene, run) if scene.driver else {}).items():
+        [driver] = (each for each in scene.driver if each.joint == joint)
+        supplied += forces[2] * value(driver, run.times[2], 1)
+    scale = np.abs(kinetic).max() / scene.duration
+    assert slope(run, kinetic) == pytest.approx(supplied, abs=1e-6 * scale)
+
+
+def is_bare(scene: Scene) -> bool:
+    """Return whether joints and gravity alone act on the bodies."""
+    return not (scene.load or scene.coupling or any(joint.reflected_inertia for joint in scene.joint))
+
+
+BARE = [name for name in MOTIONS if is_bare(MOTIONS[name]()) and name not in CROSSED]
+
+
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in BARE])
+def test_reactions_and_gravity_move_every_body(name):
+    """Newton's and Euler's equations of each body with the judge's reactions."""
+    scene, run = at_one_moment(name)
+    assert max(unbalanced(scene, with_exact_reactions(scene, run))) <= 1e-9
+
+
+def keeps_energy(scene: Scene) -> bool:
+    """Return whether gravity and elastic springs alone do work."""
+    kinds = {load.type for load in scene.load}
+    undamped = all(getattr(load, "damping", 0.0) == 0.0 for load in scene.load)
+    return not scene.driver and kinds <= {"spring", "torsion_spring", "slide_spring"} and undamped
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        n if n in QUICK else pytest.param(n, marks=pytest.mark.slow)
+        for n in MOTIONS
+        if keeps_energy(MOTIONS[n]()) and n not in CROSSED
+    ],
+)
+def test_energy_is_kept_from_the_start(name):
+    scene, run = at_one_moment(name)
+    drift = energy_series(scene, run)
+    assert drift is not None
+    assert drift.max() <= 1e-12
