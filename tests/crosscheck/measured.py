@@ -5,5 +5,17 @@ A test states the measured errors; whoever makes them smaller writes the new one
 
 from __future__ import annotations
 
+from crosscheck.judge.truth import truth_for
+from mbref import rotations
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+
 MARGIN = 10.0  # for other processors, and other versions of libraries
 ROUNDING = 1e-14  # stands for measured errors that are smaller
+
+
+def error(run: Trajectory, scene: Scene) -> float:
+    """Return the largest error of a position (m) or an orientation (rad) of a run, by its truth."""
+    truth = truth_for(scene).poses(run.times)
+    turned = rotations.angle_between(run.orientation, truth.orientation).max()
+    return max(abs(run.position - truth.position).max(), turned)

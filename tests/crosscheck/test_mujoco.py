@@ -16,12 +16,11 @@ from crosscheck.engines.mujoco.context import LIBRARIES, library
 from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
-from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN
+from tests.crosscheck.measured import MARGIN, error
 from tests.crosscheck.tree_scenes import every_joint
 
 mujoco = pytest.importorskip("mujoco")
@@ -40,13 +39,6 @@ FORWARD = {  # scene: measured error (m, rad) of accelerations integrated outsid
     "spatial_slider_crank_driven": 7.5e-14,
 }
 DRIVEN, SAMPLED, PASSED, PROJECTED = 6.9e-11, 2.9e-10, (3.3e-9, 4.4e-14), 3.9e-13  # rad; m, rad
-
-
-def error(run: Trajectory, scene: Scene) -> float:
-    """Largest error of a position (m) or an orientation (rad)."""
-    truth = truth_for(scene).poses(run.times)
-    turned = rotations.angle_between(run.orientation, truth.orientation).max()
-    return max(abs(run.position - truth.position).max(), turned)
 
 
 def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:

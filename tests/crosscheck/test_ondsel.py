@@ -27,7 +27,7 @@ from mbref.scene import (
 )
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.measured import MARGIN, ROUNDING, error
 from tests.crosscheck.tree_scenes import INERTIA
 
 pytest.importorskip("pyondsel", reason="the optional engine OndselSolver needs pyondsel")
@@ -48,13 +48,6 @@ TURNED, ALIKE, REACTION = (
 
 def simulate(scene: Scene, times: np.ndarray, step: float) -> Trajectory:
     return engine("ondsel").run(scene, times, Setting("kinematics", {"step": step}))
-
-
-def error(run: Trajectory, scene: Scene) -> float:
-    """Largest error of a position (m) or an orientation (rad)."""
-    truth = truth_for(scene).poses(run.times)
-    turned = rotations.angle_between(run.orientation, truth.orientation).max()
-    return max(abs(run.position - truth.position).max(), turned)
 
 
 @pytest.mark.parametrize("name", DRIVEN)

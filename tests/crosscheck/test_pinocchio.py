@@ -10,12 +10,11 @@ from crosscheck.conformance.rewritings import duplicated
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.pinocchio.adapter import ENGINE
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
-from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Driver, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.measured import MARGIN, ROUNDING, error
 from tests.crosscheck.tree_scenes import driven, every_joint
 
 pinocchio = pytest.importorskip("pinocchio")
@@ -35,13 +34,6 @@ PAPER = {
     "four_bar_gravity": (0.5, 5.1e-12),
     "five_bar_gravity": (0.5, 4.8e-12),
 }
-
-
-def error(run: Trajectory, scene: Scene) -> float:
-    """Largest error of a position (m) or an orientation (rad)."""
-    truth = truth_for(scene).poses(run.times)
-    turned = rotations.angle_between(run.orientation, truth.orientation).max()
-    return max(abs(run.position - truth.position).max(), turned)
 
 
 def simulate(scene: Scene, duration: float, family: str, **options) -> Trajectory:

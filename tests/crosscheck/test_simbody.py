@@ -10,11 +10,10 @@ import pytest
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import closure, joint_coordinates
 from crosscheck.judge.truth import truth_for
-from mbref import rotations
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.measured import MARGIN, ROUNDING, error
 from tests.crosscheck.tree_scenes import BODIES, every_joint, ring
 
 if find_spec("opensim") is None:
@@ -38,13 +37,6 @@ ALIKE, REACTION = (
 DRIVEN, DRIVEN_ACCELERATION = 1.6e-13, 8.1e-9  # m, rad; m/s² from Pinocchio's
 OPEN, BEFORE, BARE = 7.4e-8, 1.8e-11, ROUNDING  # m, rad
 FAMILIES = ("merson", "feldberg", "cpodes")
-
-
-def error(run: Trajectory, scene: Scene) -> float:
-    """Largest error of a position (m) or an orientation (rad)."""
-    truth = truth_for(scene).poses(run.times)
-    turned = rotations.angle_between(run.orientation, truth.orientation).max()
-    return max(abs(run.position - truth.position).max(), turned)
 
 
 def simulate(

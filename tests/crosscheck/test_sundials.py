@@ -9,12 +9,11 @@ import pytest
 
 from crosscheck.conformance.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
-from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN
+from tests.crosscheck.measured import MARGIN, error
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 
 pytest.importorskip("sksundae", reason="the optional engine SUNDIALS needs scikit-sundae")
@@ -39,13 +38,6 @@ ALIKE = {  # measured differences from Pinocchio: m, m/s, rad/s, m/s², rad/s²
 REACTION = 3e-5  # of the largest
 FREE_FALL, TURN, BARE, SPRUNG = 1.9e-7, 1.5e-3, 8.8e-9, 2.9e-7  # m, rad
 STOP, BEFORE = 2.6e-6, 2.9e-6  # s from the singular position; m, rad before it
-
-
-def error(run: Trajectory, scene: Scene) -> float:
-    """Largest error of a position (m) or an orientation (rad)."""
-    truth = truth_for(scene).poses(run.times)
-    turned = rotations.angle_between(run.orientation, truth.orientation).max()
-    return max(abs(run.position - truth.position).max(), turned)
 
 
 def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Trajectory:
