@@ -34,10 +34,9 @@ from mbref.scenes import SCENES
 from mbref.variation import Variation, variants
 
 HERE = Path(__file__).parent
-FAKES = HERE / "crosscheck"
 PARENT = """
 import sys
-sys.path[:0] = [{root!r}, {fakes!r}]
+sys.path.insert(0, {root!r})
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from crosscheck.study.grid import run_here, study
@@ -76,13 +75,13 @@ def cases(runs: int, log: Path, sleep: float) -> list[Case]:
     block = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
     scene, times = Scene(name=str(log), body=(block,)), np.array([0.0, 0.1, 0.3])
     settings = [Setting(str(k), {"sleep": sleep}) for k in range(runs)]
-    return [Case(scene, times, "fake_engines:RECORDER", setting) for setting in settings]
+    return [Case(scene, times, "tests.helpers.fake_engines:RECORDER", setting) for setting in settings]
 
 
 def parents(runs: int, times: int, folder: Path) -> Counted:
     """The process that makes a study is killed, and the study is started again."""
     path, log = folder / "records.jsonl", folder / "log"
-    program = PARENT.format(root=str(HERE.parent), fakes=str(FAKES), runs=runs, log=str(log), path=str(path))
+    program = PARENT.format(root=str(HERE.parent), runs=runs, log=str(log), path=str(path))
     draw, kills = random.Random(3), 0
     for _ in range(times):
         before = _lines(path)
@@ -195,7 +194,6 @@ def main() -> int:
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--times", type=int, default=20)
     options = parser.parse_args()
-    sys.path.insert(0, str(FAKES))
     found = []
     for kind in options.kinds:
         with tempfile.TemporaryDirectory() as folder:

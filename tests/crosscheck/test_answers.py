@@ -12,7 +12,7 @@ from crosscheck.engine import Setting
 from crosscheck.processes.answer import MalformedAnswer, well_formed
 from crosscheck.study.grid import Case, study
 from mbref.scene import Body, Scene
-from tests.crosscheck.fake_engines import DAMAGES, FAKE, MALFORMED, SCALARS
+from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 
 TIMES = np.array([0.0, 0.1, 0.3])
 BLOCK = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
@@ -40,11 +40,6 @@ SAYS = {
     "settings of objects": "settings: must be a dictionary",
     "a local class": "returned Local, not a Trajectory",
 }
-
-
-@pytest.fixture(autouse=True)
-def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
@@ -76,7 +71,7 @@ def test_a_study_goes_on_after_every_malformed_answer(tmp_path: Path):
         ("MALFORMED", {"damage": "a local class"}),
         ("FAKE", {}),
     ]
-    cases = [Case(SCENE, TIMES, f"fake_engines:{name}", Setting("a", options)) for name, options in wanted]
+    cases = [Case(SCENE, TIMES, f"{FAKES}:{name}", Setting("a", options)) for name, options in wanted]
     records = study(cases, None, tmp_path / "records.jsonl")
     outcomes = [record["outcome"] for record in records]
     assert outcomes == ["CRASHED", "CRASHED", "COMPLETED", "CRASHED", "CRASHED", "COMPLETED"]

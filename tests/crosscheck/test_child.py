@@ -16,18 +16,16 @@ import pytest
 
 from crosscheck.processes.child import Child, ChildFailed
 from mbref.trajectory import Outcome
+from tests.helpers.fake_engines import converse
 
 
 @pytest.fixture
-def child(monkeypatch: pytest.MonkeyPatch) -> Iterator[Child]:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+def child() -> Iterator[Child]:
     with closing(Child()) as made:
         yield made
 
 
 def test_calls_share_the_process_and_nothing_else(child: Child):
-    from fake_engines import converse
-
     first, second = (child.call(converse, (text,), 60.0) for text in ("first", "second"))
     (here, pid), (there, again) = first.value, second.value
     assert pid == again, "the second call had another process"
@@ -41,8 +39,6 @@ def test_calls_share_the_process_and_nothing_else(child: Child):
 
 
 def test_silent_call_after_one_that_printed_much(child: Child):
-    from fake_engines import converse
-
     child.call(converse, ("word " * 40,), 60.0)
     assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
 

@@ -23,15 +23,11 @@ from crosscheck.study.record_view import PUBLIC
 from crosscheck.study.tuning import by_error
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
+from tests.helpers.fake_engines import FAKES
 
-FAKE = "fake_engines:FAKE"
+FAKE = f"{FAKES}:FAKE"
 COMMANDS = ("list", "run", "compare", "tune", "verify", "report", "paper", "diff", "certify")
 COST = {"seconds", "build_seconds", "steps", "rejected", "rhs", "factorisations", "newton"}
-
-
-@pytest.fixture(autouse=True)
-def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
 
 
 @pytest.fixture
@@ -126,7 +122,7 @@ def test_run_without_json_and_a_table_of_every_setting(capsys, still):
 
 
 def test_a_run_that_crashes_and_exit_status_one(capsys, still):
-    asked = ("--engine", "fake_engines:SEGFAULT", "--setting", "noisy", "--json")
+    asked = ("--engine", f"{FAKES}:SEGFAULT", "--setting", "noisy", "--json")
     status, out, err = run_main(capsys, "run", still, *asked)
     [record] = json.loads(out)["records"]
     assert status == 1, (status, err)
@@ -216,7 +212,7 @@ def test_a_scene_an_engine_cannot_run_and_the_reason(capsys, tmp_path):
 
 
 def test_missing_package_and_what_to_install(capsys, still):
-    missing = "fake_engines:MISSING"
+    missing = f"{FAKES}:MISSING"
     sentence = f"{missing}: the package fake-package is not installed: pip install fake-package"
     status, out, err = run_main(capsys, "run", still, "--engine", missing)
     assert (status, out, err.strip()) == (2, "", sentence), err
@@ -324,7 +320,7 @@ def test_pasted_command_and_the_same_record(capsys, still):
 
 
 def test_engine_that_hangs_over_its_settings_is_left_out(capsys, still):
-    asked = ("--engine", FAKE, "--engine", "fake_engines:NO_SETTINGS")
+    asked = ("--engine", FAKE, "--engine", f"{FAKES}:NO_SETTINGS")
     status, out, err = run_main(capsys, "run", still, *asked)
     assert status == 0 and "its settings are unknown: ValueError: none" in err, err
     assert "plain" in out
@@ -334,7 +330,7 @@ def test_finer_settings_behind_a_time_out_are_not_started(tmp_path):
     scene = Scene(name=str(tmp_path / "log"), body=Scene.from_file(saved(tmp_path, "s")).body)
     settings = [grid.Setting("a", {"sleep": s}) for s in (0.0, 30.0, 40.0)]
     times = np.array([0.0, 1.0])
-    slow = [grid.Case(scene, times, "fake_engines:RECORDER", setting, 0.5) for setting in settings]
+    slow = [grid.Case(scene, times, f"{FAKES}:RECORDER", setting, 0.5) for setting in settings]
     records = grid.study(slow, ThreadPoolExecutor(1), run=Hurried())
     assert [r["outcome"] for r in records] == ["COMPLETED", "TIMED_OUT", "TIMED_OUT"], records
     assert records[2]["message"] == NOT_STARTED and len((tmp_path / "log").read_text().splitlines()) == 2
@@ -347,7 +343,7 @@ def test_tuning_and_the_cheapest_setting(capsys, still):
     assert [r["settings"] for r in document["records"]] == [{"seconds": 0.1}, {"seconds": 0.5}], document
     assert "--option seconds=0.1 " in document["records"][0]["command"], document["records"][0]["command"]
     assert not document["records"][0]["integrated_here"], "the fake integrates itself"
-    status, out, err = run_main(capsys, "tune", "elsewhere:ENGINE", still)
+    status, out, err = run_main(capsys, "tune", f"{FAKES}:ELSEWHERE", still)
     assert status == 1 and "No setting reaches an error of 1e-06" in out, (out, err)
 
 
@@ -414,7 +410,7 @@ def test_comparison_and_its_verdict(capsys, still):
 
 
 def test_another_mechanism_and_a_comparison_refused(capsys, still):
-    asked = ("--engine", FAKE, "--engine", "elsewhere:ENGINE")
+    asked = ("--engine", FAKE, "--engine", f"{FAKES}:ELSEWHERE")
     status, out, err = run_main(capsys, "compare", still, *asked)
     assert status == 1, err
     assert "still: elsewhere: the adapter or the scene differs: initial position: truth and elsewhere" in err
@@ -428,7 +424,7 @@ def test_another_mechanism_and_a_comparison_refused(capsys, still):
 
 def test_mechanisms_that_differ_without_a_truth_and_times_not_compared(capsys, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    asked = ("--engine", FAKE, "--engine", "elsewhere:ENGINE", "--reference-time", "0")
+    asked = ("--engine", FAKE, "--engine", f"{FAKES}:ELSEWHERE", "--reference-time", "0")
     status, out, err = run_main(capsys, "compare", two_blocks(tmp_path), *asked)
     assert status == 1, err
     assert "two: the engines simulate different mechanisms, so times are not compared: initial pos" in err, (
@@ -446,7 +442,14 @@ def test_an_adapter_that_loses_a_load_is_not_judged(capsys, tmp_path):
     Scene(
         name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0), duration=0.5
     ).save(tmp_path / "later.toml")
-    asked = ("--engine", "pinocchio", "--engine", "fake_engines:LOSES_LOADS", "--setting", "tuned")
+    asked = (
+        "--engine",
+        "pinocchio",
+        "--engine",
+        f"{FAKES}:LOSES_LOADS",
+        "--setting",
+        "tuned",
+    )
     status, out, err = run_main(capsys, "compare", str(tmp_path / "later.toml"), *asked)
     assert status == 1, (out, err)
     said = " ".join(out.split())
@@ -456,9 +459,9 @@ def test_an_adapter_that_loses_a_load_is_not_judged(capsys, tmp_path):
 
 def test_other_families_are_tried_before_an_engine_is_said_to_complete_no_run(capsys, still):
     """An engine of four families of which the first three fail: the fourth is run, and is right."""
-    status, out, _ = run_main(capsys, "compare", still, "--engine", "fake_engines:LAST_ONE_RUNS")
+    status, out, _ = run_main(capsys, "compare", still, "--engine", f"{FAKES}:LAST_ONE_RUNS")
     assert status == 0 and "last is right at its best settings" in out and "fourth" in out, out
-    asked = ("--engine", "fake_engines:LAST_ONE_RUNS", "--setting", "first")
+    asked = ("--engine", f"{FAKES}:LAST_ONE_RUNS", "--setting", "first")
     status, out, _ = run_main(capsys, "compare", still, *asked)
     assert "last completes no run" in " ".join(out.split()) and "fourth" not in out, out
 

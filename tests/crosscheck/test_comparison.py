@@ -14,8 +14,9 @@ from crosscheck.engine import Setting
 from crosscheck.study.chains import Chains
 from crosscheck.study.grid import Case, key, study
 from mbref.scene import Body, Scene
+from tests.helpers.fake_engines import FAKES
 
-FAKE = "tests.crosscheck.fake_engines:FAKE"
+FAKE = f"{FAKES}:FAKE"
 BLOCK = Scene(
     name="block",
     body=(Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),),

@@ -6,7 +6,6 @@ import contextlib
 import io
 import json
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +23,7 @@ from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 from mbref.trajectory import Outcome
+from tests.helpers.fake_engines import FAKES, Fake
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
 
@@ -50,10 +50,9 @@ def test_closed_form_of_couplings_and_the_reference(make):
     assert np.abs(turned - 1).max() < 1e-13
 
 
-def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypatch):
+def test_verify_command_and_an_engine_that_breaks_the_contract(capsys):
     """Chatter prints, leaves a file, and rests where bodies fall / its verdicts, exit status 1."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    status = main(["verify", "fake_engines:CHATTER", "--scene", "free_fall", "--json"])
+    status = main(["verify", f"{FAKES}:CHATTER", "--scene", "free_fall", "--json"])
     record = json.loads(capsys.readouterr().out)
     verdicts = {v["property"]: v["status"] for v in record["verdicts"] if v["scene"] == "free_fall"}
     faulty = {name for name, verdict in verdicts.items() if verdict == "fail"}
@@ -64,13 +63,11 @@ def test_verify_command_and_an_engine_that_breaks_the_contract(capsys, monkeypat
     assert [v["status"] for v in undone] == ["fail"], undone
 
 
-def test_a_run_in_this_process_ends_at_its_limit(monkeypatch):
+def test_a_run_in_this_process_ends_at_its_limit():
     """A loop that catches every Exception; the next run has its own time."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    from fake_engines import Fake
 
     class Endless(Fake):
-        def misbehave(self, scene):
+        def act(self, scene):
             while scene.name == "endless":
                 with contextlib.suppress(Exception):
                     sum(range(1000))
@@ -87,10 +84,9 @@ def test_a_run_in_this_process_ends_at_its_limit(monkeypatch):
 
 
 @pytest.mark.parametrize(("fake", "status"), [("FAKE", "pass"), ("AGING", "fail"), ("KEEPING", "fail")])
-def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status, monkeypatch):
+def test_what_a_run_leaves_to_the_next_and_the_property_that_tells(fake, status):
     """Of three engines that repeat themselves in processes of their own two do not within a process."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    bench = trial.set_up(Isolated(f"fake_engines:{fake}", 60.0), SPECIMENS["pendulum"])
+    bench = trial.set_up(Isolated(f"{FAKES}:{fake}", 60.0), SPECIMENS["pendulum"])
     repeated, reordered = (suite.verdict_on(check, bench) for check in ("repeated", "reordered"))
     assert repeated.status == status, repeated
     assert reordered.status == "pass", reordered
@@ -106,16 +102,14 @@ def test_shaken_scene_and_truth():
         assert 0 < apart < 1e-12, f"{name}: {apart:.1e} from data that are off by rounding"
 
 
-def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys, monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    assert main(["verify", "fake_engines:REFUSING", "--scene", "free_fall", "--in-process"]) == 1
+def test_an_engine_that_refuses_every_scene_is_not_shown_to_conform(capsys):
+    assert main(["verify", f"{FAKES}:REFUSING", "--scene", "free_fall", "--in-process"]) == 1
     assert "an engine that runs no scene is not shown to conform" in " ".join(capsys.readouterr().out.split())
-    assert main(["verify", "fake_engines:REFUSING", "--mechanisms", "1"]) == 1
+    assert main(["verify", f"{FAKES}:REFUSING", "--mechanisms", "1"]) == 1
 
 
-def test_verify_command_and_crashing_engine(capsys, monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    status = main(["verify", "fake_engines:SEGFAULT", "--scene", "free_fall"])
+def test_verify_command_and_crashing_engine(capsys):
+    status = main(["verify", f"{FAKES}:SEGFAULT", "--scene", "free_fall"])
     out = capsys.readouterr().out
     assert status == 1, status
     assert "SIGSEGV" in out, f"the table does not say why: {out[-600:]}"

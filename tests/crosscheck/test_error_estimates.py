@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +15,7 @@ from crosscheck.study.record_view import public
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome
-from tests.crosscheck.fake_engines import Fake
+from tests.helpers.fake_engines import FAKES, Fake
 
 SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)
 TIMES = np.linspace(0.0, 0.3, 7)
@@ -42,9 +41,8 @@ def test_runs_that_are_not_of_a_study_have_no_estimate():
     assert run_isolated("mbref", SCENE, TIMES, LOOSE, 60.0).to_record()["error_estimate"] is None
 
 
-def test_an_engine_without_estimates_gives_its_run(monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    record = run_case(Case(SCENE, TIMES, "fake_engines:FAKE", Setting("a", {"seconds": 0.5})))
+def test_an_engine_without_estimates_gives_its_run():
+    record = run_case(Case(SCENE, TIMES, f"{FAKES}:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
     assert run.with_error_estimate(1.0) is run

@@ -29,6 +29,7 @@ from mbref.scene import (
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
+from tests.crosscheck.tree_scenes import driven, every_joint
 
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
@@ -197,10 +198,7 @@ def test_driven_joint_and_its_prescribed_motion_agree(kind: type, family: str, b
     assert trajectory.acceleration is None, "initial accelerations leave out the driver's"
 
 
-def test_mechanism_of_every_joint_and_its_joint_equations_agree(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    from tree_scenes import driven, every_joint
-
+def test_mechanism_of_every_joint_and_its_joint_equations_agree():
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
         assert measured["violation_position"] < MARGIN * OPEN[0], (scene.name, measured)

@@ -34,6 +34,7 @@ from crosscheck.processes.pool import (
 from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
+from tests.helpers.fake_engines import FAKE, FAKES, CompilingModels, converse
 
 TIMES = np.array([0.0, 0.1, 0.3])
 PLAIN = Setting("plain", {"seconds": 0.25})
@@ -41,9 +42,8 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture(autouse=True)
-def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    end_idle()  # each test has children of its own
-    monkeypatch.syspath_prepend(str(HERE))
+def _children_of_its_own() -> Iterator[None]:
+    end_idle()
     yield
     end_idle()
 
@@ -53,7 +53,7 @@ def still(name: str = "still") -> Scene:
 
 
 def run(fake: str, scene: Scene | None = None, time_limit: float = 60.0) -> Trajectory:
-    return run_isolated(f"fake_engines:{fake}", scene or still(), TIMES, PLAIN, time_limit)
+    return run_isolated(f"{FAKES}:{fake}", scene or still(), TIMES, PLAIN, time_limit)
 
 
 def gone(pid: int) -> bool:
@@ -67,8 +67,6 @@ def gone(pid: int) -> bool:
 
 
 def test_isolated_run_and_run_in_this_process_agree():
-    from fake_engines import FAKE
-
     here, there = FAKE.run(still(), TIMES, PLAIN), run("FAKE")
     assert there.to_record() == here.to_record(), (there, here)
 
@@ -87,13 +85,11 @@ def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, versio
     assert (ended.outcome, ended.message, ended.version) == (Outcome.CRASHED, message, version)
     assert (ended.method, ended.settings) == (PLAIN.family, PLAIN.options)
     assert ended.position.shape == (0, 1, 3), ended.position.shape
-    observed = observe(f"fake_engines:{fake}", still(), TIMES, PLAIN, 60.0)
+    observed = observe(f"{FAKES}:{fake}", still(), TIMES, PLAIN, 60.0)
     assert observed.value.to_record() == ended.to_record(), (observed.value, ended)
 
 
 def test_compilation_of_a_model_extends_the_time_limit():
-    from fake_engines import CompilingModels
-
     runner = InProcess(CompilingModels(), time_limit=0.1)
     for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
         assert ended.outcome is Outcome.COMPLETED, ended.message
@@ -105,7 +101,7 @@ def test_compilation_of_a_model_extends_the_time_limit():
 def test_observed_runs_and_a_process_for_each(tmp_path: Path):
     """Each says what making the engine ready printed, and leaves no process behind."""
     log = tmp_path / "log"
-    seen = [observe("fake_engines:HERALD", still(str(log)), TIMES, PLAIN, 60.0) for _ in range(3)]
+    seen = [observe(f"{FAKES}:HERALD", still(str(log)), TIMES, PLAIN, 60.0) for _ in range(3)]
     assert [one.printed for one in seen] == ["a banner\n"] * 3, seen
     processes = [int(line.split()[1]) for line in log.read_text().splitlines()]
     assert len(set(processes)) == 3, processes
@@ -114,7 +110,7 @@ def test_observed_runs_and_a_process_for_each(tmp_path: Path):
 
 def test_observed_run_that_hangs_is_killed_with_all_it_started(tmp_path: Path):
     pid = tmp_path / "pid"
-    ended = observe("fake_engines:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
+    ended = observe(f"{FAKES}:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
     assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
@@ -141,7 +137,7 @@ def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path:
     log = tmp_path / "log"
     ways = [{}, {}, {"outcome": "NOT_CONVERGED"}, {}, {"raise": "no such joint"}, {}, {"signal": 11}, {}, {}]
     outcomes = [
-        run_isolated("fake_engines:RECORDER", still(str(log)), TIMES, Setting("a", way), 60.0).outcome.name
+        run_isolated(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", way), 60.0).outcome.name
         for way in ways
     ]
     completed, crashed = "COMPLETED", "CRASHED"
@@ -167,7 +163,7 @@ def test_runs_in_turn_share_a_process_until_one_is_ended(tmp_path: Path):
     log = tmp_path / "log"
     ways = [({}, 60.0), ({"outcome": "NOT_CONVERGED"}, 60.0), ({}, 60.0), ({"sleep": 60.0}, 1.0), ({}, 60.0)]
     outcomes = [
-        run_in_turn("fake_engines:RECORDER", still(str(log)), TIMES, Setting("a", way), limit).outcome.name
+        run_in_turn(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", way), limit).outcome.name
         for way, limit in ways
     ]
     completed = "COMPLETED"
@@ -181,9 +177,7 @@ def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
     """Getting ready takes this engine longer than its runs may."""
     log, limit = tmp_path / "log", 1.5
     ways = [{}, {"sleep": 60.0}, {}]
-    runs = [
-        run_isolated("fake_engines:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways
-    ]
+    runs = [run_isolated(f"{FAKES}:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways]
     assert [r.outcome.name for r in runs] == ["COMPLETED", "TIMED_OUT", "COMPLETED"], runs
     first, second, third = (line.split()[1] for line in log.read_text().splitlines())
     assert first == second != third, (first, second, third)
@@ -198,12 +192,12 @@ def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.Mon
 def test_engine_that_compiles_and_what_it_prints_meanwhile():
     with ThreadPoolExecutor(1) as thread:
         setting = Setting("plain", {"seconds": 0.25})
-        made = thread.submit(run_in_turn, "fake_engines:COMPILING", still(), TIMES, setting, 60.0)
+        made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, setting, 60.0)
         seen = set()
         while not made.done():
             seen |= set(starting().values())
         assert made.result().outcome is Outcome.COMPLETED, made.result().message
-    assert {"compiling kernels", "fake_engines:COMPILING plain starts"} >= seen >= {"compiling kernels"}
+    assert {"compiling kernels", f"{FAKES}:COMPILING plain starts"} >= seen >= {"compiling kernels"}
     assert not starting()
 
 
@@ -212,8 +206,7 @@ def test_engine_is_asked_alone_until_it_has_answered_once(monkeypatch: pytest.Mo
     monkeypatch.setenv("FAKE_LOG", str(log))
     with ThreadPoolExecutor(2) as threads:
         asked = [
-            threads.submit(capabilities, "fake_engines:SEARCHING", still(name), 60.0)
-            for name in ("one", "two")
+            threads.submit(capabilities, f"{FAKES}:SEARCHING", still(name), 60.0) for name in ("one", "two")
         ]
     assert all(len(answer.result()[2]) == 3 for answer in asked), asked
     assert log.read_text().split() == ["begin", "end"] * 2, log.read_text()
@@ -222,7 +215,7 @@ def test_engine_is_asked_alone_until_it_has_answered_once(monkeypatch: pytest.Mo
 def test_engines_do_not_share_a_process(tmp_path: Path):
     log, plain = tmp_path / "log", Setting("a")
     for fake in ("RECORDER", "SLOW", "RECORDER"):
-        run_isolated(f"fake_engines:{fake}", still(str(log)), TIMES, plain, 60.0)
+        run_isolated(f"{FAKES}:{fake}", still(str(log)), TIMES, plain, 60.0)
     first, other, again = (line.split()[1] for line in log.read_text().splitlines())
     assert first != other, "two engines in one process"
     assert first == again, "the child of the first engine did not wait for it"
@@ -314,12 +307,10 @@ def test_stop_all_ends_running_children(tmp_path: Path):
 
 def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
     log = tmp_path / "log"
-    from fake_engines import converse
-
-    _, served = ask("fake_engines:RECORDER", converse, (), 60.0)
+    _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
     jobs = [
-        ("fake_engines:RECORDER", Setting("a", {"seconds": 0.5})),
-        ("fake_engines:RECORDER", Setting("b", {"seconds": 0.7, "outcome": "NOT_CONVERGED"})),
+        (f"{FAKES}:RECORDER", Setting("a", {"seconds": 0.5})),
+        (f"{FAKES}:RECORDER", Setting("b", {"seconds": 0.7, "outcome": "NOT_CONVERGED"})),
     ]
     seconds = time_interleaved(still(str(log)), TIMES, jobs, repeats=2, time_limit=60.0)
     assert seconds[0] == [0.5, 0.5], seconds
@@ -337,7 +328,7 @@ def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
 
 
 def test_interleaved_crash_is_an_error():
-    jobs = [("fake_engines:FAKE", PLAIN), ("fake_engines:SEGFAULT", PLAIN)]
+    jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
         time_interleaved(still(), TIMES, jobs, repeats=1, time_limit=60.0)
     assert caught.value.outcome is Outcome.CRASHED

@@ -19,10 +19,7 @@ MOST_REPEATED = (
     ("kind", "runs", "times"),
     [*((k, *few) for k, few in FEW.items()), *(pytest.param(k, *WHOLE, marks=pytest.mark.slow) for k in FEW)],
 )
-def test_kills_lose_nothing(
-    kind: str, runs: int, times: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.syspath_prepend(str(kills.FAKES))
+def test_kills_lose_nothing(kind: str, runs: int, times: int, tmp_path: Path):
     found = kills.KINDS[kind](runs, times, tmp_path)
     assert found.is_sound and found.kills == times, f"{kind}: {found}"
     assert found.made <= runs + MOST_REPEATED * times, f"{kind}: {found}: finished runs were repeated"

@@ -8,7 +8,7 @@ from crosscheck.cli.request import find_specimens
 from crosscheck.conformance.planar import is_planar, planar_loops
 from crosscheck.engine import Cannot, Owner, Supports, engine
 from mbref.scene import GROUND, Scene
-from tests.crosscheck.fake_engines import Fake
+from tests.helpers.fake_engines import Fake
 
 
 class Planar(Fake):

@@ -15,13 +15,9 @@ from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, 
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
+from tests.helpers.fake_engines import FAKE, FAKES
 
 TIMES = np.array([0.0, 0.1, 0.3])
-
-
-@pytest.fixture(autouse=True)
-def _fakes_importable(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
 
 
 def still(name: str = "still", **changes: object) -> Scene:
@@ -30,12 +26,16 @@ def still(name: str = "still", **changes: object) -> Scene:
 
 
 def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: float = 60.0) -> Case:
-    return Case(scene or still(), TIMES, f"fake_engines:{fake}", Setting(family, {"seconds": 0.5}), limit)
+    return Case(
+        scene or still(),
+        TIMES,
+        f"{FAKES}:{fake}",
+        Setting(family, {"seconds": 0.5}),
+        limit,
+    )
 
 
 def test_record_and_trajectory_agree():
-    from fake_engines import FAKE
-
     wanted = case("a")
     [record] = study([wanted], ThreadPoolExecutor(1))
     there = Trajectory.from_record("still", json.loads(json.dumps(record)))
@@ -99,8 +99,7 @@ def test_timed_out_case_is_repeated_with_a_longer_limit_only(tmp_path: Path):
 @pytest.fixture(scope="module")
 def one_after_the_other() -> list[dict]:
     """Records of EVERYWHERE in this process, one at a time."""
-    with pytest.MonkeyPatch.context() as patch, ThreadPoolExecutor(1) as one:
-        patch.syspath_prepend(str(Path(__file__).parent))
+    with ThreadPoolExecutor(1) as one:
         return study(everywhere(), one)
 
 
@@ -170,12 +169,12 @@ def test_keys_of_different_cases_differ(other: Case, monkeypatch: pytest.MonkeyP
 
 def test_default_cases_are_the_settings_of_the_engines_that_can():
     pushed = still(load=(Force(body="block", point=(1.0, 2.0, 3.0), force=(1.0, 0.0, 0.0)),))
-    cases, unable = default_cases(still(), ["fake_engines:FAKE"], families=["plain"])
+    cases, unable = default_cases(still(), [f"{FAKES}:FAKE"], families=["plain"])
     assert [str(c.setting) for c in cases] == ["plain seconds=0.1", "plain seconds=0.2"]
-    assert len(default_cases(still(), ["fake_engines:FAKE"])[0]) == 3
+    assert len(default_cases(still(), [f"{FAKES}:FAKE"])[0]) == 3
     assert unable == []
-    cases, unable = default_cases(pushed, ["fake_engines:FAKE"])
+    cases, unable = default_cases(pushed, [f"{FAKES}:FAKE"])
     assert cases == []
     assert [(u.scene, u.engine, u.cannot.reason) for u in unable] == [
-        (pushed, "fake_engines:FAKE", "this fake has no loads")
+        (pushed, f"{FAKES}:FAKE", "this fake has no loads")
     ]

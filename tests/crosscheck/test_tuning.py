@@ -17,6 +17,7 @@ from crosscheck.study.tuning import by_closure, tuned
 from mbref import rotations
 from mbref.scene import Body, Scene
 from mbref.trajectory import Cost
+from tests.helpers.fake_engines import FAKES
 
 BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
 SCENE = Scene(name="block", body=(BLOCK,), duration=1.0)
@@ -48,9 +49,7 @@ class Modelled:
     def cases(self, *steps: float) -> list[Case]:
         times = np.array([0.0, 1.0])
         return [
-            Case(SCENE, times, "fake_engines:FAKE", Setting(f, {"step": h}))
-            for f in self.families
-            for h in steps
+            Case(SCENE, times, f"{FAKES}:FAKE", Setting(f, {"step": h})) for f in self.families for h in steps
         ]
 
 

@@ -19,7 +19,7 @@ from reports import render
 from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
 
-FAKE = "fake_engines:FAKE"
+FAKE = "tests.helpers.fake_engines:FAKE"
 
 
 def test_words_of_tables_may_break_where_the_page_is_narrow():

@@ -18,10 +18,13 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
+from tests.helpers.still_engines import Still
+
+FAKES = __name__  # an engine is named f"{FAKES}:NAME"
 
 
-class Fake(Engine):
-    """Leaves every body where it starts; ``options`` say what else to do."""
+class Fake(Still):
+    """Leaves every body where it starts; ``options`` give the outcome and the time of a run."""
 
     name = "fake"
     package = "fake-package"
@@ -37,32 +40,13 @@ class Fake(Engine):
         return [*coarse_to_fine, Setting("noisy", {"seconds": 0.5})]
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        self.misbehave(scene)
-        k, nb = len(times), len(scene.body)
-        still = np.zeros((k, nb, 3))
-        return Trajectory(
-            scene.name,
-            self.name,
-            self.version(),
-            setting.family,
-            dict(setting.options),
-            np.array(times),
-            tuple(b.name for b in scene.body),
-            still + [b.position for b in scene.body],
-            np.zeros((k, nb, 4)) + [b.orientation for b in scene.body],
-            still,
-            still,
-            outcome=Outcome[setting.options.get("outcome", "COMPLETED")],
-            t_end=float(times[-1]),
-            cost=Cost(seconds=setting.options.get("seconds", 0.1)),
-        )
-
-    def misbehave(self, scene: Scene) -> None:
-        pass
+        made, options = super().run(scene, times, setting), setting.options
+        outcome = Outcome[options.get("outcome", "COMPLETED")]
+        return replace(made, outcome=outcome, cost=Cost(seconds=options.get("seconds", 0.1)))
 
 
 class Segfault(Fake):
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         os.write(2, b"about to touch a bad pointer\n")
         os.kill(os.getpid(), signal.SIGSEGV)
 
@@ -80,7 +64,7 @@ class NoSettings(Fake):
 class Hang(Fake):
     """Sleeps, and so does a grandchild, whose process id is left in the file the scene's name gives."""
 
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         grandchild = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
         Path(scene.name).write_text(str(grandchild.pid))
         time.sleep(600)
@@ -89,20 +73,20 @@ class Hang(Fake):
 class Chatter(Fake):
     """Prints past Python's sys.stdout, as compiled code does, and writes into the working directory."""
 
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         os.write(1, b"solver banner\n")
         print("python banner")
         Path("solution.txt").write_text("left behind")
 
 
 class Raise(Fake):
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         print("residual 1e+300", flush=True)
         raise ValueError("no such joint")
 
 
 class Quit(Fake):
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         os._exit(0)
 
 
@@ -186,7 +170,7 @@ class CompilingModels(Fake):
 
     compile_seconds = 10.0
 
-    def misbehave(self, scene: Scene) -> None:
+    def act(self, scene: Scene) -> None:
         computing(time.process_time() + 0.4)
 
 
@@ -259,6 +243,16 @@ class Scalars(Fake):
         )
 
 
+class Elsewhere(Fake):
+    """Simulates another mechanism: every body is a millimetre from where the scene has it."""
+
+    name = "elsewhere"
+
+    def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
+        trajectory = super().run(scene, times, setting)
+        return replace(trajectory, position=trajectory.position + 1e-3)
+
+
 class LosesLoads(Engine):
     """Pinocchio, given scenes without their loads."""
 
@@ -303,7 +297,7 @@ SLOW, STUCK, COMPILING, SEARCHING = Slow(), Stuck(), Compiling(), Searching()
 NO_SETTINGS, REFUSING = NoSettings(), Refusing()
 MALFORMED, SCALARS, VERSIONLESS = Malformed(), Scalars(), Versionless()
 COMPILING_MODELS = CompilingModels()
-LOSES_LOADS, LAST_ONE_RUNS = LosesLoads(), LastOneRuns()
+LOSES_LOADS, LAST_ONE_RUNS, ELSEWHERE = LosesLoads(), LastOneRuns(), Elsewhere()
 
 
 def computing(seconds: float) -> None:
