@@ -173,43 +173,6 @@ def test_acceleration_residuals_are_the_slopes_of_velocity_residuals(name):
         assert len(found) == len(are_lengths(joint_frames(scene)[0]))
 
 
-@pytest.mark.parametrize("name", JOINTS)
-def test_velocity_residuals_are_the_slopes_of_position_residuals_at_closed_joints(name):
-    scene = two_bodies(JOINTS[name])
-    assert rows_at(scene, 0.0, 0) == pytest.approx(0.0 * rows_at(scene, 0.0, 0), abs=1e-15)
-    assert rows_at(scene, 0.0, 1) == pytest.approx(slope(lambda s: rows_at(scene, s, 0), 0.0), abs=1e-9)
-
-
-@pytest.mark.parametrize("name", ["revolute", "translational", "cylindrical"])
-def test_a_driver_adds_a_row_that_its_law_moves(name):
-    law = LAW.model_copy(update={"joint": "J"})
-    plain, driven = two_bodies(JOINTS[name]), two_bodies(JOINTS[name], (law,))
-    for t in (0.0, 0.2):
-        for level in (1, 2):
-            more = rows_at(driven, t, level)
-            assert more[:-1] == pytest.approx(rows_at(plain, t, level), abs=1e-14)
-        assert rows_at(driven, t, 2) == pytest.approx(slope(lambda s: rows_at(driven, s, 1), t), abs=1e-9)
-    assert rows_at(driven, 0.0, 1) == pytest.approx(slope(lambda s: rows_at(driven, s, 0), 0.0), abs=1e-9)
-    assert are_lengths(joint_frames(driven)[0])[-1] == (name == "translational")
-
-
-LENGTHS = {
-    "fixed": [1, 1, 1, 0, 0, 0],
-    "revolute": [1, 1, 1, 0, 0],
-    "universal": [1, 1, 1, 0],
-    "spherical": [1, 1, 1],
-    "translational": [1, 1, 0, 0, 0],
-    "cylindrical": [1, 1, 0, 0],
-    "planar": [1, 0, 0],
-    "distance": [1],
-}
-
-
-@pytest.mark.parametrize("name", JOINTS)
-def test_which_residuals_are_lengths(name):
-    assert are_lengths(joint_frames(two_bodies(JOINTS[name]))[0]).tolist() == [bool(x) for x in LENGTHS[name]]
-
-
 def residual(joint, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
     """Residuals of a body on the ground, whose anchor is the origin, at a pose."""
     scene = Scene(name="s", body=(body(),), joint=(joint,), driver=driver)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.judge import constraints, time_functions
+from crosscheck.judge import constraints
 from mbref import rotations
 from mbref.scene import JOINT_TYPES, Body, Driver, Scene, SceneError, Sine, Spherical
 from mbref.scenes import SCENES
@@ -151,16 +151,6 @@ def test_initial_twists_obey_joints_and_what_the_scene_gives(name):
             assert np.abs(got).max() < 1e-13 * scale, f"{name}.{body.name}: {spin[k]} against given"
 
 
-def test_initial_twists_belong_to_the_caller():
-    """They are computed once for a scene, and a caller may change them."""
-    scene = SCENES["four_bar"]()
-    first = constraints.initial_twists(scene)
-    kept = [a.copy() for a in first]
-    for a in first:
-        a[:] = 1.0
-    assert all(map(np.array_equal, constraints.initial_twists(scene), kept))
-
-
 def test_what_is_left_open_has_the_least_kinetic_energy():
     """A rod pushed off at one end: the closed-form response of least energy is that to an impulse there."""
     rod = Body(name="rod", mass=2.0, inertia=(0.3, 0.3, 0.4), position=(0.5, 0.0, 0.0))
@@ -208,21 +198,3 @@ def test_joint_coordinates_count_the_turns_put_in(order):
     assert np.abs(got - wanted).max() < 1e-12, f"off by {np.abs(got - wanted).max()} after {angle[-1]} rad"
     sparse = constraints.joint_coordinates(scene, times[::20], poses[::20], frames[::20], spin[::20])["j"]
     assert np.isnan(sparse[-1, 0]), f"samples {times[20]} s apart cannot tell the turn, got {sparse[-1, 0]}"
-
-
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_driver_derivatives_are_finite_differences(order):
-    driver = Driver(joint="j", polynomial=(0.0, 1.0, -2.0, 0.5), sine=Sine(amplitude=0.3, frequency=3.0))
-    t, h = np.linspace(0, 2, 5), 1e-5
-    if order == 0:
-        got, wanted = (
-            time_functions.value(driver, t),
-            t - 2 * t**2 + 0.5 * t**3 + 0.3 * np.sin(3 * t),
-        )
-    else:
-        ends = [time_functions.value(driver, t + s * h, order - 1) for s in (1, -1)]
-        got, wanted = (
-            time_functions.value(driver, t, order),
-            (ends[0] - ends[1]) / (2 * h),
-        )
-    assert np.allclose(got, wanted, atol=1e-8), f"order {order}: {got} against {wanted}"

@@ -7,7 +7,6 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
 
 from crosscheck.conformance.features import FACTORS, feature_scenes
 from crosscheck.engine import Owner, Setting, engine
@@ -23,7 +22,7 @@ from mbref.formats import ImportOptions
 from mbref.scene import Factor, Scene, SceneError, TorsionSpring
 from mbref.scenes import SCENES
 from tests.helpers import loads_over_time as scenes
-from tests.helpers.loads_over_time import AXIS, WAVY
+from tests.helpers.loads_over_time import AXIS
 
 TIMES = np.array([0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0])
 FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, seconds=100.0)}
@@ -60,16 +59,6 @@ def test_gauss_s_principle_has_the_motion_of_the_reference(make):
     found, exact = gauss_motion(make(), tuple(TIMES)), natural_motion(make(), TIMES, EXTENDED)
     assert np.abs(found.position - doubles(exact.position)).max() < 1e-9
     assert np.abs(found.acceleration - doubles(exact.acceleration)).max() < 1e-7
-
-
-def test_the_judge_s_spline_is_the_one_of_de_boor():
-    """Against SciPy's cubic spline, values and three derivatives, between rows and after the last."""
-    spline = CubicSpline(*zip(*WAVY, strict=True))
-    for t in np.linspace(0.0, 2.4, 49):
-        k = max(i for i, (time, _) in enumerate(WAVY[:-1]) if time <= t)
-        for order in range(4):
-            found = time_functions.value(Factor(table=WAVY), t, order, since=WAVY[k][0])
-            assert float(found) == pytest.approx(float(spline(t, order)), abs=1e-11)
 
 
 def test_functions_are_right_continuous_where_they_switch():

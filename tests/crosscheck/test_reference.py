@@ -12,15 +12,13 @@ import pytest
 
 from crosscheck.cli.scene_request import find_certifiable
 from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
-from crosscheck.conformance.features import BODY, feature_scenes, massless, undetermined
+from crosscheck.conformance.features import feature_scenes, massless, undetermined
 from crosscheck.conformance.moving import moving_probes, several_springs
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import ASKEW, Isometry
 from crosscheck.judge import constraints, metrics
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.deadline import GivenUp, given_up
-from crosscheck.judge.energy import energy_series
-from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.reference import cache
 from crosscheck.judge.reference import reference as module
 from crosscheck.judge.reference.bound import differences
@@ -34,7 +32,7 @@ from crosscheck.judge.truth import closed_form, truth_for
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.study.comparison import Wanted, collected
 from mbref import rotations
-from mbref.scene import Body, Driver, Scene, Spring, TorsionSpring
+from mbref.scene import Body, Driver, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 from tests.crosscheck.truth_scenes import ALL
@@ -207,108 +205,6 @@ def test_rows_that_become_dependent_do_not_magnify_contradictions():
 
 
 # --- physics ----------------------------------------------------------------------------------------------
-def moving(seed: int, **changes) -> tuple[Scene, Trajectory]:
-    """A random mechanism, some of its data changed, and its motion by formulation A."""
-    scene = random_mechanism(seed).with_(**changes)
-    motion = natural_motion(scene, np.linspace(0.0, 0.3, 13), EXTENDED, seconds=SECONDS)
-    assert not motion.reason
-    arrays = {name: np.asarray(getattr(motion, name), dtype=float) for name in module.FIELDS}
-    found = Reference(motion.times, **arrays, bound=np.zeros(13), both=np.zeros(13, bool), seconds=0.0)
-    return scene, trajectory(scene, found)
-
-
-def test_energy_is_kept_and_joints_stay_closed():
-    undamped = tuple(
-        load.model_copy(update={"damping": 0.0}) if load.type == "spring" else load
-        for load in random_mechanism(2).load
-        if load.type != "moment"
-    )
-    scene, motion = moving(2, load=undamped)
-    assert energy_series(scene, motion).max() < 1e-13
-    for level in (0, 1, 2):
-        assert metrics.violation_series(scene, motion, level).max() < 1e-11, f"joints open at level {level}"
-
-
-def test_accelerations_at_the_start_obey_gauss_principle():
-    scene, motion = moving(4)
-    wanted = gauss(scene)
-    assert np.abs(stacked(scene, motion, 0) - wanted).max() < 1e-11 * np.abs(wanted).max()
-
-
-def test_momentum_of_free_bodies_is_kept():
-    second = BODY.model_copy(
-        update={"name": "second", "position": (1.0, 0.4, -0.3), "velocity": (0.0, 1.0, 0.5)}
-    )
-    first = BODY.model_copy(update={"velocity": (0.5, 0.0, 0.0), "angular_velocity": (1.0, -2.0, 0.5)})
-    spring = Spring(
-        bodies=("body", "second"),
-        points=((0.4, 0, 0), (0.9, 0.5, 0)),
-        stiffness=40.0,
-        damping=0.7,
-        natural_length=0.3,
-    )
-    scene = Scene(name="pair", body=(first, second), load=(spring,))
-    motion = natural_motion(scene, np.linspace(0.0, 1.0, 9), EXTENDED, seconds=SECONDS)
-    mass = np.array([body.mass for body in scene.body])
-    linear = np.einsum("b,kbi->ki", mass, np.asarray(motion.velocity, dtype=float))
-    turn = rotations.to_matrix(np.asarray(motion.orientation, dtype=float))
-    inertia = turn @ constraints.inertia_matrices(scene) @ np.swapaxes(turn, -1, -2)
-    place, spin = (np.asarray(a, dtype=float) for a in (motion.position, motion.angular_velocity))
-    own = np.einsum("kbij,kbj->ki", inertia, spin)
-    angular = own + np.einsum("b,kbi->ki", mass, np.cross(place, np.asarray(motion.velocity, dtype=float)))
-    assert np.abs(linear - linear[0]).max() < 1e-14
-    assert np.abs(angular - angular[0]).max() < 1e-14
-
-
-def test_lengths_in_millimetres_give_the_same_motion():
-    scene = random_mechanism(5)
-    small = _scaled(scene, 1e-3)
-    times = np.linspace(0.0, 0.2, 3)
-    one, other = (natural_motion(s, times, EXTENDED, seconds=SECONDS) for s in (scene, small))
-    assert np.abs(np.asarray(one.position - 1e3 * other.position, dtype=float)).max() < 1e-13
-
-
-def _scaled(scene: Scene, by: float) -> Scene:
-    """The same mechanism with all its lengths times ``by``, moving alike in time."""
-
-    def times(value, power=1):
-        return np.asarray(value, dtype=float) * by**power
-
-    bodies = [
-        body.model_copy(
-            update={
-                "position": tuple(times(body.position)),
-                "velocity": tuple(times(body.velocity)),
-                "inertia": tuple(map(tuple, times(body.inertia, 2))),
-            }
-        )
-        for body in scene.body
-    ]
-    joints = [
-        joint.model_copy(
-            update={
-                key: tuple(
-                    times(getattr(joint, key)) if key == "anchor" else map(tuple, times(joint.anchors))
-                )
-                for key in ("anchor", "anchors")
-                if hasattr(joint, key)
-            }
-        )
-        for joint in scene.joint
-    ]
-    moment, force, spring = scene.load
-    loads = (
-        moment.model_copy(update={"moment": tuple(times(moment.moment, 2))}),
-        force.model_copy(update={"force": tuple(times(force.force)), "point": tuple(times(force.point))}),
-        spring.model_copy(
-            update={
-                "points": tuple(map(tuple, times(spring.points))),
-                "natural_length": float(times(spring.natural_length)),
-            }
-        ),
-    )
-    gravity = tuple(times(scene.gravity))
-    return scene.with_(body=tuple(bodies), joint=tuple(joints), load=loads, gravity=gravity)
 
 
 def test_double_precision_gives_thirteen_digits():

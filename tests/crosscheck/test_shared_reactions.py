@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 from crosscheck.judge import joint_reactions
-from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
-from crosscheck.judge.loads import Motion, wrenches
-from mbref.scene import Body, Coupling, Revolute, Scene, TorsionSpring, Translational
+from crosscheck.judge.constraints import initial_poses, jacobian
+from mbref.scene import Body, Coupling, Revolute, Scene, Translational
 from mbref.trajectory import Trajectory
 
 O, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
@@ -86,27 +85,3 @@ def test_shared_components_side_by_side():
     compared = joint_reactions.compare(DOOR, one, other)
     assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0
     assert compared.joints["A"].chosen == pytest.approx(2 / 7) and compared.resultant == pytest.approx(0.0)
-
-
-def test_the_least_scale_of_reactions_counts_masses_or_kilograms():
-    bare = [Body(name=b.name, position=b.position) for b in DOOR.body]
-    quiet = run(A=(0,) * 6)
-    least = joint_reactions.LEAST
-    assert joint_reactions.largest_reaction(DOOR, quiet) == pytest.approx(4 * least)
-    assert joint_reactions.largest_reaction(DOOR.with_(body=bare), quiet) == pytest.approx(2 * least)
-    assert joint_reactions.largest_reaction(DOOR, run(A=(0, 3, 4, 0, 0, 0), B=(2, 0, 0, 0, 0, 0))) == 5.0
-    length = scene_length(DOOR)
-    twisted = run(A=(0, 0, 0, 0, 0, 6 * length), B=(0, 0, 8, 6 * length, 0, 0))
-    assert length > 1 and joint_reactions.largest_reaction(DOOR, twisted) == pytest.approx(10.0)
-
-
-@pytest.mark.parametrize("kind", [np.float64, np.longdouble])
-def test_a_torsion_spring_has_the_precision_of_the_motion(kind):
-    """4 N m/rad times (1.5 - 0.5 - 0.25) rad, on both bodies."""
-    spring = TorsionSpring(joint="H", stiffness=4.0, natural_angle=0.25)
-    scene = PAIR.with_(joint=(hinge("H", "a", "b"),), coupling=(), load=(spring,))
-    zero = np.zeros((2, 2, 3), kind)
-    turn = np.array([[0.5, 1.5]] * 2, kind)
-    eye = np.tile(np.eye(3, dtype=kind), (2, 2, 1, 1))
-    _, moment = wrenches(scene, Motion(zero, eye, zero, zero, turn), np.array(Z, kind))
-    assert moment.dtype == kind and moment[:, :, 2].astype(float).tolist() == [[3.0, -3.0]] * 2

@@ -14,7 +14,7 @@ from crosscheck import measure, truth_for
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.metrics import METRICS
-from crosscheck.judge.model_identity import along, gate, gate_times
+from crosscheck.judge.model_identity import acceleration_scale, along, gate, gate_times
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.precision import grain, single_precision
 from crosscheck.judge.reaction_balance import absurd, balance, with_exact_reactions
@@ -22,6 +22,7 @@ from crosscheck.judge.truth import Truth
 from mbref import rotations
 from mbref.scene import Body, Scene
 from mbref.trajectory import Trajectory
+from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
 from tests.helpers.parts import SKEW, Z, block, hinge, turning_about
 from tests.helpers.short_motions import GRAVITY, MOTIONS, made
 
@@ -326,3 +327,16 @@ def test_single_precision_and_noise_have_their_size():
         assert of == "positions" and 0.3 * size < found * scene_length(scene) < 6 * size
     single = replace(run, velocity=run.velocity.astype(np.float32).astype(float))
     assert {item.partition(" of ")[0] for item in single_precision(scene, single)} == {"velocity"}
+
+
+# --- scales -----------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("name", MOTIONS)
+def test_accelerations_that_a_scene_can_cause_have_its_units_alone(name):
+    """Differences count against them; frames and orders have no influence."""
+    scene = MOTIONS[name]()
+    size = acceleration_scale(scene)
+    turn, shift = rotations.from_vector(0.9 * AXIS), 20 * SHIFT
+    assert acceleration_scale(in_other_units(scene, 3.0, 7.0, 0.5)) == pytest.approx(28 * size)
+    assert acceleration_scale(in_another_frame(scene, turn, shift)) == pytest.approx(size)
+    assert acceleration_scale(in_another_order(scene)) == pytest.approx(size)
+    assert size >= np.linalg.norm(scene.gravity)
