@@ -92,10 +92,13 @@ def test_another_measure_is_compared_where_the_error_is_the_same():
 def stored(place, *lines: dict[str, Any], **timings: float):
     """A folder with records, and with the times of interleaved runs by key."""
     asked = {"engine": "a", "options": {"step": 0.1}, "samples": 3, "end": 1.0}
-    common = {"scene": "s", "family": "f", "asked": asked, "cost": {"seconds": 4.0, "steps": 7}}
+    common = {"scene": "s", "family": "f", "asked": asked, "version": "1", "outcome": "COMPLETED"}
+    common |= {"message": "", "t_end": 1.0, "time_limit": 60.0, "metrics": {}, "versions": {}, "settings": {}}
+    common |= {"engine": "a", "machine": SAME, "times": [0.0, 1.0], "cost": {"seconds": 4.0, "steps": 7}}
     text = "".join(json.dumps({**common, **line}) + "\n" for line in lines)
     (place / "records.jsonl").write_text(text)
-    times = [{"key": name, "seconds": seconds} for name, seconds in timings.items()]
+    repeats = {"median": 1.0, "repeats": 5}
+    times = [{"key": name, "seconds": seconds, "timing": repeats} for name, seconds in timings.items()]
     (place / "timings.jsonl").write_text("".join(json.dumps(line) + "\n" for line in times))
     return place
 
