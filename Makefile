@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: help check test lint deep fuzz kills mutants machines coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
+.PHONY: help check test lint order deep fuzz kills mutants machines coverage report quick reference request kinds ladders picture docs site bench clean drawn paper
 
 help: ## show this list
 	@grep -E '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -21,6 +21,9 @@ test: $(VENV)/ready ## the tests, in this checkout
 
 lint: $(VENV)/ready ## format, lint, types and the prose of README and docs, in this checkout
 	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/python -m tests.prose
+
+order: $(VENV)/ready ## the tests in a random order; it prints the seed (make order SEED=2 repeats one)
+	$(BIN)/pytest -n 2 -p randomly $(and $(filter command line,$(origin SEED)),--randomly-seed=$(SEED))
 
 deep: $(VENV)/ready ## the slow tests too, with many more random cases
 	HYPOTHESIS_PROFILE=deep $(BIN)/pytest -n 2 -m "slow or not slow"

@@ -17,7 +17,7 @@ from hypothesis import Phase, settings
 os.environ |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 
 settings.register_profile("check", max_examples=10, deadline=None, derandomize=True, database=None)
-settings.register_profile("deep", max_examples=500, deadline=None, print_blob=True)
+settings.register_profile("deep", max_examples=100, deadline=None, print_blob=True)
 settings.register_profile("first", settings.get_profile("check"), phases=(Phase.generate,))
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "check"))
 

@@ -81,15 +81,6 @@ def test_rows_at_the_defaults_are_the_engines_that_have_a_run_of_them(section):
     assert defaults.rows["mujoco"][0].kind == "false"
 
 
-def test_depth_of_a_cell_is_its_digits_over_fourteen(section):
-    best, defaults = maps(section)
-    depths = {name: row[0].depth for name, row in best.rows.items()}
-    assert depths["mbref"] == pytest.approx(12 / 14) and depths["mujoco"] == pytest.approx(7 / 14)
-    assert depths["exudyn"] == 0.0 and defaults.rows["mujoco"][0].depth == pytest.approx(0.30103 / 14)
-    [[exact]] = (row[:1] for row in maps(closed_loops.render([run("mbref", 0.0)]))[0].rows.values())
-    assert exact.depth == 1.0
-
-
 def test_each_engine_has_its_version_its_runs_and_their_commands(section):
     place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "mujoco")
     table, text, commands = section[place + 1 : place + 4]
@@ -103,25 +94,3 @@ def test_each_engine_has_its_version_its_runs_and_their_commands(section):
     rows = section[place + 1].rows
     assert rows[0][2] == "refused: no hinge (missing in the engine)" and len(rows) == 2
     assert len(section[place + 3].text.splitlines()) == 1, "a refusal has no command"
-
-
-def test_mechanisms_are_listed_with_their_ends(section):
-    [table] = [b for b in section if isinstance(b, Table) and b.header[0] == "Column"]
-    assert [row[0] for row in table.rows] == [column.heading for column in DIFFICULTIES]
-    assert [float(row[2]) for row in table.rows] == [column.end for column in DIFFICULTIES]
-
-
-def test_captions_and_headers_of_the_tables(section):
-    headings = [(block.text, block.level) for block in section if isinstance(block, Heading)]
-    names = ("Engines on closed loops", "The mechanisms", "mbref", "mujoco", "pinocchio", "exudyn")
-    assert {name for name, _ in headings} == {*names} and {level for _, level in headings} == {2}
-    assert [(b.header, b.caption) for b in section if isinstance(b, Table)][:2] == [
-        (("Sign", "Meaning"), "How to read a cell."),
-        (("Column", "Scene", "Until (s)", "Mechanism"), "Scenes that the columns run."),
-    ]
-    best, defaults = maps(section)
-    assert (
-        best.caption.startswith("Each engine by its best family")
-        and "as the library has them" in defaults.caption
-    )
-    assert best.label == defaults.label == "engine"

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from synthetic import groups
 
-from crosscheck.engine import BUILT_IN
 from reports import figures, time_series
 from reports.blocks import Figure, Plot
 from reports.sections import blocks, speed
@@ -78,11 +77,6 @@ def test_history_and_a_cross_where_a_run_ended_early():
     assert 0 < crosses[0] <= 0.6 * group.scene.duration, crosses
 
 
-def test_engines_and_different_colours():
-    colours = {figures.colour(name) for name in BUILT_IN}
-    assert len(colours) == len(BUILT_IN), colours
-
-
 def test_curves_of_an_engine_and_different_looks():
     looks = figures.looks([("mbref", str(i)) for i in range(12)])
     kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
@@ -97,3 +91,10 @@ def test_powers_of_ten_are_plain_text():
     labels = re.findall(r">([^<>\n]+)</text>", figures.svg(picture, "powers"))
     assert {"10⁻⁷", "10⁰", "2×10⁰", "3×10⁰"} <= set(labels), labels
     assert len(figures.png(picture)) > 1000
+
+
+def test_files_have_no_date_and_no_program():
+    figure, _ = figures.canvas(2.0, 2.0)
+    text = figures.svg(figure, "one")
+    assert "<dc:date>" not in text and "Matplotlib" not in text
+    assert b"Software" not in figures.png(figure)

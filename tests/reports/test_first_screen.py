@@ -9,10 +9,8 @@ from pathlib import Path
 import pytest
 from synthetic import groups, scene
 
-from crosscheck.engine import engine_names
-from reports import engine_looks, render
+from reports import render
 from reports.blocks import Matrix, Opening, Plot, Record
-from reports.engine_looks import TONES, mark, tone
 from reports.places import of_family, of_run
 from reports.sections import blocks
 from reports.sections.verdict import render as first_screen
@@ -35,18 +33,6 @@ def test_matrix_and_the_grades():
     assert [(v.family, v.grade) for v in cells["mujoco"]] == [("tuned", "inaccurate"), ("defaults", "wrong")]
     assert [(v.grade, v.lines) for v in cells["exudyn"]] == [("failed", ["not converged at 0.012 s"])]
     assert cells["mbref"][0].lines == ["1.56e-05", "40 ms"], cells["mbref"]
-
-
-def test_every_engine_has_a_colour_and_a_mark_of_its_own():
-    names = engine_names()[:TONES]
-    assert [tone(name) for name in names] == list(range(len(names))), names
-    assert len({mark(name) for name in names}) == len(names) and tone("theirs") == TONES - 1
-    style = (Path(engine_looks.__file__).parent / "templates" / "style.css").read_text()
-    shades = re.findall(r"--t(\d): *([^;]+);", style)
-    assert len(shades) == len(set(shades)) == 2 * TONES, "a colour for light pages, another for dark ones"
-    assert set(re.findall(r"\.tone(\d) \{ --tone: var\(--t(\d)\); \}", style)) == {
-        (str(k), str(k)) for k in range(TONES)
-    }
 
 
 def test_opening_and_its_sentences():

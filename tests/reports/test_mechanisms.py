@@ -92,26 +92,6 @@ def test_bodies_of_a_joint_and_one_point(name):
         assert gap < 1e-9, f"{name} {joint.name}: {gap} m between the bodies"
 
 
-def test_links_and_their_lengths():
-    lengths = {s.name: np.ptp(s.points, axis=0) for s in shapes(scene("planar_slider_crank"))}
-    assert lengths["crank"] == pytest.approx([0.304, 0, 0], abs=1e-12), lengths
-    assert lengths["rod"] == pytest.approx([0.4048, 0, 0], abs=1e-12), lengths
-    assert lengths["slider"] == pytest.approx([0, 0, 0], abs=1e-12), lengths
-
-
-def test_poses_are_more_opaque_towards_the_last():
-    picture = ET.fromstring(mechanisms.poses(scene(), exact(scene())))
-    opacity = [float(n.get("opacity", 1)) for n in picture.iter(f"{SVG}polyline")]
-    seen = [o for o in opacity if o < 1]
-    assert len(set(seen)) == mechanisms.POSES - 1 and seen == sorted(seen)
-
-
-def test_path_and_the_truth_between_samples():
-    coarse, fine = exact(scene(), 49), exact(scene(), 12 * 49)
-    error = abs(mechanisms.path(coarse, 0) - fine.position[:, 0]).max()
-    assert error < 1e-5, f"{error} m off the path of the crank"
-
-
 @pytest.mark.parametrize(("name", "count"), [("planar_slider_crank_equal", 4), ("planar_slider_crank", 0)])
 def test_singular_positions_of_a_slider_crank(name, count):
     """With equal lengths the crank passes θ = ±π/2; with unequal ones nothing is singular."""

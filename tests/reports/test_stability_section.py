@@ -92,19 +92,3 @@ def test_a_cell_shows_digits_or_why_the_run_ended(error, outcome, text, red):
     assert (f"| taylor | {'**' * red}{text}{'**' * red} |" in markdown(blocks)) and "gap, m →" in html(
         blocks, {}
     )
-
-
-@pytest.mark.parametrize(
-    ("difficulty", "words"),
-    [
-        (1.5, "1.5"),
-        (0.3, "0.3"),
-        (1e-5, "1e-5"),
-        (3e-14, "3e-14"),
-        (3e7, "3e7"),
-        (1e12, "1e12"),
-        (1e3, "1000"),
-    ],
-)
-def test_columns_are_named_by_their_difficulty(difficulty, words):
-    assert section.rung(difficulty) == words
