@@ -12,12 +12,13 @@ import numpy as np
 from crosscheck.judge.constraints import jacobian, length_rows
 from crosscheck.judge.deadline import ask
 from crosscheck.judge.joint_coordinates import reflected
+from crosscheck.judge.joint_reactions import unit_rows
 from crosscheck.judge.reaction_balance import demanded
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
-# smallest share of a row that the other rows do not span; a redundant row has a share of at most 1/2
+# smallest share of a unit row that the other rows do not span; a redundant row has a share of at most 1/2
 DETERMINED = 1 - 1e-6
 
 
@@ -47,9 +48,9 @@ def _multipliers(scene: Scene, exact: Trajectory, k: int, push: np.ndarray) -> n
     twist_rates = np.hstack([exact.acceleration[k], exact.angular_acceleration[k]]).ravel()
     rotors = reflected(scene, *state)
     total = push + rotors.mass @ twist_rates - rotors.force
-    rows, _ = jacobian(scene, float(exact.times[k]), *state[:2])
+    rows, units, sizes = unit_rows(scene, jacobian(scene, float(exact.times[k]), *state[:2])[0])
     u, s, vt = np.linalg.svd(rows, full_matrices=False)
     rank = int((s > RANK * s[0]).sum())
     u = u[:, :rank]
-    found = u @ (vt[:rank] @ total / s[:rank])
+    found = u @ (vt[:rank] @ (total * units) / s[:rank]) / sizes
     return np.where(np.sum(u**2, axis=1) >= DETERMINED, found, np.nan)

@@ -76,14 +76,25 @@ def _shared(
     position = np.frombuffer(positions).reshape(-1, 3)
     orientation = np.frombuffer(orientations).reshape(-1, 4)
     rows, _ = jacobian(scene, t, position, orientation)
-    units, found = np.repeat([1.0, scene_length(scene)], 3), {}
-    lengths = np.linalg.norm(rows, axis=1)
-    u, s, _ = np.linalg.svd(rows / lengths[:, None])
+    arms, found = np.repeat([1.0, scene_length(scene)], 3), {}
+    scaled_rows, _, sizes = unit_rows(scene, rows)
+    u, s, _ = np.linalg.svd(scaled_rows)
     open_ = u[:, int(np.sum(s > rank * s[0])) :]
     for joint, wrenches in of_multipliers(scene, rows, position, orientation):
-        scaled = wrenches / units[:, None] / lengths
+        scaled = wrenches / arms[:, None] / sizes
         found[joint.name] = _span(scaled @ open_, rank * np.abs(scaled).max(initial=0.0))
     return found
+
+
+def unit_rows(scene: Scene, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows J (m, 6 nb) as rows of length one, which do not depend on the mechanism's size, with the
+    units (6 nb,) of twists and the sizes (m,): J is sizes · rows / units.
+
+    Angular velocities are multiplied by the scene's length.
+    """
+    units = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
+    sizes = np.linalg.norm(rows * units, axis=1)
+    return rows * units / sizes[:, None], units, sizes
 
 
 def of_multipliers(

@@ -18,6 +18,7 @@ from crosscheck.judge.joint_reactions import (
     of_multipliers,
     on_second,
     resultants,
+    unit_rows,
 )
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.tolerances import RANK
@@ -30,7 +31,7 @@ ABSURD = 10.0  # multiple of the largest exact force above which a reaction is i
 
 def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     """Return the exact motion with the reactions that cause it (least squares of the joints' rows). Their
-    unique components are exact, and undetermined components have the least norm in the rows' own units.
+    unique components are exact, and undetermined components have the least norm for unit rows.
 
     Raises ValueError if the motion has no accelerations.
     """
@@ -39,8 +40,10 @@ def with_exact_reactions(scene: Scene, exact: Trajectory) -> Trajectory:
     for k in range(len(exact.times)):
         position, orientation = exact.position[k], exact.orientation[k]
         rows, _ = jacobian(scene, exact.times[k], position, orientation)
+        scaled, units, sizes = unit_rows(scene, rows)
         turned, strengths = _of_armatures(scene, exact, k)
-        pushes = np.linalg.lstsq(rows.T, wanted[k].ravel() - turned.T @ strengths, rcond=RANK)[0]
+        pushed = units * (wanted[k].ravel() - turned.T @ strengths)
+        pushes = np.linalg.lstsq(scaled.T, pushed, rcond=RANK)[0] / sizes
         for joint, wrenches in of_multipliers(scene, rows, position, orientation):
             found[joint.name][k] = wrenches @ pushes
         geared = [joint for joint in scene.joint if joint.reflected_inertia]

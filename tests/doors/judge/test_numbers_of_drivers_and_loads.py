@@ -10,6 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import crosscheck
 from crosscheck.cli import main
+from crosscheck.conformance.relations import in_other_units
 from mbref.scene import (
     Body,
     Coupling,
@@ -21,6 +22,7 @@ from mbref.scene import (
     TorsionSpring,
     Translational,
 )
+from tests.helpers.statics import parallelogram
 
 INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
 
@@ -166,3 +168,17 @@ def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[flo
     found = crosscheck.judge_motion(scene, wrapped)
     assert not found.is_right
     assert all("full turns are not counted" in e.sentence for e in found.explanations)
+
+
+@pytest.mark.parametrize(
+    ("driven_joints", "length"), [("A", 1e6), ("AD", 1e-6)], ids=["determined", "shared"]
+)
+def test_torque_of_a_driver_of_a_closed_loop_does_not_depend_on_the_size(driven_joints, length):
+    drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]
+    scene = parallelogram(0.6, 0.8).with_(driver=drivers)
+    expected, found = (
+        crosscheck.reference_table(each, [0.01])["driver(A).torque"]
+        for each in (scene, in_other_units(scene, length, 1.0))
+    )
+    assert np.isnan(expected).all() == (driven_joints == "AD")
+    assert np.allclose(np.array(found) / length**2, expected, rtol=1e-9, equal_nan=True)
