@@ -21,9 +21,9 @@ from mbref.trajectory import Trajectory
 CONSTANT = 1e-6  # relative variation below which a driver's moment counts as constant
 
 
-def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scene:
-    """Return the scene that starts at a sample of its motion with velocities times ``sense``; drivers and
-    springs continue."""
+def started(scene: Scene, motion: Trajectory, sample: int, sense: float, duration: float) -> Scene:
+    """Return the scene that starts at a sample of its motion with velocities times ``sense``, for a duration
+    (s); drivers and springs continue."""
     t, carry = float(motion.times[sample]), _Carry(scene, motion, sample)
     angles = joint_coordinates(
         scene, motion.times, motion.position, motion.orientation, motion.angular_velocity, motion.angles
@@ -53,6 +53,7 @@ def started(scene: Scene, motion: Trajectory, sample: int, sense: float) -> Scen
             loads.append(load)
     loads = [replaced(load, factor=_shifted(load.over_time, t)) if load.over_time else load for load in loads]
     return scene.with_(
+        duration=duration,
         body=tuple(bodies),
         joint=tuple(map(carry.joint, scene.joint)),
         load=tuple(loads),
@@ -120,7 +121,7 @@ def _shifted(function: Any, t: float, less: float = 0.0) -> Any:
 
 def _half_way(scene: Scene, motion: Trajectory) -> Scene:
     half = len(motion.times) // 2
-    return started(scene, motion, half, 1.0).with_(duration=float(motion.times[-1] - motion.times[half]))
+    return started(scene, motion, half, 1.0, float(motion.times[-1] - motion.times[half]))
 
 
 def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
@@ -132,7 +133,7 @@ def _second_half(scene: Scene, motion: Trajectory) -> Trajectory:
 def _from_the_end(scene: Scene, motion: Trajectory) -> Scene | Outside:
     if scene.driver or any(load.is_damped or load.over_time for load in scene.load):
         return Outside("a driver, a damper or a load over time acts, so the motion is not reversible")
-    return started(scene, motion, len(motion.times) - 1, -1.0)
+    return started(scene, motion, len(motion.times) - 1, -1.0, scene.duration)
 
 
 def _backwards(scene: Scene, motion: Trajectory) -> Trajectory:

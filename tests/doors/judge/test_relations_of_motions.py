@@ -1,0 +1,94 @@
+"""Relations of the suite on whole motions: the judge moves the changed mechanism as each relation expects."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+from crosscheck import truth_for
+from crosscheck.conformance.relations import RELATIONS
+from crosscheck.conformance.trial import Outside
+from crosscheck.judge.reaction_balance import balance, with_exact_reactions
+from mbref.scene import Scene
+from mbref.trajectory import Trajectory
+from tests.helpers.errors import turned_between
+from tests.helpers.short_motions import MOTIONS
+
+LIMIT = 60.0  # CPU s of a reference; each takes about 0.2
+SCENES = (
+    "arm with universal",
+    "arm with planar",
+    "loop with cylindrical",
+    "pendulum with spring with damping",
+    "pendulum with torsion spring",
+    "pendulum with slide spring",
+    "pendulum with force over time",
+    "pendulum with torque by a table",
+    "pendulum with force of a joint that begins",
+    "driven slide",
+    "driven angle by a sine",
+    "driven angle by a table",
+    "four hinges",
+    "small masses on distances",
+)
+QUICK = {  # a scene or two for each relation that moves points, loads or functions of time
+    "rotated": ("pendulum with torsion spring",),
+    "mirrored": ("arm with universal", "pendulum with slide spring"),
+    "scaled": ("pendulum with spring with damping",),
+    "swapped": ("pendulum with torsion spring", "driven slide"),
+    "split": ("arm with planar",),
+    "replayed": ("arm with planar",),
+    "enlarged": ("driven slide", "pendulum with force over time"),
+    "in millimetres": ("pendulum with torsion spring", "pendulum with torque by a table"),
+    "restarted": (
+        "pendulum with torsion spring",
+        "pendulum with slide spring",
+        "pendulum with force over time",
+        "driven slide",
+        "pendulum with torque by a table",
+    ),
+    "reversed": ("arm with universal",),
+}
+CASES = [
+    pytest.param(r, s, marks=[] if s in QUICK.get(r, ()) else [pytest.mark.slow])
+    for r in RELATIONS
+    for s in SCENES
+]
+
+
+def exact(scene: Scene, times: np.ndarray) -> Trajectory:
+    """Return the judge's motion with reactions."""
+    truth = truth_for(scene, reference_time=LIMIT)
+    assert truth is not None
+    return with_exact_reactions(scene, truth.poses(times))
+
+
+@functools.cache
+def first_motion(name: str) -> tuple[Scene, Trajectory]:
+    scene = MOTIONS[name]()
+    return scene, exact(scene, np.linspace(0.0, scene.duration, 5))
+
+
+@pytest.mark.parametrize(("relation", "name"), CASES)
+def test_the_changed_mechanism_moves_as_expected(relation, name):
+    scene, motion = first_motion(name)
+    changed = RELATIONS[relation].change(scene, motion)
+    if isinstance(changed, Outside):
+        pytest.skip(changed.reason)
+    expected = RELATIONS[relation].expect(scene, motion)
+    found = exact(changed, expected.times)
+    order = [found.bodies.index(body) for body in expected.bodies]
+    length, spin = np.abs(expected.position).max(), np.abs(expected.angular_velocity).max()
+    rate = max(spin, np.abs(expected.velocity).max() / length, 1 / scene.duration)
+    assert np.abs(found.position[:, order] - expected.position).max() <= 1e-12 * length
+    assert turned_between(found.orientation[:, order], expected.orientation).max() <= 1e-12
+    assert np.abs(found.velocity[:, order] - expected.velocity).max() <= 1e-11 * rate * length
+    assert np.abs(found.angular_velocity[:, order] - expected.angular_velocity).max() <= 1e-11 * rate
+    if expected.acceleration is not None:
+        push = np.abs(expected.acceleration).max() + length * rate**2
+        assert np.abs(found.acceleration[:, order] - expected.acceleration).max() <= 1e-10 * push
+    known = {joint.name for joint in changed.joint}
+    if expected.bodies == tuple(b.name for b in changed.body) and known == (expected.reactions or {}).keys():
+        assert balance(changed, expected, found) <= 1e-9
