@@ -1,5 +1,7 @@
 """Consistent starts of two bodies, worked out by hand, by dense and by sparse matrices."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -74,9 +76,11 @@ def test_violation_of_rates_is_of_unit_rows_and_relative_to_the_largest_velocity
 
 def test_the_report_names_what_was_corrected():
     state = dict.fromkeys(("q", "v", "given"), np.zeros(0))
-    report = lambda *off: Start(**state, position_violation=off[0], velocity_violation=off[1]).report()  # noqa: E731
-    assert report(1e-10, 1e-10) == ""
-    assert report(2e-9, 0.0) == "initial positions were off the constraints by 2.00e-09; corrected"
-    assert report(0.0, 3e-9) == "initial velocities by 3.00e-09; corrected"
-    both = "initial positions were off the constraints by 2.00e-03 and velocities by 3.00e-04; corrected"
-    assert report(2e-3, 3e-4) == both
+    for off, says in (
+        ((1e-10, 1e-10), "^$"),
+        ((2e-9, 0.0), r"^initial positions .* 2.00e-09 .*; corrected$"),
+        ((0.0, 3e-9), r"^initial velocities by 3.00e-09.*; corrected$"),
+        ((2e-3, 3e-4), r"^initial positions .* 2.00e-03 .*and velocities by 3.00e-04.*; corrected$"),
+    ):
+        report = Start(**state, position_violation=off[0], velocity_violation=off[1]).report()
+        assert re.search(says, report), report

@@ -169,7 +169,6 @@ def test_two_hinges_share_all_but_the_moment_about_their_axis():
     vanishing, lengths = joint_reactions.vanishing_combinations(system, blocks)
     assert vanishing.shape == (1, 13, 5) and lengths.shape == (1, 13)
     rows = system.structure.dense(blocks)[0] / lengths[0][:, None]
-    assert np.linalg.norm(rows, axis=1) == pytest.approx(np.ones(13))
     assert np.abs(vanishing[0].T @ rows).max() < 1e-14
     assert vanishing[0].T @ vanishing[0] == pytest.approx(np.eye(5), abs=1e-14)
 

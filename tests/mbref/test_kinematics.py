@@ -25,7 +25,7 @@ def test_prescribed_motion_of_a_modelled_ground_without_masses():
 def test_drivers_that_contradict_each_other_are_named(rate):
     scene = SCENES["four_bar"]()
     drivers = (*scene.driver, Driver(joint="D", polynomial=(0.0, rate)))
-    with pytest.raises(SceneError, match=r"driver\[A\]: the drivers of A, D contradict .* joint '[BC]'"):
+    with pytest.raises(SceneError, match=r"driver\[D\]: the drivers of A and D contradict"):
         simulate(scene.with_(driver=drivers), "taylor", [0.01])
 
 

@@ -10,7 +10,15 @@ from hypothesis import strategies as st
 from mbref.formulations import FORMULATIONS, mpi_gs, mpi_qr
 from mbref.kernels.layout import OK
 from mbref.kernels.named_memory import allocate, packed
-from mbref.linear_algebra.elimination import cholesky_factor, cholesky_solve, full_pivot, lu_factor, lu_solve
+from mbref.linear_algebra.elimination import (
+    cholesky_factor,
+    cholesky_solve,
+    determinant,
+    full_pivot,
+    lu_factor,
+    lu_solve,
+    product_of_pivots,
+)
 from mbref.linear_algebra.orthogonal_factorisations import (
     add_pseudo_solution,
     gram_schmidt_solve,
@@ -207,6 +215,22 @@ def test_lu_and_cholesky_solve(n, seed):
     assert cholesky_factor(factor, n)
     cholesky_solve(factor, n, b)
     assert norm_of(b - x) < 1e-12 * np.linalg.cond(spd) * norm_of(x)
+
+
+@given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1), scale=st.integers(-140, 140))
+def test_sign_and_logarithm_of_a_determinant(n, seed, scale):
+    """Pivots above 1e-150 may have a product that no double can hold."""
+    rng = np.random.default_rng(seed)
+    a = rng.normal(size=(n, n))
+    sign, size = np.linalg.slogdet(a)
+    size += n * np.log(10.0) * scale
+    negative, found = determinant(a * 10.0**scale, n)
+    assert negative == (sign < 0.0)
+    assert abs(found - size) < 1e-14 * n * (np.linalg.cond(a) + abs(size))
+    pivots = rng.normal(size=n) * 10.0**scale
+    negative, found = product_of_pivots(pivots, n)
+    assert negative == (np.prod(np.sign(pivots)) < 0.0)
+    assert abs(found - np.log(np.abs(pivots)).sum()) < 1e-14 * n * (1.0 + abs(found))
 
 
 @given(seed=st.integers(0, 2**32 - 1), m=st.integers(1, 20), freedoms=st.integers(0, 20))
