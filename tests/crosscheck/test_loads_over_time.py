@@ -12,7 +12,6 @@ from crosscheck.conformance.features import FACTORS, feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.files import FORMAT
 from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.judge import time_functions
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.energy import energy_drift
 from crosscheck.judge.gauss_motion import gauss_motion
@@ -26,7 +25,6 @@ from tests.helpers.loads_over_time import AXIS
 
 TIMES = np.array([0.0, 0.3, 0.8, 0.9, 1.3, 1.45, 2.0])
 FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, seconds=100.0)}
-EVERY = (scenes.sprung_slide, scenes.wheel, scenes.thrown, scenes.arm, scenes.driven_arm, scenes.driven_wheel)
 PROBES = {name: scene for name, scene in feature_scenes().items() if "time" in name or "_" in name}
 
 
@@ -45,26 +43,6 @@ def test_formulations_have_the_closed_forms(name):
     turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)
     apart = turned - scenes.turned(TIMES)
     assert np.abs(apart - 2 * np.pi * np.round(apart / 2 / np.pi)).max() < 4e-15
-
-
-@pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
-def test_both_formulations_agree(make):
-    a, b = (run(make(), TIMES, EXTENDED) for run in FORMULATIONS.values())
-    assert np.abs(doubles(a.position - b.position)).max() < 1e-15
-    assert np.abs(doubles(a.acceleration - b.acceleration)).max() < 1e-13
-
-
-@pytest.mark.parametrize("make", (scenes.sprung_slide, scenes.thrown), ids=lambda make: make.__name__)
-def test_gauss_s_principle_has_the_motion_of_the_reference(make):
-    found, exact = gauss_motion(make(), tuple(TIMES)), natural_motion(make(), TIMES, EXTENDED)
-    assert np.abs(found.position - doubles(exact.position)).max() < 1e-9
-    assert np.abs(found.acceleration - doubles(exact.acceleration)).max() < 1e-7
-
-
-def test_functions_are_right_continuous_where_they_switch():
-    factor = Factor(polynomial=(2.0,), start=0.5, stop=1.5)
-    assert time_functions.value(factor, np.array([0.49, 0.5, 1.49, 1.5])).tolist() == [0.0, 2.0, 2.0, 0.0]
-    assert time_functions.ends(factor) == (0.5, 1.5)
 
 
 def test_energy_of_constant_loads_of_joints_is_balanced():

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.model_identity import gate, gate_times
-from crosscheck.judge.reference.taylor import Stepper
 from crosscheck.processes.serve import run_once
 from mbref.scene import Body, Scene, Universal
 
@@ -60,13 +58,3 @@ def test_every_engine_has_the_reading_of_the_judge(name):
     scene = pendulum(0.04)
     exact = gauss_motion(scene, tuple(gate_times(scene)))
     assert gate(scene, [exact, run_once(name, scene, gate_times(scene), SETTINGS[name])]) is None
-
-
-def test_the_second_run_of_a_reference_has_right_angles():
-    """The cosine of the given numbers, 1e-17 or so, is kept by the first run and zero in the second."""
-    scene, found = pendulum(1e-16), []
-    for seed in (0, 1):
-        stepper = Stepper(scene, EXTENDED, 24, float(EXTENDED.eps), (seed, 0.0))
-        constants = np.abs(np.asarray(stepper.of.c[6 * stepper.of.nb :], dtype=float))
-        found.append(constants[constants > 0].min(initial=1.0))
-    assert 0 < found[0] <= 1e-15 < found[1], found
