@@ -118,7 +118,8 @@ def _markdown(block: Block) -> str:
 
 
 def _heat(cell: Cell) -> str:
-    return f"**{cell.text}**" if cell.kind == "false" else cell.text
+    """Return a cell in Markdown, bold for a wrong motion."""
+    return Markup(f"**{_words(cell.text)}**") if cell.kind == "false" else cell.text
 
 
 def _matrix(matrix: Matrix) -> str:
@@ -146,8 +147,9 @@ def _rows(table: Table) -> str:
 
 
 def _line(cells: Sequence[str]) -> str:
-    """Return one line of a Markdown table; characters that would end a cell or a line are removed."""
-    return "| " + " | ".join(_words(cell).replace("|", "\\|") for cell in cells) + " |"
+    """Return one line of a Markdown table; cells that are no markup are shown as they are."""
+    shown = (str(cell) if isinstance(cell, Markup) else _words(cell) for cell in cells)
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in shown) + " |"
 
 
 def _words(text: str) -> str:

@@ -68,6 +68,7 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
         "scene": scene.name,
         "family": case.setting.family,
         "key": "",
+        "asked": {"engine": "mbref", "options": {}, "samples": 3, "end": t_end},
         "metrics": metrics,
     }
 
