@@ -6,7 +6,15 @@ import argparse
 from textwrap import fill
 from typing import Any
 
-from crosscheck.cli.options import DIGITS, add_reference_time, add_samples, digits, not_negative, numbers
+from crosscheck.cli.options import (
+    DIGITS,
+    add_duration,
+    add_reference_time,
+    add_samples,
+    digits,
+    not_negative,
+    numbers,
+)
 from crosscheck.judge.tolerances import FLOOR
 from mbref.command_line import add_output
 
@@ -32,7 +40,7 @@ def add_certify(commands: Commands) -> None:
     parser.add_argument("scene", metavar="SCENE", help="a built-in name, a .toml file, or random_N")
     parser.add_argument("--digits", type=digits, default=20, metavar="N", help=f"{DIGITS}; default: 20")
     add_samples(parser, 3)
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_duration(parser)
     add_output(parser, "--out", metavar="FILE", help="default: standard output")
 
 
@@ -85,5 +93,5 @@ def add_reference(commands: Commands) -> None:
     when = parser.add_mutually_exclusive_group()
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
     add_samples(when, 101)
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_duration(parser)
     add_reference_time(parser)

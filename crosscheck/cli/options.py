@@ -18,6 +18,8 @@ from mbref.command_line import add_force, add_output, output_folder, whole
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
+MOST_DURATION = 1e9  # s; a longer motion would end by its time limit in every engine
+LOOSEST = 0.99  # relative tolerance; at 1 an error is as large as the motion
 MOST_SAMPLES = 1_000_000  # of one run; `request.MOST_STATES` limits samples times bodies
 MOST_REPEATS = 1000
 MOST_MECHANISMS = 100_000  # their verdicts need about 20 kB each
@@ -62,11 +64,17 @@ def add_selection(parser: argparse.ArgumentParser) -> None:
     when.add_argument("--times", type=numbers, metavar="a,b,c", help="sample times (s), increasing")
     add_samples(when)
     parser.add_argument(
-        "--rtol", type=float, help="one relative tolerance instead of the sweep over tolerances"
+        "--rtol", type=float, help=f"one relative tolerance, at most {LOOSEST:g}, instead of the sweep"
     )
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_duration(parser)
     add_limits(parser, None)
     add_reading(parser)
+
+
+def add_duration(parser: argparse.ArgumentParser) -> None:
+    """Add the option for the end of a motion."""
+    about = f"end time (s), at most {MOST_DURATION:g}; default: the scene's"
+    parser.add_argument("--duration", type=float, metavar="T", help=about)
 
 
 def add_samples(group: Any, default: int | None = None) -> None:

@@ -13,6 +13,7 @@ from crosscheck.cli.options import (
     MOST_SEED,
     MOST_STARTS,
     add_depth,
+    add_duration,
     add_engines,
     add_folder,
     add_limits,
@@ -118,7 +119,7 @@ def _add_tune(commands: Commands) -> None:
         help="largest distance of points that a joint holds together, such as 1mm, as the criterion in place "
         "of an error; angles do not count",
     )
-    parser.add_argument("--duration", type=float, metavar="T", help="end time (s); default: the scene's")
+    add_duration(parser)
     add_limits(parser)
     add_reading(parser)
 

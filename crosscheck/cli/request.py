@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from crosscheck.cli.options import LOOSEST, MOST_DURATION
 from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.specimens import Specimen, specimens
@@ -97,13 +98,13 @@ def missing_package(name: str) -> str | None:
 
 def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None) -> Scene:
     """Return the scene with the requested end time, for which engines then choose their settings. Without a
-    ``duration`` (s) the last of the ``times`` is the end. Raises RequestError if the end is not positive or
-    earlier than a sample time."""
+    ``duration`` (s) the last of the ``times`` is the end. Raises RequestError if the end is not positive,
+    later than MOST_DURATION, or earlier than a sample time."""
     if times is not None:
         _check_times(times)
     end = duration if duration is not None else times[-1] if times else scene.duration
-    if not (math.isfinite(end) and end > 0):
-        raise RequestError(f"--duration: must be positive, got {end:g}")
+    if not 0 < end <= MOST_DURATION:
+        raise RequestError(f"--duration: must be positive and at most {MOST_DURATION:g} s, got {end:g}")
     if times and times[-1] > end:
         raise RequestError(f"--times: must end by --duration {end:g}, got {times[-1]:g}")
     return scene if end == scene.duration else scene.with_(duration=end)
@@ -152,7 +153,9 @@ def choice(
     rtol: float | None, is_quick: bool,
 ) -> Choice:  # fmt: skip
     """Return the selection of settings that a command line makes. Raises RequestError for options of a
-    setting without the name of one engine and one family."""
+    setting without the name of one engine and one family, and for a tolerance beyond its ends."""
+    if rtol is not None and not 0 < rtol <= LOOSEST:
+        raise RequestError(f"--rtol: must be positive and at most {LOOSEST:g}, got {rtol:g}")
     if options is None:
         return Choice(families or None, None, rtol, is_quick)
     if len(engines) != 1 or len(families) != 1:
@@ -310,8 +313,6 @@ def _unknown_family(name: str, offered: Iterable[str]) -> str:
 def _at_tolerance(cases: Sequence[Case], rtol: float) -> list[Case]:
     """Return one run at the tolerance for each family that has a tolerance; other families keep their
     sweep."""
-    if not (math.isfinite(rtol) and rtol > 0):
-        raise RequestError(f"--rtol: must be positive, got {rtol:g}")
     chosen: dict[tuple[str, str, str], Case] = {}
     for case in cases:
         options = dict(case.setting.options)

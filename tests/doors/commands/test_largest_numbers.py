@@ -60,6 +60,30 @@ def test_time_beyond_what_the_system_can_wait_is_refused(command: tuple[str, ...
         assert "1e+07 s" in said, "the largest value is not stated"
 
 
+DURATIONS = [
+    ("run", "four_bar", "--duration"),
+    ("compare", "four_bar", "--duration"),
+    ("tune", "mbref", "four_bar", "--duration"),
+    ("reference", "four_bar", "--out", "new.csv", "--duration"),
+    ("run", "four_bar", "--times"),
+    ("compare", "four_bar", "--times"),
+]
+
+
+@pytest.mark.parametrize("text", ["99999999999999999999", "1.1e9", "nan", "0"])
+@pytest.mark.parametrize("command", DURATIONS, ids=" ".join)
+def test_end_of_a_motion_beyond_its_ends_is_refused_before_any_run(command, text: str, capsys):
+    said = refusal(capsys, *command, f"0,{text}" if command[-1] == "--times" else text)
+    assert "at most 1e+09 s" in said or (command[-1] == "--times" and text in ("nan", "0")), said
+
+
+@pytest.mark.parametrize("text", ["99999999999999999999", "1", "nan", "0", "-1e-3"])
+@pytest.mark.parametrize("command", ["run", "compare"])
+def test_tolerance_that_asks_for_nothing_is_refused_before_any_run(command: str, text: str, capsys):
+    said = refusal(capsys, command, "four_bar", f"--rtol={text}")
+    assert "--rtol: must be positive and at most 0.99, got" in said
+
+
 def test_samples_that_would_fill_the_memory_are_refused_with_the_largest_number(tmp_path, capsys):
     out = tmp_path / "ref.csv"
     said = refusal(capsys, "reference", "four_bar_chain[20]", "--out", str(out), "--samples", "1000000")
