@@ -35,7 +35,7 @@ class ColumnError:
         Error that means nothing: of the reference, plus half a unit of the last digit. It is the bound at the
         sample of the largest error if the column is off, otherwise the largest bound.
     allowed : float
-        The bound, or the tolerance times the size of the quantity if that is larger.
+        The bound plus the tolerance times the size of the quantity.
     begins : float or None
         Time (s) at which the error first exceeds the part BEGINS of the largest error; None if right.
     rounded_to : int or None
@@ -55,7 +55,7 @@ class ColumnError:
 
     @property
     def is_right(self) -> bool:
-        """Return whether the error is within the bound or the tolerance, and the digits can show it."""
+        """Return whether the error is within bound and tolerance together, and the digits can show it."""
         return self.largest <= self.allowed and not self.is_coarse
 
 
@@ -79,7 +79,7 @@ class Compared:
 
     def allowed(self, name: str) -> np.ndarray:
         """Return the error (k,) that counts as right at each sample."""
-        return np.maximum(self.bound[name], self.tolerance[name])
+        return self.bound[name] + self.tolerance[name]
 
     def errors(self) -> tuple[ColumnError, ...]:
         """Return the error of every column."""

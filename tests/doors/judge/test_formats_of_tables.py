@@ -63,6 +63,17 @@ def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> N
         assert column.bound <= SHARE * extent or column.rounded_to is not None, (form, column)
 
 
+@pytest.mark.parametrize("form", ["%.6f", "%.7f", "%.8f", "%.7g", "spreadsheet with 8 decimals"])
+def test_numbers_within_the_tolerance_are_right_after_rounding(form: str, tmp_path: Path) -> None:
+    """Half the tolerance and half a unit of the last digit are together more than either of them."""
+    rng = np.random.default_rng(6)
+    table = {n: exact("double_pendulum")[n].copy() for n in ("time", "A.angle", "B.angle")}
+    for name in ("A.angle", "B.angle"):
+        table[name] += 0.5 * TOLERANCE * rng.choice([-1, 1], len(table["time"]))
+    path = write_table(table, tmp_path / "run.csv", FORMATS[form])
+    assert crosscheck.judge_motion(double_pendulum(), path).is_right
+
+
 @seeds
 def test_an_error_of_ten_units_is_off(seed: int, tmp_path: Path) -> None:
     """The error is in one cell of one column, and larger than the tolerance."""
