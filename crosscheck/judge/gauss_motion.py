@@ -33,6 +33,7 @@ from mbref.trajectory import Outcome, Trajectory
 
 NAME = "Gauss's principle"
 RTOL = 1e-10
+WITHOUT_INERTIA = 1e-13  # fraction of the trace; a smaller least moment of inertia is rounding of zero
 NO_AXIS = np.zeros(3)  # loads of joints are added here, along their joints' coordinates
 State = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
@@ -97,7 +98,7 @@ def accelerations(
     turn = rotations.to_matrix(orientation)
     force = applied(scene, t, state, since)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    is_singular = any(body.mass == 0 for body in scene.body)
+    is_singular = _has_singular_mass(scene)
     if is_singular or any(joint.reflected_inertia for joint in scene.joint):
         return _with_coupled_masses(scene, t, state, force, rank, is_singular)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
@@ -115,11 +116,19 @@ def accelerations(
     return np.einsum("bij,bj->bi", inverses, found.reshape(-1, 6))
 
 
+@functools.lru_cache(maxsize=64)
+def _has_singular_mass(scene: Scene) -> bool:
+    """Return whether a body lacks mass, or inertia about an axis, as points and thin rods do."""
+    least = np.linalg.eigvalsh(inertia_matrices(scene))[:, 0]
+    thin = least <= WITHOUT_INERTIA * np.trace(inertia_matrices(scene), axis1=1, axis2=2)
+    return bool(thin.any()) or any(body.mass == 0 for body in scene.body)
+
+
 def _with_coupled_masses(
     scene: Scene, t: float, state: State, force: np.ndarray, rank: int | None, is_singular: bool
 ) -> np.ndarray:
     """Return the ``accelerations`` of a scene whose armatures couple the bodies in the mass matrix, or whose
-    mass matrix is singular because of massless links."""
+    mass matrix is singular because of massless links, points or thin rods."""
     position, orientation, velocity, spin, _ = state
     turn = rotations.to_matrix(orientation)
     armatures = reflected(scene, position, orientation, velocity, spin)
@@ -152,7 +161,8 @@ def _along_free_directions(
     u, s, vt = np.linalg.svd(rows)
     r = int(np.sum(s > RANK * s[0])) if rank is None else rank
     held, free = vt[:r].T @ (u[:, :r].T @ -coasting / s[:r]), vt[r:].T
-    found: np.ndarray = held + free @ np.linalg.solve(free.T @ mass @ free, free.T @ (push - mass @ held))
+    step = np.linalg.lstsq(free.T @ mass @ free, free.T @ (push - mass @ held), rcond=None)[0]
+    found: np.ndarray = held + free @ step
     return found
 
 
