@@ -114,13 +114,6 @@ def test_json_of_several_scenes_and_a_list_in_the_order_asked(capsys, tmp_path):
     assert documents[0]["records"][0]["times"] == [0.0, 0.25, 0.5], documents[0]["records"][0]["times"]
 
 
-def test_run_without_json_and_a_table_of_every_setting(capsys, still):
-    status, out, _ = run_main(capsys, "run", still, "--engine", FAKE)
-    assert status == 0
-    for word in ("still", "plain", "noisy", "completed", "0.5"):
-        assert word in out, (word, out)
-
-
 def test_a_run_that_crashes_and_exit_status_one(capsys, still):
     asked = ("--engine", f"{FAKES}:SEGFAULT", "--setting", "noisy", "--json")
     status, out, err = run_main(capsys, "run", still, *asked)
@@ -190,11 +183,6 @@ def test_velocities_that_contradict_the_joints_are_told_once_with_their_line(cap
 def test_scene_of_no_name_and_the_known_ones(capsys):
     status, _, err = run_main(capsys, "run", "no_such_scene", "--engine", FAKE)
     assert status == 2 and "unknown scene 'no_such_scene'" in err and "four_bar" in err, err
-
-
-def test_scene_asked_twice_is_a_fault(capsys, still):
-    status, _, err = run_main(capsys, "run", still, still, "--engine", FAKE)
-    assert status == 2 and "scene 'still' is asked for twice" in err, err
 
 
 def test_a_scene_an_engine_cannot_run_and_the_reason(capsys, tmp_path):
@@ -269,12 +257,6 @@ def test_an_adapter_that_fails_when_it_is_imported(capsys, tmp_path, monkeypatch
     status, _, err = run_main(capsys, "verify", "bad_adapter:ENGINE")
     assert status == 2 and err.startswith("engine 'bad_adapter:ENGINE' cannot be loaded: TypeError: "), err
     assert err.endswith(f"({tmp_path / 'bad_adapter.py'}, line 3)\n"), err
-
-
-@pytest.mark.parametrize("digits", ["0", "3", "500", "-2", "many"])
-def test_digits_that_no_two_formulations_agree_on(capsys, digits):
-    status, _, err = run_main(capsys, "certify", "heavy_top", "--digits", digits)
-    assert status == 2 and f"argument --digits: must be from 4 to 100, got {digits}" in err, err
 
 
 def test_certify_without_its_package(capsys, monkeypatch):

@@ -116,20 +116,6 @@ def test_terms_of_an_engine_have_a_row_of_their_own() -> None:
     assert len({cell.place for row in rows.values() for cell in row.values()}) == 2 * len(DIFFICULTIES)
 
 
-def test_solvers_of_newton_have_a_table_of_their_own() -> None:
-    driven = next(c for c in DIFFICULTIES if c.heading == "driven")
-    refused = refusal() | {"engine": "newton", "scene": driven.scene}
-    found = [run(1e-3, "lox", engine="newton"), run(0.3, "featherstone", engine="newton"), refused]
-    lines = document.page(found).splitlines()
-    start = next(k for k, line in enumerate(lines) if line.startswith("Newton's solvers"))
-    rows = {
-        cells[1].strip(): cells[2:] for cells in (line.split("|") for line in lines[start + 4 : start + 6])
-    }
-    assert list(rows) == ["lox", "featherstone"]
-    assert "≈ 1e-03" in rows["lox"][0] and "✗ 0.3" in rows["featherstone"][0]
-    assert all("–" in row[5] and "○" in row[1] for row in rows.values())
-
-
 def test_new_records_supersede_old_ones() -> None:
     new = run(1e-9)
     assert records.supersedes(new, run(1e-9)), "the same key"

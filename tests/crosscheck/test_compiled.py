@@ -15,7 +15,6 @@ from crosscheck.engines.compiled import dop853
 from crosscheck.engines.compiled.calls import RATES
 from crosscheck.engines.compiled.run import MOST_STEPS
 from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import measure, violation_series
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical
@@ -57,15 +56,6 @@ PINOCCHIO = {  # scene: relative tolerance, shortest step (s), measured error (m
     "planar_slider_crank_equal": (1e-9, 1.7e-4, 1.2e-9),
     "five_bar_gravity": (1e-10, 3.7e-3, 2e-11),
     "four_bar": (1e-9, 2.4e-4, 2.9e-13),
-}
-COORDINATES = {  # scene: joint coordinates of its tree, and of the scene in its plane
-    "four_bar": (6, 3),
-    "five_bar_gravity": (8, 4),
-    "andrews_squeezer": (10, 7),
-    "planar_slider_crank": (3, 3),
-    "spatial_slider_crank": (4, 4),
-    "bricard": (6, 6),
-    "h_frame": (2, 1),
 }
 SLOW = ("heavy_top", "andrews_squeezer")  # scenes whose truth takes long
 TURNED, APART, ALONE = 1.3e-8, 2.3e-8, 1.1e-9  # m or rad
@@ -321,25 +311,6 @@ def out_of_reach() -> Scene:
     return Scene(name="short", body=tuple(bodies), joint=tuple(joints), driver=(driver,), duration=2.0)
 
 
-def test_newton_is_offered_where_drivers_prescribe_the_whole_motion() -> None:
-    pytest.importorskip("mujoco")
-    offered = {
-        name: NEWTON in {s.family for s in engine("mujoco").settings(SCENES[name]())}
-        for name in ("four_bar", "planar_slider_crank")
-    }
-    assert offered == {"four_bar": True, "planar_slider_crank": False}
-
-
-@pytest.mark.parametrize("name", COORDINATES)
-def test_joint_coordinates_of_a_scene_and_of_it_in_its_plane(name: str) -> None:
-    scene = SCENES[name]()
-    planar = planar_scene(scene)
-    assert (spanning_tree(scene).nv, spanning_tree(planar).nv) == COORDINATES[name]
-    assert planar.body == scene.body and planar.load == scene.load and planar.driver == scene.driver
-    if COORDINATES[name][0] == COORDINATES[name][1]:
-        assert planar is scene
-
-
 def test_a_mechanism_that_leaves_its_plane_keeps_its_joints() -> None:
     """A four-bar whose start has a spin out of the plane, and a double pendulum that a ball lets swing."""
     scene = SCENES["four_bar_gravity"]()
@@ -389,21 +360,6 @@ def test_pinocchio_compiled_and_in_python_with_many_joints(
     plain = simulate("pinocchio", scene, 6, python, **options)
     assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
     assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
-
-
-def test_pinocchio_compiled_on_a_free_body_and_truth(pinocchio: Engine) -> None:
-    body = Body(
-        name="stone",
-        mass=2.0,
-        inertia=(0.1, 0.2, 0.3),
-        position=(0, 0, 0),
-        angular_velocity=(0.1, 5.0, 0.1),
-        velocity=(1.0, 0.0, 0.0),
-    )
-    scene = Scene(name="stone", body=(body,), gravity=(0.0, 0.0, -9.81), duration=2.0)
-    run = simulate("pinocchio", scene, 5, "tuned, compiled", rtol=1e-10, min_step=1e-12)
-    error = measure(scene, run, truth_for(scene))["error"]
-    assert error < MARGIN * ALONE, f"{error:.1e} from the free body's motion"
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,6 @@ from mbref.scene import (
     Revolute,
     Scene,
     Spherical,
-    Spring,
     TorsionSpring,
     Translational,
 )
@@ -149,42 +148,6 @@ def forces(
         np.array([[1.0, 0.0, 0.0]]), np.array([TURNED.orientation]), np.array([v]), np.array([omega], float)
     )
     return found(at, np.array([omega], float), np.full(len(found.twists), angle))
-
-
-def test_weight_and_gyroscopic_moment() -> None:
-    scene = Scene(name="s", body=(TURNED,), gravity=(0.0, -G, 1.0), duration=1.0)
-    found = Forces(scene)
-    omega = np.array([[1.0, 2.0, 3.0]])
-    at = body_frames(np.zeros((1, 3)), np.array([[1.0, 0, 0, 0]]), np.zeros((1, 3)), omega)
-    momentum = np.array([1.0, 4.0, 9.0])
-    wanted = [0.0, -2.0 * G, 2.0, *-np.cross(omega[0], momentum)]
-    assert found(at, omega, np.zeros(0)) == pytest.approx(wanted)
-    assert (
-        np.diag(found.mass).tolist() == [2.0, 2.0, 2.0, 1.0, 2.0, 3.0] and np.count_nonzero(found.mass) == 6
-    )
-    bare = Forces(scene.with_(body=(TURNED.model_copy(update={"mass": None, "inertia": None}),)))
-    assert bare.mass.tolist() == np.eye(6).tolist() and not bare(at, omega * 0, np.zeros(0)).any()
-
-
-def test_moments_and_forces_in_the_axes_of_the_body() -> None:
-    """World x is -y of the body, and world y is x of the body."""
-    assert forces(Moment(body="b", moment=(1.0, 2.0, 3.0))) == pytest.approx([0, 0, 0, 2.0, -1.0, 3.0])
-    pull = Force(body="b", point=(1.0, 2.0, 0.0), force=(5.0, 0.0, 0.0))  # 2 m along world y: -10 N m about z
-    assert forces(pull) == pytest.approx([5.0, 0.0, 0.0, 0.0, 0.0, -10.0])
-
-
-def test_a_spring_pulls_its_ends_together() -> None:
-    """From (1, -3, 0) on the ground to the centre: 3 m long, and its rate is the velocity along y."""
-    spring = Spring(
-        bodies=("ground", "b"),
-        points=((1.0, -3.0, 0.0), (1.0, 0.0, 0.0)),
-        stiffness=4.0,
-        damping=0.5,
-        natural_length=1.0,
-    )
-    assert forces(spring, v=(9.0, 2.0, 9.0)) == pytest.approx([0.0, -(4.0 * 2.0 + 0.5 * 2.0), 0.0, 0, 0, 0])
-    back = spring.model_copy(update={"bodies": ("b", "ground"), "points": spring.points[::-1]})
-    assert forces(back, v=(9.0, 2.0, 9.0)) == pytest.approx([0.0, -9.0, 0.0, 0, 0, 0])
 
 
 @pytest.mark.parametrize(("turns", "angle"), [(0.0, 0.0), (6.0, 2 * math.pi), (-13.0, -4 * math.pi)])

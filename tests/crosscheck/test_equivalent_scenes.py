@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,6 @@ from crosscheck.conformance.trial import Outside
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical
 from mbref.scene_fields import SMALLEST
-from mbref.trajectory import Trajectory
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)
@@ -62,35 +60,6 @@ def test_velocities_that_differ_from_the_joints_by_rounding(off, is_split):
     spun = body(velocity=(-4.0, 2.0 + 4 * off, 0.0), angular_velocity=(0.0, 0.0, 2.0))
     found = rewritings.split(scene(spun, joint=(hinge,)))
     assert isinstance(found, Scene) is is_split
-
-
-@pytest.mark.parametrize("rate", [0.0, 2.0])
-def test_the_motion_of_halves_has_their_start(rate):
-    spun = body(velocity=(5.0, 6.0, 7.0), angular_velocity=(0.0, 0.0, rate))
-    whole = scene(body("a", position=ORIGIN), spun)
-    halves, run = rewritings.split(whole).body, motion(1)
-    run = replace(
-        run,
-        bodies=("a", "b"),
-        position=np.array([[each.position for each in whole.body]]),
-        orientation=np.tile([1.0, 0.0, 0.0, 0.0], (1, 2, 1)),
-        velocity=np.array([[each.velocity for each in whole.body]]),
-        angular_velocity=np.array([[each.angular_velocity for each in whole.body]]),
-        acceleration=np.zeros((1, 2, 3)),
-        angular_acceleration=np.zeros((1, 2, 3)),
-    )
-    found = rewritings.of_halves(whole, run)
-    assert found.bodies == ("a", "b", "b half")
-    assert found.acceleration is None and found.angular_acceleration is None
-    for field in ("position", "velocity", "orientation", "angular_velocity"):
-        wanted = np.array([getattr(each, field) for each in halves])
-        assert getattr(found, field)[0] == pytest.approx(wanted, abs=1e-14), field
-
-
-def motion(samples: int) -> Trajectory:
-    zero = np.zeros((samples, 1, 3))
-    turn = np.tile([1.0, 0.0, 0.0, 0.0], (samples, 1, 1))
-    return Trajectory("s", "e", "1", "m", {}, np.arange(samples) * 1.0, ("b",), zero, turn, zero, zero)
 
 
 def test_negative_quaternions_turn_alike():

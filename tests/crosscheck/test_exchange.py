@@ -197,11 +197,6 @@ def test_parts_that_change_the_motion_are_refused_unless_asked_for(old, new, kin
     assert found.scene.with_(name=plain.name) == plain
 
 
-def test_an_unknown_kind_of_parts_is_refused():
-    with pytest.raises(SceneError, match="--without: 'rust' is none of armature, couplings"):
-        formats.read(MODELS / "four_bar.xml", ImportOptions(without=["rust"]))
-
-
 def test_a_model_without_a_body_is_refused_by_its_file(tmp_path):
     path = tmp_path / "empty.xml"
     path.write_text("<mujoco/>")

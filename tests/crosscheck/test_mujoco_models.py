@@ -13,24 +13,19 @@ from crosscheck.engine import Setting
 from crosscheck.engines.mujoco import model as built
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.simulation import Simulation
-from crosscheck.engines.sampling import Failed
 from mbref.scene import (
     Body,
     Coupling,
-    Cylindrical,
     Fixed,
     Force,
-    JointForce,
     JointTorque,
     Moment,
     Revolute,
     Scene,
-    SlideSpring,
     Spring,
     TorsionSpring,
     Translational,
 )
-from mbref.trajectory import Outcome
 
 BODY = Body(name="b", mass=4.0, inertia=(1.0, 2.0, 2.5), position=(1.0, 0.0, 0.0))
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
@@ -140,18 +135,6 @@ def test_springs_along_a_joint_are_one_spring() -> None:
     assert model.qpos_spring.tolist() == pytest.approx([0.4])
 
 
-def test_loads_of_a_sleeve_are_along_its_two_coordinates() -> None:
-    sleeve = Cylindrical(name="C", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
-    loads = (
-        SlideSpring(joint="C", stiffness=3.0),
-        TorsionSpring(joint="C", stiffness=5.0),
-        JointForce(joint="C", force=7.0),
-        JointTorque(joint="C", torque=11.0),
-    )
-    found = compiled(scene(joint=(sleeve,), load=loads))
-    assert found.model.jnt_stiffness.tolist() == [3.0, 5.0] and found.pushed.tolist() == [7.0, 11.0]
-
-
 def test_a_spring_between_two_points() -> None:
     spring = Spring(
         bodies=("ground", "b"),
@@ -172,12 +155,6 @@ def test_a_spring_between_two_points() -> None:
 
 
 # --- One run ----------------------------------------------------------------------------------------------
-def test_a_run_begins_with_the_rates_and_loads_of_the_scene() -> None:
-    moving = BODY.model_copy(update={"velocity": (0.0, 3.0, 0.0), "angular_velocity": (0.0, 0.0, 3.0)})
-    loads = (JointTorque(joint="H", torque=7.0), Moment(body="b", moment=(1.0, 0.0, 0.0)))
-    found = simulation(given=scene(body=(moving,), load=loads))
-    assert found.data.qvel == pytest.approx([3.0]) and found.data.qfrc_applied.tolist() == [7.0]
-    assert found.data.xfrc_applied[1].tolist() == [0.0, 0.0, 0.0, 1.0, 0.0, 0.0] and found.since == 0.0
 
 
 @pytest.mark.parametrize(("family", "rhs"), [("stock", 4), ("euler", 1)])
@@ -199,15 +176,6 @@ def test_pieces_of_a_function_of_time_are_steps_of_their_own() -> None:
         found.advance(0.0, 1.0)
     assert found.data.qvel == pytest.approx([0.25]) and found.data.qpos == pytest.approx([0.03125 + 0.1875])
     assert found.counts.steps == 3 and found.since == 1.0
-
-
-def test_a_state_that_is_not_finite_ends_the_run() -> None:
-    for name in ("qpos", "qvel"):
-        found = simulation("stock", step=0.5)
-        getattr(found.data, name)[0] = math.nan
-        with pytest.raises(Failed, match=r"infinite or NaN between 0\.25 s and 0\.75 s") as failed:
-            found.advance(0.25, 0.75)
-        assert failed.value.outcome is Outcome.NOT_FINITE and failed.value.t == 0.25
 
 
 def test_a_sample_has_poses_velocities_and_reactions_in_world_axes() -> None:

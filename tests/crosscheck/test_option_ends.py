@@ -48,13 +48,3 @@ def test_the_end_of_a_motion_by_hand():
     for end in (0.0, np.inf, np.nan):
         with pytest.raises(RequestError, match="--duration: must be positive"):
             request.lasting(SCENE, None, end)
-
-
-def test_options_need_one_engine_and_one_family():
-    chosen = request.choice(["a"], ["f"], [("x", 1)], None, True)
-    assert chosen.setting.family == "f" and dict(chosen.setting.options) == {"x": 1} and chosen.is_named
-    assert request.choice(["a", "b"], [], None, 1e-6, False) == request.Choice(None, None, 1e-6, False)
-    assert not request.choice(["a"], [], None, None, True).is_named
-    for engines, families in ((["a", "b"], ["f"]), (["a"], ["f", "g"]), (["a"], [])):
-        with pytest.raises(RequestError, match="--option: needs one --engine and one --setting"):
-            request.choice(engines, families, [("x", 1)], None, True)

@@ -79,32 +79,6 @@ def test_parts_of_links_that_change_the_motion(
     assert found.left_out == (f"{sentence} (--without {kind})",)
 
 
-@pytest.mark.parametrize("text", ["true", " True ", "1"])
-def test_links_with_weight(text: str, tmp_path: Path) -> None:
-    assert read(tmp_path, LINK.replace("</link>", f"<gravity>{text}</gravity></link>")).left_out == ()
-
-
-@pytest.mark.parametrize("options", [{"keyframe": "k"}, {"pose": {"j": 1.0}}, {"close": ["a=b"]}])
-def test_options_that_an_sdf_file_does_not_have(options: dict[str, Any], tmp_path: Path) -> None:
-    with pytest.raises(SceneError, match="--keyframe, --pose, --close: an SDF file gives the poses"):
-        read(tmp_path, LINK, **options)
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("<sdf", "m.sdf: is no XML"),
-        ("<robot><model/></robot>", "m.sdf: has no model"),
-        ("<sdf><world/></sdf>", "m.sdf: has no model"),
-        ("<sdf/>", "m.sdf: has no model"),
-    ],
-)
-def test_files_that_are_no_sdf(text: str, says: str, tmp_path: Path) -> None:
-    (tmp_path / "m.sdf").write_text(text)
-    with pytest.raises(SceneError, match=says):
-        reading.read(tmp_path / "m.sdf", ImportOptions())
-
-
 # --- Joints -----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "ball", "fixed", "universal", "continuous"])
 def test_joints_are_at_the_child_with_their_axes(kind: str, tmp_path: Path) -> None:
@@ -151,31 +125,6 @@ def test_friction_and_springs_of_other_joints_are_parts(tmp_path: Path) -> None:
     damped = DYNAMICS.replace(">3<", ">0<")
     found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
     assert found.left_out == ("damping of joint 'j' (--without damping)",)
-
-
-@pytest.mark.parametrize(("ratio", "wanted"), [("<gearbox_ratio>3</gearbox_ratio>", -3.0), ("", -1.0)])
-def test_a_gearbox_couples_two_hinges(ratio: str, wanted: float, tmp_path: Path) -> None:
-    other = LINK.replace('"b"', '"c"') + hinge(name="k", ends="<parent>world</parent><child>c</child>")
-    gear = hinge(kind="gearbox", name="g", ends="<parent>b</parent><child>c</child>", axes="axis axis2")
-    gear = gear.replace("1 0 0", "0 0 1").replace(
-        "</joint>", f"{ratio}<gearbox_reference_body>world</gearbox_reference_body></joint>"
-    )
-    [coupling] = read(tmp_path, LINK + other + hinge() + gear).scene.coupling
-    assert (coupling.name, coupling.joints, coupling.ratio) == ("g", ("j", "k"), wanted)
-    zero = (
-        gear.replace("</joint>", "<gearbox_ratio>0</gearbox_ratio></joint>")
-        if not ratio
-        else gear.replace(">3<", ">0<")
-    )
-    with pytest.raises(SceneError, match="joint 'g': gearbox_ratio must not be 0"):
-        read(tmp_path, LINK + other + hinge() + zero)
-
-
-def test_parts_without_effect_are_counted(tmp_path: Path) -> None:
-    limits = "<limit><lower>0</lower></limit>"
-    found = read(tmp_path, LINK.replace("</link>", "<light/><light/><sensor/></link>") + hinge(limits))
-    assert found.left_out == ("2 lights", "1 sensor", "1 limit of a joint")
-    assert read(tmp_path, LINK + hinge("<limit><effort>1</effort></limit>")).left_out == ()
 
 
 def test_sdf_is_read_only(tmp_path: Path) -> None:

@@ -11,10 +11,9 @@ import pytest
 from crosscheck.engines import driver_motion
 from crosscheck.engines.compiler import Compiler, NoLibrary
 from crosscheck.engines.fixed_steps import unended_piece
-from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
+from crosscheck.engines.geometry import in_body, point_in_body
 from crosscheck.engines.joint_coordinates import JointCoordinates
 from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through
-from crosscheck.engines.written import Written
 from crosscheck.refusals import Owner
 from mbref import rotations
 from mbref.scene import (
@@ -50,15 +49,6 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
 
 
 # --- frames -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("axis", [X, Y, Z, (1.0, 2.0, 2.0), (-3.0, 0.1, 4.0)])
-def test_a_joint_frame_has_its_axis_last(axis):
-    frame = joint_frame(axis)
-    assert frame[:, 2] == pytest.approx(np.array(axis) / np.linalg.norm(axis))
-    assert frame.T @ frame == pytest.approx(np.eye(3)) and np.linalg.det(frame) == pytest.approx(1.0)
-    least = np.argmin(np.abs(axis))
-    assert frame[least, 0] == pytest.approx(0.0, abs=1e-15), "the first column is across the least component"
 
 
 def test_world_vectors_in_the_axes_of_a_body():
@@ -240,17 +230,6 @@ def test_the_fastest_rate_that_is_stated(parts, rate):
     assert driver_motion.stated_rate(turning) == pytest.approx(10.0)
 
 
-def test_pieces_of_switched_tables_at_their_ends():
-    """The cubic through 0, 1, 8, 27 starts at 1 s where it is switched on, and is zero before."""
-    rows = tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0))
-    factor = Factor(table=rows, start=1.0, stop=2.5)
-    assert driver_motion.motion(factor, 0.999) == (0.0, 0.0, 0.0)
-    assert driver_motion.motion(factor, 1.0) == pytest.approx((1.0, 3.0, 6.0))
-    assert driver_motion.motion(factor, 2.5) == (0.0, 0.0, 0.0)
-    assert driver_motion.motion(factor, 2.5, since=2.0) == pytest.approx((15.625, 18.75, 15.0))
-    assert driver_motion.motion(factor, 1.0, since=0.5) == (0.0, 0.0, 0.0)
-
-
 # --- compilers and code -----------------------------------------------------------------------------------
 def test_the_compiler_that_is_installed(monkeypatch):
     compiler = Compiler("C", "CC", ("one", "two"))
@@ -269,13 +248,3 @@ def test_the_compiler_that_is_installed(monkeypatch):
 def test_a_compiler_that_cannot_be_run():
     with pytest.raises(NoLibrary, match="the C compiler could not be run"):
         Compiler("C", "CC", ()).run(["/nowhere/compiler"])
-
-
-def test_assignments_become_code():
-    lines: list[str] = []
-    model = Written("model", lines)
-    model.opt.timestep = 0.5
-    model.name = "a"
-    assert lines == ["model.opt.timestep = 0.5", "model.name = 'a'"] and repr(model.opt) == "model.opt"
-    with pytest.raises(AttributeError):
-        _ = model.__length__

@@ -13,8 +13,7 @@ from rich.console import Console
 
 from crosscheck.cli import differences, tables
 from crosscheck.cli.terminal_plot import scatter
-from crosscheck.judge.reference.cache import mechanism
-from crosscheck.study.difference import changes, circumstances, load
+from crosscheck.study.difference import load
 from crosscheck.study.sentences import breaks, headline, right, verdict
 from crosscheck.study.speed_sentences import ADAPTERS, CLOCK, WITHOUT_PYTHON, fast
 from crosscheck.study.truth_sentences import truth
@@ -276,28 +275,6 @@ def saved(folder: Path, records: list[dict]) -> Path:
     for one in records:
         append(folder / "records.jsonl", one)
     return folder
-
-
-def test_runs_of_another_mechanism_are_not_compared(tmp_path):
-    """A scene that was edited under its name between two reports."""
-    first, second = (synthetic.scene().with_(gravity=(0.0, g, 0.0)) for g in (-9.81, -1.62))
-    old, new = (
-        record("a", "x", e, 0.1, scene=s.name, mechanism=mechanism(s)) | {"key": s.name + str(e)}
-        for e, s in ((1e-5, first), (1e-1, second))
-    )
-    stale = record("a", "stale", 1e-5, 0.1, scene=first.name, mechanism=mechanism(first))
-    folders = [saved(tmp_path / "old", [old]), saved(tmp_path / "new", [old, stale, new])]
-    for folder, scene in zip(folders, (first, second), strict=True):
-        (folder / "scenes").mkdir()
-        scene.save(folder / "scenes" / f"{scene.name}.toml")
-    before, after = map(load, folders)
-    assert len(after) == 1, "records of the mechanism before it was edited are left out"
-    assert [c.sentences for c in changes(before, after)] == [["only in the new set"], ["only in the old set"]]
-    told = circumstances(before, after)
-    assert told == [f"{first.name}: the mechanism was changed, so its runs are not compared."], told
-    console = Console(width=80, file=io.StringIO())
-    assert differences.show(console, *map(str, folders), False)
-    assert "The two sets have no run in common" in console.file.getvalue()
 
 
 def test_a_comparison_leaves_files_as_they_are(tmp_path):
