@@ -25,7 +25,8 @@ from crosscheck.conformance.rewritings import (
 from crosscheck.conformance.trial import Outside
 from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
-from mbref.scene import JointLoad, Scene, TimeFunction
+from mbref.scene import Coupling, JointLoad, Scene, TimeFunction
+from mbref.scene_joints import DISPLACEMENT
 from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
@@ -154,14 +155,15 @@ def times(factor: float) -> Mapped:
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with masses, inertias, forces, stiffnesses and dampings times a factor; its motion is
-    unchanged."""
+    """Return the scene with masses, inertias, armatures, forces, stiffnesses and dampings times a factor; its
+    motion is unchanged."""
 
     fields = dict.fromkeys(
-        ("mass", "inertia", "force", "moment", "torque", "stiffness", "damping"), times(factor)
+        ("mass", "inertia", "armature", "force", "moment", "torque", "stiffness", "damping"), times(factor)
     )
     return scene.with_(
         body=tuple(mapped(body, fields) for body in scene.body),
+        joint=tuple(mapped(joint, fields) for joint in scene.joint),
         load=tuple(mapped(load, fields) for load in scene.load),
     )
 
@@ -209,12 +211,24 @@ def in_other_units(scene: Scene, length: float, time: float) -> Scene:
         gravity=times(push)(scene.gravity).tolist(),
         duration=scene.duration * time,
         body=tuple(mapped(body, bodies) for body in scene.body),
-        joint=tuple(mapped(joint, places) for joint in scene.joint),
+        joint=tuple(
+            mapped(joint, places if joint.name in slides else {**places, "armature": times(length**2)})
+            for joint in scene.joint
+        ),
+        coupling=tuple(_coupled_in_lengths(scene, coupling, length) for coupling in scene.coupling),
         driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
         load=tuple(
             mapped(x, {**loads, **(turning if x.type == "torsion_spring" else linear)}) for x in scene.load
         ),
     )
+
+
+def _coupled_in_lengths(scene: Scene, coupling: Coupling, length: float) -> Coupling:
+    """Return a coupling whose displacements are multiplied by a length."""
+    first, second = (
+        length if coordinate == DISPLACEMENT else 1.0 for _, coordinate in scene.coupled(coupling)
+    )
+    return mapped(coupling, {"ratio": times(second / first), "offset": times(second)})
 
 
 def _slower(function: Function, amount: float, time: float) -> Function:

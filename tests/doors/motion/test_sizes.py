@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.conformance.relations import in_other_units
-from mbref import find_scene, simulate
+from crosscheck.conformance.relations import in_other_units, scaled
+from mbref import Scene, find_scene, simulate
+from tests.helpers.statics import ORIGIN, hinge, rod
 
 
 def ends(scene):
@@ -23,6 +24,31 @@ def test_built_in_scenes_end_alike_at_every_size(name, length, time):
     (expected, place), (found, other) = ends(scene), ends(in_other_units(scene, length, time))
     assert found == expected
     assert np.allclose(other / length, place, rtol=0.0, atol=1e-6)
+
+
+def rack_and_pinion() -> Scene:
+    """Return a driven pinion with armature, 2 rad/s and 6 rad/s², and a rack with armature on its slide."""
+    slide = {"type": "translational", "bodies": ["ground", "rack"], "anchor": (0, 0.2, 0), "axis": (1, 0, 0)}
+    return Scene(
+        name="rack_and_pinion",
+        body=[rod("pinion", ORIGIN), rod("rack", (0.0, 0.2, 0.0), mass=1.5)],
+        joint=[
+            hinge("A", ("ground", "pinion")) | {"armature": 0.4},
+            {"name": "B", "armature": 0.7} | slide,
+        ],
+        coupling=[{"name": "teeth", "joints": ("A", "B"), "ratio": -0.2, "offset": 0.01}],
+        driver=[{"joint": "A", "polynomial": (0.0, 2.0, 3.0)}],
+    )
+
+
+@pytest.mark.parametrize("mass", [1.0, 1e-9])
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
+def test_torque_of_a_rack_and_pinion_is_exact_at_every_size(length, mass):
+    scene = in_other_units(scaled(rack_and_pinion(), mass), length, 1.0)
+    run = simulate(scene, times=[0.5])
+    angle, inertia = 2.0 * 0.5 + 3.0 * 0.5**2, 0.3 + 0.4 + 0.2**2 * (1.5 + 0.7)
+    assert run.joint("B").displacement / length == pytest.approx([0.01 - 0.2 * angle], rel=1e-10)
+    assert run.driver("A").torque / (mass * length**2) == pytest.approx([6.0 * inertia], rel=1e-9)
 
 
 @pytest.mark.slow
