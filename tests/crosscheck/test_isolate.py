@@ -31,10 +31,11 @@ from crosscheck.processes.pool import (
     starting,
     time_interleaved,
 )
-from mbref.scene import Body, Scene
+from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
 from tests.helpers.fake_engines import FAKE, FAKES, CompilingModels, converse
+from tests.helpers.still_engines import resting as still
 
 TIMES = np.array([0.0, 0.1, 0.3])
 PLAIN = Setting("plain", {"seconds": 0.25})
@@ -46,10 +47,6 @@ def _children_of_its_own() -> Iterator[None]:
     end_idle()
     yield
     end_idle()
-
-
-def still(name: str = "still") -> Scene:
-    return Scene(name=name, body=(Body(name="block", position=(1.0, 2.0, 3.0)),))
 
 
 def run(fake: str, scene: Scene | None = None, time_limit: float = 60.0) -> Trajectory:

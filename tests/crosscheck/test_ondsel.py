@@ -221,8 +221,3 @@ def test_a_motion_the_joints_cannot_follow_keeps_the_states_before() -> None:
     run = simulate(scene, np.linspace(0, 0.2, 21), 2e-3)
     assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"
     assert 0 < len(run.times) < 21, f"{len(run.times)} samples, ended at {run.t_end}: {run.message}"
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        engine("ondsel").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"step": 1e-3}))

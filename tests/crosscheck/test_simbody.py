@@ -145,8 +145,3 @@ def test_the_same_motion_with_and_without_masses() -> None:
     assert gap < MARGIN * BARE, f"positions with and without masses differ by {gap:.1e} m"
     assert runs[1].reactions is None, "reactions without masses"
     assert engine("simbody").cannot(bare.with_(driver=())) is not None, "free motion without masses"
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        simulate(SCENES["four_bar"](), 0.1, 1e-6, "best")

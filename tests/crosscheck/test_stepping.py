@@ -148,8 +148,3 @@ def test_fixed_steps_have_fourth_order_and_divide_the_interval() -> None:
         assert counts.steps == step_count(0.0, 1.0, h) and counts.rhs == 4 * counts.steps, f"{counts}"
     order = np.log2(errors[0] / errors[1])
     assert 3.8 < order < 4.2, f"errors {errors} of steps {steps}: order {order:.2f}"
-
-
-@pytest.mark.parametrize(("step", "expected"), [(0.1, 10), (0.3, 4), (2.0, 1), (1 / 3, 3)])
-def test_no_step_is_longer_than_asked(step: float, expected: int) -> None:
-    assert step_count(0.0, 1.0, step) == expected, f"{step_count(0.0, 1.0, step)} steps of {step}"

@@ -146,8 +146,3 @@ def test_drivers_that_no_motion_can_follow_end_the_run() -> None:
     scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
     run = simulate(scene, 0.2, 1e-5)
     assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(ValueError, match="no family of settings 'best'"):
-        engine("sundials").run(SCENES["four_bar"](), np.array([0.0]), Setting("best", {"rtol": 1e-6}))
