@@ -5,11 +5,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.changes import mapped, replaced
+from crosscheck.conformance.changes import mapped
 from crosscheck.conformance.replays import RESTARTED, REVERSED, joints_kept, pinned, replayed
 from crosscheck.conformance.rewritings import (
     duplicated,
@@ -23,14 +23,13 @@ from crosscheck.conformance.rewritings import (
     swapped,
 )
 from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.units import in_other_units, scaled, times
 from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
-from mbref.scene import Coupling, JointLoad, Scene, TimeFunction
-from mbref.scene_joints import DISPLACEMENT
+from mbref.scene import JointLoad, Scene
 from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
-Function = TypeVar("Function", bound=TimeFunction)
 HEAVIER = 2.5
 # reflects the body frames of a mirrored scene, so that they stay right-handed
 FLIP = np.diag([1.0, -1.0, 1.0])
@@ -149,25 +148,6 @@ def with_pushes(
     )
 
 
-def times(factor: float) -> Mapped:
-    """Return the function that multiplies by a factor."""
-    return lambda value: factor * np.asarray(value)
-
-
-def scaled(scene: Scene, factor: float) -> Scene:
-    """Return the scene with masses, inertias, armatures, forces, stiffnesses and dampings times a factor; its
-    motion is unchanged."""
-
-    fields = dict.fromkeys(
-        ("mass", "inertia", "armature", "force", "moment", "torque", "stiffness", "damping"), times(factor)
-    )
-    return scene.with_(
-        body=tuple(mapped(body, fields) for body in scene.body),
-        joint=tuple(mapped(joint, fields) for joint in scene.joint),
-        load=tuple(mapped(load, fields) for load in scene.load),
-    )
-
-
 def reordered(scene: Scene) -> Scene:
     """Return the scene with bodies, joints and loads in reverse order; its motion is unchanged."""
     return scene.with_(body=scene.body[::-1], joint=scene.joint[::-1], load=scene.load[::-1])
@@ -185,64 +165,6 @@ def shaken(scene: Scene, seed: int) -> Scene:
         body=tuple(mapped(body, fields) for body in scene.body),
         joint=tuple(mapped(joint, fields) for joint in scene.joint),
     )
-
-
-def in_other_units(scene: Scene, length: float, time: float) -> Scene:
-    """Return the scene with lengths and times multiplied, and all other numbers converted according to their
-    units; masses are unchanged."""
-    speed, push = length / time, length / time**2
-
-    places = dict.fromkeys(
-        ("position", "anchor", "anchors", "point", "points", "natural_length", "natural_displacement"),
-        times(length),
-    )
-    bodies = {
-        **places,
-        "velocity": times(speed),
-        "angular_velocity": times(1 / time),
-        "inertia": times(length**2),
-    }
-    moments = dict.fromkeys(("moment", "torque"), times(length * push))
-    loads = {**places, **moments, "force": times(push), "factor": lambda factor: _slower(factor, 1.0, time)}
-    linear = {"stiffness": times(1 / time**2), "damping": times(1 / time)}
-    turning = {"stiffness": times(length * push), "damping": times(length * speed)}
-    slides = {joint.name for joint in scene.joint if joint.facts.driven == "displacement"}
-    return scene.with_(
-        gravity=times(push)(scene.gravity).tolist(),
-        duration=scene.duration * time,
-        body=tuple(mapped(body, bodies) for body in scene.body),
-        joint=tuple(
-            mapped(joint, places if joint.name in slides else {**places, "armature": times(length**2)})
-            for joint in scene.joint
-        ),
-        coupling=tuple(_coupled_in_lengths(scene, coupling, length) for coupling in scene.coupling),
-        driver=tuple(_slower(d, length if d.joint in slides else 1.0, time) for d in scene.driver),
-        load=tuple(
-            mapped(x, {**loads, **(turning if x.type == "torsion_spring" else linear)}) for x in scene.load
-        ),
-    )
-
-
-def _coupled_in_lengths(scene: Scene, coupling: Coupling, length: float) -> Coupling:
-    """Return a coupling whose displacements are multiplied by a length."""
-    first, second = (
-        length if coordinate == DISPLACEMENT else 1.0 for _, coordinate in scene.coupled(coupling)
-    )
-    return mapped(coupling, {"ratio": times(second / first), "offset": times(second)})
-
-
-def _slower(function: Function, amount: float, time: float) -> Function:
-    """Return a function of time with its values and its times multiplied by factors."""
-    fields = {
-        "polynomial": lambda c: tuple(amount * x / time**k for k, x in enumerate(c)),
-        "sine": lambda sine: replaced(
-            sine, amplitude=amount * sine.amplitude, frequency=sine.frequency / time
-        ),
-        "table": lambda rows: tuple((time * t, amount * x) for t, x in rows),
-        "start": times(time),
-        "stop": times(time),
-    }
-    return mapped(function, fields)
 
 
 def _other_units(about: str, length: float, time: float) -> Relation:
