@@ -34,6 +34,7 @@ def test_weights_in_balance_at_every_height_are_one_table(tmp_path, capsys):
     assert shown.count("weights: Equilibrium") == 1 and "indifferent" in shown
 
 
+@pytest.mark.slow
 def test_a_spring_that_just_holds_a_pendulum_is_one_indifferent_pose():
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 2.0 * G * 0.7}
     [each] = steady_poses(pendulum((0.0, 0.7, 0.0), load=[spring]))
