@@ -358,6 +358,9 @@ def test_accelerations_and_reactions_beside_a_crossing(scene):
     assert np.abs(run.velocity - exact.velocity).max() < 3e-11 * speeds
     away = np.concatenate([distances, [0.0], distances[::-1]])
     allowed = 1e-6 if scene.driver else 1e-9 + 1e-9 / np.maximum(away, 3e-5)
+    beside = away < 1e-7  # the judge's rank leaves reactions open there: they are as at the sample before
     for name, true in exact.reactions.items():
-        off = np.abs(run.reactions[name] - true).max(axis=1)
-        assert (off < allowed * np.abs(true).max()).all(), name
+        found, largest = run.reactions[name], np.abs(true).max()
+        off = np.abs(found - true).max(axis=1)
+        assert (off < allowed * largest)[~beside].all(), name
+        assert np.abs(found[beside] - found[np.flatnonzero(beside)[0] - 1]).max() < 1e-5 * largest, name

@@ -13,7 +13,7 @@ from mbref.scene import Scene
 from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, write_table
 
 SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
-GATE, DEEP = 15, 200  # number of random tables
+GATE, DEEP = 15, 100  # number of random tables
 SHARE = 1e-3  # fraction of a column's range, above which the bound beside "right" is stated as rounding
 TOLERANCE = 1e-8  # the judge's default tolerance, relative to the size of a quantity
 seeds = pytest.mark.parametrize(
