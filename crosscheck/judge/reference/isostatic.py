@@ -12,10 +12,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from crosscheck.judge.constraints import initial_poses, jacobian
+from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.deadline import ask
+from crosscheck.judge.gauss_principle import rank as rank_at_start
 from crosscheck.judge.reference.tree_joints import used_coordinates
-from crosscheck.judge.tolerances import RANK
 from mbref.scene import JOINT_TYPES, Joint, Scene, Universal
 
 WEAKER = {
@@ -37,13 +37,13 @@ def isostatic(scene: Scene, along: Sequence[Pose] = ()) -> Scene:
     rank at t = 0 and at poses along the motion is unchanged.  Joints whose coordinate is used are unchanged;
     if such joints have redundant rows, the scene is unchanged."""
     poses = [(0.0, *initial_poses(scene)), *along]
-    rank = _rank(scene)
+    rank = rank_at_start(scene)
     least = [_singular_value(scene, rank, pose) for pose in poses]
     needed = {name for _, name in used_coordinates(scene)}
 
     def serves(trial: Scene) -> bool:
         ask()
-        if _rank(trial) != rank:
+        if rank_at_start(trial) != rank:
             return False
         return all(
             _singular_value(trial, rank, pose) > KEPT * s for pose, s in zip(poses, least, strict=True)
@@ -93,17 +93,14 @@ def _with(scene: Scene, joint: Joint, others: tuple[Joint, ...]) -> Scene:
     return scene.with_(joint=tuple(j for part in parts for j in part))
 
 
-def _rank(scene: Scene) -> int:
-    """Return the rank of the rows at t = 0, drivers included."""
-    values = _singular_values(scene, (0.0, *initial_poses(scene)))
-    return int((values > RANK * values.max(initial=0.0)).sum())
-
-
 def _singular_value(scene: Scene, number: int, pose: Pose) -> float:
     """Return a singular value of the rows by its number: number 1 is the largest, number 0 gives infinity."""
     return float(_singular_values(scene, pose)[number - 1]) if number else np.inf
 
 
 def _singular_values(scene: Scene, pose: Pose) -> np.ndarray:
-    rows, _ = jacobian(scene, *pose)
-    return np.linalg.svd(rows, compute_uv=False) if len(rows) else np.zeros(0)
+    """Return the singular values of the rows, with velocities over the scene's length."""
+    rows, length = jacobian(scene, *pose)[0], scene_length(scene)
+    scaled = rows * np.tile(np.repeat([length, 1.0], 3), len(scene.body))
+    sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
+    return np.linalg.svd(scaled / sizes, compute_uv=False) if len(rows) else np.zeros(0)

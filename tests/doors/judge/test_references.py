@@ -7,6 +7,8 @@ import pytest
 
 from crosscheck import truth_for
 from crosscheck.judge import constraints
+from crosscheck.judge.joint_reactions import shared_wrenches
+from crosscheck.judge.reference.isostatic import isostatic, replaced
 from crosscheck.judge.reference.reference import Reference, reference
 from crosscheck.judge.truth import closed_form
 from mbref import rotations
@@ -203,3 +205,15 @@ def test_length_of_a_mechanism_grows_with_its_units_alone(name):
     assert constraints.scene_length(in_other_units(scene, 3.0, 7.0, 0.5)) == pytest.approx(7 * length)
     assert constraints.scene_length(in_another_frame(scene, TURN, SHIFT)) == pytest.approx(length)
     assert constraints.scene_length(in_another_order(scene)) == pytest.approx(length)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e4])
+@pytest.mark.parametrize("name", ["four hinges", "doubled hinge", "slider-crank of hinges"])
+def test_redundancy_does_not_depend_on_the_size(name, size):
+    """Components of reactions that redundancy leaves open, and weaker joints without redundant rows."""
+    plain = MOTIONS[name]()
+    scene = in_other_units(plain, 1.0, size, 1.0)
+    shared, wanted = (shared_wrenches(s, 0.0, *constraints.initial_poses(s)) for s in (scene, plain))
+    assert {n: b.shape[1] for n, b in shared.items()} == {n: b.shape[1] for n, b in wanted.items()}
+    assert sum(basis.shape[1] for basis in wanted.values()) > 0
+    assert replaced(scene, isostatic(scene)) == replaced(plain, isostatic(plain)) != {}
