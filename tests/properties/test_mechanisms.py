@@ -108,7 +108,7 @@ def test_motion_and_reference_and_way_back(scene):
     assert apart < MOVED, f"mbref and Gauss's principle differ by {apart:.1e}: {scene}"
     drift = energy_series(scene, motion)
     assert drift is None or drift.max() < 1e-5, f"energy drifts by {drift.max():.1e}: {scene}"
-    back = run(started(scene, motion, len(motion.times) - 1, -1.0), 9)
+    back = run(started(scene, motion, len(motion.times) - 1, -1.0, scene.duration), 9)
     position, orientation = back.position[-1] - motion.position[0], back.orientation[-1]
     turned = rotations.angle_between(orientation, motion.orientation[0]).max()
     off = max(float(np.abs(position).max()) / scene_length(scene), float(turned))
