@@ -80,14 +80,14 @@ def status_of(action: Callable[[], int], *refused: type[Exception]) -> int:
     OSError, or if standard output cannot be written; 130 after an interrupt. Control characters in printed
     texts are escaped.
     """
-    told: tuple[type[Exception], ...] = (InputError, SceneError, *refused)
+    reported: tuple[type[Exception], ...] = (InputError, SceneError, *refused)
     with printable_streams():
         try:
             try:
                 return action()
             finally:
                 sys.stdout.flush()
-        except told as error:
+        except reported as error:
             return _refuse(getattr(error, "faults", [str(error)]))
         except KeyboardInterrupt:
             return _refuse(["interrupted"], INTERRUPTED)

@@ -17,17 +17,14 @@ from mbref.linear_algebra.least_norm import least_norm
 from mbref.scene import Scene, SceneError
 
 COMPARED_TIMES = 101  # number of times over the motion at which drivers are compared
-DEPENDENT_DRIVER = (
-    1e-9  # singular value of unit rows / largest one, below which a combination of rows vanishes
-)
+# singular value of unit rows / largest one, below which a combination of rows vanishes
+DEPENDENT_DRIVER = 1e-9
 DRIVER_WEIGHT = 1e-6  # weight of a driver's row in such a combination above which the driver takes part
 # difference of the motions of drivers, lengths of the mechanism or rad, that is no rounding
 CONFLICT = 1e-9
 MOST_DRIVER_ROWS = 300  # constraint rows; of larger mechanisms singular values take too long
-POSE_STEPS, LAST_MOVE = (
-    20,
-    1e-15,
-)  # largest number of Newton steps to a pose; change of the last one, lengths or rad
+POSE_STEPS = 20  # largest number of Newton steps to a pose
+LAST_MOVE = 1e-15  # change of a pose by the last Newton step, lengths of the mechanism or rad
 
 
 class Conflict(NamedTuple):
