@@ -21,9 +21,10 @@ from crosscheck.engine import Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.study.grid import Case, Record, study
-from crosscheck.study.least_errors import TIME_LIMIT, LeastError
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_completed
+from crosscheck.study.search.least_errors import LeastError
+from crosscheck.study.search.selection import LEAST_ERROR_LIMIT
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -59,7 +60,7 @@ def case(scene: Scene, least: LeastError, relation: Relation) -> Case:
     """The run of the changed scene at the engine's setting of least error."""
     setting = Setting(least.best["family"], least.best["settings"])
     times = np.array(Trajectory.from_record(scene.name, least.best).times)
-    return Case(copied(scene, least, relation), times, least.engine, setting, TIME_LIMIT)
+    return Case(copied(scene, least, relation), times, least.engine, setting, LEAST_ERROR_LIMIT)
 
 
 def copied(scene: Scene, least: LeastError, relation: Relation) -> Scene:

@@ -12,8 +12,9 @@ from rich.console import Console
 from rich.table import Table
 
 from crosscheck.study.grid import study
-from crosscheck.study.least_errors import HEADER, LeastError, candidates, least_errors
 from crosscheck.study.progress import shown
+from crosscheck.study.search.least_errors import HEADER, LeastError, least_errors
+from crosscheck.study.search.selection import candidates
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 

@@ -30,12 +30,12 @@ from crosscheck.cli import request
 from crosscheck.cli.request import Choice
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.engine import Setting, engine, installed
-from crosscheck.study.between import LOOSEST, STEP, longest_step, work
 from crosscheck.study.grid import Case, Record, run_here
-from crosscheck.study.ladder import families
 from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.search.cheapest import tuned
+from crosscheck.study.search.neighbours import LOOSEST, STEP, longest_step, work
+from crosscheck.study.search.selection import families
 from crosscheck.study.speed_sentences import COMPILED
-from crosscheck.study.tuning import tuned
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 

@@ -15,11 +15,10 @@ from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability, sweep
 from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.dead_positions import followed
-from crosscheck.study.grid import Case, Record
+from crosscheck.study.grid import Case, Record, shown_name
 from crosscheck.study.progress import shown
 from crosscheck.study.record_shape import Ladder, Timing, checked
 from crosscheck.study.record_view import with_time
-from crosscheck.study.scouting import shown_name
 from crosscheck.study.timings import with_timings
 from mbref.records import looked_at
 from mbref.scene import Scene

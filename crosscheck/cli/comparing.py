@@ -12,23 +12,23 @@ from crosscheck.cli.comparison import WIDTH, comparisons
 from crosscheck.cli.request import Choice
 from crosscheck.cli.running import COMPLETED, OTHERWISE, asked_of, console, missing_truths, notice, print_json
 from crosscheck.engine import engine
-from crosscheck.study import sweep
 from crosscheck.study.command import command
 from crosscheck.study.comparison import Wanted, collected, scouted
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.grid import study
-from crosscheck.study.ladder import families
 from crosscheck.study.progress import counted
 from crosscheck.study.record_view import public
+from crosscheck.study.search import selection
+from crosscheck.study.search.cheapest import by_closure, by_error, tuned
+from crosscheck.study.search.selection import families
 from crosscheck.study.timings import with_timings
-from crosscheck.study.tuning import by_closure, by_error, tuned
 from mbref.formats import import_options
 
 
 def compare(arguments: argparse.Namespace) -> int:
     """Print a verdict, tables and a plot for each scene, or the records with the verdict as JSON; returns 1
     if engines simulate different mechanisms."""
-    asked = asked_of(arguments, sweep.QUICK_SAMPLES)
+    asked = asked_of(arguments, selection.QUICK_SAMPLES)
     there = [
         followed(scene, times, arguments.reference_time)
         for scene, times in zip(asked.scenes, asked.times, strict=True)
@@ -71,7 +71,7 @@ def tune(arguments: argparse.Namespace) -> int:
     path = shlex.join([arguments.scene, *reading.words()])
     name = request.find_engine(arguments.engine, notice)
     scene = request.lasting(scene, None, arguments.duration)
-    times = request.sample_times(scene, None, sweep.QUICK_SAMPLES)
+    times = request.sample_times(scene, None, selection.QUICK_SAMPLES)
     scouted([scene], [name])
     limit, ours = arguments.time_limit, engine(name).integrated_here
     planned = request.plan([scene], [name], Choice(is_quick=False), [times], limit, notice)

@@ -14,12 +14,12 @@ from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.request import Choice
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
-from crosscheck.study import sweep
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.fair_timing import force_differences, model_differences
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
+from crosscheck.study.search import selection
 from crosscheck.study.sentences import Verdict, verdict
 from crosscheck.study.verdict import Judged, grade, judged
 from mbref.files import write
@@ -151,7 +151,7 @@ def compare(
     families: str | Sequence[str] | None = None,
     depth: str = "quick",
     duration: float | None = None,
-    samples: int = sweep.QUICK_SAMPLES,
+    samples: int = selection.QUICK_SAMPLES,
     time_limit: float | None = None,
     reference_time: float = SECONDS,
     out: str | Path | None = None,
@@ -202,7 +202,7 @@ def compare(
     names = request.find_engines(_several(engines), tell)
     lasting, when, dead = followed(lasting, request.sample_times(lasting, None, samples), reference_time)
     times = [when]
-    limit = time_limit or (sweep.QUICK_LIMIT if is_quick else TIME_LIMIT)
+    limit = time_limit or (selection.QUICK_LIMIT if is_quick else TIME_LIMIT)
     chosen = Choice(_several(families), is_quick=is_quick)
     found = collected(
         [lasting],

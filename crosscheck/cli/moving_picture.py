@@ -10,7 +10,7 @@ from crosscheck.engine import Setting
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper.singular import rank, scaled_singular_values
 from crosscheck.study.grid import Case, Record, study
-from crosscheck.study.scouting import settings
+from crosscheck.study.search.offers import settings
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory

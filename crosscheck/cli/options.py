@@ -12,7 +12,7 @@ from crosscheck.judge.reference.certify import FEWEST_DIGITS, MOST_DIGITS
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
-from crosscheck.study.sweep import QUICK_LIMIT
+from crosscheck.study.search.selection import QUICK_LIMIT
 from mbref import formats
 from mbref.command_line import add_force, add_output, output_folder, whole
 from mbref.scene_units import in_si

@@ -16,9 +16,9 @@ from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
-from crosscheck.study.grid import MOST_SECONDS, Case, default_cases
-from crosscheck.study.scouting import of_file, scout, settings, shown_name
-from crosscheck.study.sweep import of_few_families
+from crosscheck.study.grid import MOST_SECONDS, Case, shown_name
+from crosscheck.study.search.offers import default_cases, of_file, scout, settings
+from crosscheck.study.search.selection import of_few_families
 from mbref.scene import Scene
 from mbref.scene_fields import meant
 

@@ -16,10 +16,10 @@ from crosscheck.cli import request, scene_request
 from crosscheck.cli.request import Choice
 from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
-from crosscheck.study.hurried import Hurried
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_judged, public
-from crosscheck.study.sweep import QUICK_LIMIT, thinned
+from crosscheck.study.search.execution import Hurried
+from crosscheck.study.search.selection import QUICK_LIMIT, thinned
 from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
 from mbref.formats import import_options

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from crosscheck.judge.constraints import initial_twists
 from crosscheck.judge.start import started
-from crosscheck.study.scouting import remember
+from crosscheck.study.search.offers import remember
 from mbref import formats
 from mbref.formats import ImportOptions
 from mbref.scene import GROUND, Fixed, Scene, SceneError

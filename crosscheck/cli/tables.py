@@ -27,9 +27,9 @@ from crosscheck.study.record_view import (
     never_moved,
     varied_settings,
 )
+from crosscheck.study.search.cheapest import Criterion, known_error
 from crosscheck.study.sentences import Verdict
 from crosscheck.study.speed_sentences import LEVEL, SAID, title
-from crosscheck.study.tuning import Criterion, known_error
 from crosscheck.study.verdict import Grade, Judged
 from mbref.scene import Scene
 

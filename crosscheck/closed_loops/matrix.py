@@ -13,8 +13,8 @@ from crosscheck.engines.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record
-from crosscheck.study.least_errors import rank
 from crosscheck.study.record_view import ended, error, error_bound
+from crosscheck.study.search.least_errors import rank
 from crosscheck.study.verdict import DEFAULTS, Grade, grade
 from mbref.trajectory import Outcome
 

@@ -11,9 +11,10 @@ import numpy as np
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import engine
-from crosscheck.study.grid import Case, Record, Unable, default_cases, key, study
+from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_shape import Measured, Refused, checked
+from crosscheck.study.search.offers import Unable, default_cases
 from mbref import files
 from mbref.records import looked_at
 from mbref.trajectory import Outcome

@@ -15,9 +15,10 @@ from crosscheck.closed_loops.records import REFUSED, kept, read, write
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
-from crosscheck.study.grid import Case, Record, default_cases, key, run_in_turn, study
+from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
+from crosscheck.study.search.offers import default_cases
 
 FILE = Path(__file__).parent / "records.jsonl"
 SAMPLES = 11

@@ -15,16 +15,16 @@ import numpy as np
 
 from crosscheck.judge.deadline import given_up
 from crosscheck.processes.pool import end_idle
-from crosscheck.study import pictures, sweep
-from crosscheck.study.between import MOST_COARSER
-from crosscheck.study.chains import Chains
+from crosscheck.study import pictures
 from crosscheck.study.fair_timing import identity_cases
-from crosscheck.study.grid import Case, Record, default_cases, key, known, record_of, study
-from crosscheck.study.hurried import Hurried
-from crosscheck.study.ladder import Family, beyond, families, finest, first
+from crosscheck.study.grid import Case, Record, key, known, record_of, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.record_shape import Truth, checked
-from crosscheck.study.scouting import scout, unasked
+from crosscheck.study.search import selection
+from crosscheck.study.search.execution import Chains, Hurried
+from crosscheck.study.search.neighbours import MOST_COARSER
+from crosscheck.study.search.offers import default_cases, scout, unasked
+from crosscheck.study.search.selection import Family, beyond, families, finest, first
 from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
@@ -59,9 +59,9 @@ class Wanted(NamedTuple):
     """Request of a comparison: sample times (k,) of every scene, CPU seconds for a reference, and the folder
     for records.
 
-    Further fields choose few settings (`study.ladder`), the timing of short runs only, and whether the user
-    named families. Named families that cannot run a scene are not replaced by other families. ``dead`` has
-    the time (s) of a dead position (`study.dead_positions`) of each scene, or None.
+    Further fields choose few settings (`study.search.selection`), the timing of short runs only, and whether
+    the user named families. Named families that cannot run a scene are not replaced by other families.
+    ``dead`` has the time (s) of a dead position (`study.dead_positions`) of each scene, or None.
     """
 
     times: Sequence[np.ndarray]
@@ -124,7 +124,7 @@ def _measured(
     run = [case for group in groups for case in group if key(case) in by_key]
     reported, found = [by_key[key(case)] for case in run], truths.result()
     moving = _pictures(list(zip(run, reported, strict=True)), found, wanted.out)
-    long = sweep.QUICK_LONG if wanted.is_quick else sweep.LONG
+    long = selection.QUICK_LONG if wanted.is_quick else selection.LONG
     timed = with_timings(run, reported, _file(wanted, "timings.jsonl"), notice, long, wanted.repeats)
     return Collection(scenes, timed, [by_key[key(gate)] for gate in gates], found, *moving)
 

@@ -17,9 +17,9 @@ from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
 from crosscheck.setting import best_family
 from crosscheck.study.grid import Case, Record
-from crosscheck.study.least_errors import least_errors
 from crosscheck.study.record_view import is_completed
-from crosscheck.study.scouting import settings
+from crosscheck.study.search.least_errors import least_errors
+from crosscheck.study.search.offers import settings
 from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.verdict import Grade, grade
 from mbref.scene import Scene

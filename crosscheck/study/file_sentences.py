@@ -12,7 +12,7 @@ from crosscheck.judge.free_fall import falls_freely
 from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, is_completed
-from crosscheck.study.tuning import opened
+from crosscheck.study.search.cheapest import opened
 from crosscheck.study.verdict import Grade, Judged, grade
 from crosscheck.study.wording import listed
 from mbref.scene import Scene

@@ -15,11 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Setting, engine
+from crosscheck.engine import Setting, engine
 from crosscheck.judge import metrics
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.judge.reference.reference import SECONDS
-from crosscheck.judge.start import started
 from crosscheck.judge.truth import Truth, truth_for
 from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed
@@ -28,13 +27,11 @@ from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_shape import checked
-from crosscheck.study.scouting import offer, shown_name
 from mbref.records import append, stored
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 
 SCHEMA = 1
-SAMPLES = 101  # sample times of a default case, both ends included
 TIME_LIMIT = 60.0  # s, of a default case
 MOST_SECONDS = 1e7  # s, about four months: ten times as much is still a time that the system can wait
 MEASURED = 2.0  # limit of the CPU time for the metrics, as a multiple of the time limit of the case
@@ -69,54 +66,6 @@ class Case(NamedTuple):
     setting: Setting
     time_limit: float = TIME_LIMIT
     reference_time: float = SECONDS
-
-
-class Unable(NamedTuple):
-    """An engine that cannot run a scene, and its refusal."""
-
-    scene: Scene
-    engine: str
-    cannot: Cannot
-
-
-def default_cases(
-    scene: Scene,
-    engines: Sequence[str],
-    families: Sequence[str] | None = None,
-    times: np.ndarray | None = None,
-    time_limit: float = TIME_LIMIT,
-) -> tuple[list[Case], list[Unable]]:
-    """Return the settings of every engine for a scene as cases, and the engines that cannot run it.
-
-    Parameters
-    ----------
-    scene : Scene
-        The mechanism.
-    engines : sequence of str
-        Names of engines.
-    families : sequence of str, optional
-        Families of settings. Default: all.
-    times : ndarray, shape (k,), optional
-        Sample times, s. Default: SAMPLES equidistant ones over the scene's duration.
-    time_limit : float
-        CPU time (s) of a run.
-
-    Returns
-    -------
-    tuple of (list of Case, list of Unable)
-        The runs, and the refusals.
-    """
-    scene = started(scene)
-    times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
-    cases, unable = [], []
-    for name in engines:
-        found = offer(name, scene)
-        if isinstance(found, Cannot):
-            unable.append(Unable(scene, name, found))
-            continue
-        wanted = [s for s in found if families is None or s.family in families]
-        cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
-    return cases, unable
 
 
 def study(
@@ -222,6 +171,14 @@ def record_of(case: Case, trajectory: Trajectory) -> Record:
         "seed": 0,
         **made_by(),
     }
+
+
+def shown_name(engine_name: str) -> str:
+    """Return the displayed name of an engine: for ``module:attribute`` the name of the object."""
+    try:
+        return engine(engine_name).name if ":" in engine_name else engine_name
+    except Exception:  # the run itself reports the failed import as its outcome
+        return engine_name
 
 
 def _asked(case: Case) -> dict[str, Any]:

@@ -11,9 +11,9 @@ import numpy as np
 from crosscheck.engine import Setting, engine
 from crosscheck.processes.pool import run_estimated
 from crosscheck.setting import BRANCHES
-from crosscheck.study.chains import Chains
 from crosscheck.study.grid import Case, Record, record_of, study
 from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.search.execution import Chains
 from mbref.crossing import Crossing
 from mbref.trajectory import Trajectory
 

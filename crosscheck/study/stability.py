@@ -18,7 +18,7 @@ from crosscheck.engine import Setting
 from crosscheck.judge.truth import Truth, closed_form
 from crosscheck.study.grid import Case, Record, study
 from crosscheck.study.progress import counted, shown
-from crosscheck.study.scouting import scout, settings, unasked
+from crosscheck.study.search.offers import scout, settings, unasked
 from mbref.scene import GROUND, Body, Driver, Revolute, Scene, Spring
 from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.links import CRANK_RATE

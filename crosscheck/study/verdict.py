@@ -14,8 +14,8 @@ from crosscheck.judge.metrics import cost_at_error, error_series
 from crosscheck.judge.mobility import mobility
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.grid import Record
-from crosscheck.study.least_errors import LeastError, least_errors
 from crosscheck.study.record_view import error, is_completed
+from crosscheck.study.search.least_errors import LeastError, least_errors
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

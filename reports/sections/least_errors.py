@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from crosscheck.judge.tolerances import FLOOR
-from crosscheck.study.least_errors import HEADER, least_errors
+from crosscheck.study.search.least_errors import HEADER, least_errors
 
 from ..blocks import Block, Heading, Table, Text
 from ..runs import SceneRuns, short

@@ -18,8 +18,8 @@ from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.command import command
 from crosscheck.study.file_sentences import as_in_file, free_falls
 from crosscheck.study.grid import Case, run_here
-from crosscheck.study.scouting import of_file, offer
-from crosscheck.study.sweep import of_few_families
+from crosscheck.study.search.offers import of_file, offer
+from crosscheck.study.search.selection import of_few_families
 from crosscheck.study.verdict import Judged
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError

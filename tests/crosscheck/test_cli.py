@@ -18,9 +18,9 @@ from crosscheck.cli.parser import parser
 from crosscheck.engine import engine
 from crosscheck.study import grid
 from crosscheck.study.command import command
-from crosscheck.study.hurried import NOT_STARTED, Hurried
 from crosscheck.study.record_view import PUBLIC
-from crosscheck.study.tuning import by_error
+from crosscheck.study.search.cheapest import by_error
+from crosscheck.study.search.execution import NOT_STARTED, Hurried
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES

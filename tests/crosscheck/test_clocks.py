@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck.cli.scene_request import find_scenes
 from crosscheck.engine import Setting, engine
-from crosscheck.study.scouting import of_file
+from crosscheck.study.search.offers import of_file
 from mbref.formats import ImportOptions
 from mbref.scene import Scene
 from mbref.scenes import SCENES

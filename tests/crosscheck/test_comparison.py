@@ -11,8 +11,8 @@ from crosscheck.cli import main
 from crosscheck.cli.comparison import Comparison
 from crosscheck.cli.request import RequestError
 from crosscheck.engine import Setting
-from crosscheck.study.chains import Chains
 from crosscheck.study.grid import Case, key, study
+from crosscheck.study.search.execution import Chains
 from mbref.scene import Body, Scene
 from tests.helpers.fake_engines import FAKES
 

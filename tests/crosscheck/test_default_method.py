@@ -1,8 +1,8 @@
 """mbref as an engine / the default method at quick depth."""
 
 from crosscheck.engine import engine
-from crosscheck.study.grid import default_cases
-from crosscheck.study.sweep import of_few_families
+from crosscheck.study.search.offers import default_cases
+from crosscheck.study.search.selection import of_few_families
 from mbref.method import default_method
 from mbref.scenes import SCENES
 

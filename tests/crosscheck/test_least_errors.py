@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from crosscheck.study.least_errors import least_errors
+from crosscheck.study.search.least_errors import least_errors
 
 
 def record(

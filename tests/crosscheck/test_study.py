@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import Setting
-from crosscheck.study.grid import Case, default_cases, key, run_case, run_here, study
+from crosscheck.study.grid import Case, key, run_case, run_here, study
+from crosscheck.study.search.offers import default_cases
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory

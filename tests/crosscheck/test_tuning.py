@@ -11,9 +11,9 @@ import pytest
 
 from crosscheck.cli.options import length
 from crosscheck.engine import Setting
-from crosscheck.study.between import STEP, between, coarser, longest_step, within, work
 from crosscheck.study.grid import Case, key
-from crosscheck.study.tuning import by_closure, tuned
+from crosscheck.study.search.cheapest import by_closure, tuned
+from crosscheck.study.search.neighbours import STEP, between, coarser, longest_step, within, work
 from mbref import rotations
 from mbref.scene import Body, Scene
 from mbref.trajectory import Cost

@@ -112,7 +112,7 @@ MAKERS = (
     "crosscheck.engines",
     "crosscheck.cli.collection",
     "crosscheck.cli.moving_picture",
-    "crosscheck.study.sweep",
+    "crosscheck.study.search.selection",
     "crosscheck.study.timings",
 )
 

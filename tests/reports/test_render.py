@@ -10,8 +10,9 @@ import pytest
 from synthetic import groups
 
 from crosscheck.engine import Setting
-from crosscheck.study import sweep as sweeps
-from crosscheck.study.grid import default_cases, study
+from crosscheck.study.grid import study
+from crosscheck.study.search import selection
+from crosscheck.study.search.offers import default_cases
 from crosscheck.study.timings import LONG, with_timings
 from mbref.scene import Body, Scene
 from reports import render
@@ -89,7 +90,7 @@ def still(name: str) -> Scene:
     return Scene(name=name, body=(block,), duration=0.5)
 
 
-def few(scenes, engines) -> sweeps.Sweep:
+def few(scenes, engines) -> selection.Sweep:
     return default_cases(scenes[0], engines, None, np.linspace(0, 0.5, 4))
 
 

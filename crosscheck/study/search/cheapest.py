@@ -13,10 +13,18 @@ from typing import NamedTuple
 from crosscheck.engine import Setting
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.openings import Opening, opening
-from crosscheck.study.between import MOST_COARSER, STILL_CHEAPER, between, coarser, longest_step, within, work
 from crosscheck.study.grid import Case, Record
-from crosscheck.study.ladder import Family, families
 from crosscheck.study.record_view import error, error_bound, error_text, is_completed
+from crosscheck.study.search.neighbours import (
+    MOST_COARSER,
+    STILL_CHEAPER,
+    between,
+    coarser,
+    longest_step,
+    within,
+    work,
+)
+from crosscheck.study.search.selection import Family, families
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

@@ -1,18 +1,27 @@
-"""Settings of the engines for scenes. An engine may run a scene to find its settings, so each pair of engine
-and scene is asked once."""
+"""Settings that the engines offer for scenes, and the runs at all of them.
+
+An engine may run a scene to find its settings, so each pair of engine and scene is asked once.
+"""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
+from typing import NamedTuple
+
+import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting, engine
+from crosscheck.judge.start import started
 from crosscheck.processes.child import ChildFailed
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import READY_SECONDS, capabilities
+from crosscheck.study.grid import TIME_LIMIT, Case, shown_name
 from mbref.formats import OriginalRun
 from mbref.scene import Scene
+
+SAMPLES = 101  # sample times of a default case, both ends included
 
 Offer = tuple[Setting, ...] | Cannot  # the settings of an engine for a scene, or its refusal
 
@@ -77,6 +86,54 @@ def unasked(engines: Sequence[str], scenes: Sequence[Scene]) -> int:
     return sum((name, scene) not in _found for scene in scenes for name in engines)
 
 
+class Unable(NamedTuple):
+    """An engine that cannot run a scene, and its refusal."""
+
+    scene: Scene
+    engine: str
+    cannot: Cannot
+
+
+def default_cases(
+    scene: Scene,
+    engines: Sequence[str],
+    families: Sequence[str] | None = None,
+    times: np.ndarray | None = None,
+    time_limit: float = TIME_LIMIT,
+) -> tuple[list[Case], list[Unable]]:
+    """Return the settings of every engine for a scene as cases, and the engines that cannot run it.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    engines : sequence of str
+        Names of engines.
+    families : sequence of str, optional
+        Families of settings. Default: all.
+    times : ndarray, shape (k,), optional
+        Sample times, s. Default: SAMPLES equidistant ones over the scene's duration.
+    time_limit : float
+        CPU time (s) of a run.
+
+    Returns
+    -------
+    tuple of (list of Case, list of Unable)
+        The runs, and the refusals.
+    """
+    scene = started(scene)
+    times = np.linspace(0.0, scene.duration, SAMPLES) if times is None else times
+    cases, unable = [], []
+    for name in engines:
+        found = offer(name, scene)
+        if isinstance(found, Cannot):
+            unable.append(Unable(scene, name, found))
+            continue
+        wanted = [s for s in found if families is None or s.family in families]
+        cases += [Case(scene, times, name, setting, time_limit) for setting in wanted]
+    return cases, unable
+
+
 def _offered(engine_name: str, scene: Scene) -> Offer:
     simulator = engine(engine_name)
     return simulator.cannot(scene) or tuple(simulator.settings(scene))
@@ -88,11 +145,3 @@ def _asked(pair: tuple[str, Scene]) -> Offer:
     except ChildFailed as failure:
         return Cannot(Owner.ADAPTER, f"its settings are unknown: {failure}")
     return cannot or tuple(found)
-
-
-def shown_name(engine_name: str) -> str:
-    """Return the displayed name of an engine: for ``module:attribute`` the name of the object."""
-    try:
-        return engine(engine_name).name if ":" in engine_name else engine_name
-    except Exception:  # the run itself reports the failed import as its outcome
-        return engine_name

@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from crosscheck.judge.tolerances import FLOOR
-from crosscheck.study.grid import Case, Record, default_cases
+from crosscheck.study.grid import Record
 from crosscheck.study.record_view import by_scene, ended, error, error_text, is_completed, varied_settings
-from mbref.scene import Scene
 
 HEADER = ("scene", "engine", "family", "settings", "least error", "time (s)", f"within {FLOOR:.0e}", "others")
-
-FINEST = 3  # number of the finest settings of each family that are run
-TIME_LIMIT = 240.0  # CPU seconds of a run
-
-
-def candidates(scene: Scene, engines: Sequence[str]) -> list[Case]:
-    """Return the finest settings of every family of each engine that can run the scene."""
-    families = defaultdict(list)
-    for case in default_cases(scene, engines, time_limit=TIME_LIMIT)[0]:
-        families[case.engine, case.setting.family].append(case)
-    return [case for group in families.values() for case in group[-FINEST:]]
 
 
 @dataclass(frozen=True)

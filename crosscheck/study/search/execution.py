@@ -1,5 +1,7 @@
-"""Parallel runs of several engines. The runs of one engine follow each other; metrics are computed in
-parallel."""
+"""Order of the runs: several engines at once, each from coarse to fine, without hopeless settings.
+
+Metrics are computed in parallel with the runs.
+"""
 
 from __future__ import annotations
 
@@ -10,8 +12,12 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Lock
 from typing import Any
 
-from crosscheck.study.grid import Case, Record
-from mbref.trajectory import Trajectory
+from crosscheck.processes.pool import run_estimated
+from crosscheck.processes.serve import failed
+from crosscheck.study.grid import Case, Record, record_of
+from mbref.trajectory import Outcome, Trajectory
+
+NOT_STARTED = "not started: a coarser setting of the family reached the time limit"
 
 Measure = Callable[[Case, Trajectory], Record]
 Call = tuple[Future[Record], Callable[[Case], Trajectory], Case]
@@ -73,3 +79,27 @@ def _reported(future: Future[Record], function: Callable[..., Any], *arguments: 
     except BaseException as error:
         future.set_exception(error)
         return None
+
+
+class Hurried:
+    """Replacement of ``run_case`` for cases that come coarse to fine in each family.
+
+    After a run that ran out of time, finer settings of its family are not started.
+    """
+
+    def __init__(self) -> None:
+        self._slow: set[tuple[str, str, str]] = set()
+
+    def __call__(self, case: Case) -> Record:
+        """Return the record of a case; TIMED_OUT without a run if a coarser setting ran out of time."""
+        return record_of(case, self.trajectory(case))
+
+    def trajectory(self, case: Case) -> Trajectory:
+        """Return the trajectory of a case; TIMED_OUT without a run if a coarser setting ran out of time."""
+        family = case.scene.name, case.engine, case.setting.family
+        if family in self._slow:
+            return failed(case.engine, "", case.scene, case.setting, Outcome.TIMED_OUT, NOT_STARTED)
+        run = run_estimated(case.engine, case.scene, case.times, case.setting, case.time_limit)
+        if run.outcome is Outcome.TIMED_OUT:
+            self._slow.add(family)
+        return run
