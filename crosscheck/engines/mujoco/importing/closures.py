@@ -59,6 +59,11 @@ class Closure:
         twist = _rotation_vector(turn.T @ second.turn(data))
         return np.concatenate([apart[self._lengths], twist[self._angles]])
 
+    def opening(self, data: Any) -> float:
+        """Return the gap's distance (m) or its angle (rad), whichever number is larger."""
+        distance, angle = np.split(self.gap(data), [len(self._lengths)])
+        return float(max(np.linalg.norm(distance), np.linalg.norm(angle)))
+
     def rows(self, mujoco: Any, model: Any, data: Any) -> np.ndarray:
         """Return the Jacobian (rows, nv) of the residuals at a closed pose."""
         first, second = self.frames

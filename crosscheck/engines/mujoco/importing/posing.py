@@ -76,8 +76,8 @@ class Poses:
         self.mujoco.mj_comPos(self.model, self.data)
 
     def gaps(self) -> dict[str, float]:
-        """Return the largest residual (m or rad) of every closure and coupled coordinate at the pose."""
-        found = {c.name: float(np.abs(c.gap(self.data)).max()) for c in self.closures}
+        """Return by how much (m or rad) every closure and coupled coordinate is open at the pose."""
+        found = {c.name: c.opening(self.data) for c in self.closures}
         return found | {row.name: abs(self._residual(row)) for row in self.joint_rows}
 
     def close(self) -> None:
@@ -85,17 +85,20 @@ class Poses:
 
         Coordinates of ``--pose`` are unchanged if the loops allow it. If no small motion closes the loops, as
         for a straight chain, the pose is first moved in the direction in which the weight accelerates it.
-        Raises SceneError with the remaining gap.
+        Raises SceneError with the least gap of all poses that were tried.
         """
         start = self.data.qpos.copy()
+        least: list[tuple[float, str]] = []
         for held, falls in ((self.held, False), (self.held, True), ([], False), ([], True)):
             self.data.qpos[:] = start
             if falls:
                 self.mujoco.mj_integratePos(self.model, self.data.qpos, self._fall(), 1.0)
             self.place()
-            if self._newton(held):
+            open_by = self._newton(held)
+            if open_by is None:
                 return
-        name, gap = max(self.gaps().items(), key=lambda item: item[1])
+            least.append(open_by)
+        gap, name = min(least)
         raise SceneError(
             [
                 f"closure {name!r}: cannot be closed from this pose; the least gap found is {gap:.3g} m "
@@ -126,11 +129,14 @@ class Poses:
         size = np.abs(found).max()
         return self.scale * found * (FALL / size if size > 0 else 0.0)
 
-    def _newton(self, held: list[int]) -> bool:
+    def _newton(self, held: list[int]) -> tuple[float, str] | None:
+        """Close the loops by Newton's method; return None, or the least gap (m or rad) with its name."""
+        least = []
         for _ in range(ITERATIONS):
             r, rows = self._scaled(self.residuals()), self.unit_free(self.jacobian())
             if not np.abs(r).max(initial=0.0) > CLOSED:
-                return True
+                return None
+            least.append(self._widest())
             step = self._step(r, rows, held)
             size = np.abs(step).max()
             if not size > 0.0:
@@ -138,7 +144,11 @@ class Poses:
             step *= self.scale * min(1.0, LONGEST / size)
             self.mujoco.mj_integratePos(self.model, self.data.qpos, step, 1.0)
             self.place()
-        return bool(np.abs(self._scaled(self.residuals())).max() <= ROUNDED)
+        is_closed = np.abs(self._scaled(self.residuals())).max() <= ROUNDED
+        return None if is_closed else min(*least, self._widest())
+
+    def _widest(self) -> tuple[float, str]:
+        return max((gap, name) for name, gap in self.gaps().items())
 
     def _scaled(self, rows: np.ndarray) -> np.ndarray:
         """Return residuals or their Jacobian with lengths as fractions of the model's extent."""
