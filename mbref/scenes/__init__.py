@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from mbref.scene import Scene, SceneError
 from mbref.scene_fields import meant
@@ -19,6 +20,7 @@ from mbref.scenes.four_bar import four_bar, four_bar_gravity
 from mbref.scenes.four_bar_chain import four_bar_chain
 from mbref.scenes.h_frame import h_frame
 from mbref.scenes.heavy_top import heavy_top
+from mbref.scenes.lattice import lattice
 from mbref.scenes.planar_slider_crank import (
     planar_slider_crank,
     planar_slider_crank_equal,
@@ -28,12 +30,14 @@ from mbref.scenes.planar_slider_crank import (
 from mbref.scenes.point_pendulum import point_pendulum
 from mbref.scenes.rigid_slider_crank import rigid_slider_crank
 from mbref.scenes.sarrus import sarrus
+from mbref.scenes.sarrus_stack import sarrus_stack
 from mbref.scenes.slider_crank_chain import slider_crank_chain
 from mbref.scenes.spatial_slider_crank import (
     spatial_slider_crank,
     spatial_slider_crank_driven,
     spatial_slider_crank_gravity,
 )
+from mbref.scenes.strandbeest import strandbeest
 
 SCENES: dict[str, Callable[[], Scene]] = {
     "four_bar": four_bar,
@@ -66,15 +70,27 @@ SCENES: dict[str, Callable[[], Scene]] = {
 
 OTHER_FILES = (".xml", ".urdf", ".sdf")  # suffixes of MJCF, URDF and SDF files
 
-# chains with any number of loops, by default two: four_bar_chain[40]
-CHAINS: dict[str, Callable[[int, str], Scene]] = {
-    "four_bar_chain": four_bar_chain,
-    "slider_crank_chain": slider_crank_chain,
+
+class Family(NamedTuple):
+    """Scenes of any size: function of the sizes and the name, number of sizes, loops for each unit of
+    size."""
+
+    make: Callable[..., Scene]
+    sizes: int
+    loops: int
+
+
+# four_bar_chain[40], lattice[6,4]
+FAMILIES = {
+    "four_bar_chain": Family(four_bar_chain, 1, 1),
+    "slider_crank_chain": Family(slider_crank_chain, 1, 1),
+    "lattice": Family(lattice, 2, 1),
+    "strandbeest": Family(strandbeest, 1, 3),
+    "sarrus_stack": Family(sarrus_stack, 1, 1),
 }
 
-
 # rows and columns of a Jacobian grow with the loops: at 3000 its 39 000 by 36 000 numbers take 11 GB
-LARGEST_CHAIN = 3000
+MOST_LOOPS = 3000
 
 
 def find_scene(name: Scene | str | Path) -> Scene:
@@ -83,8 +99,8 @@ def find_scene(name: Scene | str | Path) -> Scene:
     Parameters
     ----------
     name : Scene, str or path
-        A name in SCENES, a chain with its number of loops (``four_bar_chain[40]``), the path of a .toml file,
-        or a scene.
+        A name in SCENES, a family with its size (``four_bar_chain[40]``, ``lattice[6,4]``), the path of a
+        .toml file, or a scene.
 
     Raises
     ------
@@ -96,11 +112,9 @@ def find_scene(name: Scene | str | Path) -> Scene:
     name = str(name)
     if name in SCENES:
         return SCENES[name]()
-    chain = re.fullmatch(r"(\w+)\[([1-9]\d*)\]", name)
-    if chain and chain[1] in CHAINS:
-        if len(chain[2]) > len(str(LARGEST_CHAIN)) or int(chain[2]) > LARGEST_CHAIN:
-            raise SceneError([f"{name:.80}: must have at most {LARGEST_CHAIN} loops"])
-        return CHAINS[chain[1]](int(chain[2]), name)
+    family = re.fullmatch(r"(\w+)(?:\[([1-9]\d*(?:,[1-9]\d*)*)\])?", name)
+    if family and family[1] in FAMILIES:
+        return _of_size(family[1], family[2].split(",") if family[2] else [], name)
     if Path(name).suffix in OTHER_FILES:
         makes = f"`mbref import {name}` makes one, and `crosscheck compare {name}` reads it as it is"
         raise SceneError([f"{name}: is no scene file; {makes}"])
@@ -108,8 +122,22 @@ def find_scene(name: Scene | str | Path) -> Scene:
         return Scene.from_file(name)
     if name.endswith(".toml"):
         raise SceneError([_missing(Path(name))])
-    known = f"built-in: {', '.join(SCENES)}; or a .toml file"
-    raise SceneError([f"unknown scene {name!r}; {known}{meant(name, SCENES)}"])
+    names = dict.fromkeys((*SCENES, *FAMILIES))
+    known = f"built-in: {', '.join(names)}; or a .toml file"
+    raise SceneError([f"unknown scene {name!r}; {known}{meant(name, names)}"])
+
+
+def _of_size(family: str, sizes: list[str], name: str) -> Scene:
+    """Return a scene of a family with the given numbers, by default the smallest scene that shows its
+    structure."""
+    make, count, loops = FAMILIES[family]
+    if len(sizes) not in (0, count):
+        form = f"{family}[{','.join('NM'[:count])}]"
+        raise SceneError([f"{name:.80}: must have its size in brackets, {form}"])
+    digits = len(str(MOST_LOOPS))
+    if any(len(size) > digits for size in sizes) or loops * math.prod(map(int, sizes)) > MOST_LOOPS:
+        raise SceneError([f"{name:.80}: must have at most {MOST_LOOPS} loops"])
+    return make(*map(int, sizes), name=name)
 
 
 def _missing(path: Path) -> str:

@@ -1,0 +1,120 @@
+"""Scenes of any size move as their equations of few freedoms say, and refuse sizes that they do not have."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from mbref import Limits, SceneError, simulate
+from mbref.scenes import find_scene
+
+G = 9.81  # m/s²
+EXACT = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+METHODS = ("taylor", "alf-dual+projection")
+
+
+def motion_of(name, method, end):
+    scene = find_scene(name)
+    run = simulate(scene, method, [0.0, end], Limits(rtol=1e-10))
+    assert run.outcome.name == "COMPLETED"
+    return {body.name: run.position[:, k] for k, body in enumerate(scene.body)}, run
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
+    columns, floors, end = 2, 3, 0.2
+    above = np.arange(floors)[::-1] * (
+        2.0 * columns + 1
+    )  # kg carried by the tops of a floor, without its bars
+    carried = (columns + 1) / 2 + columns + above
+    own = (columns + 1) * (1 / 4 + (3 * 0.01**2 + 1) / 12) + columns + above
+    pairs = np.maximum(np.arange(floors)[:, None], np.arange(floors))
+    mass = np.where(np.eye(floors, dtype=bool), np.diag(own), carried[pairs])
+
+    def rate(_, y):
+        angle, speed = np.split(y, 2)
+        apart = angle[:, None] - angle
+        torque = G * carried * np.sin(angle) - mass * np.sin(apart) @ speed**2
+        return [*speed, *np.linalg.solve(mass * np.cos(apart), torque)]
+
+    bodies, _ = motion_of(f"lattice[{columns},{floors}]", method, end)
+    lean = np.array([0.3 * (-1) ** k + 0.05 * k / floors for k in range(floors)])
+    angles = solve_ivp(rate, (0.0, end), [*lean, *np.zeros(floors)], **EXACT).y[:floors, -1]
+    foot = np.zeros(2)
+    for floor, angle in enumerate(angles):
+        up = np.array([np.sin(angle), np.cos(angle)])
+        for i in range(columns + 1):
+            assert bodies[f"upright{i}_{floor}"][1, :2] == pytest.approx(foot + [i, 0] + up / 2, abs=1e-8)
+        for i in range(columns):
+            assert bodies[f"bar{i}_{floor}"][1, :2] == pytest.approx(up + foot + [i + 0.5, 0], abs=1e-8)
+        foot = foot + up
+
+
+def test_stacked_platforms_fall_as_folding_bars_let_them():
+    count, end, half, bar_mass, platform_mass = 2, 0.15, 0.5, 0.5, 1.0  # bars of 0.5 m
+    across = bar_mass * (3 * 0.01**2 + half**2) / 12
+    # rows of (height, reach) of bodies by sin and cos of the bars' angles: bars, then the platform
+    falls = [[0.0] * k + [share] + [0.0] * (count - k - 1) for k in range(count) for share in (0.5, 1.5)]
+    heights = np.array([[2.0] * k + fall[k:] for k, fall in zip([0, 0, 1, 1], falls, strict=True)])
+    tops = np.array([[2.0] * (k + 1) + [0.0] * (count - k - 1) for k in range(count)])
+    masses = np.array([2 * bar_mass] * len(heights) + [platform_mass] * count)
+    rises = half * np.vstack([heights, tops])
+    reaches = half / 2 * np.vstack([np.eye(count).repeat(2, axis=0), np.zeros((count, count))])
+
+    def rate(_, y):
+        angle, speed = np.split(y, 2)
+        c, s = np.cos(angle), np.sin(angle)
+        up, out = rises * c, -reaches * s
+        bent = (up.T @ (masses * (-(rises * s) @ speed**2)), out.T @ (masses * (-(reaches * c) @ speed**2)))
+        matrix = (up.T * masses) @ up + (out.T * masses) @ out + 4 * across * np.eye(count)
+        return [*speed, *np.linalg.solve(matrix, -up.T @ masses * G - sum(bent))]
+
+    bodies, _ = motion_of(f"sarrus_stack[{count}]", "taylor", end)
+    start = [*np.full(count, np.radians(60)), *np.zeros(count)]
+    angles = solve_ivp(rate, (0.0, end), start, **EXACT).y[:count, -1]
+    found = [bodies[f"platform{k}"][1] for k in range(count)]
+    assert np.array(found)[:, 2] == pytest.approx(rises[-count:] @ np.sin(angles), abs=1e-8)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_legs_keep_their_lengths_and_their_energy(method):
+    legs, end = 2, 0.1
+    _, run = motion_of(f"strandbeest[{legs}]", method, end)
+    scene = find_scene(f"strandbeest[{legs}]")
+    mass = np.array([body.mass for body in scene.body])
+    moment = np.array([body.inertia[2] for body in scene.body])
+    speed, spin = run.velocity, run.angular_velocity[..., 2]
+    kinetic = (mass * (speed**2).sum(axis=2) + moment * spin**2).sum(axis=1) / 2
+    energy = kinetic + G * run.position[..., 1] @ mass
+    assert energy[1] == pytest.approx(energy[0], abs=1e-8 * np.abs(kinetic).max())
+    # every joint stays closed: the world points of both bodies coincide
+    angle = 2 * np.arctan2(run.orientation[..., 3], run.orientation[..., 0])
+    turned = angle[1] - angle[0]
+    names = {body.name: k for k, body in enumerate(scene.body)}
+
+    def moved(name, anchor):
+        if name == "ground":
+            return np.array(anchor)
+        k = names[name]
+        x, y, z = np.array(anchor) - run.position[0, k]
+        c, s = np.cos(turned[k]), np.sin(turned[k])
+        return run.position[1, k] + [c * x - s * y, s * x + c * y, z]
+
+    for joint in scene.joint:
+        first, second = (moved(name, joint.anchor) for name in joint.bodies)
+        assert first == pytest.approx(second, abs=1e-12)
+    assert abs(turned[names["crank"]]) > 0.1
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("lattice[3]", r"its size in brackets, lattice\[N,M\]"),
+        ("strandbeest[1,2]", r"its size in brackets, strandbeest\[N\]"),
+        ("strandbeest[2999]", "at most 3000 loops"),
+        ("lattice[99,99]", "at most 3000 loops"),
+        ("strandbest", "did you mean 'strandbeest'"),
+    ],
+)
+def test_size_that_a_family_does_not_have_is_refused(name, fault):
+    with pytest.raises(SceneError, match=fault):
+        find_scene(name)
