@@ -12,13 +12,14 @@ from crosscheck.cli.request import RequestError, find_engines
 from crosscheck.closed_loops.records import read
 from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
-from crosscheck.study import stability, sweep
+from crosscheck.study import stability
 from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.grid import Case, Record, shown_name
 from crosscheck.study.progress import shown
 from crosscheck.study.record_shape import Ladder, Timing, checked
 from crosscheck.study.record_view import with_time
+from crosscheck.study.search import selection
 from crosscheck.study.timings import with_timings
 from mbref.records import looked_at
 from mbref.scene import Scene
@@ -63,15 +64,15 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
     """
     scenes, engines, is_quick = wanted.scenes, find_engines(wanted.engines, notice), wanted.is_quick
     if scenes is None:
-        scenes = sweep.quick_scenes() if is_quick else sweep.whole_scenes()
-    samples = sweep.QUICK_SAMPLES if is_quick else sweep.SAMPLES
+        scenes = selection.quick_scenes() if is_quick else selection.whole_scenes()
+    samples = selection.QUICK_SAMPLES if is_quick else selection.SAMPLES
     given = [np.linspace(0.0, scene.duration, samples) for scene in scenes]
     there = [followed(*pair, wanted.reference_time) for pair in zip(scenes, given, strict=True)]
     chosen, times = [f.scene for f in there], [f.times for f in there]
     dead = [f.dead for f in there]
 
     def plan() -> list[Case]:
-        cases, unable = (sweep.quick if is_quick else sweep.whole)(chosen, engines)
+        cases, unable = (selection.quick if is_quick else selection.whole)(chosen, engines)
         for pair in unable:
             notice(f"{shown_name(pair.engine)} cannot run {pair.scene.name}: {pair.cannot}")
         if not cases:
