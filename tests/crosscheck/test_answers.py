@@ -1,4 +1,4 @@
-"""Malformed answers of an engine: outcomes of their runs; the study goes on."""
+"""Malformed answers of engines are refused with their defect, and a study goes on after them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 TIMES = np.array([0.0, 0.1, 0.3])
 BLOCK = Body(name="block", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 2.0, 3.0))
 SCENE = Scene(name="still", body=(BLOCK,))
-SAYS = {
+SAYS = {  # what each function of DAMAGES changes in a good answer: the words of its error
     "nothing": "returned NoneType, not a Trajectory",
     "a table": "returned dict, not a Trajectory",
     "an engine": "not a Trajectory",
@@ -43,18 +43,19 @@ SAYS = {
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_malformed_answers_are_told_apart(damage: str):
+def test_error_of_a_malformed_answer_names_its_defect(damage: str):
     with pytest.raises(MalformedAnswer) as caught:
         well_formed(MALFORMED.run(SCENE, TIMES, Setting("a", {"damage": damage})), SCENE, TIMES)
     assert SAYS[damage] in str(caught.value)
 
 
-def test_a_run_that_ended_early_has_its_samples():
+def test_a_failed_run_may_answer_with_the_first_samples_alone():
+    """Two of the three requested times; a completed run with two is malformed (``few samples``)."""
     good = FAKE.run(SCENE, TIMES[:2], Setting("a", {"outcome": "STEP_FAILED"}))
     assert well_formed(good, SCENE, TIMES).times.tolist() == [0.0, 0.1]
 
 
-def test_numbers_of_numpy_become_plain():
+def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
     run = well_formed(SCALARS.run(SCENE, TIMES, Setting("a")), SCENE, TIMES)
     assert json.loads(json.dumps(run.to_record()))["cost"]["steps"] == 7
     kinds = [type(x) for x in (run.t_end, run.cost.seconds, run.cost.steps, run.settings["seconds"])]
@@ -62,18 +63,17 @@ def test_numbers_of_numpy_become_plain():
     assert run.velocity.shape == (3, 1, 3) and run.bodies == ("block",)
 
 
-def test_a_study_goes_on_after_every_malformed_answer(tmp_path: Path):
-    wanted = [
-        ("MALFORMED", {"damage": "nothing"}),
-        ("MALFORMED", {"damage": "few samples"}),
-        ("SCALARS", {}),
-        ("VERSIONLESS", {}),
-        ("MALFORMED", {"damage": "a local class"}),
-        ("FAKE", {}),
+def test_a_study_records_malformed_answers_as_crashed_and_goes_on(tmp_path: Path):
+    wanted = [  # engine, its options, the outcome in its record
+        ("MALFORMED", {"damage": "nothing"}, "CRASHED"),
+        ("MALFORMED", {"damage": "few samples"}, "CRASHED"),
+        ("SCALARS", {}, "COMPLETED"),
+        ("VERSIONLESS", {}, "CRASHED"),
+        ("MALFORMED", {"damage": "a local class"}, "CRASHED"),
+        ("FAKE", {}, "COMPLETED"),
     ]
-    cases = [Case(SCENE, TIMES, f"{FAKES}:{name}", Setting("a", options)) for name, options in wanted]
+    cases = [Case(SCENE, TIMES, f"{FAKES}:{name}", Setting("a", options)) for name, options, _ in wanted]
     records = study(cases, None, tmp_path / "records.jsonl")
-    outcomes = [record["outcome"] for record in records]
-    assert outcomes == ["CRASHED", "CRASHED", "COMPLETED", "CRASHED", "CRASHED", "COMPLETED"]
-    assert "no licence" in records[3]["message"], records[3]["message"]
+    assert [record["outcome"] for record in records] == [outcome for *_, outcome in wanted]
+    assert "no licence" in records[3]["message"], "the error that ``version`` raises"
     assert len((tmp_path / "records.jsonl").read_text().splitlines()) == 6

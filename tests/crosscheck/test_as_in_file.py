@@ -1,4 +1,4 @@
-"""Files of other programs as scenes of crosscheck: the file's own model in MuJoCo / its own stepping loop."""
+"""MJCF files as scenes of crosscheck: MuJoCo's run of the file's own model, and bodies held by ``--hold``."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ import pytest
 
 from crosscheck.cli.scene_request import RequestError, find_scenes, held
 from crosscheck.engine import Setting, engine
+from crosscheck.engines.mujoco.importing.reading import source
 from crosscheck.engines.mujoco.original import FAMILIES, FINER, STIFFER, STIFFER_RK4
 from crosscheck.judge.constraints import initial_poses, scene_length
 from crosscheck.judge.free_fall import falls_freely
+from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import violation_series
 from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.command import command
@@ -26,6 +28,7 @@ from mbref.scene import SceneError
 from mbref.scenes import SCENES
 from mbref.trajectory import Trajectory
 
+# four-bar whose last pin is a soft connect; the keyframe leaves the loop open
 FOUR_BAR = """<mujoco><compiler angle="radian"/><option timestep="0.004" integrator="implicitfast"/>
 <worldbody>
 <body name="left" pos="0 0 1"><joint name="A" axis="0 1 0" range="-0.01 0.01" limited="true"/>
@@ -39,6 +42,7 @@ FOUR_BAR = """<mujoco><compiler angle="radian"/><option timestep="0.004" integra
 <equality><connect name="C" site1="tip" site2="toe" solref="0.03 1"/></equality>
 <actuator><position joint="A" kp="50"/></actuator>
 <keyframe><key name="tilted" qpos="0.5 -0.5 0.5"/></keyframe></mujoco>"""
+# box on a free joint with one leg
 DOG = """<mujoco><compiler angle="radian"/><worldbody><frame pos="0 0 0.1">
 <body name="trunk" pos="0 0 0.5"><freejoint/><geom type="box" size=".2 .1 .05" mass="4"/>
 <body name="leg" pos="0.2 0 0"><joint name="hip" axis="0 1 0"/>
@@ -58,7 +62,7 @@ def setting_of(scene, family: str) -> Setting:
 
 
 def own_loop(model, start, times) -> np.ndarray:
-    """(k, nq) of MuJoCo's steps with the parts off that a scene does not have."""
+    """Return centres of mass (k, nb, 3) by mj_step, whose last step before a sample is shortened."""
     for name in ("CONTACT", "LIMIT"):
         model.opt.disableflags |= getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}")
     data = mujoco.MjData(model)
@@ -78,7 +82,8 @@ def own_loop(model, start, times) -> np.ndarray:
     return np.array(reached)
 
 
-def test_a_file_runs_at_its_own_settings(tmp_path):
+def test_family_as_in_file_takes_mujocos_steps_with_the_options_of_the_file(tmp_path):
+    """Positions equal a loop of mj_step on the file from the assembled pose; its soft closure opens."""
     scene = found(tmp_path, FOUR_BAR, TILTED)
     setting, times = setting_of(scene, AS_IN_FILE), np.array([0.0, 0.04, 0.25, 0.301, 0.4])
     assert {k: setting.options[k] for k in ("step", "integrator", "solref")} == {
@@ -88,22 +93,14 @@ def test_a_file_runs_at_its_own_settings(tmp_path):
     }
     run = engine("mujoco").run(scene, times, setting)
     model = mujoco.MjModel.from_xml_string(FOUR_BAR)
-    start = mujoco.MjData(model)
-    start.qpos[:] = 0.5, -0.5, 0.5
-    mujoco.mj_kinematics(model, start)
-    gap = np.abs(start.site("tip").xpos - start.site("toe").xpos).max()
-    assert gap > 1e-3, "the keyframe leaves the loop open, so that it is assembled"
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    from crosscheck.engines.mujoco.importing.reading import source
-
     read = source(tmp_path / "robot.xml", TILTED)
     assert np.abs(run.position - own_loop(model, read.qpos, times)).max() < 1e-12
     assert np.abs(run.position[0] - [b.position for b in scene.body]).max() < 1e-12
-    assert violation_series(scene, run).max() * scene_length(scene) > 1e-5, "soft closures open"
+    assert violation_series(scene, run).max() * scene_length(scene) > 1e-5, "m; stiff closures keep 1e-9 m"
 
 
-def test_rates_of_the_original_are_derivatives(tmp_path):
-    """Velocities and accelerations at a sample / differences over the sample."""
+def test_velocities_and_accelerations_of_the_files_model_are_differences_of_its_motion(tmp_path):
+    """Central differences over 2e-5 s; relative errors allowed: 1e-5 of velocities, 1e-3 of accelerations."""
     scene, h = found(tmp_path, FOUR_BAR, TILTED), 1e-5
     setting = setting_of(scene, STIFFER_RK4)
     run = engine("mujoco").run(scene, np.array([0.1 - h, 0.1, 0.1 + h]), setting)
@@ -113,30 +110,37 @@ def test_rates_of_the_original_are_derivatives(tmp_path):
     assert np.abs(change - run.acceleration[1]).max() < 1e-3 * np.abs(run.acceleration[1]).max()
 
 
-def test_smaller_steps_and_stiffer_closures_reach_the_scene_s_motion(tmp_path):
-    """The finest stiff run of the original is the tuned run of the scene; the softness stays at any step."""
-    scene = found(tmp_path, FOUR_BAR, TILTED).with_(duration=0.4)
-    times, simulator = np.linspace(0, 0.4, 5), engine("mujoco")
-    true = simulator.run(scene, times, Setting("tuned", {"step": 2e-4, "beta": 150.0, "hard": 1e-7}))
+def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joints(tmp_path):
+    """Errors of positions (m) against Gauss's principle; smaller steps alone leave the closures soft."""
+    scene, times = found(tmp_path, FOUR_BAR, TILTED), np.array([0.0, 0.05])
+    true = gauss_motion(scene, tuple(times.tolist())).position
     off = {
-        family: np.abs(simulator.run(scene, times, setting_of(scene, family)).position - true.position).max()
+        family: np.abs(engine("mujoco").run(scene, times, setting_of(scene, family)).position - true).max()
         for family in (AS_IN_FILE, FINER, STIFFER, STIFFER_RK4)
     }
-    assert off[STIFFER_RK4] < 1e-7 < off[STIFFER] < 2e-4 < off[FINER], off
-    assert 1e-3 < off[AS_IN_FILE] < 0.1, off
+    assert off[STIFFER_RK4] < 1e-7 and off[FINER] > 1e-4, off
+    assert off[STIFFER_RK4] < off[STIFFER] < off[FINER] < off[AS_IN_FILE], off
 
 
-def test_settings_of_the_file_come_first_and_only_its_own_at_quick_depth(tmp_path):
-    scene = found(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
-    families = list(dict.fromkeys(s.family for s in offer("mujoco", scene)))
-    assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families
-    cases = [Case(scene, np.array([0.0, 0.3]), "mujoco", s) for s in offer("mujoco", scene)]
-    few = {case.setting.family for case in of_few_families(cases)}
-    assert few == {AS_IN_FILE, "defaults", "tuned", "forward, compiled"}
+def test_families_of_the_files_model_are_offered_before_those_of_the_scene(tmp_path):
+    families = list(dict.fromkeys(s.family for s in offer("mujoco", found(tmp_path, FOUR_BAR, TILTED))))
+    assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
+
+
+def test_no_family_of_a_file_is_offered_for_other_engines_or_scenes(tmp_path):
+    scene = found(tmp_path, FOUR_BAR, TILTED)
     assert not of_file("exudyn", scene) and not of_file("mujoco", SCENES["four_bar"]())
 
 
-def test_the_command_of_a_run_reads_the_file_again(tmp_path):
+def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(tmp_path):
+    scene = found(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
+    cases = [Case(scene, np.array([0.0, 0.3]), "mujoco", s) for s in offer("mujoco", scene)]
+    few = {case.setting.family for case in of_few_families(cases)}
+    assert few & set(FAMILIES) == {AS_IN_FILE} and "tuned" in few, few
+
+
+def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_path):
+    """The path is the command's argument, so it is no option ``file=`` of the setting."""
     scene = found(tmp_path, FOUR_BAR, TILTED)
     times = np.linspace(0, scene.duration, 3)
     record = run_here(Case(scene, times, "mujoco", setting_of(scene, AS_IN_FILE), 5.0, 0.0))
@@ -147,8 +151,8 @@ def test_the_command_of_a_run_reads_the_file_again(tmp_path):
     assert "solref=" in said and "file=" not in said
 
 
-def test_a_verdict_says_how_wrong_the_file_is(tmp_path):
-    scene = found(tmp_path, FOUR_BAR, TILTED)
+def sentence(scene, **changes) -> str:
+    """Return the verdict on a run of the file: off by 20 mm and 0.03 rad, closures open by 1.2 mm."""
     settings = {"step": 0.004, "integrator": "Euler", "solref": "0.03 1", "file": "/robots/robot.xml"}
     metrics = {
         "error": 0.2,
@@ -173,54 +177,73 @@ def test_a_verdict_says_how_wrong_the_file_is(tmp_path):
         "t_end": 1.0,
         "message": "",
     }
-    said = as_in_file([Judged(scene, {}, [record])])
-    assert said == (
+    return as_in_file([Judged(scene, {}, [record | changes])])
+
+
+def test_verdict_on_a_files_own_settings_states_errors_and_the_opening_of_closures(tmp_path):
+    assert sentence(found(tmp_path, FOUR_BAR, TILTED)) == (
         "robot at its own settings (time step 0.004 s, Euler, solref 0.03 1) is wrong: bodies are off by "
         "up to 20 mm and 0.03 rad, and its closures open by up to 1.2 mm. `crosscheck tune mujoco "
-        f"{settings['file']} --closure 0.1mm` finds a solref and a time step that are ten times better. "
+        "/robots/robot.xml --closure 0.1mm` finds a solref and a time step that are ten times better. "
         "Contacts, limits and dry friction are off, as in the scene."
     )
-    right = as_in_file([Judged(scene, {}, [{**record, "metrics": {**metrics, "error": 1e-9}}])])
-    assert "is right:" in right and "tune" not in right
-    failed = {**record, "outcome": "NOT_FINITE", "t_end": 0.2, "message": "the state became NaN"}
-    assert "is not finite at 0.2 s: the state became NaN" in as_in_file([Judged(scene, {}, [failed])])
-    unknown = {**record, "metrics": {"error": None}}
-    assert "has no known error: its closures open by up to 1.2 mm." in as_in_file(
-        [Judged(scene, {}, [unknown])]
-    )
-    assert as_in_file([Judged(scene, {}, [{**record, "family": "tuned"}])]) == ""
 
 
-def test_a_free_base_verifies_nothing_and_is_held_on_request(tmp_path):
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"metrics": {"error": 1e-9, "position_error": 1e-9, "rotation_error": 1e-9}}, "is right:"),
+        (
+            {"outcome": "NOT_FINITE", "t_end": 0.2, "message": "the state became NaN"},
+            "is not finite at 0.2 s: the state became NaN",
+        ),
+        ({"metrics": {"error": None}}, "has no known error: its closures open by up to 1.2 mm."),
+    ],
+)
+def test_verdict_on_right_failed_and_unjudged_runs_proposes_no_tuning(tmp_path, changes, says):
+    said = sentence(found(tmp_path, FOUR_BAR, TILTED), **changes)
+    assert says in said and "tune" not in said, said
+
+
+def test_verdict_on_the_file_takes_no_run_of_another_family(tmp_path):
+    assert sentence(found(tmp_path, FOUR_BAR, TILTED), family="tuned") == ""
+
+
+def test_a_free_base_is_reported_with_the_option_that_holds_it(tmp_path):
     free = found(tmp_path, DOG)
-    assert falls_freely(free)
     (said,) = free_falls([Judged(free, {}, [])])
     assert "verifies nothing but gravity: `--hold trunk`" in said
+
+
+def test_hold_fixes_the_base_at_the_pose_of_the_keyframe(tmp_path):
+    """Trunk at (1, 0, 2) m, hip 0.2 m before it with 2 rad/s about y: only the leg is left."""
     fixed = found(tmp_path, DOG, ImportOptions(hold=["trunk"], keyframe="high"))
     assert not falls_freely(fixed) and [body.name for body in fixed.body] == ["leg"]
     (joint,) = fixed.joint
-    assert joint.anchor == pytest.approx((1.2, 0.0, 2.0)), "at the keyframe's pose"
+    assert joint.anchor == pytest.approx((1.2, 0.0, 2.0))
     run = engine("mujoco").run(fixed, np.array([0.0, 0.2]), setting_of(fixed, STIFFER_RK4))
     assert run.position[0, 0] == pytest.approx(fixed.body[0].position, abs=1e-14)
     assert fixed.body[0].angular_velocity == pytest.approx((0.0, 2.0, 0.0))
-    assert "verifies" not in " ".join(free_falls([Judged(fixed, {}, [])]))
+
+
+def test_hold_refuses_a_body_that_hangs_on_another_body(tmp_path):
     with pytest.raises(RequestError, match="--hold leg: is not a body that a joint connects to the ground"):
         found(tmp_path, DOG, ImportOptions(hold=["leg"]))
 
 
-@pytest.mark.parametrize(("name", "falls"), [("heavy_top", False), ("point_pendulum", False)])
-def test_motions_with_a_joint_to_the_ground_are_no_free_fall(name, falls):
-    assert falls_freely(SCENES[name]()) is falls
+@pytest.mark.parametrize("name", ["heavy_top", "point_pendulum"])
+def test_a_body_on_a_joint_to_the_ground_does_not_fall_freely(name):
+    assert not falls_freely(SCENES[name]())
 
 
-def test_a_turning_free_body_is_no_mere_fall():
-    scene = SCENES["heavy_top"]().with_(joint=(), load=())
-    assert not falls_freely(scene) if any(scene.body[0].angular_velocity or ()) else falls_freely(scene)
-    spinning = scene.with_("body[0].angular_velocity", (1.0, 2.0, 3.0))
-    assert not falls_freely(spinning) and not falls_freely(spinning.with_(gravity=(0.0, 0.0, 0.0)))
+def test_a_free_body_falls_freely_only_with_gravity_and_without_spin():
+    still = SCENES["heavy_top"]().with_(joint=()).with_("body[0].angular_velocity", (0.0, 0.0, 0.0))
+    assert falls_freely(still)
+    assert not falls_freely(still.with_("body[0].angular_velocity", (1.0, 2.0, 3.0)))
+    assert not falls_freely(still.with_(gravity=(0.0, 0.0, 0.0)))
 
 
-def test_a_body_of_a_scene_is_held_by_a_fixed_joint():
+def test_hold_adds_a_fixed_joint_to_a_scene_and_refuses_an_unknown_body():
     scene = SCENES["four_bar_gravity"]()
     fixed = held(scene, [scene.body[0].name])
     assert fixed.joint[-1].type == "fixed" and fixed.joint[:-1] == scene.joint
@@ -228,21 +251,27 @@ def test_a_body_of_a_scene_is_held_by_a_fixed_joint():
         held(scene, ["wheel"])
 
 
-def test_parts_that_a_scene_lacks_are_reported_and_faults_name_the_file(tmp_path):
+def test_reading_a_file_reports_parts_left_out_and_closed_loops(tmp_path):
     said: list[str] = []
     path = tmp_path / "robot.xml"
     path.write_text(FOUR_BAR)
     find_scenes([str(path)], TILTED, said.append)
     assert any("left out: limit of joint 'A', which acts at the start" in sentence for sentence in said)
     assert any("closure 'C' was open by" in sentence for sentence in said)
-    path.write_text(FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"'))
+
+
+def test_a_file_with_dry_friction_is_refused_with_the_option_that_leaves_it_out(tmp_path):
+    text = FOUR_BAR.replace('damping="0.01"', 'frictionloss="0.1"')
     with pytest.raises(RequestError, match="dry friction of 'D': it changes the motion; --without friction"):
-        find_scenes([str(path)])
+        found(tmp_path, text)
+
+
+def test_a_missing_file_is_refused_by_its_name(tmp_path):
     with pytest.raises(RequestError, match=r"none\.xml"):
         find_scenes([str(tmp_path / "none.xml")])
 
 
-def test_a_file_that_needs_xacro_is_refused_with_the_command(tmp_path):
+def test_a_xacro_file_is_refused_with_the_command_that_expands_it(tmp_path):
     (tmp_path / "robot.urdf.xacro").write_text("<robot name='r'/>")
     with pytest.raises(
         RequestError, match=r"no format reads .xacro; known: .*; write a URDF with `xacro FILE"

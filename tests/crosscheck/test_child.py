@@ -1,4 +1,4 @@
-"""Child process: what one call does / what the next one finds."""
+"""Child process: values, printed text and files of its calls, limits, and failures that end it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ def child() -> Iterator[Child]:
         yield made
 
 
-def test_calls_share_the_process_and_nothing_else(child: Child):
+def test_calls_share_a_process_but_no_folder_and_no_printed_text(child: Child):
+    """``converse`` prints by Python and C, warns, leaves a file, and returns its folder and process."""
     first, second = (child.call(converse, (text,), 60.0) for text in ("first", "second"))
     (here, pid), (there, again) = first.value, second.value
     assert pid == again, "the second call had another process"
@@ -38,28 +39,27 @@ def test_calls_share_the_process_and_nothing_else(child: Child):
     assert "first" not in second.printed, second.printed
 
 
-def test_silent_call_after_one_that_printed_much(child: Child):
+def test_a_silent_call_after_a_long_output_has_no_output(child: Child):
     child.call(converse, ("word " * 40,), 60.0)
     assert child.call(operator.add, (2, 3), 60.0) == (5, "", ())
 
 
-def test_child_has_the_present_environment(monkeypatch: pytest.MonkeyPatch):
+def test_a_child_has_the_environment_at_its_start(monkeypatch: pytest.MonkeyPatch):
     for value in ("first", "second"):
         monkeypatch.setenv("CROSSCHECK_PROBE", value)
         with closing(Child()) as made:
             assert made.call(os.getenv, ("CROSSCHECK_PROBE",), 60.0).value == value
-            assert made.call(os.getenv, ("OMP_NUM_THREADS",), 60.0).value == "1"
 
 
-def test_failed_call_and_its_child(child: Child):
+def test_a_call_that_raises_ends_its_child_as_crashed(child: Child):
     with pytest.raises(ChildFailed, match="ZeroDivisionError: division by zero") as raised:
         child.call(operator.truediv, (1, 0), 60.0)
     assert raised.value.outcome is Outcome.CRASHED
-    assert not child.is_alive, "what is left of a failed call would be there in the next"
+    assert not child.is_alive, "the next call would find remains of the failed one"
 
 
-def test_late_call_and_its_child(child: Child):
-    child.call(operator.add, (2, 3), 60.0)  # it has started
+def test_a_call_past_its_limit_ends_its_child_as_timed_out(child: Child):
+    child.call(operator.add, (2, 3), 60.0)  # the limit does not cover the start of the process
     with pytest.raises(ChildFailed, match=r"no result after 0\.2 s") as raised:
         child.call(time.sleep, (60.0,), 0.2)
     assert raised.value.outcome is Outcome.TIMED_OUT
@@ -67,7 +67,8 @@ def test_late_call_and_its_child(child: Child):
 
 
 @pytest.mark.parametrize("in_copy", [False, True])
-def test_a_busy_call_is_late(child: Child, in_copy: bool):
+def test_a_call_that_computes_without_pause_times_out(child: Child, in_copy: bool):
+    """3 ** 10⁹ holds the interpreter for hours, in the child itself or in a forked copy of it."""
     child.call(operator.add, (2, 3), 60.0)
     with pytest.raises(ChildFailed, match=r"no result after 0\.5 s") as raised:
         child.call(pow, (3, 10**9), 0.5, in_copy)
@@ -85,7 +86,8 @@ def test_value_that_cannot_be_sent_is_a_failed_call(child: Child):
 
 
 @pytest.mark.parametrize(("given", "used"), [({}, "1"), ({"OMP_NUM_THREADS": "3"}, "3")])
-def test_the_command_line_computes_with_one_thread_unless_the_user_wants_more(given, used):
+def test_the_command_line_computes_with_one_thread_unless_the_user_sets_a_number(given, used):
+    """The variable is set before numpy is imported, which reads it once."""
     known = {name: value for name, value in os.environ.items() if not name.endswith("_NUM_THREADS")}
     code = "import os, sys, crosscheck; assert 'numpy' not in sys.modules; import crosscheck.cli\n"
     code += "print(os.environ['OMP_NUM_THREADS'])"
