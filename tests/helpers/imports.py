@@ -33,15 +33,15 @@ class Files:
             status = int(end.code or 0)
         return status, *self.capsys.readouterr()
 
-    def scene(self, text: str, name: str, *words: str) -> tuple[Scene, str]:
+    def scene(self, text: str | bytes, name: str, *words: str) -> tuple[Scene, str]:
         """Return the scene that the command writes, and its output."""
         status, out, errors = self.run(text, name, *words)
         assert status == 0, errors
         return Scene.from_file(self.out), out
 
     def refusal(self, text: str | bytes, name: str, *words: str) -> str:
-        """Return the sentences with which the command refuses a file; the exit status is 2."""
+        """Return the sentences with which the command refuses a file, with exit status 2 and no scene."""
         status, _, errors = self.run(text, name, *words)
         assert status == 2, (status, errors)
-        assert errors.strip(), "no sentence"
+        assert errors.strip() and "Traceback" not in errors and not self.out.exists()
         return errors

@@ -1,4 +1,4 @@
-"""The suite's verdict on engines of low order: a right one conforms, and one with a fault does not."""
+"""Conformance suite: engines of order 1 and 2 conform with right equations, and fail with wrong ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def failures(step: Step, scenes: list[str], fault: str = "") -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("step", [euler, symplectic_euler, midpoint])
 @pytest.mark.parametrize("scene", sorted(set(SHOWN_ON.values())))
-def test_right_engine_of_low_order_conforms(step: Step, scene: str):
+def test_engine_of_low_order_with_right_equations_conforms(step: Step, scene: str):
     assert failures(step, [scene]) == []
 
 
@@ -47,12 +47,12 @@ def test_engine_of_low_order_with_a_fault_does_not_conform(step: Step, fault: st
 
 
 @pytest.mark.parametrize("step", [euler, midpoint])
-def test_engine_of_low_order_falls_right_and_not_with_twice_the_weight(step: Step):
+def test_free_fall_of_low_order_conforms_with_its_weight_and_fails_with_twice_its_weight(step: Step):
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")
 
 
 @pytest.mark.parametrize("step", [symplectic_euler, midpoint])
-def test_engine_of_low_order_that_forgets_armature_does_not_conform(step: Step):
-    """The example engine has no armature, and runs the scene as if it had none."""
+def test_engine_of_low_order_that_ignores_armature_does_not_conform(step: Step):
+    """The example engine knows no armature: it runs the scene with the armature as if it had none."""
     assert failures(step, ["armature pendulum"])

@@ -14,7 +14,8 @@ from crosscheck.processes.pool import capabilities, end_idle, run_isolated
 from crosscheck.study.grid import Case, study
 from tests.helpers.still_engines import LONG, resting
 
-TIMES, SETTING, MOST = np.array([0.0, 1.0]), Setting("plain", {}), 2000
+TIMES, SETTING = np.array([0.0, 1.0]), Setting("plain", {})
+MOST = 2000  # characters that a message may have
 
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
@@ -28,7 +29,7 @@ def test_record_has_the_beginning_of_a_message_of_10_megabytes(name: str, tmp_pa
 
 
 @pytest.mark.parametrize("name", ["TALKATIVE", "FAILING"])
-def test_run_in_this_process_has_the_same_message(name: str):
+def test_message_is_cut_alike_in_this_process_and_in_a_child_process(name: str):
     called = f"tests.helpers.still_engines:{name}"
     own = InProcess(engine(called), called).observe(resting("rest"), TIMES, SETTING).value
     assert own.message == run_isolated(called, resting("rest"), TIMES, SETTING, 60.0).message
@@ -36,7 +37,7 @@ def test_run_in_this_process_has_the_same_message(name: str):
     end_idle()
 
 
-def test_reason_of_a_refusal_is_cut():
+def test_reason_of_10_megabytes_for_a_refusal_is_cut_to_its_beginning():
     called = "tests.helpers.still_engines:REFUSING"
     _, cannot, _ = capabilities(called, resting("rest"), 60.0)
     assert cannot is not None and len(str(cannot)) < MOST and LONG[:500] in cannot.reason

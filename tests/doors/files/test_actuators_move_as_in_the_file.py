@@ -1,4 +1,4 @@
-"""Actuators of an MJCF file: the imported scene accelerates as MuJoCo's own model of the file."""
+"""Actuators of an MJCF file: joints of the imported scene accelerate as in MuJoCo (qacc)."""
 
 from __future__ import annotations
 
@@ -65,7 +65,8 @@ SERVOS = [
 CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.9]
 
 
-def test_springs_and_dampers_of_servos_accelerate_as_mujoco_says(files):
+def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
+    """Angles, speeds (random) and controls are in a keyframe with a name, and in one with a number only."""
     random = np.random.default_rng(3)
     for name in ("pose", ""):
         qpos = " ".join(map(str, random.uniform(-4, 4, len(SERVOS))))
@@ -78,16 +79,17 @@ def test_springs_and_dampers_of_servos_accelerate_as_mujoco_says(files):
         assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())
 
 
-def test_servos_act_without_a_keyframe_too(files):
+def test_servos_without_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
+    """Position servos hold the control 0 of the file; motor and damper have no control and no force."""
     text = model_of(SERVOS)
     scene, out = files.scene(text, "servos.xml")
     theirs = accelerations(text, -1)
-    assert "left out: 2 actuators without a control value: no force" in out, "motor and damper"
+    assert "left out: 2 actuators without a control value: no force" in out
     assert of_scene(scene) == pytest.approx(theirs, abs=ROUNDED * np.abs(theirs).max())
 
 
-def test_a_servo_holds_its_natural_angle_for_a_whole_motion(files):
-    """A pendulum without gravity between a spring of the joint and a servo: q = q∞ + a cos ωt."""
+def test_wheel_on_a_spring_and_a_servo_swings_about_their_common_natural_angle(files):
+    """q = q∞ + (q₀ - q∞) cos ωt with q∞ = (k qₛ + kₚ u) / (k + kₚ) and ω² = (k + kₚ) / I."""
     text = """<mujoco><compiler angle='radian'/><option gravity='0 0 0'/><worldbody><body name='a'>
     <joint name='j' axis='0 0 1' stiffness='2' springref='1'/>
     <inertial pos='0 0 0' mass='1' diaginertia='1 1 .5'/>
@@ -95,9 +97,9 @@ def test_a_servo_holds_its_natural_angle_for_a_whole_motion(files):
     <keyframe><key qpos='9' ctrl='-3'/></keyframe></mujoco>"""
     scene, _ = files.scene(text, "spun.xml", "--keyframe", "0")
     times = np.linspace(0.0, 2.0, 81)
-    middle, rate = (2 * 1 + 6 * -3) / 8, np.sqrt(8 / 0.5)
-    turned = mbref.simulate(scene, times=times).joint("j").angle
-    assert turned == pytest.approx((9 - middle) * (np.cos(rate * times) - 1), abs=1e-8 * 9)
+    start, middle, rate = 9, (2 * 1 + 6 * -3) / (2 + 6), np.sqrt((2 + 6) / 0.5)
+    turned = mbref.simulate(scene, times=times).joint("j").angle  # from the angle of the keyframe
+    assert turned == pytest.approx((start - middle) * (np.cos(rate * times) - 1), abs=1e-8 * start)
 
 
 @pytest.mark.parametrize(
@@ -122,7 +124,7 @@ def test_a_servo_holds_its_natural_angle_for_a_whole_motion(files):
         ),
     ],
 )
-def test_an_actuator_that_no_scene_has_is_an_error_unless_it_is_left_out(files, actuator, key, says):
+def test_an_actuator_that_a_scene_cannot_have_is_refused_or_left_out_on_request(files, actuator, key, says):
     text = model_of([actuator], f"name='k' {key}" if key else "")
     text = text.replace("</worldbody>", "<site name='there'/></worldbody>")
     words = ("--keyframe", "k") if key else ()
@@ -132,7 +134,8 @@ def test_an_actuator_that_no_scene_has_is_an_error_unless_it_is_left_out(files, 
     assert not scene.load and "(--without motors)" in out
 
 
-def test_forces_are_clipped_as_in_the_file(files):
+def test_controls_and_forces_of_motors_are_clipped_as_in_mujoco(files):
+    """The ranges are of a control, of an actuator's force and of a joint's force."""
     parts = [
         "<motor joint='JOINT' ctrlrange='-1 1' ctrllimited='true' gear='2'/>",
         "<motor joint='JOINT' forcerange='-0.5 0.5' gear='2'/>",
@@ -147,6 +150,7 @@ def test_forces_are_clipped_as_in_the_file(files):
 
 
 def test_keyframes_are_found_by_name_and_by_number(files):
+    """The file has the keyframe "other" at zero, and one at 0.5 rad whose only name is its number, 1."""
     text = model_of(["<motor joint='JOINT'/>"], "qpos='0.5'")
     by_number = files.scene(text, "a.xml", "--keyframe", "1")[0]
     assert by_number.body[0].orientation[2] == pytest.approx(np.sin(0.25), rel=1e-12)
@@ -154,7 +158,8 @@ def test_keyframes_are_found_by_name_and_by_number(files):
     assert "known: other, 1" in files.refusal(text, "a.xml", "--keyframe", "2")
 
 
-def test_a_number_that_is_a_name_means_the_name(files):
+def test_a_number_that_is_the_name_of_a_keyframe_means_that_keyframe(files):
+    """The second keyframe, at 0.5 rad, has the name "0"."""
     text = model_of(["<motor joint='JOINT'/>"], "name='0' qpos='0.5'")
     scene, _ = files.scene(text, "a.xml", "--keyframe", "0")
     assert scene.body[0].orientation[2] == pytest.approx(np.sin(0.25), rel=1e-12)

@@ -35,15 +35,15 @@ def folder(place: Path, lines: bytes) -> Path:
     return place
 
 
-def record_without(field: str, value: Any = None) -> bytes:
-    """Return a record with another value of a field, or without the field."""
+def record_with(field: str, value: Any = None) -> bytes:
+    """Return a line of a right record in which a field has another value, or is missing."""
     record = copy.deepcopy(RECORD)
     del record[field]
     return json.dumps(record if value is None else {**record, field: value}).encode() + b"\n"
 
 
 def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
-    """Return the message with which a folder is neither rendered nor compared."""
+    """Return the message with which a folder is not rendered; it is not compared either."""
     assert report(["--render", str(place)]) == 2
     rendering = capsys.readouterr().err
     assert crosscheck(["diff", str(place), str(place)]) == 2
@@ -55,28 +55,28 @@ def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
 
 
 @pytest.mark.parametrize("content", FOREIGN, ids=lambda content: ascii(content[:8]))
-def test_file_without_records_is_named(content, tmp_path, capsys):
+def test_records_file_of_other_content_is_named(content, tmp_path, capsys):
     assert "holds no records" in refused(capsys, folder(tmp_path / "r", content))
 
 
 @pytest.mark.parametrize(("field", "value"), FAULTS, ids=lambda x: str(x)[:12])
 def test_faulty_field_of_a_record_is_named(field, value, tmp_path, capsys):
-    said = refused(capsys, folder(tmp_path / "r", record_without(field, value)))
+    said = refused(capsys, folder(tmp_path / "r", record_with(field, value)))
     assert f"record 'k1': {field}" in said
 
 
 @pytest.mark.parametrize("name", ["timings.jsonl", "truths.jsonl", "motions.jsonl", "conformance/x.json"])
-def test_faulty_companions_of_records_are_named(name, tmp_path, capsys):
-    place = folder(tmp_path / "r", record_without("seed", 0))
+def test_faulty_file_beside_right_records_is_named(name, tmp_path, capsys):
+    place = folder(tmp_path / "r", record_with("seed", 0))
     (place / name).parent.mkdir(exist_ok=True)
     (place / name).write_text('{"key": "k1", "scene": "four_bar"}\n')
     assert report(["--render", str(place)]) == 2
     assert name in capsys.readouterr().err
 
 
-def test_stored_tables_of_the_commands_are_checked(tmp_path, capsys):
+def test_commands_that_print_records_name_their_missing_field(tmp_path, capsys):
     faulty = tmp_path / "records.jsonl"
-    faulty.write_bytes(record_without("cost"))
+    faulty.write_bytes(record_with("cost"))
     for command in ("closed-loops", "convergence"):
         assert crosscheck([command, "--records", str(faulty)]) == 2
         assert "record 'k1': cost: field required" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Output files: complete or unchanged, in their folder, and never over a file that exists without a word."""
+"""Output files: complete or unchanged, in their folder, and over a file that exists only by --force."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def test_full_disk_leaves_no_part_of_a_file(command, tmp_path, capsys):
     assert out.read_text() == "my own" and [*tmp_path.iterdir()] == [out]
 
 
-def test_reference_table_on_a_full_disk_is_not_cut(tmp_path, capsys):
+def test_full_disk_leaves_no_part_of_a_reference_table(tmp_path, capsys):
     out = tmp_path / "table.csv"
     with full_disk(500):
         words = ["reference", "four_bar", "--samples", "20", "--out", str(out)]
@@ -74,8 +74,8 @@ def test_reference_table_on_a_full_disk_is_not_cut(tmp_path, capsys):
     assert str(out) in capsys.readouterr().err and not [*tmp_path.iterdir()]
 
 
-def test_link_to_a_file_stays_a_link_and_permissions_stay(tmp_path):
-    target, link = tmp_path / "kept.csv", tmp_path / "link.csv"
+def test_table_is_written_through_a_link_into_its_target_which_keeps_its_permissions(tmp_path):
+    target, link = tmp_path / "target.csv", tmp_path / "link.csv"
     target.write_text("old")
     target.chmod(0o640)
     link.symlink_to(target)
@@ -84,7 +84,7 @@ def test_link_to_a_file_stays_a_link_and_permissions_stay(tmp_path):
     assert target.stat().st_mode & 0o777 == 0o640
 
 
-def test_default_file_of_a_picture_is_replaced_only_by_force(tmp_path, monkeypatch, capsys):
+def test_picture_with_the_default_name_is_replaced_only_by_force(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["draw", "four_bar"]) == 0
     assert main(["draw", "four_bar"]) == 2
@@ -93,7 +93,7 @@ def test_default_file_of_a_picture_is_replaced_only_by_force(tmp_path, monkeypat
     assert [path.name for path in tmp_path.iterdir()] == ["four_bar.svg"]
 
 
-def test_folder_with_other_files_becomes_no_report_unless_forced(tmp_path, capsys):
+def test_report_is_not_written_into_a_folder_with_other_files(tmp_path, capsys):
     from reports.__main__ import main as report
 
     mine = tmp_path / "scenes" / "four_bar.toml"
@@ -105,7 +105,7 @@ def test_folder_with_other_files_becomes_no_report_unless_forced(tmp_path, capsy
 
 
 @pytest.mark.parametrize("path", ["no/such/folder/out.svg", "", ".", "x" * 300 + ".svg", "a\nb/c.svg"])
-def test_path_that_cannot_be_written_is_refused_before_any_work(path, tmp_path, monkeypatch, capsys):
+def test_path_that_cannot_be_written_is_refused_and_nothing_is_written(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     with pytest.raises(SystemExit) as ended:
         main(["draw", "four_bar", "--out", path])

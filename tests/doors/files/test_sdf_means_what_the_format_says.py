@@ -36,7 +36,8 @@ def sdf(*parts: str, version: str = "1.6") -> str:
 
 
 @pytest.mark.parametrize("name", ["world", "arm", "hand", "__model__"])
-def test_a_joint_is_at_its_child_whatever_its_name(files, name):
+def test_a_joint_without_a_pose_is_at_its_child_link_whatever_its_name(files, name):
+    """As the format says; "world" and "__model__" are also names of frames, and "arm" and "hand" of links."""
     text = sdf(
         link("arm", "0.5 0 0 0 0 0"),
         link("hand", "0.9 0.2 0 0 0 0"),
@@ -58,6 +59,7 @@ def test_a_joint_is_at_its_child_whatever_its_name(files, name):
     ],
 )
 def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
+    """As libsdformat: thread_pitch p is -2π / p m a turn, screw_thread_pitch comes first, 1 m is usual."""
     scene, _ = files.scene(sdf(link("nut"), joint("s", "screw", "world", "nut", more=more)), "screw.sdf")
     motion = mbref.simulate(scene.with_(gravity=(0.0, 0.0, -9.81)), times=[0.0, 0.3])
     turned, moved = motion.joint("s").angle[-1], motion["nut"].position[-1][2]
@@ -65,7 +67,8 @@ def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
     assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)
 
 
-def test_a_mimic_with_an_offset_starts_where_both_joints_obey(files):
+def test_joints_of_a_mimic_with_an_offset_are_turned_at_the_start_so_that_both_obey(files):
+    """The format: follower = multiplier (leader - reference) + offset, here -1.5 (q + 0.4) + 0.2, in rad."""
     mimic = mimics("lead", -1.5, 0.2, -0.4)
     arm = "<inertial><pose>0.2 0 0 0 0 0</pose><mass>1</mass></inertial>"
     text = sdf(
@@ -85,7 +88,8 @@ def test_a_mimic_with_an_offset_starts_where_both_joints_obey(files):
 @pytest.mark.parametrize(
     ("ratio", "reference", "offset"), [(3, 0.1, 0.3), (0.1, 0.7, 0.07), (-1.1, 1.1, -1.21)]
 )
-def test_an_offset_by_rounding_is_none(files, ratio, reference, offset):
+def test_an_offset_that_is_zero_but_for_rounding_is_exactly_zero(files, ratio, reference, offset):
+    """offset - ratio · reference vanishes, but not in binary numbers."""
     mimic = mimics("a", ratio, offset, reference)
     text = sdf(
         link("p"),
@@ -102,7 +106,8 @@ def inertia(xx: float, yy: float, zz: float) -> str:
     return f"<inertial><mass>1</mass><inertia>{entries}</inertia></inertial>"
 
 
-def test_an_impossible_inertia_is_named_with_its_moments(files):
+def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
+    """A moment equal to their sum, but for rounding, is that of a flat plate, and is read."""
     text = sdf(link("plate", inertia=inertia(0.2, 0.9, 0.3)), joint("j", "revolute", "world", "plate"))
     said = files.refusal(text, "plate.sdf")
     assert "link 'plate'" in said and "0.2, 0.3, 0.9" in said and "<ixx>, <iyy>, <izz>" in said
@@ -135,7 +140,8 @@ def hanging(limit: str, kind: str = "revolute") -> str:
         ("<lower>-1e16</lower><upper>1e16</upper>", "prismatic", False),
     ],
 )
-def test_a_limit_that_acts_at_the_start_is_an_error(files, limit, kind, acts):
+def test_a_limit_is_refused_if_the_motion_meets_it_at_the_start(files, limit, kind, acts):
+    """Joints start at 0. A body falls to larger angles or smaller displacements; ±1e16 is no limit in SDF."""
     text = hanging(limit, kind)
     if not acts:
         assert "1 limit of a joint" in files.scene(text, "a.sdf")[1]
@@ -144,7 +150,7 @@ def test_a_limit_that_acts_at_the_start_is_an_error(files, limit, kind, acts):
     assert "(--without limits)" in files.scene(text, "a.sdf", "--without", "limits")[1]
 
 
-def test_unknown_elements_are_listed(files):
+def test_elements_that_are_not_read_are_listed_with_their_part(files):
     text = sdf(
         link("a").replace("<inertial>", "<hovers>1</hovers><inertial>"),
         joint(
@@ -156,7 +162,8 @@ def test_unknown_elements_are_listed(files):
     assert "left out: <physics> of joint 'j': is not read" in out
 
 
-def test_many_frames_in_a_row_are_followed(files):
+def test_a_chain_of_2000_frames_is_followed_to_its_end(files):
+    """Each frame is 1 mm from the next one: the link is at 2 m."""
     frames = "".join(
         f"<frame name='f{k}'><pose relative_to='f{k + 1}'>0.001 0 0 0 0 0</pose></frame>" for k in range(2000)
     )

@@ -1,4 +1,4 @@
-"""URDF: loops of further elements, elements that nobody reads, and inertias that no body has."""
+"""URDF: elements that close loops, elements that are not read, and impossible inertias."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ PLACES = """<parent link="b"/><parent_origin xyz="0.3 0 0"/><child link="c"/><ch
         ("fixed", "", 0),
     ],
 )
-def test_a_loop_of_parent_and_child_is_a_joint(files, tag, kind, axes, freedoms):
+def test_an_element_that_closes_a_loop_is_a_joint_of_the_scene(files, tag, kind, axes, freedoms):
+    """A parallelogram of links of 0.3 m with the crank at 1.2 rad: the tip is at 0.3 (1 + cos, 0, sin) m."""
     turn = ' rpy="0 -1.2 0"' if kind == "fixed" else ""
     places = PLACES.replace('<parent_origin xyz="0.3 0 0"', f'<parent_origin xyz="0.3 0 0"{turn}')
     loop = f'<{tag} name="tip" type="{kind}">{places}{axes}</{tag}>'
@@ -64,11 +65,11 @@ def test_a_loop_of_parent_and_child_is_a_joint(files, tag, kind, axes, freedoms)
         ),
     ],
 )
-def test_a_faulty_loop_is_named(files, loop, says):
+def test_a_fault_of_an_element_that_closes_a_loop_is_named(files, loop, says):
     assert says in files.refusal(robot(*CRANKS, loop), "r.urdf")
 
 
-def test_elements_that_nobody_reads_are_listed(files):
+def test_elements_that_are_not_read_are_listed_with_their_part(files):
     parts = (
         hinge("ja", "base", "a", "0 0 0", more="<safety_controller k_velocity='1'/>"),
         hinge("jb", "a", "b", "0.3 0 0", more="<springy/>"),
@@ -81,14 +82,15 @@ def test_elements_that_nobody_reads_are_listed(files):
         assert f"left out: <{tag}> of " in out
 
 
-def test_an_impossible_inertia_is_named_with_its_moments(files):
+def test_a_moment_of_inertia_larger_than_the_two_others_together_is_refused(files):
     text = robot(*CRANKS).replace(MOMENTS, 'ixx="0.1" ixy="0" ixz="0" iyy="0.5" iyz="0" izz="0.2"', 1)
     said = files.refusal(text, "r.urdf")
     assert "link 'a'" in said and "0.1, 0.2, 0.5 kg m²" in said and "balanceinertia" not in said
 
 
 @pytest.mark.parametrize("excess", [0.0, 1e-16, 1e-13, 1e-10])
-def test_a_flat_link_is_read_as_rounded(files, excess):
+def test_inertia_of_a_flat_link_is_read_though_rounding_makes_it_impossible(files, excess):
+    """A moment of 0.3 (1 + excess) = 0.1 + 0.2 kg m² but for a relative rounding of up to 1e-10."""
     moments = f'ixx="0.1" ixy="0" ixz="0" iyy="{0.3 * (1 + excess)!r}" iyz="0" izz="0.2"'
     scene, _ = files.scene(robot(*CRANKS).replace(MOMENTS, moments, 1), "r.urdf")
     assert np.diag(scene.body[0].inertia) == pytest.approx(np.diag([0.1, 0.3, 0.2]), rel=1e-8, abs=1e-8)

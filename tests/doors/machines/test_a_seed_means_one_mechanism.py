@@ -53,7 +53,8 @@ def table() -> dict[str, list[list[float]]]:
     return drawn | {name: [signature(scene) for scene in scenes] for name, scenes in named().items()}
 
 
-def test_mechanisms_are_the_stored_ones():
+def test_mechanisms_of_all_seeds_and_names_equal_the_stored_ones():
+    """The words of their scenes agree exactly, and the weighted sums of their numbers to 12 digits."""
     found, wanted = table(), json.loads(STORED.read_text())
     assert found.keys() == wanted.keys()
     for name, signatures in found.items():
@@ -66,11 +67,12 @@ def test_mechanisms_are_the_stored_ones():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kernels", KERNELS)
-def test_mechanisms_do_not_depend_on_the_kernels_of_the_linear_algebra(kernels):
+def test_mechanisms_do_not_depend_on_the_kernels_of_openblas(kernels):
+    """OpenBLAS rounds otherwise for each family of processors, which OPENBLAS_CORETYPE chooses."""
     changes = {"OPENBLAS_CORETYPE": kernels}
     if not runs_here(changes):
         pytest.skip(f"this processor does not run the kernels {kernels}")
-    test = f"{__file__}::test_mechanisms_are_the_stored_ones"
+    test = f"{__file__}::test_mechanisms_of_all_seeds_and_names_equal_the_stored_ones"
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", test]
     done = subprocess.run(
         command, cwd=ROOT, env=environment(changes), capture_output=True, text=True, check=False

@@ -70,7 +70,8 @@ def numbers_in(log: Path) -> list[int]:
     raise AssertionError(f"nothing was written to {log}")
 
 
-def test_child_that_is_killed_while_it_waits_is_replaced(log: Path):
+def test_child_process_that_is_killed_between_two_runs_is_replaced(log: Path):
+    """Five runs complete in five processes: SIGKILL ends each process after its run."""
     end_idle()
     for _ in range(5):
         run = run_isolated(f"{ENGINES}:LOGGED", resting(), np.array([0.0, 1.0]), Setting("plain", {}), 60.0)
@@ -81,7 +82,8 @@ def test_child_that_is_killed_while_it_waits_is_replaced(log: Path):
 
 
 @pytest.mark.parametrize("engine", ["LEAVES_A_PROGRAM", "WAITS_WITH_A_PROGRAM"])
-def test_programs_that_an_engine_started_end_with_the_parent(engine: str, log: Path):
+def test_programs_that_an_engine_started_end_when_the_parent_is_killed(engine: str, log: Path):
+    """The process of the engine and its program end, after the run and during it."""
     command = [sys.executable, "-c", RUN, f"{ENGINES}:{engine}"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, cwd=ROOT) as parent:
         processes = numbers_in(log)
@@ -90,7 +92,9 @@ def test_programs_that_an_engine_started_end_with_the_parent(engine: str, log: P
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_program_ends_with_its_parent(number: signal.Signals, tmp_path: Path):
+def test_program_ends_when_a_signal_ends_its_parent(number: signal.Signals, tmp_path: Path):
+    """SIGINT and SIGTERM are passed on, and the exit status is the program's, 256 - signal. SIGKILL cannot be
+    passed on; the processes that the program started end, too."""
     (tmp_path / "waiting_module.py").write_text(WAITING)
     environment = {**os.environ, "PYTHONPATH": f"{ROOT}{os.pathsep}{tmp_path}"}
     command = [sys.executable, "-c", PROGRAM, "--option"]
@@ -111,6 +115,7 @@ def test_program_ends_with_its_parent(number: signal.Signals, tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("command", ["report", "compare"])
 def test_command_that_is_killed_leaves_no_process(command: str, log: Path, tmp_path: Path):
+    """A variable of the environment marks its processes; an engine and its program are among them."""
     options = ["--out", str(tmp_path / "out")] if command == "report" else []
     resting().save(tmp_path / "resting.toml")
     asked = [command, str(tmp_path / "resting.toml"), "--engine", f"{ENGINES}:WAITS_WITH_A_PROGRAM", *options]

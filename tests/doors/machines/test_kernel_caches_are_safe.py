@@ -1,4 +1,4 @@
-"""Compiled kernels on disk: not loaded from a folder of others, and damage is found at any file time."""
+"""Compiled kernels on disk: none is loaded from a folder that others can write, nor from a damaged file."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ USERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="needs users of PO
 
 
 def run(folder: Path, cache: Path) -> tuple[str, str, str]:
-    """Return the value, the number of kernels from the cache, and the errors of a program with a kernel."""
+    """Run a program that doubles 3.0 by a kernel; return its result, the kernels loaded, and its errors."""
     program = folder / "program.py"
     if not program.exists():  # numba compiles anew after a change of the file's time
         program.write_text(RUN)
@@ -45,6 +45,7 @@ def run(folder: Path, cache: Path) -> tuple[str, str, str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("place", ["root", "versions", "kernels"])
 def test_a_cache_that_others_can_write_is_not_loaded(place, tmp_path):
+    """One of its three levels of folders has the mode 0777; with the old mode the kernel is loaded again."""
     cache = tmp_path / "cache"
     assert run(tmp_path, cache)[:2] == ("6.0", "0") and run(tmp_path, cache)[:2] == ("6.0", "1")
     (version,) = cache.iterdir()
@@ -63,19 +64,21 @@ def test_a_cache_that_others_can_write_is_not_loaded(place, tmp_path):
 
 @USERS
 @pytest.mark.slow
-def test_a_new_cache_is_closed_to_others(tmp_path):
-    before = os.umask(0)
+def test_a_new_cache_and_its_folder_of_a_version_have_mode_0700_whatever_the_umask(tmp_path):
+    cache, before = tmp_path / "cache", os.umask(0)
     try:
-        run(tmp_path, tmp_path / "cache")
-        assert run(tmp_path, tmp_path / "cache")[1:] == ("1", "")
+        run(tmp_path, cache)
+        assert [path.stat().st_mode & 0o777 for path in (cache, *cache.iterdir())] == [0o700, 0o700]
+        assert run(tmp_path, cache)[1:] == ("1", ""), "the owner loads the kernel"
     finally:
         os.umask(before)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ahead", [5.0, 1e8])
-@pytest.mark.parametrize("pattern", ["*.nbc", "*.nbi"])
-def test_damaged_kernels_of_the_future_are_compiled_again(pattern, ahead, tmp_path):
+@pytest.mark.parametrize("ahead", [5.0, 1e8])  # s: clocks that differ a little, or by three years
+@pytest.mark.parametrize("pattern", ["*.nbc", "*.nbi"])  # numba's machine code and its index
+def test_damaged_kernel_is_compiled_again_though_its_file_time_lies_ahead(pattern, ahead, tmp_path):
+    """Damage is found by a checksum, and not by the times of files."""
     cache = tmp_path / "cache"
     run(tmp_path, cache)
     (file,) = cache.rglob(pattern)
@@ -89,14 +92,14 @@ def test_damaged_kernels_of_the_future_are_compiled_again(pattern, ahead, tmp_pa
 
 
 @USERS
-def test_stored_data_of_a_folder_of_others_are_not_read(tmp_path, capsys):
+def test_no_data_are_written_to_or_read_from_a_folder_that_others_can_write(tmp_path, capsys):
     ours, open_to_all = tmp_path / "cache" / "ours", tmp_path / "cache" / "open"
-    checked_file.write(ours / "data", b"kept")
+    checked_file.write(ours / "data", b"stored")
     for folder in (tmp_path, ours.parent):  # which others can reach
         folder.chmod(0o755)
     open_to_all.mkdir()
     open_to_all.chmod(0o777)
-    checked_file.write(open_to_all / "data", b"not kept")
-    assert checked_file.read(ours / "data") == b"kept"
+    checked_file.write(open_to_all / "data", b"refused")
+    assert checked_file.read(ours / "data") == b"stored"
     assert not (open_to_all / "data").exists() and checked_file.read(open_to_all / "data") is None
     assert capsys.readouterr().err.count("can be written by other users") == 1
