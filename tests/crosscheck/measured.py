@@ -8,14 +8,16 @@ from __future__ import annotations
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
+from mbref.trajectory import Outcome, Trajectory
 
 MARGIN = 10.0  # for other processors, and other versions of libraries
 ROUNDING = 1e-14  # stands for measured errors that are smaller
 
 
-def error(run: Trajectory, scene: Scene) -> float:
-    """Return the largest error of a position (m) or an orientation (rad) of a run, by its truth."""
+def completed_error(run: Trajectory, scene: Scene) -> float:
+    """Return the largest error of a position (m) or an orientation (rad), by the truth; the run must have
+    completed."""
+    assert run.outcome is Outcome.COMPLETED, f"{run.outcome.label} at {run.t_end} s: {run.message}"
     truth = truth_for(scene).poses(run.times)
     turned = rotations.angle_between(run.orientation, truth.orientation).max()
     return max(abs(run.position - truth.position).max(), turned)

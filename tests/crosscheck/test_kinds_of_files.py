@@ -95,21 +95,23 @@ def found(name: str) -> Source:
         if not name.startswith(ROWS_OF_OUR_OWN)
     ],
 )
-def test_a_file_of_each_kind_moves_as_its_own_model(name):
+def test_imported_scene_moves_as_mujoco_s_model_of_the_file(name):
+    """The judge moves the scene; the file's masses, forces and rows by MuJoCo are integrated finely."""
     read_file = found(name)
     assert apart(read_file.original, read_file, 0.02, read_file.original.nkey - 1) < SAME
 
 
 @pytest.mark.parametrize("name", sorted(REFUSED))
-def test_a_file_of_each_kind_is_refused_by_name(name):
+def test_file_with_an_unsupported_element_is_refused_with_the_element_s_name(name):
+    """REFUSED gives each file's element and, if it may be left out, the option ``--without``."""
     with pytest.raises(SceneError) as refusal:
         found(name)
     assert re.search(REFUSED[name], " ".join(str(refusal.value).split()))
 
 
 @pytest.mark.parametrize("name", [n for n in READ if n.endswith(".urdf") and n not in FREE_IN_PINOCCHIO])
-def test_a_urdf_has_the_masses_and_weights_of_pinocchio_s_own_reading(name):
-    """Mass matrix and weight in joint coordinates, at random coordinates."""
+def test_urdf_has_the_mass_matrix_and_weight_of_pinocchio_s_reading(name):
+    """At random joint coordinates, M and g of the model that the scene is made from are Pinocchio's."""
     pinocchio = pytest.importorskip("pinocchio")
     model, ours = pinocchio.buildModelFromXML((KINDS / name).read_text()), found(name).original
     data, random = mujoco.MjData(ours), np.random.default_rng(0)
@@ -130,8 +132,8 @@ def test_a_urdf_has_the_masses_and_weights_of_pinocchio_s_own_reading(name):
     assert np.abs(data.qfrc_bias - weight).max() < SAME * np.abs(weight).max()
 
 
-def test_files_that_include_and_attach_others(tmp_path):
-    """A body of an included file, and one of a model that is attached with a prefix."""
+def test_included_and_attached_bodies_are_imported_with_their_prefix(tmp_path):
+    """An included file gives body "arm"; the file attached with prefix "left/" gives "left/arm"."""
     arm = f'<body name="arm" pos="0 0 0.5">{hinge("A")}{LUMP}</body>'
     (tmp_path / "arm.xml").write_text(f"<mujoco><worldbody>{arm}</worldbody></mujoco>")
     both = """<mujoco><include file="arm.xml"/><asset><model name="other" file="arm.xml"/></asset><worldbody>
@@ -142,16 +144,18 @@ def test_files_that_include_and_attach_others(tmp_path):
     assert apart(read_file.original, read_file, 0.02) < SAME
 
 
-def test_straight_chains_are_closed_in_the_direction_in_which_they_fall():
+def test_straight_chain_is_closed_below_its_straight_line():
+    """The file's chain is straight at a height of 1 m, where it can close upward or downward: it falls."""
     scene = found("connect_by_sites.xml").imported.scene
-    assert scene.joint_named("C").anchor[2] < 1.0  # the chain is straight at a height of 1 m
+    assert scene.joint_named("C").anchor[2] < 1.0
 
 
-def test_missing_shapes_are_named():
+def test_missing_shape_files_are_named_in_the_notes():
     notes = found("missing_mesh.xml").imported.notes
     assert "files that are missing: link1.stl, link2.obj, skin.png; these shapes have no effect" in notes
 
 
-def test_motion_capture_bodies_stand_where_the_keyframe_has_them():
+def test_motion_capture_body_stands_at_its_place_in_the_keyframe():
+    """The keyframe has mpos="0.6 0.1 1.5"; the file's own place of the body is (0.5, 0, 1.4)."""
     scene = found("mocap_in_a_keyframe.xml").imported.scene
     assert np.allclose(scene.joint_named("e").anchor, (0.6, 0.1, 1.5))

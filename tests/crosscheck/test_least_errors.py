@@ -33,7 +33,9 @@ RECORDS = [
 ]
 
 
-def test_rows_and_records():
+def test_table_shows_the_best_family_and_the_end_of_the_others():
+    """Columns: scene, engine, best family, its settings, least error, time (s), families within 1e-9,
+    others. A run is reached (within 1e-9) for "good", 2e-10, and not for "bad", 2e-8."""
     good, bad = least_errors(RECORDS)
     assert good.row() == (
         "bar",
@@ -49,7 +51,7 @@ def test_rows_and_records():
     assert bad.row()[4:] == ("2.00e-08", "2", "", "only 2.00e-08"), bad.row()
 
 
-def test_engine_without_a_completed_run():
+def test_engine_without_a_completed_run_is_shown_by_its_last_end():
     (least,) = least_errors([r for r in RECORDS if r["family"] == "early"])
     assert not least.is_reached
     assert least.best["outcome"] == "NOT_CONVERGED", "the run that got furthest stands for the engine"

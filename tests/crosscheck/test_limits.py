@@ -20,8 +20,8 @@ TRUTH = truth_for(SCENE).poses(np.linspace(0, 0.02, 5))
 
 
 def made(step: float, order: float, bias: float, constant: float = 1e-2) -> Trajectory:
-    """A run off the truth by bias + constant · step^order, shifted and turned by as much; every second one
-    with the other sign of its quaternions."""
+    """A run off the truth by bias + constant · step^order, shifted and turned by as much; the run of step
+    0.1 has quaternions of opposite sign, which are the same orientations."""
     off = bias + constant * step**order
     turn = rotations.from_vector([0.0, off / 2, 0.0])
     sign = -1.0 if step == 0.1 else 1.0
@@ -32,7 +32,9 @@ def made(step: float, order: float, bias: float, constant: float = 1e-2) -> Traj
 
 
 @pytest.mark.parametrize("order, bias", [(1.0, 1e-4), (2.0, 0.0), (2.0, 3e-5), (4.0, 1e-6)])
-def test_order_and_bias_found_and_put_in(order: float, bias: float):
+def test_richardson_limit_finds_the_order_and_bias_put_into_the_runs(order: float, bias: float):
+    """The limit of the steps to zero is off the truth by the bias; the finest run (step 0.1) is off its limit
+    by 1e-2 · 0.1^order."""
     steps = [0.1, 0.3, 1.0, 0.2]
     found = limit(SCENE, steps, [made(h, order, bias) for h in steps])
     error = error_series(SCENE, found.motion, TRUTH).max()
@@ -41,9 +43,14 @@ def test_order_and_bias_found_and_put_in(order: float, bias: float):
     assert error == pytest.approx(bias, rel=1e-2, abs=1e-8), f"limit off by {error:.2e}, bias put in {bias:g}"
 
 
-def test_runs_off_every_power_and_no_limit():
-    steps = [1.0, 0.5, 0.25]
-    wandering = [made(h, 1.0, off) for h, off in zip(steps, (0.0, 1e-3, -2e-2), strict=True)]
-    assert limit(SCENE, steps, wandering) is None
-    assert limit(SCENE, steps, [made(0.5, 1.0, 1e-3)] * 3) is None, "no difference, no order"
-    assert limit(SCENE, steps[:2], wandering[:2]) is None, "two runs have no order"
+STEPS = [1.0, 0.5, 0.25]
+WANDERING = [made(h, 1.0, off) for h, off in zip(STEPS, (0.0, 1e-3, -2e-2), strict=True)]
+
+
+@pytest.mark.parametrize(
+    "runs",
+    [WANDERING, [made(0.5, 1.0, 1e-3)] * 3, [made(h, 1.0, 0.0) for h in STEPS[:2]]],
+    ids=["differences that grow", "equal runs", "two runs"],
+)
+def test_runs_that_follow_no_power_of_the_step_have_no_limit(runs):
+    assert limit(SCENE, STEPS[: len(runs)], runs) is None

@@ -28,8 +28,14 @@ FORMULATIONS = {"A": natural_motion, "B": lambda *args: tree_motion(*args, secon
 PROBES = {name: scene for name, scene in feature_scenes().items() if "time" in name or "_" in name}
 
 
+ROUNDED = 1e-15  # m: positions of up to 1 m, integrated in long double and rounded to double
+
+
 @pytest.mark.parametrize("name", FORMULATIONS)
-def test_formulations_have_the_closed_forms(name):
+def test_reference_formulations_move_joint_loads_as_the_closed_forms(name):
+    """A sprung and damped slide, a slide under a force that is switched, and a wheel under a sinusoidal
+    torque, whose angle is compared modulo a full turn (rad, up to 4 roundings)."""
+
     def moved(scene: Scene) -> np.ndarray:
         motion = FORMULATIONS[name](scene, TIMES, EXTENDED)
         assert not motion.reason
@@ -37,15 +43,16 @@ def test_formulations_have_the_closed_forms(name):
 
     start = np.array(scenes.sprung_slide().body[0].position)
     along = (moved(scenes.sprung_slide()) - start) @ AXIS
-    assert np.abs(along - scenes.sprung_displacement(TIMES)).max() < 1e-15
-    assert np.abs(moved(scenes.thrown()) @ AXIS - scenes.switched(TIMES)).max() < 1e-15
+    assert np.abs(along - scenes.sprung_displacement(TIMES)).max() < ROUNDED
+    assert np.abs(moved(scenes.thrown()) @ AXIS - scenes.switched(TIMES)).max() < ROUNDED
     motion = FORMULATIONS[name](scenes.wheel(), TIMES, EXTENDED)
     turned = 2 * np.arctan2(*doubles(motion.orientation)[:, 0, [3, 0]].T)
     apart = turned - scenes.turned(TIMES)
-    assert np.abs(apart - 2 * np.pi * np.round(apart / 2 / np.pi)).max() < 4e-15
+    assert np.abs(apart - 2 * np.pi * np.round(apart / 2 / np.pi)).max() < 4 * ROUNDED
 
 
-def test_energy_of_constant_loads_of_joints_is_balanced():
+def test_motion_under_constant_joint_loads_keeps_its_energy():
+    """Undamped springs, constant forces and constant torques of joints have a potential."""
     scene = scenes.arm()
     still = [
         load.model_copy(update={"damping": 0.0} if load.action.stiffness else {"factor": None})
@@ -55,12 +62,12 @@ def test_energy_of_constant_loads_of_joints_is_balanced():
     scene = scene.with_(load=still)
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 1.0, 41)))
     assert energy_drift(scene, motion).max() < 1e-8
-    assert energy_drift(scenes.arm(), motion) is None
+    assert energy_drift(scenes.arm(), motion) is None, "dampers and loads over time have no potential"
 
 
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
 @pytest.mark.parametrize(("of", "within"), [("mujoco", 1e-12), ("exudyn", 1e-10), ("pinocchio", 1e-10)])
-def test_engines_move_loads_of_joints(of, within, name):
+def test_engine_moves_joint_loads_as_the_reference(of, within, name):
     check(of, PROBES[name], within)
 
 
@@ -69,7 +76,7 @@ SMOOTH = ("slide_spring load", "joint_torque load", "joint_force load", "polynom
 
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("on_terms", ["drake", "dart"])
-def test_terms_of_engines_move_loads_of_joints(on_terms, name):
+def test_integrated_accelerations_of_drake_and_dart_move_joint_loads_as_the_reference(on_terms, name):
     pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}[on_terms])
     check(on_terms, PROBES[name].with_(duration=0.2), 1e-10)
 
@@ -83,8 +90,8 @@ def test_terms_of_engines_move_loads_of_joints(on_terms, name):
         ("bullet", "pybullet", "iterated", {"iterations": 1000}),
     ],
 )
-def test_own_steps_of_engines_move_loads_of_joints(of, module, family, options, name):
-    """A step is of first order: a lost or reversed load would leave an error that does not become smaller."""
+def test_first_order_steps_with_joint_loads_converge_to_the_reference(of, module, family, options, name):
+    """A tenth of the step leaves at most a fifth of the error; a lost or reversed load would leave all."""
     pytest.importorskip(module)
     scene, times = PROBES[name].with_(duration=0.2), np.array([0.0, 0.2])
     exact = doubles(natural_motion(scene, times, EXTENDED).position)
@@ -96,8 +103,9 @@ def test_own_steps_of_engines_move_loads_of_joints(of, module, family, options, 
     assert fine < 1e-3 * moved and fine < 0.2 * coarse + 1e-9, (coarse, fine, moved)
 
 
-def test_a_loaded_hinge_keeps_its_coordinate_where_the_loop_is_cut():
-    """A hinge that an engine closes by itself has no coordinate, on which a load could act."""
+def test_hinge_with_a_load_keeps_its_coordinate_when_a_loop_is_cut():
+    """Bennett's loop is cut at a hinge, which a closure of type "revolute" replaces, without a coordinate.
+    With a spring on every hinge the loop is cut in a body ("weld") and each hinge keeps its coordinate."""
     scene = SCENES["bennett"]()
     springs = [TorsionSpring(joint=joint.name, stiffness=1.0) for joint in scene.joint]
     (whole,) = spanning_tree(scene, ("revolute",)).closures
@@ -107,16 +115,17 @@ def test_a_loaded_hinge_keeps_its_coordinate_where_the_loop_is_cut():
 
 
 @pytest.mark.parametrize("kind", FACTORS)
-def test_mujoco_moves_loads_over_time(kind):
+def test_mujoco_moves_loads_over_time_as_the_reference(kind):
     check("mujoco", PROBES[f"{kind} loads over time"].with_(duration=0.12), 1e-11)
 
 
-def test_exudyn_moves_smooth_loads_over_time():
+def test_exudyn_moves_polynomial_loads_over_time_as_the_reference():
     check("exudyn", PROBES["polynomial loads over time"].with_(duration=0.1), 1e-10)
 
 
 def check(name: str, scene: Scene, within: float) -> None:
-    """An engine's motion by its best setting / the reference, m and of the largest acceleration."""
+    """Compare positions of an engine's best setting with the reference within ``within`` (m), and its
+    accelerations within 100 times as much, relative to the largest (at least 1 m/s²)."""
     times, simulator = np.linspace(0.0, scene.duration, 4), engine(name)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
     exact = natural_motion(scene, times, EXTENDED)
@@ -127,7 +136,8 @@ def check(name: str, scene: Scene, within: float) -> None:
     assert off < 100 * within * max(largest, 1.0)
 
 
-def test_engines_without_functions_of_time_refuse_them():
+def test_engines_refuse_functions_of_time_that_they_lack():
+    """Pinocchio's adapter maps none, Exudyn's polynomials only; MuJoCo's maps all."""
     assert not engine("mujoco").cannot(PROBES["table loads over time"])
     for name, kind in (("pinocchio", "sine"), ("exudyn", "table"), ("exudyn", "switched")):
         refused = engine(name).cannot(PROBES[f"{kind} loads over time"])
@@ -149,7 +159,9 @@ def read(tmp_path: Path, text: str, **options: object):
     return FORMAT.read(tmp_path / "model.xml", ImportOptions(**options))
 
 
-def test_springs_of_slides_and_motors_of_a_keyframe_are_loads(tmp_path):
+def test_slide_springs_and_keyframe_motors_are_imported_as_loads(tmp_path):
+    """Torque = gear 20 · ctrl 0.05 = 1 N m. Force = gain 3 · gear -2 · ctrl 4, clipped to 1, = -6 N.
+    The scene moves as MuJoCo's RK4 moves the model; without the keyframe no motor acts."""
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
     scene = read(tmp_path, plain, keyframe="on").scene
     found = {load.type: load for load in scene.load}
@@ -165,17 +177,19 @@ def test_springs_of_slides_and_motors_of_a_keyframe_are_loads(tmp_path):
     assert not {"joint_torque", "joint_force"} & {load.type for load in read(tmp_path, plain).scene.load}
 
 
-def test_servos_with_a_range_of_forces_are_refused_by_name(tmp_path):
+def test_servo_with_a_force_range_is_refused_by_name_or_left_out(tmp_path):
+    """With ``--without motors`` the other motors of the file remain loads."""
     servo = '<position name="s" joint="turn" kp="3" forcerange="-1 1"/>'
     text = MOTORS.replace("SERVO", servo).replace("SERVED", " 0.2")
     with pytest.raises(SceneError, match=r"'s', whose range of forces.*--without motors"):
         read(tmp_path, text, keyframe="on")
     left = read(tmp_path, text, keyframe="on", without=("motors",)).scene
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
-    assert left.load == read(tmp_path, plain, keyframe="on").scene.load, "motors that a scene has stay"
+    assert left.load == read(tmp_path, plain, keyframe="on").scene.load
 
 
-def test_loads_of_joints_return_from_mjcf(tmp_path):
+def test_joint_loads_return_from_exported_mjcf_with_their_motion(tmp_path):
+    """Motors are written with keyframe "loads"; the notes say this, and that a load over time is left out."""
     plain = MOTORS.replace("SERVO", "").replace("SERVED", "")
     scene = read(tmp_path, plain, keyframe="on").scene
     exported = FORMAT.write(scene)

@@ -32,7 +32,7 @@ def bumped(array, sample, body, bump):
 
 
 def test_violations_are_the_gap_and_the_rates_put_in():
-    """The slider lifted off its line by z: 3 mm, 0.2 m/s and 5 m/s² at one sample."""
+    """The slider lifted off its line by 3 mm, 0.2 m/s and 5 m/s², at one sample each; over the length."""
     up = np.array([0.0, 0.0, 1.0])
     lifted = replace(
         EXACT,
@@ -72,6 +72,7 @@ def test_energy_error_is_the_kinetic_energy_put_in():
 
 
 def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
+    """The truth has no drift except for the quadrature of the power between samples, of fourth order."""
     scene = pendulum(gravity=(0.0, -9.81, 0.0), load=(Moment(body="bar", moment=(1.0, 0.0, 2.5)),))
     truth = truth_for(scene)
     drifts = [energy_series(scene, truth.poses(np.linspace(0, 1, n + 1))).max() for n in (40, 80, 160)]
@@ -80,30 +81,31 @@ def test_work_of_a_moment_across_the_turning_axis_is_its_power_integrated():
 
 
 def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
+    """The truth has no drift except for the quadrature of the power between 400 samples, 1.6e-12."""
     scene = free(load=(Moment(body="body", moment=(1.0, -2.0, 0.5)),))
     drift = energy_series(scene, truth_for(scene).poses(np.linspace(0, 1, 401))).max()
     assert drift < MARGIN * 1.6e-12, f"energy drifts by {drift}"
 
 
-def test_turns_that_samples_cannot_tell_give_no_energy():
+def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
     scene = SCENES["planar_slider_crank"]()
     sparse = truth_for(scene).poses(np.linspace(0, 0.4, 9))
-    assert measure(scene, sparse)["energy_error"] is None, "6 turns between samples"
+    assert measure(scene, sparse)["energy_error"] is None
 
 
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_driven"])
-def test_driver_s_work_gives_no_energy(name):
+def test_energy_error_is_none_for_a_driven_scene(name):
     scene = SCENES[name]()
     assert measure(scene, truth_for(scene).poses(np.linspace(0, 0.1, 5)))["energy_error"] is None
 
 
-def test_damper_s_work_gives_no_energy():
+def test_energy_error_is_none_for_a_damped_scene():
     scene = SPRUNG["block_spring"]
     damped = scene.with_(load=(scene.load[0].model_copy(update={"damping": 1.0}),))
     assert measure(damped, truth_for(damped).poses(np.linspace(0, 1, 50)))["energy_error"] is None
 
 
-def test_a_run_without_samples_has_no_numbers():
+def test_every_metric_of_a_run_without_samples_is_none():
     empty = Trajectory.failed(
         scene=SCENE.name,
         engine="e",
@@ -127,7 +129,7 @@ def test_states_that_are_not_finite_have_infinite_errors(value):
     assert not any(v is not None and math.isnan(v) for v in found.values()), found
 
 
-def test_without_truth_only_errors_are_missing():
+def test_only_metrics_of_the_error_are_none_without_a_truth():
     found = measure(SCENE, EXACT)
     missing = {name for name, value in found.items() if value is None}
     of_truth = {
@@ -143,19 +145,22 @@ def test_without_truth_only_errors_are_missing():
     assert missing == of_truth, missing
 
 
-def test_bodies_in_another_order_are_the_same_run():
+def test_metrics_do_not_depend_on_the_order_of_bodies():
     order = [2, 0, 1]
     keys = ("position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
     shuffled = replace(
         EXACT, bodies=tuple(EXACT.bodies[i] for i in order), **{k: getattr(EXACT, k)[:, order] for k in keys}
     )
     assert measure(SCENE, shuffled, TRUTH) == pytest.approx(measure(SCENE, EXACT, TRUTH), abs=1e-15)
+
+
+def test_run_of_a_body_that_the_scene_lacks_is_refused():
     with pytest.raises(ValueError, match="other"):
         measure(SCENE, replace(EXACT, bodies=("crank", "rod", "other")), TRUTH)
 
 
 @pytest.mark.parametrize("order", [0.75, 1, 2, 4, 8])
-def test_order_is_the_power_put_in_above_a_floor(order):
+def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
     steps = 0.5 / 2.0 ** np.arange(12)
     scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
     errors = np.maximum(3 * steps**order * scatter, 1e-13)
@@ -164,11 +169,13 @@ def test_order_is_the_power_put_in_above_a_floor(order):
     assert got == pytest.approx(order, abs=0.1), f"put in {order}, measured {got}"
 
 
-def test_no_line_has_no_order():
-    assert order_of_convergence([0.1, 0.05], [1e-2, 1e-3]) is None
-    assert order_of_convergence([0.1, 0.05, 0.025, 0.0125], [1e-13, 2e-13, 1e-13, 1.5e-13]) is None
-    assert order_of_convergence([0.1, 0.05, 0.025, 0.0125], [1e-2, 1e-7, 1e-3, 1e-9]) is None
-    assert order_of_convergence([0.1, 0.05, 0.025], [math.inf, math.nan, 0.0]) is None
+@pytest.mark.parametrize(
+    "errors",
+    [[1e-2, 1e-3], [1e-13, 2e-13, 1e-13, 1.5e-13], [1e-2, 1e-7, 1e-3, 1e-9], [math.inf, math.nan, 0.0]],
+    ids=["two runs", "rounding", "scatter", "no finite error"],
+)
+def test_errors_that_follow_no_power_have_no_order_of_convergence(errors):
+    assert order_of_convergence([0.1, 0.05, 0.025, 0.0125][: len(errors)], errors) is None
 
 
 def test_cost_is_read_on_the_lower_envelope():
@@ -180,8 +187,8 @@ def test_cost_is_read_on_the_lower_envelope():
     assert cost_at_error([1.0, 2.0], [math.nan, math.inf], 1.0) is None
 
 
-def test_energy_of_a_mechanism_at_rest_is_no_rounding_over_rounding():
-    """A bar that hangs still, its places rounded: nothing to divide by, so no drift."""
+def test_energy_error_is_none_for_a_mechanism_at_rest():
+    """A bar that hangs still has only rounding, of 1e-16 m and m/s, as energy and as change of energy."""
     scene = pendulum(gravity=(0.0, -9.81, 0.0))
     times = np.linspace(0.0, 1.0, 5)
     noise = 1e-16 * np.random.default_rng(0).standard_normal((5, 1, 3))
@@ -201,7 +208,10 @@ def test_energy_of_a_mechanism_at_rest_is_no_rounding_over_rounding():
     assert energy_series(scene, rest) is None
 
 
-def test_a_run_beyond_the_truth_is_judged_on_the_part_that_is_known():
+def test_error_of_a_run_beyond_the_truth_is_measured_to_its_end():
+    """Positions are off by a vector of 13 mm: at sample 15, behind the truth's end at 0.1 s (sample 10), it
+    is no error, and at sample 7 it is. Violations need no truth: they are measured over the whole run."""
+
     class Ending:
         """TRUTH, known up to 0.1 s."""
 
@@ -217,4 +227,4 @@ def test_a_run_beyond_the_truth_is_judged_on_the_part_that_is_known():
     early = measure(SCENE, replace(EXACT, position=bumped(EXACT.position, 7, 0, shift)), Ending())
     assert late["error"] < 1e-15 and late["velocity_error"] == 0 and late["error_until"] == EXACT.times[10]
     assert early["error"] == pytest.approx(0.013 / scene_length(SCENE), rel=1e-12)
-    assert late["violation_position"] > 1e-3, "violations need no truth and are of the whole run"
+    assert late["violation_position"] > 1e-3

@@ -20,7 +20,7 @@ def test_built_in_scenes_have_the_counts_of_mbref(name):
 
 
 @pytest.mark.parametrize("make", [gear_pair, screw, pendulum, coupled_loops])
-def test_couplings_are_rows_and_armatures_are_none(make):
+def test_coupling_is_a_constraint_row_and_an_armature_is_none(make):
     """mbref's hidden rotors add six coordinates and six rows each, and no freedom."""
     scene = make()
     counts, found = scene.counts(), mobility(scene)
@@ -29,7 +29,8 @@ def test_couplings_are_rows_and_armatures_are_none(make):
     assert found.rows == counts.rows - 6 * rotors
 
 
-def test_a_free_body_a_pendulum_and_a_held_boom():
+def test_mobility_of_four_small_scenes_is_as_counted_by_hand():
+    """(rows, redundant rows, freedoms) of a free body, a pendulum, a boom on a rope, and a doubled hinge."""
     body = Body(name="rod", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0))
     free = Scene(name="free", body=[body])
     hinge = Revolute(name="A", bodies=(GROUND, "rod"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0))

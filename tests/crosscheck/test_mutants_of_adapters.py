@@ -135,7 +135,7 @@ def is_right(simulator: Engine, way: str) -> bool:
 @pytest.mark.parametrize(
     "way", [pytest.param(way, marks=pytest.mark.slow if way in SLOW else ()) for way in WAYS]
 )
-def test_adapters_without_defect_are_right(way):
+def test_adapter_without_defect_moves_as_the_reference(way):
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     assert is_right(engine(package(way)), way)
@@ -156,7 +156,9 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
 
 
 @pytest.mark.parametrize(("way", "defect"), CASES)
-def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
+def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypatch, tmp_path):
+    """One replaced text makes the motion, velocities or reactions wrong, or the run fail. Limits in WAYS are
+    far above the errors without the defect."""
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -165,12 +167,12 @@ def test_a_defect_of_an_adapter_is_seen(way, defect, monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize("name", sorted({package(way) for way in WAYS}))
-def test_each_adapter_has_a_defect_of_each_kind(name):
+def test_each_adapter_is_tried_with_each_kind_of_defect(name):
     found = {one["kind"] for way, defects in DEFECTS.items() if package(way) == name for one in defects}
     assert set(KINDS) - found == set(UNABLE.get(name, {}))
 
 
-def test_the_example_of_the_documentation_is_the_adapter_of_bullet():
+def test_example_of_the_documentation_is_the_code_of_bullet_s_adapter():
     page = (FOLDER.parents[1] / "docs" / "verify-your-engine.md").read_text()
     (example,) = [block for block in page.split("```python\n")[1:] if "stepSimulation" in block]
     source = textwrap.dedent((FOLDER / "bullet" / "adapter.py").read_text().partition("class _World")[2])

@@ -57,14 +57,14 @@ def off(family: str, step: float = STEP) -> float:
     return float(error_series(scene, run, truth_for(scene).poses(times)).max())
 
 
-def test_refusals_name_the_owner_and_the_part():
+def test_newton_refuses_drivers_and_the_adapter_refuses_torsion_springs():
     newton = engine("newton")
     driven = newton.cannot(SCENES["four_bar"]())
     assert driven.owner is Owner.ENGINE and "joint 'A'" in driven.reason, driven
     scene = SCENES["bennett"]()
     sprung = newton.cannot(scene.with_(load=[TorsionSpring(joint="R1", stiffness=1.0)]))
     assert sprung.owner is Owner.ADAPTER and "load[0]" in sprung.reason, sprung
-    assert newton.cannot(scene) is None and newton.rounding == 2.0**-23
+    assert newton.cannot(scene) is None
 
 
 def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
@@ -76,15 +76,15 @@ def test_solvers_that_need_a_constraint_do_not_serve_a_free_body():
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ERRORS)
-def test_solvers_move_a_four_bar_as_measured(family):
+def test_newton_s_solver_moves_a_four_bar_within_its_measured_error(family):
     assert 0 < off(family) < MARGIN * ERRORS[family]
 
 
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("family", ORDERS)
-def test_orders_of_kaminos_integrators(family):
-    """Moreau's is of second order, Euler's of first."""
+def test_kamino_s_integrators_converge_with_their_order(family):
+    """Moreau's is of second order, Euler's of first; over 0.2 s of a four-bar at steps of 4, 2 and 1 ms."""
     lengths = np.array([4e-3, 2e-3, 1e-3])
     order, _ = np.polyfit(np.log(lengths), np.log([off(family, h) for h in lengths]), 1)
     assert order == pytest.approx(ORDERS[family], abs=0.3)
@@ -93,13 +93,14 @@ def test_orders_of_kaminos_integrators(family):
 @INSTALLED
 @pytest.mark.slow
 def test_featherstone_does_not_close_the_loop():
+    """The solver works on trees: without the closing joint the four-bar is off by over 0.1 of its length."""
     assert off("featherstone") > 0.1
 
 
 @INSTALLED
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "bennett", "flyball_governor"])
-def test_newtons_own_kinematics_have_the_poses_and_velocities_at_the_start(name):
+def test_newton_s_kinematics_give_the_poses_and_velocities_at_the_start(name):
     """Newton computes them from the joint velocities; the judge from the scene."""
     scene = SCENES[name]()
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
@@ -159,8 +160,9 @@ def chain() -> Scene:
     ("family", "make"),
     [("lox", pushed), ("semi-implicit", pushed), ("padmm, moreau", chain), ("mujoco", chain)],
 )
-def test_a_first_step_has_the_exact_accelerations(family, make):
-    """The change of the velocities over a short step; a load of another sign, frame or unit is seen."""
+def test_first_step_of_newton_has_the_reference_s_accelerations(family, make):
+    """The change of velocities over 1 ms / 1 ms, within 2 % of the largest acceleration; a load of opposite
+    sign, or in another frame or unit, changes them by more."""
     scene, h = make(), 1e-3
     run = engine("newton").run(scene, np.array([0.0, h]), setting(family, h))
     exact = natural_motion(scene, [0.0], EXTENDED)
@@ -169,5 +171,5 @@ def test_a_first_step_has_the_exact_accelerations(family, make):
         assert np.abs(change - wanted).max() < 0.02 * np.abs(wanted).max(), name
 
 
-def test_every_family_is_tested():
+def test_every_solver_of_newton_has_a_measured_error():
     assert set(ERRORS) | {"featherstone"} == set(FAMILIES)

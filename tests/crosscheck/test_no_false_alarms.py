@@ -54,7 +54,7 @@ def on_a_turntable() -> Scene:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", [hanging, held_boom, falling, on_a_turntable])
-def test_no_engine_is_blamed(make, tmp_path, capsys):
+def test_compare_blames_no_engine_for_rounding(make, tmp_path, capsys):
     scene = make()
     scene.save(tmp_path / "scene.toml")
     words = [word for name in ENGINES for word in ("--engine", name)]

@@ -27,7 +27,7 @@ from mbref.scene import (
 )
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, ROUNDING, error
+from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
 from tests.crosscheck.tree_scenes import INERTIA
 
 pytest.importorskip("pyondsel", reason="the optional engine OndselSolver needs pyondsel")
@@ -58,7 +58,9 @@ def test_ondsel_and_truth(name: str) -> None:
     run = simulate(scene, np.linspace(0, scene.duration, 41), scene.duration / 400)
     truth = truth_for(scene).poses(run.times)
     assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
-    assert error(run, scene) < MARGIN * measured, f"{name}: {error(run, scene):.2e} from the truth"
+    assert completed_error(run, scene) < MARGIN * measured, (
+        f"{name}: {completed_error(run, scene):.2e} from the truth"
+    )
     centripetal = abs(truth.angular_velocity).max() ** 2  # the size of what cancels in ω' of a steady crank
     for field, size in (
         ("velocity", 0.0),
@@ -77,7 +79,7 @@ def test_uneven_samples_and_even_samples() -> None:
     times = np.array([0.003, 0.004, 0.011, 0.02, 0.03, 0.057, 0.0999])
     run = simulate(scene, times, 5e-4)
     assert run.outcome is Outcome.COMPLETED and np.array_equal(run.times, times), run.message
-    assert error(run, scene) < MARGIN * UNEVEN, f"{error(run, scene):.2e} from the truth"
+    assert completed_error(run, scene) < MARGIN * UNEVEN, f"{completed_error(run, scene):.2e} from the truth"
 
 
 def body(name: str, position: tuple, turned: tuple) -> Body:

@@ -13,7 +13,7 @@ from crosscheck.judge.truth import truth_for
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, ROUNDING, error
+from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
 from tests.crosscheck.tree_scenes import BODIES, every_joint, ring
 
 if find_spec("opensim") is None:
@@ -52,13 +52,17 @@ def test_simbody_and_truth(name: str) -> None:
     duration, measured = PAPER[name]
     run = simulate(scene, duration, 1e-9)
     assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
-    assert error(run, scene) < MARGIN * measured, f"{name}: {error(run, scene):.2e} from the truth"
+    assert completed_error(run, scene) < MARGIN * measured, (
+        f"{name}: {completed_error(run, scene):.2e} from the truth"
+    )
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_finer_accuracies_and_smaller_errors(family: str) -> None:
     scene = SCENES["spatial_slider_crank"]()
-    errors = [error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)]
+    errors = [
+        completed_error(simulate(scene, 0.02, accuracy, family), scene) for accuracy in (1e-4, 1e-6, 1e-8)
+    ]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, f"{family}: errors {errors}"
 
 
@@ -130,7 +134,7 @@ def test_a_singular_position_and_the_end_of_an_accurate_run() -> None:
     """Reported as the outcome with the states before it; θ = -π is reached at 0.0378 s."""
     scene = SCENES["planar_slider_crank_equal"]()
     run = simulate(scene, 0.2, 1e-10, samples=41)
-    assert run.outcome is Outcome.STEP_FAILED or error(run, scene) > 1e-3, "nothing happened"
+    assert run.outcome is Outcome.STEP_FAILED or completed_error(run, scene) > 1e-3, "nothing happened"
     before = run.times < 0.06  # the crank is at right angles to the line at 0.0612 s
     truth = truth_for(scene).poses(run.times[before])
     gap = abs(run.position[before] - truth.position).max()
