@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -31,14 +31,15 @@ def probable_slips(scene: Scene) -> list[str]:
 
 def link_lengths(scene: Scene) -> dict[str, dict[str, float]]:
     """Return distances (m) between the joints of each body and of the ground: ``{"rod": {"A–B": 0.5}}``."""
-    found: dict[str, dict[str, float]] = {}
-    for name in [*(body.name for body in scene.body), GROUND]:
-        ends = [
-            (joint.name, joint.anchor_pair[joint.bodies.index(name)])
-            for joint in scene.joint
-            if name in joint.bodies
-        ]
-        found[name] = {f"{a}–{b}": math.dist(p, q) for k, (a, p) in enumerate(ends) for b, q in ends[k + 1 :]}
+    ends: dict[str, list[tuple[str, Sequence[float]]]]
+    ends = {name: [] for name in (*(body.name for body in scene.body), GROUND)}
+    for joint in scene.joint:
+        for name, anchor in zip(joint.bodies, joint.anchor_pair, strict=True):
+            ends[name].append((joint.name, anchor))
+    found = {
+        name: {f"{a}–{b}": math.dist(p, q) for (a, p), (b, q) in itertools.combinations(of_body, 2)}
+        for name, of_body in ends.items()
+    }
     return {name: lengths for name, lengths in found.items() if lengths}
 
 

@@ -291,11 +291,12 @@ def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:
 
 
 def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:
+    first: dict[str, int] = {}
     for i, name in enumerate(names):
         if name in reserved:
             yield f"{key}[{i}].name", f"{name!r} is reserved for the fixed frame"
-        elif name and name in names[:i]:
-            yield f"{key}[{i}].name", f"{name!r} is already the name of {key}[{names.index(name)}]"
+        elif name and first.setdefault(name, i) != i:
+            yield f"{key}[{i}].name", f"{name!r} is already the name of {key}[{first[name]}]"
 
 
 def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:

@@ -107,15 +107,31 @@ def reached(
     model: Model, entries: np.ndarray, rows: np.ndarray, columns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return columns (n,) and rows (m,) of the blocks that contain one of the given rows or columns."""
-    column = model.entry_columns
-    found = np.append(columns, np.zeros(6, dtype=bool))
+    row, entry = np.nonzero(entries)
+    column = model.entry_columns[row, entry]
+    of_rows, of_columns = _blocks(row, column, model.m, model.n)
+    found = np.zeros(model.n + 1, dtype=bool)
+    found[of_rows[rows]] = found[of_columns[columns]] = True
+    found[model.n] = False
+    return found[of_columns], rows | found[of_rows]
+
+
+def _blocks(row: np.ndarray, column: np.ndarray, m: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the block of each of m rows and n columns, which entries at rows (e,) and columns (e,) connect.
+
+    A block is numbered by its first column; n stands for a row without entries. Each pass joins a block to
+    the first one with which it shares a row, so that chains of blocks need few passes.
+    """
+    first = np.arange(n)
     while True:
-        rows = rows | (entries & found[column]).any(axis=1)
-        more = found.copy()
-        more[column[entries & rows[:, None]]] = True
-        if np.array_equal(more, found):
-            return found[: model.n], rows
-        found = more
+        of_rows = np.full(m, n)
+        np.minimum.at(of_rows, row, first[column])
+        joined = first.copy()
+        np.minimum.at(joined, first[column], of_rows[row])
+        joined = joined[joined]
+        if np.array_equal(joined, first):
+            return of_rows, first
+        first = joined
 
 
 def without_rounding(

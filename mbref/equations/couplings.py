@@ -72,9 +72,12 @@ def _rotor(joint: Joint, name: str, frame: str, length: float) -> tuple[Body, Jo
 
 def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
     """Return the couplings of a scene, q₂ - ratio · q₁ = 0, scaled such that no factor is above one."""
-    found = []
+    if not scene.coupling:
+        return ()
+    found, joints = [], {joint.name: joint for joint in scene.joint}
     for coupling in scene.coupling:
-        (first, one), (second, other) = scene.coupled(coupling)
+        one, other = (joints[name] for name in coupling.joints)
+        (first, one), (second, other) = coupling.pairs((one, other))
         largest = max(1.0, abs(coupling.ratio))
         factors = -coupling.ratio / largest, 1.0 / largest
         found.append(Coupled(coupling.name, (first, second), (one, other), factors))

@@ -88,9 +88,9 @@ def _add_coupled(
 
     Each is a force along, or a moment about, the axis that the first body carries.
     """
-    primitives = model.data.primitives
+    primitives, number = model.data.primitives, {name: j for j, name in enumerate(names)}
     for p, place in enumerate(model.structure.places.primitives):
-        if not place.part or place.of not in names:
+        if not place.part or place.of not in number:
             continue
         x, y = primitives.direction_first[p], primitives.turning_first[p]
         turns = place.kind == COUPLED_ANGLE
@@ -99,7 +99,7 @@ def _add_coupled(
             axis = rotations.rotate(q[:, place.first, 3:], axis[None])
         strength = -multipliers[:, primitives.row[p]] * primitives.length[p]
         components = slice(3, 6) if turns else slice(0, 3)
-        wrench[:, names.index(place.of), components] += strength[:, None] * axis
+        wrench[:, number[place.of], components] += strength[:, None] * axis
 
 
 def open_dimensions(model: Model, blocks: np.ndarray) -> dict[str, np.ndarray]:
@@ -171,7 +171,8 @@ class JointPlaces(NamedTuple):
 @functools.lru_cache(maxsize=MOST_KEPT)
 def _places(structure: Structure, names: tuple[str, ...]) -> JointPlaces:
     """Return the places of the named joints, which are the first joints in the structure."""
-    of = np.array([names.index(name) for name in structure.row_joint if name in names], dtype=int)
+    number = {name: j for j, name in enumerate(names)}
+    of = np.array([number[name] for name in structure.row_joint if name in number], dtype=int)
     starts = np.searchsorted(of, np.arange(len(names)))
     bodies = structure.row_bodies[starts]
     side = (bodies[:, 1] < structure.nb).astype(int)

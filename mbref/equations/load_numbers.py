@@ -14,14 +14,20 @@ from mbref.scene_joints import ANGLE
 Values = tuple[float, ...]
 
 
+def loaded_joints(scene: Scene) -> dict[str, Joint]:
+    """Return the joints of a scene by name if a load acts along or about a joint's axis, otherwise none."""
+    has_joint_loads = any(isinstance(load, JointLoad) for load in scene.load)
+    return {joint.name: joint for joint in scene.joint} if has_joint_loads else {}
+
+
 def load_place(
-    scene: Scene, place: int, index: Mapping[str, int], turning: Mapping[str, int], function: int
-) -> LoadPlace:
+    load: Load, place: int, joints: Mapping[str, Joint], index: Mapping[str, int], turning: Mapping[str, int],
+    function: int,
+) -> LoadPlace:  # fmt: skip
     """Return kind, bodies, function of time and angle of load[place]; raises SceneError for an unknown type.
 
-    ``index`` are the bodies by name, ``turning`` the turning joints.
+    ``joints`` are ``loaded_joints``, ``index`` the bodies by name, ``turning`` the turning joints.
     """
-    load = scene.load[place]
     if isinstance(load, Moment | Force):
         return LoadPlace(FORCE if isinstance(load, Force) else MOMENT, index[load.body], 0, function)
     if isinstance(load, Spring):
@@ -29,7 +35,7 @@ def load_place(
         return LoadPlace(SPRING, first, second, function)
     if not isinstance(load, JointLoad):
         raise SceneError([f"load[{place}]: mbref has no equations for loads of type {load.type!r}"])
-    first, second = map(index.__getitem__, scene.joint_named(load.joint).bodies)
+    first, second = map(index.__getitem__, joints[load.joint].bodies)
     if load.coordinate == ANGLE:
         return LoadPlace(ABOUT_AXIS, first, second, function, turning[load.joint])
     return LoadPlace(ALONG_AXIS, first, second, function)
@@ -41,9 +47,9 @@ def anchors_of(joint: Joint) -> tuple[float, ...]:
     return *first, *second
 
 
-def numbers_of_load(load: Load, scene: Scene) -> tuple[float, ...]:
+def numbers_of_load(load: Load, joints: Mapping[str, Joint]) -> tuple[float, ...]:
     """Return force, two points and axis (world, t = 0), stiffness, damping, and natural length or angle of a
-    load; unused vectors are zero."""
+    load; unused vectors are zero. ``joints`` are ``loaded_joints``."""
     if isinstance(load, Moment):
         return *load.moment, *ORIGIN * 4
     if isinstance(load, Force):
@@ -51,7 +57,7 @@ def numbers_of_load(load: Load, scene: Scene) -> tuple[float, ...]:
     if isinstance(load, Spring):
         first, second = load.points
         return *ORIGIN, *first, *second, *ORIGIN, load.stiffness, load.damping, load.natural_length
-    joint, action = scene.joint_named(load.joint), load.action
+    joint, action = joints[load.joint], load.action
     numbers = action.stiffness, action.damping, action.natural
     return action.amount, 0.0, 0.0, *anchors_of(joint), *unit(joint.directions[0]), *numbers
 

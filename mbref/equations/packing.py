@@ -17,11 +17,13 @@ from mbref import rotations
 from mbref.equations.couplings import coordinate_primitives, couplings_of
 from mbref.equations.functions import functions_of, numbers_of, pieces_of
 from mbref.equations.joints import Primitive, driver_primitive, primitives_of
+from mbref.equations.largest_distance import largest_distances
 from mbref.equations.load_numbers import (
     Values,
     anchors_of,
     directions_across,
     load_place,
+    loaded_joints,
     numbers_of_load,
     turning_joints,
 )
@@ -119,6 +121,7 @@ class Packs:
         turning = {joint.name: k for k, joint in enumerate(turning_joints(joints))}
         ends = [(self.index[joint.bodies[0]], self.index[joint.bodies[1]]) for joint in joints]
         loads, functions = () if self.kinematic else scene.load, functions_of(scene)
+        named = loaded_joints(scene)
         factor = itertools.count(len(scene.driver))
         return Places(
             nb=self.nb,
@@ -129,7 +132,7 @@ class Packs:
             )
             + tuple(self._of_couplings(coupled)),
             loads=tuple(
-                load_place(scene, k, self.index, turning, next(factor) if load.over_time else -1)
+                load_place(load, k, named, self.index, turning, next(factor) if load.over_time else -1)
                 for k, load in enumerate(loads)
             ),
             turning=tuple(
@@ -183,17 +186,18 @@ class Packs:
         anchors = self._rows(_once(anchors_of, joints), 6).reshape(len(self.scenes), -1, 3)
         nb, nj = len(self.scenes[0].body), len(self.scenes[0].joint)
         points = np.concatenate((self._centres[:, :nb], anchors[:, : 2 * nj]), axis=1)
-        apart = points[:, :, None] - points[:, None]
-        self.length = np.sqrt((apart * apart).sum(axis=3).max(axis=(1, 2)))
+        self.length = largest_distances(points)
         self.length = np.where(self.length > COINCIDENT * np.abs(points).max(axis=(1, 2)), self.length, 1.0)
-        return body_lengths(anchors - self._centres[:, self.structure.anchored], self.structure.anchor_shares)
+        anchored = self.structure.anchored
+        return body_lengths(anchors - self._centres[:, anchored], anchored, self.nb)
 
     def _fixed_in_bodies(self, of_primitives: Sequence[Values]) -> tuple[Primitives, Loads, TurningJoints]:
         """Return primitives, loads and turning joints from the numbers of all primitives. Their vectors are
         rotated to the principal frames of the bodies in one operation."""
         structure, scenes = self.structure, () if self.kinematic else self.scenes
         numbers = self._rows(of_primitives, 16)
-        of_loads = self._rows((numbers_of_load(load, scene) for scene in scenes for load in scene.load), 15)
+        named = [(scene, loaded_joints(scene)) for scene in scenes]
+        of_loads = self._rows((numbers_of_load(l, joints) for scene, joints in named for l in scene.load), 15)
         turning = [joint for joints in self.joints for joint in turning_joints(joints)]
         of_angles = self._rows(_once(directions_across, turning), 9)
         (s, p), l = numbers.shape[:2], of_loads.shape[1]

@@ -139,21 +139,20 @@ class Structure:
     @functools.cached_property
     def closed_loops(self) -> int:
         """Number of independent loops of bodies and joints; without a loop no position is singular."""
-        part, loops = list(range(self.nb + 1)), 0
+        nearer, loops = list(range(self.nb + 1)), 0  # a body nearer to the representative of its tree
+
+        def representative(body: int) -> int:
+            while nearer[body] != body:
+                nearer[body] = body = nearer[nearer[body]]
+            return body
+
         for _, one, other in dict.fromkeys(
             (p.joint, p.first, p.second) for p in self.places.primitives if not p.part
         ):
-            first, second = part[one], part[other]
+            first, second = representative(one), representative(other)
             loops += first == second
-            part = [first if p == second else p for p in part]
+            nearer[second] = first
         return loops
-
-    @functools.cached_property
-    def anchor_shares(self) -> np.ndarray:
-        """Return (e, nb): one over the number of anchors on a body, for each anchor on it."""
-        on_body = self.anchored[:, None] == np.arange(self.nb)
-        shares: np.ndarray = on_body / np.maximum(on_body.sum(axis=0), 1)
-        return shares
 
     def dense(self, blocks: np.ndarray) -> np.ndarray:
         """Return Φ_q (…, m, n) from its blocks (…, m, 12)."""

@@ -49,15 +49,17 @@ def unit_equations(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.
     return matrix / lengths[..., None], rhs / lengths
 
 
-def body_lengths(arms: np.ndarray, shares: np.ndarray) -> np.ndarray:
-    """Return the length (…, nb) of every body (m).
+def body_lengths(arms: np.ndarray, bodies: np.ndarray, nb: int) -> np.ndarray:
+    """Return the length (s, nb) of every body (m) of s scenes.
 
     A body with all anchors in its centre has the mean of all other lengths, or 1. Arguments are the joints'
-    anchors (…, e, 3), relative to the centres of mass of their bodies, and (e, nb) one over the number of
-    anchors on the body.
+    anchors (s, e, 3), relative to the centres of mass of their bodies, and the bodies (e,), nb for the fixed
+    frame.
     """
-    # a product of matrices would round the lengths of one scene and of many differently
-    lengths = (np.sqrt((arms * arms).sum(axis=-1))[..., None] * shares).sum(axis=-2)
+    place = (nb + 1) * np.arange(len(arms))[:, None] + bodies
+    distances, size = np.sqrt((arms * arms).sum(axis=-1)), len(arms) * (nb + 1)
+    total = np.bincount(place.ravel(), distances.ravel(), size).reshape(len(arms), nb + 1)[:, :nb]
+    lengths = total / np.maximum(np.bincount(bodies, minlength=nb + 1)[:nb], 1)
     has_arms = lengths > SHORTEST_LENGTH * lengths.max(axis=-1, keepdims=True, initial=0.0)
     if has_arms.all():
         return lengths

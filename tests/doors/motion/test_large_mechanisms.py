@@ -1,0 +1,66 @@
+"""Facts of mechanisms of many bodies that must not depend on how they are found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mbref import Outcome, Scene, simulate
+from mbref.equations.largest_distance import largest_distances
+from mbref.rotations import to_matrix
+from mbref.scenes.four_bar_chain import four_bar_chain
+from tests.helpers.changed_scenes import in_another_frame, in_another_order
+from tests.helpers.statics import hinge, rod
+
+N = 300
+LINE, TURN = np.arange(float(N)), np.linspace(0.0, 2 * np.pi, N)
+SHAPES = {
+    "line": np.stack([LINE, 0 * LINE, 0 * LINE], axis=1),
+    "two_rows": np.stack([LINE // 2, LINE % 2, 0 * LINE], axis=1),
+    "circle": np.stack([np.cos(TURN), np.sin(TURN), 0 * TURN], axis=1),
+    "ball": np.random.default_rng(2).normal(size=(N, 3)),
+    "far_away": 1e6 + 1e-6 * np.random.default_rng(3).integers(0, 9, (N, 3)),
+    "one_place": np.ones((N, 3)),
+    "few": np.random.default_rng(4).normal(size=(7, 3)),
+}
+TURN_OF_FRAME, SHIFT = np.array([0.5, 0.1, -0.7, 0.5]), np.array([3.0, -2.0, 5.0])
+
+
+def frame(scene: Scene) -> Scene:
+    """Return the scene turned by TURN_OF_FRAME and moved by SHIFT."""
+    return in_another_frame(scene, TURN_OF_FRAME, SHIFT)
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_largest_distance_is_the_largest_of_all_pairs(shape):
+    points = SHAPES[shape]
+    shuffled = np.random.default_rng(5).permutation(points)
+    exact = np.sqrt(((points[:, None] - points) ** 2).sum(axis=2).max())
+    assert largest_distances(np.stack([points, shuffled])) == pytest.approx(
+        [exact, exact], rel=4e-16, abs=0.0
+    )
+
+
+@pytest.mark.parametrize("change", [in_another_order, frame], ids=["order", "frame"])
+def test_long_chain_moves_alike_in_another_order_and_frame(change):
+    scene = four_bar_chain(20)
+    motion, other = (simulate(each, times=[0.02]) for each in (scene, change(scene)))
+    places = [other.bodies.index(name) for name in motion.bodies]
+    moved = other.position[0, places]
+    if change is frame:
+        moved = (moved - SHIFT) @ to_matrix(TURN_OF_FRAME)
+    assert other.outcome == Outcome.COMPLETED
+    assert np.abs(moved - motion.position[0]).max() <= 1e-9 * len(scene.body)
+
+
+def test_motion_of_the_first_joint_reaches_the_end_of_a_long_chain():
+    """A row of wheels, each geared to its neighbour by -1; the driver turns the first."""
+    count = 80
+    body = [rod(f"wheel{k}", (float(k), 0.0, 0.0)) for k in range(count)]
+    joint = [hinge(f"J{k}", ("ground", f"wheel{k}"), (float(k), 0.0, 0.0)) for k in range(count)]
+    gears = [{"name": f"G{k}", "joints": (f"J{k - 1}", f"J{k}"), "ratio": -1.0} for k in range(1, count)]
+    driver = [{"joint": "J0", "polynomial": (0.0, 0.5)}]
+    scene = Scene(name="row", body=body, joint=joint, coupling=gears, driver=driver)
+    motion = simulate(scene, "alf-dual+projection/dop853", times=[1.0])
+    angles = [motion.joint(f"J{k}").angle[0] for k in range(count)]
+    assert angles == pytest.approx([0.5 * (-1) ** k for k in range(count)], abs=1e-9)
