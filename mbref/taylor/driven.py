@@ -24,6 +24,7 @@ from mbref.taylor.layout import SERIES
 from mbref.taylor.mode import is_accurate, set_high_accuracy, set_predictor
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.samples import put_terms
+from mbref.taylor.series_options import ACCURATE_TOLERANCE, PREDICTOR_TOLERANCE
 from mbref.taylor.stepping import (
     LOST_MOTION,
     LOST_ROWS,
@@ -39,11 +40,7 @@ from mbref.taylor.stepping import (
     save_start,
 )
 
-PREDICTOR_TOLERANCE = 3e-7  # tolerance of the last terms, away from singular positions
-ACCURATE_TOLERANCE = 1e-13  # tolerance of high-accuracy steps
 MIN_PREDICTOR_RATIO = 0.25  # predictor step / crossing step: a shorter one is not taken
-# default order of the series; least order that crosses a singular position
-PREDICTOR_ORDER, LEAST_PREDICTOR_ORDER = 16, 12
 
 
 @entry(INT(SERIES))

@@ -29,6 +29,8 @@ def test_only_a_kernel_that_says_so_can_allocate():
 def test_every_kernel_of_the_series_is_prepared():
     """A missing kernel would compile while the clock of a run counts."""
     from mbref.taylor import stepper
+    from mbref.taylor.crossing import branch_follower
 
-    called = {kernel for kernel in vars(stepper).values() if isinstance(kernel, Entry)}
+    names = vars(stepper) | vars(branch_follower)
+    called = {kernel for kernel in names.values() if isinstance(kernel, Entry)}
     assert {*CALLED, *called} == set(KERNELS_OF_SERIES) and called
