@@ -83,7 +83,7 @@ def _singular_values(
     return np.array(found)
 
 
-def _is_shaky(model: Model, motion: Motion) -> bool:
+def _is_rigid_to_second_order(model: Model, motion: Motion) -> bool:
     """Return whether equations of second order forbid all velocities at every tested pose."""
     if model.m > MOST_BRANCHED or model.closed_loops == 0:
         return False
@@ -113,7 +113,7 @@ def _summary(model: Model, motion: Motion, values: np.ndarray) -> AlongMotion:
         nearest=float(nearest[at]),
         nearest_time=float(times[at]),
         crossings=tuple(motion.crossings or ()),
-        shaky=_is_shaky(model, motion),
+        shaky=_is_rigid_to_second_order(model, motion),
         stopped="" if motion.outcome is Outcome.COMPLETED else motion.message,
     )
 

@@ -66,19 +66,25 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     lengths.
     """
     scene = scene.assembled()
-    pairs = {pair: _shared(scene, *pair) for pair in lengths}
-    shifts = _shifts(scene, lengths, pairs)
+    pairs = {pair: _common_link(scene, *pair) for pair in lengths}
+    shifts = _point_displacements(scene, lengths, pairs)
     q = Model(scene).start()
     for share in np.linspace(0.0, 1.0, SHARES + 1)[1:]:
         elsewhere = {key: np.array(key[1]) + share * shift for key, shift in shifts.items()}
         model = Model(scene, _Reshaped(scene, elsewhere))
         q, phi = solve_positions(model, 0.0, q)
         if not is_closed(model, model.terms(0.0, q)):
-            raise SceneError([_open(model, phi, share)])
-    return _compared(scene, placed(model, q), pairs)
+            worst = int(np.argmax(np.abs(phi)))
+            raise SceneError(
+                [
+                    f"joint[{model.row_joint[worst]}]: the loops cannot be closed with these lengths; at "
+                    f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} remains open"
+                ]
+            )
+    return _differences(scene, placed(model, q), pairs)
 
 
-def _shared(scene: Scene, first: str, second: str) -> str:
+def _common_link(scene: Scene, first: str, second: str) -> str:
     """Return the link that two joints share."""
     known = {joint.name for joint in scene.joint}
     for name in (first, second):
@@ -92,12 +98,12 @@ def _shared(scene: Scene, first: str, second: str) -> str:
     return next((b for b in both if b != GROUND), GROUND)
 
 
-def _anchor(scene: Scene, joint: str, body: str) -> Vector3:
+def _anchor_on(scene: Scene, joint: str, body: str) -> Vector3:
     found = scene.joint_named(joint)
     return found.anchor_pair[found.bodies.index(body)]
 
 
-def _shifts(
+def _point_displacements(
     scene: Scene, lengths: Mapping[tuple[str, str], float], pairs: Mapping[tuple[str, str], str]
 ) -> dict[tuple[str, Vector3], np.ndarray]:
     """Return the displacements (3,) of the points of each link that give it its lengths, with the least sum
@@ -105,14 +111,14 @@ def _shifts(
     found: dict[tuple[str, Vector3], np.ndarray] = {}
     for body in set(pairs.values()):
         own = {pair: lengths[pair] for pair, b in pairs.items() if b == body}
-        points = list(dict.fromkeys(_anchor(scene, joint, body) for pair in own for joint in pair))
-        ends = [tuple(points.index(_anchor(scene, joint, body)) for joint in pair) for pair in own]
-        moved = _with_distances(body, np.array(points), ends, list(own.values()))
+        points = list(dict.fromkeys(_anchor_on(scene, joint, body) for pair in own for joint in pair))
+        ends = [tuple(points.index(_anchor_on(scene, joint, body)) for joint in pair) for pair in own]
+        moved = _points_at_distances(body, np.array(points), ends, list(own.values()))
         found |= {(body, point): new - np.array(point) for point, new in zip(points, moved, strict=True)}
     return found
 
 
-def _with_distances(
+def _points_at_distances(
     body: str, points: np.ndarray, ends: list[tuple[int, ...]], lengths: list[float]
 ) -> np.ndarray:
     """Return points (n, 3) near the given ones with given distances: Gauss–Newton steps of least norm."""
@@ -134,19 +140,11 @@ def _with_distances(
     return x
 
 
-def _open(model: Model, phi: np.ndarray, share: float) -> str:
-    worst = int(np.argmax(np.abs(phi)))
-    return (
-        f"joint[{model.row_joint[worst]}]: the loops cannot be closed with these lengths; at "
-        f"{100 * share:.0f} % of the changes {abs(phi[worst]):.3g} remains open"
-    )
+def _distance(scene: Scene, first: str, second: str, body: str) -> float:
+    return math.dist(_anchor_on(scene, first, body), _anchor_on(scene, second, body))
 
 
-def _apart(scene: Scene, first: str, second: str, body: str) -> float:
-    return math.dist(_anchor(scene, first, body), _anchor(scene, second, body))
-
-
-def _compared(old: Scene, new: Scene, pairs: Mapping[tuple[str, str], str]) -> Assembled:
+def _differences(old: Scene, new: Scene, pairs: Mapping[tuple[str, str], str]) -> Assembled:
     """Return the differences of the new scene from the old one."""
     joints = {
         a.name: max(map(math.dist, a.anchor_pair, b.anchor_pair))
@@ -160,7 +158,7 @@ def _compared(old: Scene, new: Scene, pairs: Mapping[tuple[str, str], str]) -> A
         for a, b in zip(old.body, new.body, strict=True)
     }
     lengths = {
-        f"{first}–{second}": (_apart(old, first, second, body), _apart(new, first, second, body))
+        f"{first}–{second}": (_distance(old, first, second, body), _distance(new, first, second, body))
         for (first, second), body in pairs.items()
     }
     return Assembled(new, joints, bodies, lengths)

@@ -55,15 +55,15 @@ class Newton:
         """Return the displacements (f,) along v that balance x'' (n,), each shorter than a length or rad."""
         parts, most = self.parts(off), longest / self.sizes
         return np.asarray(
-            np.sign(parts) * np.minimum(np.abs(parts) / np.maximum(self._held(most), 1e-300), most)
+            np.sign(parts) * np.minimum(np.abs(parts) / np.maximum(self._least_stiffness(most), 1e-300), most)
         )
 
-    def _held(self, most: np.ndarray) -> np.ndarray:
+    def _least_stiffness(self, most: np.ndarray) -> np.ndarray:
         """Return σ (f,), not less than the accelerations at the pose over the largest displacements."""
-        return np.maximum(self.stiffness, np.maximum(np.abs(self.parts(self.off)), self._ignored) / most)
+        return np.maximum(self.stiffness, np.maximum(np.abs(self.parts(self.off)), self._negligible) / most)
 
     @property
-    def _ignored(self) -> np.ndarray:
+    def _negligible(self) -> np.ndarray:
         """Accelerations (f,) that no step reduces: those in balance, or rounding if all are in balance."""
         return self.rounding if self.is_balanced else self.bound
 
@@ -71,11 +71,11 @@ class Newton:
         """Return the Newton step y (f,): at most LONGEST_STEP along each direction."""
         parts = self.parts(self.off)
         moves = -self.displacements(self.off, LONGEST_STEP)
-        return np.asarray(self.directions @ np.where(np.abs(parts) <= self._ignored, 0.0, moves))
+        return np.asarray(self.directions @ np.where(np.abs(parts) <= self._negligible, 0.0, moves))
 
     def level(self, off: np.ndarray) -> float:
         """Return the size of x'' (n,) as a displacement, lengths or rad, by the stiffness of this pose."""
-        held = self._held(LONGEST_STEP / self.sizes)
+        held = self._least_stiffness(LONGEST_STEP / self.sizes)
         parts = np.abs(self.parts(off))
         return float(np.linalg.norm(parts / np.maximum(held, 1e-300) * self.sizes))
 
@@ -98,7 +98,7 @@ def balanced(tangent: Tangent, freedoms: int) -> Newton | None:
         for _ in range(MOST_NEWTON_STEPS):
             if here.is_balanced:
                 return _refined(here, freedoms)
-            ahead = _ahead(here, freedoms)
+            ahead = _damped_step(here, freedoms)
             if ahead is None:
                 return None
             if ahead.freedoms != freedoms:  # a singular position
@@ -110,7 +110,7 @@ def balanced(tangent: Tangent, freedoms: int) -> Newton | None:
     return None
 
 
-def _ahead(here: Newton, freedoms: int) -> Tangent | None:
+def _damped_step(here: Newton, freedoms: int) -> Tangent | None:
     """Return the pose after a share of the Newton step that brings the balance nearer."""
     step, level = here.step(), here.level(here.off)
     for share in STEP_SHARES:
@@ -137,7 +137,7 @@ def _refined(here: Newton, freedoms: int) -> Newton:
 
 def are_one(first: Newton, second: Newton) -> bool:
     """Return whether poses between two equilibria are equilibria too, so that both belong to one family."""
-    if np.abs(_twists(first.tangent) - _twists(second.tangent)).max(initial=0.0) > np.pi:
+    if np.abs(_spring_angles(first.tangent) - _spring_angles(second.tangent)).max(initial=0.0) > np.pi:
         return False
     here, target, before = first.tangent, second.tangent, np.inf
     for _ in range(LINKS):
@@ -150,19 +150,19 @@ def are_one(first: Newton, second: Newton) -> bool:
         y = here.coordinates(apart)
         size = float(np.linalg.norm(here.basis @ y)) or 1.0
         moved = here.moved(min(1.0, STRIDE / size) * y)
-        if moved is None or moved.freedoms != here.freedoms or not _is_still(moved, first):
+        if moved is None or moved.freedoms != here.freedoms or not _is_equilibrium(moved, first):
             return False
         here, before = moved, distance
     return False
 
 
-def _twists(tangent: Tangent) -> np.ndarray:
+def _spring_angles(tangent: Tangent) -> np.ndarray:
     """Return the angles (k,), rad, of torsion springs; full turns of other joints leave a pose as it is."""
     model = tangent.model
     return np.asarray(tangent.angles[model.data.loads.angle[sprung(model)].astype(int)])
 
 
-def _is_still(tangent: Tangent, near: Newton) -> bool:
+def _is_equilibrium(tangent: Tangent, near: Newton) -> bool:
     """Return whether nothing accelerates at a pose, by the bounds of an equilibrium."""
     parts = np.abs(tangent.coordinates(tangent.off_balance()))
     return bool((parts <= BALANCED * tangent.pushes + near.bound.max(initial=0.0)).all())
@@ -184,7 +184,7 @@ def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
         wish = drawn if old is None else old + 0.3 * rotations.unit(drawn)
         if old is None and side and directions[0] is not None:
             wish = -directions[0]
-        ahead = _soft(tangent, tangent.basis.T @ wish, first.forces)
+        ahead = _soft_direction(tangent, tangent.basis.T @ wish, first.forces)
         moved = tangent.moved(STRIDE * ahead)
         if moved is None or moved.freedoms != freedoms:
             directions[side] = None
@@ -194,7 +194,7 @@ def starts_from(first: Tangent, freedoms: int, count: int) -> Iterator[Tangent]:
         yield moved
 
 
-def _soft(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _soft_direction(tangent: Tangent, y: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Return the direction y (f,) of unit length, with less of each direction that a spring holds.
 
     Its part is the displacement by forces on the bodies, of sizes (2 nb,), over a stride, at most one.

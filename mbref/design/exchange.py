@@ -47,15 +47,17 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     if not model.m:
         return []
     at_pose = Model(placed(model, general_pose(model)))
-    rows = _rows(at_pose)
-    dependences, number = _dependences(rows)
+    rows = _rows_by_joint(at_pose)
+    null = null_space(np.concatenate(list(rows.values())).T, NEARLY)  # vanishing combinations of rows
+    ends, number = np.cumsum([len(r) for r in rows.values()])[:-1], null.shape[1]
+    dependences = dict(zip(rows, np.split(null, ends), strict=True))
     part = {name: np.linalg.norm(of_joint, axis=1) for name, of_joint in dependences.items()}
     involved = [joint.name for joint in at_pose.scene.joint if part[joint.name].max() > PART]
-    choices = _choices(scene, at_pose, rows, {name: dependences[name] for name in involved})
+    choices = _weaker_types(scene, at_pose, rows, {name: dependences[name] for name in involved})
     kept = {name: {k: w for k, w in kinds.items() if k != REMOVED} for name, kinds in choices.items()}
-    found = _smallest(kept, number, most)
-    found += [e for e in _smallest(choices, number, most) if REMOVED in e.values()]
-    found = found or [e for e in [_joint_by_joint(choices, number)] if e]
+    found = _smallest_sets(kept, number, most)
+    found += [e for e in _smallest_sets(choices, number, most) if REMOVED in e.values()]
+    found = found or [e for e in [_greedy_set(choices, number)] if e]
     return [exchange for exchange in found if _is_cure(rows, choices, exchange)]
 
 
@@ -73,28 +75,21 @@ class Weaker(NamedTuple):
 Choices = Mapping[str, Mapping[str, Weaker]]  # joint → type → remaining rows
 
 
-def _dependences(rows: Mapping[str, np.ndarray]) -> tuple[dict[str, np.ndarray], int]:
-    """Return a basis of the c vanishing linear combinations of rows (d, n), by joint (d, c), and c."""
-    null = null_space(np.concatenate(list(rows.values())).T, NEARLY)
-    ends = np.cumsum([len(r) for r in rows.values()])[:-1]
-    return dict(zip(rows, np.split(null, ends), strict=True)), null.shape[1]
-
-
-def _keep_rank(lost: np.ndarray) -> bool:
+def _keeps_rank(lost: np.ndarray) -> bool:
     """Return whether the rank is unchanged without row combinations that have these components (l, c)."""
     return bool(np.sum(np.linalg.svd(lost, compute_uv=False) > PART) == len(lost))
 
 
-def _smallest(choices: Choices, number: int, most: int) -> list[Exchange]:
+def _smallest_sets(choices: Choices, number: int, most: int) -> list[Exchange]:
     """Return the sets of the fewest joints that end all dependences, at most ``most``; none for more than
     four joints."""
     for size in range(1, MOST_EXCHANGES + 1):
-        if found := list(itertools.islice(_of_size(choices, number, size), most)):
+        if found := list(itertools.islice(_sets_of_size(choices, number, size), most)):
             return found
     return []
 
 
-def _of_size(choices: Choices, number: int, size: int) -> Iterator[Exchange]:
+def _sets_of_size(choices: Choices, number: int, size: int) -> Iterator[Exchange]:
     """Yield the exchanges of ``size`` joints that end all dependences, for a limited number of trials."""
     names, trials = list(choices), itertools.count(1)
     most = [max((len(weaker.lost) for weaker in choices[name].values()), default=0) for name in names]
@@ -113,13 +108,13 @@ def _of_size(choices: Choices, number: int, size: int) -> Iterator[Exchange]:
             for kind, weaker in choices[names[k]].items():
                 if next(trials) > MOST_TRIALS:
                     return
-                if _keep_rank(more := np.concatenate([lost, weaker.lost])):
+                if _keeps_rank(more := np.concatenate([lost, weaker.lost])):
                     yield from extended({**chosen, names[k]: kind}, more, k + 1)
 
     return extended({}, np.zeros((0, number)), 0)
 
 
-def _joint_by_joint(choices: Choices, number: int) -> Exchange | None:
+def _greedy_set(choices: Choices, number: int) -> Exchange | None:
     """Return exchanges that end all dependences, found joint by joint: each exchange loses as many rows as
     possible. A joint is removed if no weaker type is left. Return None if no set is found.
     """
@@ -129,7 +124,7 @@ def _joint_by_joint(choices: Choices, number: int) -> Exchange | None:
     lost = np.zeros((0, number))
     for name, kind in offers:
         more = np.concatenate([lost, choices[name][kind].lost])
-        if name not in chosen and len(lost) < number and _keep_rank(more):
+        if name not in chosen and len(lost) < number and _keeps_rank(more):
             lost, chosen[name] = more, kind
     return {name: chosen[name] for name in choices if name in chosen} if len(lost) == number else None
 
@@ -141,13 +136,13 @@ def _is_cure(rows: Mapping[str, np.ndarray], choices: Choices, exchange: Exchang
     return rank_of(remaining, NEARLY) == rank_of(every, NEARLY) == len(remaining)
 
 
-def _rows(model: Model) -> dict[str, np.ndarray]:
+def _rows_by_joint(model: Model) -> dict[str, np.ndarray]:
     """Return the rows of Φ_q at the scene's poses, of unit length, by joint."""
     jacobian, owner = scaled_jacobian(model, 0.0, model.start()), np.array(model.row_joint)
     return {name: jacobian[owner == name] for name in dict.fromkeys(model.row_joint)}
 
 
-def _bearing(scene: Scene, name: str) -> list[str]:
+def _admissible_types(scene: Scene, name: str) -> list[str]:
     """Return the joint types that can have the driver, the armature, the loads and the couplings of the joint
     of that name."""
     joint = scene.joint_named(name)
@@ -165,38 +160,38 @@ def _bearing(scene: Scene, name: str) -> list[str]:
     ]
 
 
-def _choices(
+def _weaker_types(
     scene: Scene, model: Model, rows: Mapping[str, np.ndarray], names: Mapping[str, np.ndarray]
 ) -> Choices:
     """Return the weaker types of joints, and their removal, that keep the rank at the model's poses.
 
     ``names`` gives the dependences (d, c) of each of these joints.
     """
-    bearing = {name: _bearing(scene, name) for name in names}
+    bearing = {name: _admissible_types(scene, name) for name in names}
     found: dict[str, dict[str, Weaker]] = {name: {} for name in names}
     for kind in dict.fromkeys(itertools.chain(*WEAKER.values())):
         changed = [
             n for n in names if kind in WEAKER.get(scene.joint_named(n).type, ()) and kind in bearing[n]
         ]
-        joints = tuple(_as(j, kind) if j.name in changed else j for j in model.scene.joint)
-        weaker_rows = _rows(Model(model.scene.with_(joint=joints, coupling=()))) if changed else {}
+        joints = tuple(_retyped(j, kind) if j.name in changed else j for j in model.scene.joint)
+        weaker_rows = _rows_by_joint(Model(model.scene.with_(joint=joints, coupling=()))) if changed else {}
         for name in changed:
-            found[name][kind] = _weaker(weaker_rows[name], rows[name], names[name])
+            found[name][kind] = _remaining(weaker_rows[name], rows[name], names[name])
     for name in names:
         order = WEAKER.get(scene.joint_named(name).type, ())
         found[name] = {kind: found[name][kind] for kind in order if kind in found[name]}
         if len(bearing[name]) == len(JOINT_TYPES):
-            found[name][REMOVED] = _weaker(rows[name][:0], rows[name], names[name])
-    return {name: {k: w for k, w in kinds.items() if _keep_rank(w.lost)} for name, kinds in found.items()}
+            found[name][REMOVED] = _remaining(rows[name][:0], rows[name], names[name])
+    return {name: {k: w for k, w in kinds.items() if _keeps_rank(w.lost)} for name, kinds in found.items()}
 
 
-def _weaker(rows: np.ndarray, own: np.ndarray, dependences: np.ndarray) -> Weaker:
+def _remaining(rows: np.ndarray, own: np.ndarray, dependences: np.ndarray) -> Weaker:
     """Return a weaker type with rows (k, n) from a joint's own rows (d, n) and their dependences (d, c)."""
     _, _, vt = np.linalg.svd((rows @ np.linalg.pinv(own)).reshape(-1, len(own)))
     return Weaker(rows, vt[len(rows) :] @ dependences)
 
 
-def _as(joint: Joint, kind: str) -> Joint:
+def _retyped(joint: Joint, kind: str) -> Joint:
     """Return the joint as another type at the same place; a universal joint gets the old axis as its first
     axis."""
     axis = np.array(joint.directions[0] if joint.directions else (0.0, 0.0, 1.0))

@@ -34,7 +34,7 @@ def idle_freedoms(scene: Scene) -> list[str]:
     found = [
         _sentence(model, q, link, joints)
         for link, joints in _links(scene)
-        if len(joints) >= FEWEST_JOINTS and _twists(model, general, link).size
+        if len(joints) >= FEWEST_JOINTS and _free_twists(model, general, link).size
     ]
     return [sentence for sentence in found if sentence]
 
@@ -53,7 +53,7 @@ def _links(scene: Scene) -> Iterator[tuple[list[str], list[str]]]:
             yield link, [joint.name for joint in ends]
 
 
-def _twists(model: Model, q: np.ndarray, link: list[str]) -> np.ndarray:
+def _free_twists(model: Model, q: np.ndarray, link: list[str]) -> np.ndarray:
     """Return twists (6, k) of a link alone, about the first body's centre: velocity over the mechanism's
     length, and angular velocity, world axes."""
     poses, moved = q.reshape(model.nb, 7), np.zeros((model.n, 6))
@@ -69,7 +69,7 @@ def _twists(model: Model, q: np.ndarray, link: list[str]) -> np.ndarray:
 
 def _sentence(model: Model, q: np.ndarray, link: list[str], joints: list[str]) -> str:
     """Return how a link moves alone at coordinates q (7 nb,)."""
-    twists, names = _twists(model, q, link), " and ".join(link)
+    twists, names = _free_twists(model, q, link), " and ".join(link)
     verb = "moves" if len(link) == 1 else "move"
     if not twists.size:
         return ""
@@ -84,14 +84,10 @@ def _sentence(model: Model, q: np.ndarray, link: list[str], joints: list[str]) -
     point = (
         np.cross(spin, velocity) / rate**2 * model.length + q.reshape(model.nb, 7)[model.index(link[0]), :3]
     )
-    own = all(_distance(model, q, joint, point, spin / rate) < AXIAL * model.length for joint in joints)
+    anchors = model.anchors(q.reshape(1, model.nb, 7))[0]
+    anchors = anchors[[joint.name in joints for joint in model.scene.joint]]
+    distances = np.linalg.norm(np.cross(anchors - point, spin / rate), axis=1)
+    own = bool((distances < AXIAL * model.length).all())
     whose = "its" if len(link) == 1 else "their"
     about = f"{whose} own axis" if own else "an axis"
     return f"{names} can spin about {about} and {verb} nothing else"
-
-
-def _distance(model: Model, q: np.ndarray, joint: str, point: np.ndarray, axis: np.ndarray) -> float:
-    """Return the distance (m) of a joint's anchor from an axis."""
-    number = [each.name for each in model.scene.joint].index(joint)
-    anchor = model.anchors(q.reshape(1, model.nb, 7))[0, number]
-    return float(np.linalg.norm(np.cross(anchor - point, axis)))

@@ -59,7 +59,7 @@ class Tangent:
             raise SceneError(["body: no mass resists a motion that the joints allow, so it has no vibration"])
         self.basis = free @ (axes * np.sqrt(self.mass / squares))
         inwards = frame.relative(model, q, np.zeros(model.n), np.zeros(model.n)) / model.units
-        self.forces = _by_body(terms.force * model.units) + _by_body(self.weight * inwards)
+        self.forces = _norms_by_body(terms.force * model.units) + _norms_by_body(self.weight * inwards)
 
     @property
     def freedoms(self) -> int:
@@ -78,7 +78,7 @@ class Tangent:
 
     def pushes_of(self, forces: np.ndarray) -> np.ndarray:
         """Return ``pushes`` for the sizes (2 nb,) of forces on the bodies."""
-        return np.asarray(_by_body(self.basis).T @ forces / self.mass)
+        return np.asarray(_norms_by_body(self.basis).T @ forces / self.mass)
 
     def along(self, axes: np.ndarray) -> Tangent:
         """Return the tangent with coordinates along orthonormal directions (f, f) of y."""
@@ -140,9 +140,9 @@ class Tangent:
     def linear_part(self, share: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return A = ∂y''/∂y and B = ∂y''/∂y' (f, f) by differences of order 8, with a share of the step."""
         zero, steps = np.zeros(self.freedoms), share * DIFFERENCE_STEP / self.sizes
-        by_place = [_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
+        by_place = [_directional_derivative(lambda y: self.accelerations(y, zero), h) for h in np.diag(steps)]
         place, fast = np.array(by_place).T / steps, steps * self.rate_scale
-        by_rate = [_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
+        by_rate = [_directional_derivative(lambda y: self.accelerations(zero, y), h) for h in np.diag(fast)]
         return place, np.array(by_rate).T / fast
 
     @property
@@ -151,13 +151,13 @@ class Tangent:
         return float(np.sqrt((self.pushes / self.sizes).max(initial=0.0))) or 1.0
 
 
-def _derivative(function: Callable[[np.ndarray], np.ndarray], h: np.ndarray) -> np.ndarray:
+def _directional_derivative(function: Callable[[np.ndarray], np.ndarray], h: np.ndarray) -> np.ndarray:
     """Return the change of a function along a vector h, to first order."""
     parts = [w * (function(k * h) - function(-k * h)) for k, w in enumerate(CENTRAL, 1)]
     return np.asarray(np.sum(parts, axis=0))
 
 
-def _by_body(x: np.ndarray) -> np.ndarray:
+def _norms_by_body(x: np.ndarray) -> np.ndarray:
     """Return the lengths (2 nb, …) of the translational and rotational parts of x (6 nb, …)."""
     return np.asarray(np.linalg.norm(x.reshape(-1, 3, *x.shape[1:]), axis=1))
 

@@ -22,7 +22,7 @@ MET_OFFSET = 1e-12  # gap (lengths of the mechanism, or rad) that rounding may l
 
 def assembled(scene: Scene) -> Scene:
     """Return a scene with offsets of couplings at poses that obey them (see ``Scene.assembled``)."""
-    return _moved(scene)[0]
+    return _at_offsets(scene)[0]
 
 
 def angles_at_start(scene: Scene) -> dict[str, float]:
@@ -30,18 +30,18 @@ def angles_at_start(scene: Scene) -> dict[str, float]:
     poses that obey its offsets; full turns count."""
     if not any(coupling.offset for coupling in scene.coupling):
         return {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
-    return _moved(scene)[1]
+    return _at_offsets(scene)[1]
 
 
 @functools.lru_cache(maxsize=64)
-def _moved(scene: Scene) -> tuple[Scene, dict[str, float]]:
+def _at_offsets(scene: Scene) -> tuple[Scene, dict[str, float]]:
     """Return the scene at poses that obey its offsets, and the angles of joints from the given poses."""
     offsets = {c.name: c.offset / max(1.0, abs(c.ratio)) for c in scene.coupling}
     found = scene.with_(coupling=[c.model_copy(update={"offset": 0.0}) for c in scene.coupling])
     angles = {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
     value = np.array([offsets.get(name, 0.0) for name in Model(found).row_joint])
     parts = 1
-    while parts < MOST_PARTS and not _is_small(found, value / parts):
+    while parts < MOST_PARTS and not _is_near(found, value / parts):
         parts *= 2
     for part in range(parts):
         model = Model(found)
@@ -55,7 +55,7 @@ def _moved(scene: Scene) -> tuple[Scene, dict[str, float]]:
     return found, angles
 
 
-def _is_small(scene: Scene, value: np.ndarray) -> bool:
+def _is_near(scene: Scene, value: np.ndarray) -> bool:
     """Return whether Φ = value (m,) is obeyed by poses near the scene's, up to LARGEST_PART."""
     model = Model(scene)
     q, _ = solve_positions(model, 0.0, model.start(), value)

@@ -25,11 +25,11 @@ def placed(model: Model, q: np.ndarray) -> Scene:
     scene, zeros = model.scene, np.zeros((1, model.nb, 6))
     motion = model.motion(q.reshape(1, model.nb, 7), zeros, zeros)
     bodies = [
-        body.model_copy(update={"position": _three(r, model.length), "orientation": tuple(p.tolist())})
+        body.model_copy(update={"position": _rounded(r, model.length), "orientation": tuple(p.tolist())})
         for body, r, p in zip(scene.body, motion["position"][0], motion["orientation"][0], strict=True)
     ]
-    joints = [joint.model_copy(update=_carried(model, joint, q)) for joint in scene.joint]
-    loads = [load.model_copy(update=_points(model, load, q)) for load in scene.load]
+    joints = [joint.model_copy(update=_moved_geometry(model, joint, q)) for joint in scene.joint]
+    loads = [load.model_copy(update=_moved_points(model, load, q)) for load in scene.load]
     return scene.with_(body=bodies, joint=joints, load=loads)
 
 
@@ -42,11 +42,13 @@ def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[int, float]
     found, turned = placed(model, q), angles or {}
     pose = at_rest(found)
     return found.with_(
-        load=[_with_natural(model.scene, pose, load, turned.get(k)) for k, load in enumerate(found.load)]
+        load=[
+            _with_natural_value(model.scene, pose, load, turned.get(k)) for k, load in enumerate(found.load)
+        ]
     )
 
 
-def _with_natural(scene: Scene, pose: Trajectory, load: Load, angle: float | None) -> Load:
+def _with_natural_value(scene: Scene, pose: Trajectory, load: Load, angle: float | None) -> Load:
     """Return a load whose natural angle or displacement counts from a pose of the scene."""
     if not isinstance(load, TorsionSpring | SlideSpring):
         return load
@@ -55,15 +57,15 @@ def _with_natural(scene: Scene, pose: Trajectory, load: Load, angle: float | Non
     return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - angle})
 
 
-def _carried(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
+def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
     """Return the geometric fields of a joint at coordinates q."""
     ends = tuple(place(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
-    axes = tuple(_direction(model, *end, q) for end in zip(joint.bodies, joint.directions * 2, strict=False))
+    axes = tuple(_world_axis(model, *end, q) for end in zip(joint.bodies, joint.directions * 2, strict=False))
     every: dict[str, Any] = {"anchor": ends[1], "anchors": ends, "axis": axes[:1] and axes[0], "axes": axes}
     return {key: value for key, value in every.items() if key in type(joint).model_fields}
 
 
-def _points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
+def _moved_points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
     if load.type == "force":
         return {"point": place(model, load.body, load.point, q)}
     if load.type == "spring":
@@ -76,16 +78,18 @@ def place(model: Model, body: str, point: tuple[float, float, float], q: np.ndar
     """Return the world position at coordinates q of a body-fixed point (world, t = 0)."""
     b, local = model.index(body), model.point(body, point)
     if b == model.nb:
-        return _three(local, model.length)
+        return _rounded(local, model.length)
     r, p = np.split(q.reshape(model.nb, 7)[b], [3])
-    return _three(r + rotations.rotate(p, local), model.length)
+    return _rounded(r + rotations.rotate(p, local), model.length)
 
 
-def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
+def _world_axis(
+    model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray
+) -> tuple[float, ...]:
     b, local = model.index(body), model.direction(body, axis)
-    return _three(local if b == model.nb else rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
+    return _rounded(local if b == model.nb else rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
 
 
-def _three(vector: np.ndarray, size: float = 1.0) -> tuple[float, ...]:
+def _rounded(vector: np.ndarray, size: float = 1.0) -> tuple[float, ...]:
     """Return three numbers in which rounding errors of zeros are zero, for numbers of a size."""
     return tuple((np.round(vector, 15 - round(math.log10(size))) + 0.0).tolist())

@@ -52,7 +52,7 @@ def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
 def eigenvalues_of(linear: Linear) -> Eigenvalues:
     """Return the eigenvalues with their bounds, the smallest first; parts within the bound are zero."""
     undamped = not (np.abs(linear.by_rate) > linear.rate_errors).any()
-    values, bounds, shapes = _of_squares(linear) if undamped else _of_both(linear)
+    values, bounds, shapes = _undamped_eigenvalues(linear) if undamped else _damped_eigenvalues(linear)
     real = np.where(np.abs(values.real) <= bounds, 0.0, values.real)
     imaginary = np.where(np.abs(values.imag) <= bounds, 0.0, values.imag)
     values = real + 1j * imaginary
@@ -61,27 +61,27 @@ def eigenvalues_of(linear: Linear) -> Eigenvalues:
     return Eigenvalues(values[order], bounds[order], shapes[:, order])
 
 
-def _of_squares(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _undamped_eigenvalues(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return eigenvalues ± √μ of eigenvalues μ of A, without damping."""
-    squares, errors, vectors = _bounded(linear.by_place, linear.place_errors)
+    squares, errors, vectors = _bounded_eigenvalues(linear.by_place, linear.place_errors)
     roots = np.sqrt(squares.astype(complex))
     size = np.abs(squares)
     bounds = np.where(size <= errors, np.sqrt(size + errors), errors / np.sqrt(np.maximum(size, 1e-300)))
     return np.concatenate([roots, -roots]), np.tile(bounds, 2), np.tile(vectors, 2)
 
 
-def _of_both(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _damped_eigenvalues(linear: Linear) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return eigenvalues of the equations of first order for (y, y' / w), with a rate w of their size."""
     f = len(linear.by_place)
     w = max(np.sqrt(np.abs(linear.by_place).max()), np.abs(linear.by_rate).max())
     zero = np.zeros((f, f))
     matrix = np.block([[zero, w * np.eye(f)], [linear.by_place / w, linear.by_rate]])
     errors = np.block([[zero, zero], [linear.place_errors / w, linear.rate_errors]])
-    values, bounds, vectors = _bounded(matrix, errors)
+    values, bounds, vectors = _bounded_eigenvalues(matrix, errors)
     return values, bounds, vectors[:f]
 
 
-def _bounded(matrix: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _bounded_eigenvalues(matrix: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return eigenvalues of a matrix (k, k), their bounds for the errors of its entries, and vectors."""
     from scipy.linalg import eig
 

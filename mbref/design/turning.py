@@ -31,7 +31,7 @@ class Turning(NamedTuple):
 
     def velocities(self, model: Model, q: np.ndarray) -> np.ndarray:
         """Return the velocities (n,) of bodies at rest in the frame: r' in the world, ω' along body axes."""
-        position, orientation = _bodies(model, q)
+        position, orientation = _poses(model, q)
         found = np.zeros((model.nb, 6))
         count = len(position)
         found[:count, :3] = np.cross(self.spin, position - self.point)
@@ -44,7 +44,7 @@ class Turning(NamedTuple):
 
         r'' - 2 Ω × r' - Ω × (Ω × r) for positions, and ω̇' + ω' × Ω along body axes for orientations.
         """
-        position, orientation = _bodies(model, q)
+        position, orientation = _poses(model, q)
         found, moved = a.reshape(model.nb, 6).copy(), rate.reshape(model.nb, 6)[: len(position)]
         inwards = np.cross(self.spin, np.cross(self.spin, position - self.point))
         found[: len(position), :3] -= 2 * np.cross(self.spin, moved[:, :3]) + inwards
@@ -54,7 +54,7 @@ class Turning(NamedTuple):
 
     def turned(self, model: Model, q: np.ndarray, angle: float) -> np.ndarray:
         """Return the coordinates (7 nb,) after a rotation of the mechanism by an angle (rad)."""
-        half = self._rotation(angle)
+        half = self._quaternion(angle)
         found, count = q.reshape(model.nb, 7).copy(), len(model.scene.body)
         found[:count, :3] = self.point + rotations.rotate(half, found[:count, :3] - self.point)
         found[:count, 3:] = rotations.multiply(half, found[:count, 3:])
@@ -63,10 +63,10 @@ class Turning(NamedTuple):
     def turned_rates(self, model: Model, v: np.ndarray, angle: float) -> np.ndarray:
         """Return velocities or accelerations (n,) after a rotation; angular ones are along body axes."""
         found, count = v.reshape(model.nb, 6).copy(), len(model.scene.body)
-        found[:count, :3] = rotations.rotate(self._rotation(angle), found[:count, :3])
+        found[:count, :3] = rotations.rotate(self._quaternion(angle), found[:count, :3])
         return found.ravel()
 
-    def _rotation(self, angle: float) -> np.ndarray:
+    def _quaternion(self, angle: float) -> np.ndarray:
         """Return the unit quaternion (4,) of a rotation by an angle (rad) about the axis."""
         return rotations.from_vector(angle * self.spin / self.rate)
 
@@ -93,7 +93,7 @@ class Turning(NamedTuple):
         ]
 
 
-def _bodies(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _poses(model: Model, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (nb, 3) and quaternions (nb, 4) of the scene's bodies, without a ground body."""
     position, orientation = np.split(q.reshape(model.nb, 7)[: len(model.scene.body)], [3], axis=1)
     return position, orientation

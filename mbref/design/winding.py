@@ -19,12 +19,13 @@ def wound(first: Tangent) -> Tangent:
 
     The first pose is returned if no spring is twisted by more than half a turn.
     """
-    slots, natural = _springs(first)
+    loads, acting = first.model.data.loads, sprung(first.model)
+    slots, natural = loads.angle[acting].astype(int), loads.natural[acting]
     here, twist = first, natural - first.angles[slots]
     if not np.abs(twist).max(initial=0.0) > FAR:
         return first
     for _ in range(STRIDES):
-        step = np.linalg.lstsq(_turning(here, slots), twist, rcond=None)[0]
+        step = np.linalg.lstsq(_angle_derivatives(here, slots), twist, rcond=None)[0]
         size = float(np.linalg.norm(here.basis @ step)) or 1.0
         moved = here.moved(min(1.0, STRIDE / size) * step)
         if moved is None or moved.freedoms != first.freedoms:
@@ -36,13 +37,7 @@ def wound(first: Tangent) -> Tangent:
     return here
 
 
-def _springs(tangent: Tangent) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (k,) of the angles of torsion springs, and their natural angles (k,), rad."""
-    loads, acting = tangent.model.data.loads, sprung(tangent.model)
-    return loads.angle[acting].astype(int), loads.natural[acting]
-
-
-def _turning(tangent: Tangent, slots: np.ndarray) -> np.ndarray:
+def _angle_derivatives(tangent: Tangent, slots: np.ndarray) -> np.ndarray:
     """Return the derivatives (k, f) of the springs' angles by the coordinates y."""
     model, found = tangent.model, []
     for direction in tangent.basis.T:
