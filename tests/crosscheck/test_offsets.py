@@ -41,7 +41,8 @@ def shifted(make, name: str, offset: float) -> Scene:
 
 
 @every
-def test_judge_finds_the_offset_in_the_assembled_poses(make, name, offset):
+def test_judge_measures_the_offset_in_the_assembled_poses(make, name, offset):
+    """q₂ - ratio · q₁ = offset, in the judge's joint coordinates of the poses that mbref assembles."""
     scene = shifted(make, name, offset)
     assert started(scene) == scene.assembled()
     (coupling,) = scene.coupling
@@ -55,7 +56,7 @@ def test_judge_finds_the_offset_in_the_assembled_poses(make, name, offset):
 
 
 @pytest.mark.parametrize("factor", [0.5, -1.0, 1.0 + 1e-9])
-def test_poses_of_another_offset_are_refused(factor, monkeypatch):
+def test_start_with_another_offset_is_refused(factor, monkeypatch):
     """Half of the offset, the opposite offset and an inaccurate assembly violate the judge's equation."""
     usual = SERVICES["assembled"]
     wrong = lambda scene: usual(scene.with_("coupling[teeth].offset", factor * scene.coupling[0].offset))  # noqa: E731
@@ -64,7 +65,8 @@ def test_poses_of_another_offset_are_refused(factor, monkeypatch):
         started(shifted(gear_pair, "teeth", 0.4))
 
 
-def test_poses_off_a_joint_are_refused(monkeypatch):
+def test_start_that_opens_a_joint_is_refused(monkeypatch):
+    """The wheel is moved by 0.1 mm off joint B."""
     usual = SERVICES["assembled"]
     wrong = lambda scene: usual(scene).with_("body[wheel].position[0]", 0.4001)  # noqa: E731
     monkeypatch.setitem(SERVICES, "assembled", wrong)
@@ -73,12 +75,14 @@ def test_poses_off_a_joint_are_refused(monkeypatch):
 
 
 def test_full_turns_at_the_start_are_no_violation():
+    """An offset of 20 rad turns a wheel by three full turns and 1.15 rad."""
     scene = shifted(gear_pair, "teeth", 20.0)
     assert started(scene) == scene.assembled()
 
 
 @every
-def test_both_formulations_and_mbref_move_alike_from_the_assembled_start(make, name, offset):
+def test_reference_and_mbref_agree_on_couplings_with_offsets(make, name, offset):
+    """Both formulations of the reference differ by rounding; mbref is off them by at most 1e-11."""
     scene = shifted(make, name, offset).with_(duration=0.4)
     given = started(scene)
     a, b = (motion(given, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
@@ -89,7 +93,7 @@ def test_both_formulations_and_mbref_move_alike_from_the_assembled_start(make, n
 
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "simbody", "drake", "dart"])
-def test_engines_move_from_the_assembled_start(name):
+def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
     modules = {"simbody": "opensim", "drake": "pydrake", "dart": "dartpy"}
     pytest.importorskip(modules.get(name, name))
     scene, simulator = shifted(coupled_loops, "gears", 0.1).with_(duration=0.2), engine(name)
@@ -108,8 +112,9 @@ def test_engines_refuse_a_scene_that_is_not_assembled():
     )
 
 
-def test_tables_count_from_the_poses_of_the_file(tmp_path):
-    """The reference has mbref's joint coordinates, and a motion with these is judged right."""
+def test_coordinates_of_a_reference_table_count_from_the_file_s_poses(tmp_path):
+    """The coordinates are mbref's, with s = 0.003 m + 0.05 m · φ; a table of these is judged right, and one
+    whose angle counts from the assembled pose is judged wrong."""
     scene = shifted(rack, "teeth", 0.003)
     table = reference_table(scene, TIMES)
     motion = mbref.simulate(scene, times=TIMES, rtol=1e-13)
@@ -120,13 +125,14 @@ def test_tables_count_from_the_poses_of_the_file(tmp_path):
     assert not judge_motion(scene, recorded | {"A.angle": table["A.angle"] - table["A.angle"][0]}).is_right
 
 
-def test_commands_read_the_assembled_scene(tmp_path):
+def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
     scene, path = shifted(gear_pair, "teeth", 0.4), str(tmp_path / "gears.toml")
     scene.save(path)
     assert find_scenes([path]) == [scene.assembled()] and read_scenes([path]) == [scene]
 
 
-def test_export_and_import_keep_the_motion(tmp_path):
+def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
+    """The rack returns from its MJCF with its motion, 2 mm or more off the motion without the offset."""
     pytest.importorskip("mujoco")
     scene, path = shifted(rack, "teeth", 0.003), tmp_path / "rack.xml"
     formats.write(scene, path)
@@ -136,6 +142,6 @@ def test_export_and_import_keep_the_motion(tmp_path):
     assert np.abs(one["rack"].position - mbref.simulate(rack(), times=TIMES)["rack"].position).max() > 2e-3
 
 
-def test_skew_chain_with_two_offsets():
+def test_judge_accepts_the_assembled_chain_of_two_offsets():
     scene = shifted(spatial_chain, "cable", 0.1).with_("coupling[mesh].offset", "-20 deg")
     assert started(scene) == scene.assembled()

@@ -9,6 +9,7 @@ import pytest
 
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import joint_coordinates
+from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import (
@@ -38,7 +39,6 @@ DRIVEN = {  # scene: measured errors (m, rad), and of rates and accelerations, p
     "five_bar": (2.2e-14, 3.5e-10),
     "spatial_slider_crank_driven": (3e-11, 2.1e-11),
 }
-UNEVEN, SAME, PHASED = ROUNDING, ROUNDING, ROUNDING  # m, rad; m; rad
 TURNED, ALIKE, REACTION = (
     5.2e-14,
     3.9e-14,
@@ -51,16 +51,13 @@ def simulate(scene: Scene, times: np.ndarray, step: float) -> Trajectory:
 
 
 @pytest.mark.parametrize("name", DRIVEN)
-def test_ondsel_and_truth(name: str) -> None:
-    """Through every singular position of the duration: redundant rows are removed, the branch is kept."""
+def test_ondsel_stays_within_its_measured_error_of_the_truth(name: str) -> None:
+    """Driven mechanisms, through every singular position of their duration; also rates and accelerations."""
     scene = SCENES[name]()
     measured, measured_rates = DRIVEN[name]
     run = simulate(scene, np.linspace(0, scene.duration, 41), scene.duration / 400)
     truth = truth_for(scene).poses(run.times)
-    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
-    assert completed_error(run, scene) < MARGIN * measured, (
-        f"{name}: {completed_error(run, scene):.2e} from the truth"
-    )
+    assert completed_error(run, scene) < MARGIN * measured
     centripetal = abs(truth.angular_velocity).max() ** 2  # the size of what cancels in ω' of a steady crank
     for field, size in (
         ("velocity", 0.0),
@@ -73,13 +70,13 @@ def test_ondsel_and_truth(name: str) -> None:
         assert gap < MARGIN * measured_rates, f"{name}: {field} is {gap:.1e} of the largest from the truth"
 
 
-def test_uneven_samples_and_even_samples() -> None:
-    """Every change of spacing is a new analysis, from the pose reached and turns later."""
+def test_uneven_sample_times_leave_the_error_at_rounding() -> None:
+    """OndselSolver takes even spacings only: at each change the adapter starts a new analysis from the pose
+    reached."""
     scene = SCENES["four_bar"]()
     times = np.array([0.003, 0.004, 0.011, 0.02, 0.03, 0.057, 0.0999])
     run = simulate(scene, times, 5e-4)
-    assert run.outcome is Outcome.COMPLETED and np.array_equal(run.times, times), run.message
-    assert completed_error(run, scene) < MARGIN * UNEVEN, f"{completed_error(run, scene):.2e} from the truth"
+    assert np.array_equal(run.times, times) and completed_error(run, scene) < MARGIN * ROUNDING
 
 
 def body(name: str, position: tuple, turned: tuple) -> Body:
@@ -140,7 +137,7 @@ def clockwork(swapped: bool) -> Scene:
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_ondsel_and_pinocchio_on_every_joint(swapped: bool) -> None:
+def test_ondsel_moves_every_joint_type_as_pinocchio(swapped: bool) -> None:
     """Kinematics and inverse dynamics of full inertia matrices; either order of the joints' bodies."""
     pytest.importorskip("pinocchio")
     scene = clockwork(swapped)
@@ -160,8 +157,9 @@ def test_ondsel_and_pinocchio_on_every_joint(swapped: bool) -> None:
 
 
 @pytest.mark.parametrize("swapped", [False, True])
-def test_a_driver_with_a_phase_and_the_angle_it_prescribes(swapped: bool) -> None:
-    """Samples apart by two lengths: the second analysis begins in the middle of the motion."""
+def test_driver_with_a_phase_turns_the_joint_as_prescribed(swapped: bool) -> None:
+    """φ = 0.3 sin(5 t + 0.4) - t - 0.3 sin 0.4 (rad). Two spacings of samples, so that the second analysis
+    begins in the middle of the motion."""
     sine = Sine(amplitude=0.3, frequency=5.0, phase=0.4)
     start = -sine.amplitude * math.sin(sine.phase)
     base = clockwork(swapped)
@@ -171,11 +169,11 @@ def test_a_driver_with_a_phase_and_the_angle_it_prescribes(swapped: bool) -> Non
     found = joint_coordinates(scene, run.times, run.position, run.orientation, run.angular_velocity)["cyl"]
     prescribed = start - run.times + sine.amplitude * np.sin(5.0 * run.times + 0.4)
     gap = abs(found[:, 0] - prescribed).max()
-    assert gap < MARGIN * PHASED, f"{gap:.1e} rad from the driver's angle"
+    assert gap < MARGIN * ROUNDING, f"{gap:.1e} rad from the driver's angle"
 
 
-def test_accelerations_that_the_solver_gets_wrong_are_left_out() -> None:
-    """A cylindrical joint between moving bodies."""
+def test_wrong_accelerations_of_a_cylinder_between_moving_bodies_are_left_out() -> None:
+    """OndselSolver's accelerations are wrong there; reactions follow from them."""
     base = clockwork(False)
     arm = body("arm", (-0.4, 0.2, 0.1), (0.1, 0.2, 0.3))
     joints = {joint.name: joint for joint in base.joint}
@@ -191,7 +189,7 @@ def test_accelerations_that_the_solver_gets_wrong_are_left_out() -> None:
     assert run.acceleration is None and run.angular_acceleration is None and run.reactions is None
 
 
-def test_a_distance_joint_is_refused() -> None:
+def test_ondsel_refuses_a_distance_joint() -> None:
     scene = clockwork(False)
     cord = Distance(name="cord", bodies=("crank", "sled"), anchors=((0.3, 0.0, 0.0), (1.0, 0.1, 0.2)))
     refusal = engine("ondsel").cannot(scene.with_(joint=(*scene.joint, cord)))
@@ -199,13 +197,15 @@ def test_a_distance_joint_is_refused() -> None:
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "four_bar_straight"])
-def test_open_motion_is_refused(name: str) -> None:
-    """Also what is open at the start only: OndselSolver takes the wrong branch there."""
+def test_ondsel_refuses_motions_that_drivers_do_not_determine(name: str) -> None:
+    """The straight four-bar is driven, but its branch is open at the start, where OndselSolver takes the
+    wrong one."""
     refusal = engine("ondsel").cannot(SCENES[name]())
     assert refusal is not None and refusal.owner is Owner.ENGINE, refusal
 
 
-def test_reactions_only_where_the_solver_knows_every_force() -> None:
+def test_ondsel_gives_reactions_only_with_masses_and_without_loads() -> None:
+    """The motion of a driven mechanism is the same in all three cases."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     loaded = base.with_(load=(Moment(body="crank", moment=(0.0, 1.0, 0.0)),))
@@ -213,13 +213,14 @@ def test_reactions_only_where_the_solver_knows_every_force() -> None:
     assert runs[base].reactions is not None, "no reactions of a scene without loads"
     assert runs[bare].reactions is None and runs[loaded].reactions is None, "reactions of unknown forces"
     gap = max(abs(run.position - runs[base].position).max() for run in runs.values())
-    assert gap < MARGIN * SAME, f"masses and loads move a driven mechanism by {gap:.1e} m"
+    assert gap < MARGIN * ROUNDING, f"masses and loads move a driven mechanism by {gap:.1e} m"
 
 
-def test_a_motion_the_joints_cannot_follow_keeps_the_states_before() -> None:
-    """The slider would have to leave its reach of 0.4 m about the crank's pin."""
+def test_driver_beyond_the_reach_ends_the_run_with_the_samples_before_the_failure() -> None:
+    """The slider starts at the end of its reach. OndselSolver first gives a pose 5 mm beyond it, which the
+    judge measures as a violation of 0.05 of the length, and then fails."""
     base = SCENES["spatial_slider_crank"]()
     scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())
     run = simulate(scene, np.linspace(0, 0.2, 21), 2e-3)
-    assert run.outcome is not Outcome.COMPLETED and run.message, f"{run.outcome.label} {run.message!r}"
-    assert 0 < len(run.times) < 21, f"{len(run.times)} samples, ended at {run.t_end}: {run.message}"
+    assert run.outcome is Outcome.NOT_CONVERGED and "OndselSolver failed" in run.message, run.message
+    assert 0 < len(run.times) < 21 and violation_series(scene, run)[1:].min(initial=1.0) > 0.01

@@ -30,7 +30,7 @@ SCENE = Scene(name="s", duration=2.0, body=(BLOCK,))
     ],
     ids=["positive", "not negative", "whole", "digits"],
 )
-def test_numbers_at_the_ends_of_what_an_option_takes(parse, good, bad):
+def test_option_takes_the_ends_of_its_range_and_refuses_values_beyond(parse, good, bad):
     for text in good:
         assert parse(text) == float(text), text
     for text in bad:
@@ -38,11 +38,16 @@ def test_numbers_at_the_ends_of_what_an_option_takes(parse, good, bad):
             parse(text)
 
 
-def test_the_end_of_a_motion_by_hand():
-    assert request.lasting(SCENE, None, None) is SCENE and request.lasting(SCENE, None, 2.0) is SCENE
-    assert request.lasting(SCENE, [0.5, 1.5], None).duration == 1.5, "the last time ends it"
-    assert request.lasting(SCENE, [0.5], 0.5).duration == 0.5
-    assert request.lasting(SCENE, None, 3.0).duration == 3.0
+@pytest.mark.parametrize(
+    ("times", "duration", "end"),
+    [(None, None, 2.0), (None, 2.0, 2.0), (None, 3.0, 3.0), ([0.5, 1.5], None, 1.5), ([0.5], 0.5, 0.5)],
+)
+def test_motion_ends_at_the_last_time_or_at_the_duration_option(times, duration, end):
+    """Without both options the scene's own duration of 2 s stays."""
+    assert request.lasting(SCENE, times, duration).duration == end
+
+
+def test_duration_before_the_last_time_or_not_positive_is_refused():
     with pytest.raises(RequestError, match=r"--times: must end by --duration 0\.5, got 0\.6"):
         request.lasting(SCENE, [0.6], 0.5)
     for end in (0.0, np.inf, np.nan):

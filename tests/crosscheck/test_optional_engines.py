@@ -25,17 +25,17 @@ def nothing_more(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(metadata, "version", found)
 
 
-def test_missing_packages_and_the_engines_that_run(nothing_more: None) -> None:
+def test_optional_engines_without_their_packages_are_not_run_by_default(nothing_more: None) -> None:
     assert set(OPTIONAL) <= set(engine_names()), f"known: {engine_names()}"
     assert not any(map(installed, OPTIONAL)), f"installed: {[n for n in OPTIONAL if installed(n)]}"
     assert default_engines()[: len(BUILT_IN)] == BUILT_IN and not set(OPTIONAL) & set(default_engines())
     notices: list[str] = []
     assert not set(find_engines(None, notices.append)) & set(OPTIONAL)
-    assert not any(name in notice for notice in notices for name in OPTIONAL), f"said unasked: {notices}"
+    assert not any(name in notice for notice in notices for name in OPTIONAL), f"named unasked: {notices}"
 
 
 @pytest.mark.parametrize("name", OPTIONAL + ON_REQUEST)
-def test_what_is_asked_for_and_what_to_install(nothing_more: None, name: str) -> None:
+def test_request_for_a_missing_engine_names_the_package_to_install(nothing_more: None, name: str) -> None:
     reason = missing_package(name)
     assert reason and f"pip install {engine(name).package}" in reason, reason
     with pytest.raises(RequestError, match="pip install"):
@@ -48,9 +48,11 @@ def test_installed_engines_run_by_default(name: str, monkeypatch: pytest.MonkeyP
     assert installed(name) and name in default_engines(), f"default: {default_engines()}"
 
 
-def test_all_is_every_installed_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_engine_all_means_every_installed_engine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Named engines come first, each once."""
     known = {"mujoco", "drake", "casadi"}
     monkeypatch.setattr(engine_module, "installed", lambda name: name in known)
     monkeypatch.setattr(request, "missing_package", lambda name: "")
     assert set(find_engines(["all"], print)) == known, find_engines(["all"], print)
+    assert sorted(find_engines(["mujoco", "all"], print)) == sorted(known)
     assert find_engines(["mujoco", "all"], print)[0] == "mujoco"

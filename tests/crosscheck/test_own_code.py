@@ -31,7 +31,8 @@ MODEL = (
         ("stiff", {**HARDENED, "beta": 1000.0}),
     ],
 )
-def test_mjcf_makes_the_options_of_a_run(family, options):
+def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
+    """A model with the shown XML and Python has the options, softness and regularisers of the adapter's."""
     mujoco = pytest.importorskip("mujoco")
     from crosscheck.engines.mujoco.simulation import Simulation
 
@@ -52,7 +53,8 @@ def test_mjcf_makes_the_options_of_a_run(family, options):
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank"])
 @pytest.mark.parametrize("family", ["defaults", "trapezoidal", "alpha"])
-def test_python_makes_the_settings_of_exudyn(name, family):
+def test_shown_python_sets_the_settings_of_an_exudyn_run(name, family):
+    """The executed line makes the settings and solver type that the adapter uses, not Exudyn's defaults."""
     exu = pytest.importorskip("exudyn")
     from crosscheck.engines.exudyn.adapter import DYNAMIC
     from crosscheck.engines.exudyn.dynamic import Solver
@@ -75,7 +77,8 @@ class _Solving:
         self.solved.append(solverType)
 
 
-def test_python_makes_the_settings_of_pinocchio():
+def test_shown_python_sets_the_solver_of_a_pinocchio_run():
+    """The executed code has the adapter's accuracies, iterations, Baumgarte gains and step."""
     pinocchio = pytest.importorskip("pinocchio")
     from crosscheck.engines.pinocchio.simulation import Simulation
 
@@ -96,29 +99,30 @@ def test_python_makes_the_settings_of_pinocchio():
             assert np.allclose(corrector.Kp, other.Kp) and np.allclose(corrector.Kd, other.Kd)
 
 
-def test_simbody_s_line_names_its_integrator():
+def test_shown_python_of_simbody_names_an_integrator_of_opensim():
     opensim = pytest.importorskip("opensim")
     line = engine("simbody").own_code(SCENE, Setting("merson", {"accuracy": 1e-6}))
     assert hasattr(opensim.Manager, re.search(r"IntegratorMethod_\w+", line)[0])
     assert line.endswith("manager.setIntegratorAccuracy(1e-06)")
 
 
-def test_mbref_s_line_runs():
+def test_shown_python_of_mbref_runs_with_its_tolerance():
     line = engine("mbref").own_code(SCENE, Setting("taylor", {"rtol": 1e-6}))
     motion = eval(line, {"mbref": mbref, "scene": SCENE.with_(duration=0.001)})
     assert motion.settings["rtol"] == 1e-6 and motion.outcome.name == "COMPLETED"
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_families_that_crosscheck_integrates_have_no_line_of_an_engine_s_integrator(name):
-    pytest.importorskip({"pinocchio": "pinocchio"}.get(name, name))
+def test_no_code_is_shown_for_families_that_crosscheck_integrates(name):
+    """Pinocchio has no integrator: there the code of three families sets its solver."""
+    pytest.importorskip(name)
     found, integrators = engine(name), {"pinocchio": ("defaults", "proximal", "baumgarte")}.get(name, ())
     for family in found.integrated_here:
         if family not in integrators:
             assert not found.own_code(SCENE, Setting(family, {"step": 1e-3, "rtol": 1e-6, "min_step": 1e-5}))
 
 
-def test_code_is_written_from_assignments():
+def test_assignments_are_recorded_as_lines_of_code():
     statements: list[str] = []
     settings = Written("settings", statements)
     settings.newton.relativeTolerance = 1e-6
@@ -126,7 +130,10 @@ def test_code_is_written_from_assignments():
     assert statements == ["settings.newton.relativeTolerance = 1e-06", "settings.solver = exu.Kind.Dense"]
 
 
-def test_the_fastest_run_within_a_level_is_used_else_the_most_accurate():
+def test_fastest_run_within_the_level_is_chosen_otherwise_the_most_accurate():
+    """Within 1e-6, engine a's family "own" has runs of 1, 2 and 3 s: the one of 1 s. Engine b has none: the
+    one of least error."""
+
     def record(engine: str, error: float, seconds: float, family: str = "own") -> dict[str, Any]:
         return {
             "engine": engine,

@@ -46,13 +46,16 @@ def simulated(label: Label, times: np.ndarray | None = None) -> Trajectory:
         ("20", Outcome.TIMED_OUT, 20.0, Match.DIFFERENT),
     ],
 )
-def test_match_and_outcome_and_time(cell, outcome, t_end, expected):
+def test_run_matches_a_cell_of_the_paper_by_outcome_and_end_time(cell, outcome, t_end, expected):
+    """ "0.031c": the run ended at 0.031 s by a violation of the constraints (c); "20": it completed 20 s."""
     end, letter = (None, "") if cell == "20" else (float(cell[:-1]), cell[-1])
     mark = match(Cell("I", "a method", "a column", end, letter), outcome, t_end)
     assert mark is expected, f"{cell} against {outcome.label} at {t_end}: {mark}, expected {expected}"
 
 
-def test_every_cell_and_a_run_of_its_method():
+def test_every_cell_of_the_paper_has_a_run_of_its_method():
+    """Its method, with partitioning for rows "CP", no masses (M = I), and one set of options for all
+    cells."""
     tables = runs.tables()
     for cell in CELLS:
         case = tables[Label(cell.table, cell.row, cell.column)]
@@ -64,7 +67,7 @@ def test_every_cell_and_a_run_of_its_method():
     assert len(used) == 1, f"{len(used)} sets of settings, not one for all cells"
 
 
-def test_variants_and_one_thing_changed():
+def test_every_variant_changes_one_setting():
     default = {f.name for f in dataclasses.fields(Limits)}
     for variant in settings.SWEEP:
         assert set(variant.options()) <= default, f"{variant.name}: {set(variant.options()) - default}"
@@ -76,8 +79,10 @@ def test_variants_and_one_thing_changed():
         assert len(changed) + len(others) == 1, f"{variant.name} changes {sorted(changed)} and {others}"
 
 
-def test_alf_and_what_errors_make_of_it_near_a_singular_position():
-    """An iteration takes out a factor 1 + α σ² of what errors put into the direction that vanishes."""
+def test_errors_near_a_singular_position_raise_the_iterations_of_alf():
+    """Iterations 1 to 0.001 rad from θ₂ = 0, without errors and with errors of 1e-8. One iteration divides
+    the errors in the vanishing direction by 1 + α σ²; at 0.03 rad the paper's limit of iterations is
+    exceeded."""
     exact = [singular.alf_iterations(distance, 0.0) for distance in (1.0, 0.001)]
     wrong = [singular.alf_iterations(distance, 1e-8) for distance in (1.0, 0.1, 0.03, 0.01)]
     assert max(exact) <= 6, f"iterations with γ exact, 1 and 0.001 rad from θ₂ = 0: {exact}"
@@ -85,8 +90,9 @@ def test_alf_and_what_errors_make_of_it_near_a_singular_position():
     assert wrong[2] > settings.ALF["iterations"], f"{wrong[2]} iterations 0.03 rad away"
 
 
-def test_rank_tolerance_and_a_row_that_is_redundant_in_the_plane_only():
-    """Without stabilisation a tilt grows; the planar row then counts as independent and brakes the crank."""
+def test_small_rank_tolerance_brakes_a_crank_tilted_out_of_its_plane():
+    """Without stabilisation a tilt grows, and a row that is redundant in the plane counts as independent. At
+    12.2 s the crank has half of the true speed or less; with a raised tolerance it has the true speed."""
     braked, right = (
         simulated(Label("dynamic", "MPI (SVD)", runs.UNEQUAL, name), np.linspace(0, 12.2, 62))
         for name in (settings.BASE.name, runs.RAISED.name)
@@ -109,15 +115,15 @@ def test_rank_tolerance_and_a_row_that_is_redundant_in_the_plane_only():
         ("II", "MPI (GS) + CP", "five-bar"),
     ],
 )
-def test_cell_and_a_real_run(table, row, column):
+def test_run_ends_as_its_cell_of_the_paper(table, row, column):
     [cell] = [c for c in CELLS if (c.table, c.row, c.column) == (table, row, column)]
     run = simulated(Label(table, row, column))
     mark = match(cell, run.outcome, run.t_end)
     assert mark is Match.SAME, f"paper {cell}; ours {run.outcome.label} at {run.t_end:.5f} s"
 
 
-def test_forced_step_and_the_outcome_that_ends_a_run():
-    """Without it the step fails where with it the run goes on until its violation ends it."""
+def test_forced_step_carries_a_run_on_to_its_violation():
+    """Without the forced step the run ends by its step size (STEP_FAILED)."""
     case = runs.linkage("MPI (SVD)", "θ₂ = π/4", np.array([0.1]))
     options = dict(case.setting.options)
     forced = simulate(case.scene, case.setting.family, case.times, Limits(**options))
@@ -127,14 +133,15 @@ def test_forced_step_and_the_outcome_that_ends_a_run():
     )
 
 
-def test_forced_step_and_a_run_that_never_needs_it():
+def test_forced_step_below_all_steps_changes_no_bit():
     scene, times = SCENES["planar_slider_crank"](), [0.05, 0.1]
     plain = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6))
     forced = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6, forced_step=1e-9))
     assert np.array_equal(plain.position, forced.position), "a forced step far below the steps changed them"
 
 
-def test_rank_and_the_crossings_of_the_rhombus():
+def test_rank_of_the_rhombus_drops_from_18_to_17_where_it_is_flat():
+    """At the crossings, and 5 ms behind each; scaled singular values of the 20 rows."""
     for theta0 in (math.pi / 4, math.pi / 2):
         times = [t for t, _ in singular.crossings(theta0, 0.06)]
         at = [singular.rank(v) for v in singular.scaled_singular_values(four_bar(theta0), np.array(times))]
@@ -143,7 +150,8 @@ def test_rank_and_the_crossings_of_the_rhombus():
         assert set(at) == {17} and set(beside) == {18}, f"ranks at kπ {at}, beside {beside}"
 
 
-def test_fold_and_the_driver():
+def test_fold_satisfies_the_driver_from_pi_and_not_from_zero():
+    """Driver at -0.1 rad: the fold from θ = π obeys joints and driver, the fold from 0 misses it by 0.1."""
     open_fold, closed = (singular.fold_residual(theta, -0.1) for theta in (math.pi, 0.0))
     assert open_fold < 1e-14, f"on the fold from π the joints and the driver are off by {open_fold}"
     assert math.isclose(closed, 0.1, rel_tol=1e-9), (
@@ -152,8 +160,8 @@ def test_fold_and_the_driver():
 
 
 @pytest.mark.slow
-def test_table_i_and_the_paper():
-    """The whole of Table I: the letter of every cell, and the end times of all but two."""
+def test_table_i_has_the_paper_s_letters_and_all_end_times_but_two():
+    """33 cells: none differs in its letter, and at least 31 have the end time too."""
     marks = Counter()
     for cell in CELLS:
         if cell.table == "I":

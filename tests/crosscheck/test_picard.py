@@ -10,22 +10,25 @@ from crosscheck.judge.truth import picard
 from crosscheck.judge.truth.picard import NoSolution, Solution
 
 
-def test_equations_of_motion_that_end_say_so():
+def test_solution_with_a_pole_ends_at_the_pole():
+    """y' = y², y(0) = 1: y = 1 / (1 - t)."""
     solution = Solution(lambda y: y**2, np.array([1.0]), 0.1)
     assert abs(solution(np.array([0.9]))[0, 0] - 10) < 1e-12
-    with pytest.raises(NoSolution, match=r"t = (1|0\.99999)"):
+    with pytest.raises(NoSolution) as ended:
         solution(np.array([1.1]))
+    assert ended.value.until == pytest.approx(1.0, abs=1e-5)
 
 
 def test_panels_reach_rounding_error_over_many_periods():
+    """The sine over 48 periods, by y'' = -y."""
     t = np.linspace(0, 300.0, 50)
     got = Solution(lambda y: np.stack([y[:, 1], -y[:, 0]], axis=1), np.array([0.0, 1.0]), 0.1)(t)
     off = np.abs(got[:, 0].astype(float) - np.sin(t)).max()
     assert off < 1e-14, f"sine off by {off} after {t[-1]} rad"
 
 
-def test_threads_that_ask_at_once_get_the_same_states():
-    """Runs of a study share the truth of a scene; at every call of f here another thread goes on."""
+def test_threads_that_share_a_solution_get_the_states_of_one_thread():
+    """Runs of a study share the truth of a scene. The derivative yields to another thread at every call."""
 
     def derivative(y):
         sleep(0)
@@ -39,7 +42,7 @@ def test_threads_that_ask_at_once_get_the_same_states():
         np.testing.assert_array_equal(answer, alone(times))
 
 
-def test_times_at_which_a_component_has_a_value():
+def test_solution_finds_the_times_at_which_a_component_has_given_values():
     """y' = (1, 2 y₀): the first grows as t, the second as t²."""
     made = picard.Solution(lambda y: np.stack([np.ones_like(y[:, 0]), 2 * y[:, 0]], axis=1), np.zeros(2), 0.5)
     assert made.where(1, np.array([0.25, 4.0])).astype(float) == pytest.approx(

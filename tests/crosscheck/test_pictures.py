@@ -22,7 +22,9 @@ def run():
     return case, run_case(case)
 
 
-def test_runs_along_branches_part_behind_the_crossing(run, tmp_path):
+def test_runs_along_both_branches_part_at_the_crossing(run, tmp_path):
+    """The rhombus is flat at θ = -π, t = 1.5 π / 124.8 s: then the coupler either goes on parallel to the
+    ground (centre at twice the crank's centre + 0.25 m) or folds onto the crank."""
     first = branches([run], tmp_path / "branches.jsonl")
     asked = [record["asked"]["options"] for record in first]
     assert asked == [{"rtol": 1e-9, BRANCHES: [[2, branch]]} for branch in (1, 2)]
@@ -36,11 +38,13 @@ def test_runs_along_branches_part_behind_the_crossing(run, tmp_path):
     assert np.abs(smooth - (2 * along_crank + lifted)).max() < 1e-6
     assert np.abs(fold - np.where((times > crossing)[:, None], along_crank, smooth)).max() < 1e-6
     size = (tmp_path / "branches.jsonl").stat().st_size
-    assert branches([run], tmp_path / "branches.jsonl") == first, "they are not run again"
-    assert (tmp_path / "branches.jsonl").stat().st_size == size
+    assert branches([run], tmp_path / "branches.jsonl") == first
+    assert (tmp_path / "branches.jsonl").stat().st_size == size, "stored runs were made again"
 
 
-def test_the_run_of_largest_error_is_kept_as_poses_alone(run):
+def test_worst_run_is_shown_by_its_poses_alone(run):
+    """The run of largest error, at the times of the truth's motion; a run that crashed has no poses to
+    show."""
     case, record = run
     worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
     coarse = case._replace(setting=Setting("taylor", {"rtol": 1e-3}))
@@ -51,22 +55,27 @@ def test_the_run_of_largest_error_is_kept_as_poses_alone(run):
     assert not worst_runs([(case, {**record, "outcome": "CRASHED"})], [truth], None)
 
 
-def test_numbers_are_kept_to_digits_of_the_largest():
+def test_shown_numbers_have_six_digits_of_the_largest():
     exact = {"a": {"position": [[123.456789012, 1e-9, 0.0]], "orientation": [[1.0, 0.0, 0.0, 0.0]]}}
     assert shortened(exact)["a"]["position"] == [[123.457, 0.0, 0.0]] and DIGITS == 6
     empty = {"a": {"position": np.zeros((0, 3)), "orientation": np.zeros((0, 4))}}
     assert shortened(empty) == {"a": {"position": [], "orientation": []}}
 
 
-def test_positions_of_several_branches_are_shown_first():
+def test_crossings_with_several_branches_are_shown_before_others():
+    """Up to two crossings, by their number: those with several branches, otherwise the first."""
     alone, several = {"velocity": [1]}, {"velocity": [1, 2]}
     assert shown([alone, several, several, several]) == [2, 3]
     assert shown([alone, alone]) == [1]
 
 
-def test_an_option_beyond_the_sweep_is_taken(capsys):
+def test_run_takes_an_option_that_its_sweep_does_not_vary(capsys):
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out
+
+
+def test_unknown_option_of_a_family_is_refused_with_the_known_ones(capsys):
+    asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.replace("branches", "branch").split()]) == 2
     assert "has no option 'branch'; it has: rtol, branches; did you mean" in capsys.readouterr().err

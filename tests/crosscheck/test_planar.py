@@ -102,7 +102,8 @@ def off(run: Trajectory) -> float:
 
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
 @pytest.mark.parametrize("name", FREE)
-def test_a_block_on_an_incline_and_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
+def test_block_on_an_incline_moves_as_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
+    """Its centre falls along the plane and it spins steadily; forces by Newton's and Euler's equations."""
     run = run_fine(name, incline(bodies), TIMES)
     assert off(run) < CLOSE[name], f"{name}: off by {off(run):.1e} m, rad"
     assert run.reactions is not None
@@ -129,7 +130,9 @@ def guided() -> tuple[Scene, Scene]:
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_a_plane_in_place_of_the_guide_of_a_slider_crank(name: str) -> None:
+def test_plane_replaces_the_guide_of_a_slider_crank(name: str) -> None:
+    """A spherical slider joint becomes a hinge, so that a plane across it leaves the slider-crank's freedom;
+    the truth is the motion with the guide."""
     base, planar = guided()
     assert (base.counts().redundant, planar.counts().redundant) == (3, 1)
     times = np.linspace(0, 0.1, 4)
@@ -179,12 +182,13 @@ def swash_plate(bodies: tuple[str, str]) -> tuple[Scene, np.ndarray]:
 
 @pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
 @pytest.mark.parametrize("name", FINE)
-def test_a_swash_plate_lifts_a_pin(name: str, bodies: tuple[str, str]) -> None:
+def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str, str]) -> None:
+    """z = 0.2 + slope · radius (1 - cos ω t). Ondsel's wrong accelerations there are left out."""
     scene, heights = swash_plate(bodies)
     run = run_fine(name, scene, TIMES)
     gap = np.abs(run.position[:, 1, 2] - heights).max()
     assert gap < CLOSE[name], f"{name}: the pin is off by {gap:.1e} m"
-    assert name != "ondsel" or run.acceleration is None, "accelerations that miss the joint's equations"
+    assert name != "ondsel" or run.acceleration is None
 
 
 def referred(scene: Scene) -> Reference:
@@ -198,8 +202,8 @@ def referred(scene: Scene) -> Reference:
 
 @pytest.mark.parametrize("joints", [1, 2])
 @pytest.mark.parametrize("bodies", ORDERS, ids="-".join)
-def test_the_reference_of_a_block_on_an_incline(bodies: tuple[str, str], joints: int) -> None:
-    """The planar joint is in the tree of formulation B, a second one closes a loop."""
+def test_reference_of_a_block_on_an_incline_is_the_closed_form(bodies: tuple[str, str], joints: int) -> None:
+    """One planar joint is in the tree of formulation B; a second one closes a loop."""
     found, (position, orientation) = referred(incline(bodies, joints)), exact_poses()
     allowed = found.bound.max()
     assert np.abs(found.position[:, 0] - position).max() <= allowed
@@ -208,7 +212,7 @@ def test_the_reference_of_a_block_on_an_incline(bodies: tuple[str, str], joints:
 
 
 @pytest.mark.parametrize("bodies", [("plate", "pin"), ("pin", "plate")], ids="-".join)
-def test_the_reference_of_a_swash_plate(bodies: tuple[str, str]) -> None:
+def test_reference_of_a_swash_plate_is_the_closed_form(bodies: tuple[str, str]) -> None:
     scene, heights = swash_plate(bodies)
     found = referred(scene)
     assert np.abs(found.position[:, 1, 2] - heights).max() <= found.bound.max()

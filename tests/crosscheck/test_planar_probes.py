@@ -30,21 +30,23 @@ def loops(scene: Scene) -> int:
     return len(scene.joint) - len(scene.body)
 
 
-def test_an_engine_of_planar_mechanisms_is_run_on_twenty_loops():
+def test_planar_engine_is_run_on_at_least_twenty_loops():
+    """Without planar probes an engine of hinges along z and slides would be run on few closed loops."""
     scenes = [specimen.scene for specimen in find_specimens(None, 0.0, ENGINE)]
     able = [s for s in scenes if PLANAR.cannot(s) is None and loops(s) > 0]
     assert len(able) >= 20 and len({s.name for s in scenes}) == len(scenes), [s.name for s in able]
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
-def test_an_engine_of_spatial_mechanisms_is_held_against_the_suite_as_before(name):
+def test_spatial_engine_gets_planar_probes_only_by_name(name):
     assert not is_planar(engine(name))
     assert not {s.scene.name for s in find_specimens(None, 0.0, name)} & set(planar_loops())
-    assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load, "it can be asked for by name"
+    assert find_specimens(["planar four-bar: spring"], 0.0, name)[0].scene.load
 
 
 @pytest.mark.parametrize("name", planar_loops())
-def test_planar_probes_are_loops_in_the_plane(name):
+def test_planar_probe_is_a_loop_in_the_plane_with_its_named_part(name):
+    """A name is "mechanism: part", where the part is a load's type, a driver, or gravity alone."""
     scene = planar_loops()[name]
     assert loops(scene) >= 1 and scene.name == name
     assert {joint.type for joint in scene.joint} <= set(Planar.supports.joints)

@@ -30,7 +30,7 @@ def rounded(array: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_rounded_array_and_its_name(bench, name):
+def test_array_in_single_precision_is_named(bench, name):
     single = replace(bench.close, **{name: rounded(getattr(bench.close, name))})
     told = {item.partition(" of ")[0] for item in single_precision(bench.scene, single)}
     assert told == {name.replace("_", " ")}, told
@@ -49,7 +49,7 @@ def test_rounded_reactions_and_noise(bench):
     assert grain(bench.scene, replace(run, orientation=run.orientation * signs))[0] < 1e-14, "q and -q"
 
 
-def test_numbers_that_are_no_evidence(bench):
+def test_constant_simple_and_tiny_numbers_do_not_count_as_single_precision(bench):
     """Constant, simple and small numbers may be of few bits in double precision too."""
     run = bench.close
     shape = run.acceleration.shape
@@ -58,13 +58,13 @@ def test_numbers_that_are_no_evidence(bench):
         assert not single_precision(bench.scene, replace(run, acceleration=few)), few[:, 0, 0]
 
 
-def test_numbers_that_are_not_finite(bench):
+def test_arrays_that_are_not_finite_are_named(bench):
     wrench = np.full_like(bench.close.reactions["J"], np.nan)
     lost = replace(bench.close, reactions={"J": wrench}, velocity=np.full_like(bench.close.velocity, np.inf))
     assert not_finite(lost) == ["velocity", "reaction in J"]
 
 
-def test_claim_of_single_precision():
+def test_engine_that_claims_single_precision_is_not_failed_for_it():
     """An engine whose velocities are of single precision and which says so / an engine that does not."""
     faulty = engine(DEFECTS["velocities rounded to single precision"])
     for claimed, status in ((2.0**-52, suite.FAIL), (2.0**-23, suite.OUTSIDE)):
@@ -74,7 +74,7 @@ def test_claim_of_single_precision():
         assert (suite.verdict_on("smooth", bench).status == suite.FAIL) == (claimed < 1e-9)
 
 
-def test_length_of_a_body_alone():
+def test_length_of_a_body_in_flight_is_its_way():
     """The characteristic length of a body in flight is its way, at rest its radius of gyration."""
     body = Body(name="body", mass=2.0, inertia=(0.02, 0.08, 0.07), position=(0.3, 0.0, 0.0))
     still = Scene(name="alone", duration=0.5, body=(body,))

@@ -35,7 +35,7 @@ def moved(sample: int, body: int, by: tuple[float, float, float], k: int = 3) ->
     return run
 
 
-def test_energy_is_the_largest_change_in_joule():
+def test_energy_measure_is_the_largest_change_in_joule():
     """2 kg at 3 m/s have 9 J; 3 kg higher by 0.1 m have 3 J."""
     fast = at_rest()
     fast.velocity[2, 0] = (0.0, 3.0, 0.0)
@@ -44,7 +44,7 @@ def test_energy_is_the_largest_change_in_joule():
     assert measures.energy(SCENE, at_rest(), None) == 0.0
 
 
-def test_distances_of_a_centre():
+def test_distance_measures_compare_a_centre_with_the_truth():
     """The second body is 5 m from the origin; it is off by 0.5 m once in three samples."""
     off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
     assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
@@ -59,7 +59,7 @@ def test_distances_of_a_centre():
     assert measures.mean_square_distance("far")(SCENE, at_rest(0), at_rest(0)) is None
 
 
-def test_relative_error_of_each_observed_number():
+def test_relative_measure_is_the_largest_over_all_observed_numbers():
     """Numbers 2 and 1e-5 are off by 0.02 and 1e-5: 0.01, and 0.01 of the least denominator 1e-3."""
 
     def first(motion: Trajectory) -> np.ndarray:
@@ -75,7 +75,7 @@ def test_relative_error_of_each_observed_number():
     assert measure(SCENE, run, at_rest(0)) == 0.0, "a truth without a sample"
 
 
-def test_relative_error_at_the_end():
+def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
     def seen(scene: Scene, motion: Trajectory) -> dict[str, float]:
         return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1]), "z": 1.0}
 
@@ -105,7 +105,7 @@ def turning(angles: tuple[tuple[float, float], ...]) -> Trajectory:
     return run
 
 
-def test_hinges_that_turn_in_opposite_directions():
+def test_opposite_hinges_measure_is_the_largest_sum_of_both_angles():
     pair = measures.opposite_hinges([("A", "B")])
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.2), (0.5, -0.5))), None) == pytest.approx(0.0, abs=1e-15)
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.3), (0.5, -0.44))), None) == pytest.approx(0.1)
@@ -113,7 +113,7 @@ def test_hinges_that_turn_in_opposite_directions():
     assert measures.opposite_hinges([])(SCENE, at_rest(), None) == 0.0
 
 
-def test_a_guided_body_keeps_its_vertical_line_and_its_orientation():
+def test_guided_measure_is_the_distance_off_the_line_or_the_tilt():
     guided = measures.guided("far")
     assert guided(SCENE, moved(1, 1, (0.03, 0.04, 7.0)), None) == pytest.approx(0.05), "its height is free"
     tilted = at_rest()

@@ -47,7 +47,7 @@ def held(
     )
 
 
-def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
+def test_resume_repeats_no_test_that_passed_before(tmp_path):
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
     first = held(tmp_path, "free_fall")
     assert first.returncode == 0 and " passed" in first.stdout, first.stdout[-1500:] + first.stderr[-500:]
@@ -57,7 +57,7 @@ def test_sound_engine_and_a_second_run_that_resumes(tmp_path):
     assert held(tmp_path, "free_fall").returncode == 1, "an engine without gravity passed"
 
 
-def test_an_engine_of_the_working_directory_and_its_child_processes(tmp_path):
+def test_plugin_finds_an_engine_of_the_working_directory_in_child_processes(tmp_path):
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
     run = held(tmp_path, "free_fall and refusal", path=str(ROOT))
     assert run.returncode == 0 and " passed" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
@@ -67,14 +67,14 @@ def test_an_engine_of_the_working_directory_and_its_child_processes(tmp_path):
     ("name", "says"),
     [("no_such_module:ENGINE", "No module named 'no_such_module'"), ("nothing", "unknown engine 'nothing'")],
 )
-def test_a_name_that_leads_to_no_engine_ends_before_any_test(tmp_path, name, says):
+def test_unknown_engine_is_a_usage_error_before_any_test(tmp_path, name, says):
     run = held(tmp_path, "free_fall", name=name)
     assert run.returncode == pytest.ExitCode.USAGE_ERROR, run.stdout[-1500:]
     assert f"--engine {name}: " in run.stderr and says in run.stderr, run.stderr
 
 
 @pytest.mark.slow
-def test_shrinking_and_what_still_fails():
+def test_violation_of_a_real_defect_is_shrunk_to_a_smaller_scene():
     """A scene gets smaller only as long as the check fails; a sound engine's stays as it is."""
     scene = moving_probes()["spring load"]
     faulty = violates(InProcess(engine(DEFECTS["spring's damping with the wrong sign"])), "truth")
@@ -84,7 +84,7 @@ def test_shrinking_and_what_still_fails():
 
 
 @pytest.mark.parametrize("defect", ["spring's damping ignored"])
-def test_violation_and_the_sound_engine(defect):
+def test_check_fails_for_a_defect_and_passes_for_the_sound_engine(defect):
     scene = moving_probes()["spring load"].with_(gravity=(0.0, 0.0, 0.0))
     assert np.all(np.array(scene.gravity) == 0.0)
     assert violates(InProcess(engine(DEFECTS[defect])), "truth")(scene)

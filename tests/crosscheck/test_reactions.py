@@ -49,7 +49,7 @@ def door(kind: type) -> Scene:
     return Scene(name="door", gravity=(0.0, 0.0, -9.81), duration=0.1, body=(leaf,), joint=tuple(hinges))
 
 
-def test_two_ball_hinges_and_the_force_between_them():
+def test_two_ball_hinges_share_only_the_force_along_their_line():
     """Only the force along the line of both is statically open."""
     shared = shared_wrenches(door(Spherical), 0.0, *initial_poses(door(Spherical)))
     for name, basis in shared.items():
@@ -58,7 +58,7 @@ def test_two_ball_hinges_and_the_force_between_them():
         assert along == pytest.approx(1.0, abs=1e-12), f"{name}: shared wrench {basis[:, 0]}, by hand along z"
 
 
-def test_two_revolute_hinges_and_the_five_of_them():
+def test_two_revolute_hinges_share_all_five_components():
     """Each alone holds the door: all five components of either are open."""
     shared = shared_wrenches(door(Revolute), 0.0, *initial_poses(door(Revolute)))
     sizes = {name: basis.shape[1] for name, basis in shared.items()}
@@ -68,7 +68,7 @@ def test_two_revolute_hinges_and_the_five_of_them():
 
 
 @pytest.mark.parametrize("name", SCENES_COMPARED)
-def test_engines_and_mbref_where_unique(name):
+def test_engines_have_mbref_s_unique_reactions_and_resultants(name):
     scene = door(Spherical) if name == "door" else SCENES[name]()
     runs = {engine: run(engine, scene) for engine in ("mbref", *MEASURED)}
     for label, measured in MEASURED.items():
@@ -80,7 +80,7 @@ def test_engines_and_mbref_where_unique(name):
         assert found.resultant < resultants, f"{label} and mbref: resultants differ by {found.resultant:.2e}"
 
 
-def test_redundant_rows_and_shared_dimensions():
+def test_one_redundant_row_shares_at_most_one_component_at_a_joint():
     """One redundant row opens at most one dimension at a joint, no redundant row none."""
     for name, most in {"spatial_slider_crank_gravity": 0, "planar_slider_crank_gravity": 1}.items():
         scene = SCENES[name]()
@@ -108,7 +108,7 @@ def test_choices_side_by_side_and_weight():
 
 
 @pytest.mark.parametrize("name", SCENES_COMPARED)
-def test_mbref_and_exact_reactions(name):
+def test_mbref_has_the_exact_unique_reactions(name):
     """The unique parts by Newton, Euler and the exact accelerations, mbref apart."""
     scene = door(Spherical) if name == "door" else SCENES[name]()
     exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))
@@ -117,7 +117,7 @@ def test_mbref_and_exact_reactions(name):
     assert max(worst, found.resultant) < MARGIN * EXACT, f"{name}: {worst:.1e} and {found.resultant:.1e}"
 
 
-def test_absurd_reactions_and_their_size():
+def test_reactions_of_ten_meganewtons_are_called_absurd():
     """Ten million newtons where a hundred are right show as what they are, and are named."""
     scene = door(Spherical)
     exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))

@@ -121,7 +121,7 @@ PLANTED = {
 }
 
 
-def test_an_exact_motion_is_right_within_the_bound(table):
+def test_exact_motion_is_right_in_every_column(table):
     found = judge_motion(SCENE, table)
     assert found.is_right and not found.explanations and len(found.columns) == len(table) - 1
 
@@ -147,7 +147,7 @@ SELDOM = ("mass", "missing body", "damping", "interpolation")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SELDOM)) for name in PLANTED]
 )
-def test_the_planted_difference_is_the_first_explanation(name, table):
+def test_planted_difference_is_the_first_explanation(name, table):
     plant, says = PLANTED[name]
     found = judge_motion(SPRUNG if name in ("mass", "missing body") else SCENE, plant(table))
     assert not found.is_right
@@ -156,7 +156,7 @@ def test_the_planted_difference_is_the_first_explanation(name, table):
 
 
 @pytest.mark.slow
-def test_a_motion_far_from_every_changed_scene_has_no_explanation():
+def test_motion_of_a_weightless_body_has_no_explanation():
     """The changes' fits leave the range of numbers."""
     assert not judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5))).explanations
 
@@ -200,14 +200,14 @@ def test_two_planted_differences_are_the_first_explanation(name, table):
     assert first.remains < 1e-3
 
 
-def test_errors_begin_where_the_motions_part(table):
+def test_column_states_the_time_at_which_its_error_begins(table):
     late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.2501)}
     column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
     assert column.name == "upper.position.x" and column.begins == pytest.approx(0.255)
     assert column.largest == pytest.approx(1e-3)
 
 
-def test_a_written_reference_is_read_and_right(table, tmp_path):
+def test_written_reference_table_is_judged_right(table, tmp_path):
     write(reference_table(SCENE, TIMES), tmp_path / "ref.csv")
     assert (tmp_path / "ref.csv").read_text().startswith("time [s],bound [1],upper.position.x [m]")
     recording = read(tmp_path / "ref.csv", SCENE, {})
@@ -215,7 +215,7 @@ def test_a_written_reference_is_read_and_right(table, tmp_path):
     assert judge_motion(SCENE, recording).is_right
 
 
-def test_tables_of_other_tools(table, tmp_path):
+def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     """Numbers of columns, units in headers or given, decimal commas, quaternions with w last."""
     x, angle = table["lower.position.x"] * 1e3, np.degrees(table["A.angle"])
     rows = zip(TIMES * 1e3, x, angle, strict=True)
@@ -248,13 +248,13 @@ def test_tables_of_other_tools(table, tmp_path):
         ("time,upper.x [deg]\n0,1\n", {}, "'deg' is not a unit of a quantity in m"),
     ],
 )
-def test_faulty_tables_are_refused(text, columns, says, tmp_path):
+def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
     (tmp_path / "faulty.csv").write_text(text)
     with pytest.raises(SceneError, match=says):
         read(tmp_path / "faulty.csv", SCENE, columns)
 
 
-def test_commands_write_and_judge(tmp_path, capsys):
+def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
     SCENE.save(tmp_path / "s.toml")
     scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
     assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0

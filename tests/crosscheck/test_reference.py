@@ -76,7 +76,7 @@ def errors(scene: Scene, found: Reference, exact: Trajectory) -> np.ndarray:
 
 # --- closed forms -----------------------------------------------------------------------------------------
 @pytest.mark.parametrize("make", CLOSED_FORMS, ids=lambda make: make.__name__)
-def test_closed_form_is_within_the_bound(make):
+def test_reference_is_within_its_bound_of_the_closed_form(make):
     scene, exact = make()
     found, reason = samples(scene, scene.duration)
     assert not reason
@@ -114,17 +114,17 @@ QUICK = ("four_bar_gravity", "pendulum_all", "free_spring", "four_bar_chain")
 
 
 @pytest.mark.parametrize("name", QUICK)
-def test_known_motion_is_within_the_bound(name):
+def test_reference_is_within_its_bound_of_a_known_motion(name):
     assert_family(name)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(ALL) - {*QUICK, "four_bar_straight"}))
-def test_every_known_motion_is_within_the_bound(name):
+def test_reference_is_within_its_bound_of_every_known_motion(name):
     assert_family(name)
 
 
-def test_redundant_joints_with_rounded_anchors_are_within_the_bound():
+def test_reference_with_contradicting_joints_is_within_its_bound_of_the_exact_motion():
     """A mechanism turned askew, whose joints contradict each other, moves as the exact one turned."""
     scene = SCENES["bricard"]()
     times, turned = np.linspace(0.0, 0.3, 4), Isometry(ASKEW, np.array([0.3, -0.5, 0.2]))
@@ -152,13 +152,13 @@ def test_formulations_agree_on_every_feature(feature):
         assert np.abs(one - other).max() <= 1e-13 * rate**2, name
 
 
-def test_closures_that_vanish_on_the_way_are_not_held():
+def test_tree_formulation_passes_the_flat_linkage_of_bennett_in_few_panels():
     """Where Bennett's linkage is flat, one of two rows that close it vanishes, and panels grew short."""
     motion = tree_motion(SCENES["bennett"](), np.linspace(0.0, 1.0, 3), EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 10
 
 
-def test_panels_of_stiff_motions_are_as_long_as_the_motion_is_smooth():
+def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
     """Dampers of the governor act in 40 µs, and Picard's iteration takes 20 panels to 7 ms."""
     scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 5)
     motion = tree_motion(scene, times, EXTENDED, seconds=SECONDS)
@@ -166,7 +166,7 @@ def test_panels_of_stiff_motions_are_as_long_as_the_motion_is_smooth():
     assert differences(scene, natural_motion(scene, times, EXTENDED, seconds=SECONDS), motion).max() < 1e-15
 
 
-def test_other_rows_and_displaced_closures_show_contradictions():
+def test_seed_of_the_rows_moves_contradicting_joints_by_rounding_only():
     """B on other rows of a linkage turned askew moves apart by the rounding of its axes, and no more."""
     scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())
     one, same, other = (
@@ -185,13 +185,13 @@ def assert_random(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", [3, 5])
-def test_random_mechanism_has_a_tight_reference(seed):
+def test_reference_of_a_random_mechanism_has_a_bound_of_1e_11(seed):
     assert_random(seed)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", KEPT[4:])
-def test_random_mechanisms_have_tight_references(seed):
+def test_references_of_more_random_mechanisms_have_a_bound_of_1e_11(seed):
     assert_random(seed)
 
 
@@ -240,7 +240,7 @@ def test_twenty_digits_are_certified_by_both_formulations():
     ("make", "times"),
     [(SCENES["heavy_top"], [0.05, 0.06]), (SCENES["andrews_squeezer"], [1e-3]), (several_springs, [0.02])],
 )
-def test_many_digits_and_extended_precision(make, times):
+def test_thirty_digits_and_extended_precision_move_alike(make, times):
     """Rounding does not grow from step to step; every load has its digits."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = make()
@@ -250,7 +250,7 @@ def test_many_digits_and_extended_precision(make, times):
     assert np.abs(doubles(motion.position) - doubles(other.position)).max() < 1e-15
 
 
-def test_small_residuals_in_many_digits_are_no_ball_around_zero():
+def test_redundant_joints_are_moved_in_ball_arithmetic():
     """A residual below the radius of its ball divided the equations by zero on redundant joints."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = random_mechanism(3)
@@ -269,14 +269,14 @@ def test_contradicting_joints_are_replaced_before_digits_are_certified():
     assert np.abs(motion.position - np.array(table["position"], dtype=np.longdouble)).max() < 1e-15
 
 
-def test_a_start_in_a_singular_position_is_not_certified():
+def test_start_in_a_singular_position_is_not_certified():
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     with pytest.raises(NotCertified, match="A ends at t = 0 s: it starts in a singular position"):
         certified(SCENES["four_bar_straight"](), np.array([0.0, 1e-4]), 20)
 
 
 @pytest.mark.parametrize("name", ["bennett", "four_bar_gravity", "h_frame", "random_12"])
-def test_weaker_joints_leave_the_freedoms_and_no_redundant_row(name):
+def test_isostatic_scene_keeps_the_freedoms_and_has_no_redundant_row(name):
     scene = find_certifiable(name)
     before, after = scene.counts(), isostatic(scene).counts()
     assert before.redundant > after.redundant == 0
@@ -284,7 +284,7 @@ def test_weaker_joints_leave_the_freedoms_and_no_redundant_row(name):
     assert replaced(scene, isostatic(scene)) and not replaced(scene, scene)
 
 
-def test_weaker_joints_keep_the_rank_along_the_motion():
+def test_isostatic_scene_along_a_motion_has_no_singular_position():
     """With the joints that serve at the start, Bennett's linkage is singular where it is flat."""
     scene = SCENES["bennett"]()
     motion = natural_motion(scene, np.linspace(0.0, 1.0, 41), EXTENDED, seconds=SECONDS)
@@ -299,7 +299,7 @@ def test_weaker_joints_keep_the_rank_along_the_motion():
     assert other.contradiction < 1e-17 < motion.contradiction
 
 
-def test_driven_joints_are_kept():
+def test_isostatic_door_keeps_its_driven_hinge_alone():
     """A door whose driven hinge, of all joints, comes last is left with that hinge alone."""
     door = moving_probes()["door"]
     *others, last = door.joint
@@ -314,7 +314,7 @@ def test_certified_tables_of_every_scene_but_the_singular_start():
     assert set(TABLES) == set(SCENES) - {"four_bar_straight"} | {f"random_{seed}" for seed in KEPT}
 
 
-def test_certified_tables_are_whole():
+def test_certified_tables_are_unedited_and_bounded_by_1e_20():
     for path in TABLES.values():
         table = json.loads(path.read_text())
         assert table["hash"] == digest(table), f"{path.name} was edited"
@@ -341,25 +341,25 @@ def test_reference_is_within_its_bound_of_the_certified_table(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(set(TABLES) - (set(BRIEFLY) & set(SCENES))))
-def test_every_reference_is_within_its_bound_of_the_certified_table(name):
+def test_more_references_are_within_their_bound_of_the_certified_table(name):
     assert_within_the_bound_of_its_table(name)
 
 
 # --- what has none ----------------------------------------------------------------------------------------
-def test_a_start_in_a_singular_position_is_refused_with_the_remedy():
+def test_reference_from_a_singular_position_is_refused_with_the_remedy():
     times = np.linspace(0.0, 1e-4, 3)  # within the first step
     motion = natural_motion(SCENES["four_bar_straight"](), times, EXTENDED, seconds=SECONDS)
     assert "starts in a singular position" in motion.reason and "later time" in motion.reason
     assert motion.position.shape == (0, 3, 3)
 
 
-def test_a_body_that_can_turn_without_inertia_is_named():
+def test_reference_names_a_body_that_turns_without_inertia():
     pole = Body(name="pole", mass=1.0, inertia=(0.0, 0.1, 0.1), position=(0.0, 0.0, 0.0))
     motion = natural_motion(Scene(name="rod", body=(pole,)), [0.1], EXTENDED, seconds=SECONDS)
     assert motion.reason == "body 'pole' can turn without inertia"
 
 
-def test_point_mass_on_a_joint_needs_no_inertia():
+def test_formulations_agree_on_a_point_mass_on_a_joint():
     scene, _ = pendulum()
     bob = scene.body[0].model_copy(update={"inertia": (0.0, 0.0, 0.0)})
     motion = natural_motion(scene.with_(body=(bob,)), [0.3], EXTENDED, seconds=SECONDS)
@@ -367,14 +367,14 @@ def test_point_mass_on_a_joint_needs_no_inertia():
     assert differences(scene, motion, other).max() < AGREE
 
 
-def test_bodies_without_mass_have_to_be_driven():
+def test_reference_moves_massless_bodies_only_if_driven():
     motion = natural_motion(undetermined(), [0.1], EXTENDED, seconds=SECONDS)
     assert motion.reason == "bodies without mass have to be driven in every freedom"
     driven = massless(SCENES["four_bar"]()).with_(duration=0.01)
     assert not natural_motion(driven, [0.01], EXTENDED, seconds=SECONDS).reason
 
 
-def test_time_is_limited():
+def test_reference_ends_after_its_cpu_time():
     scene = SCENES["planar_slider_crank"]()
     motion = natural_motion(scene, np.linspace(0.0, 100.0, 3), EXTENDED, seconds=0.2)
     assert motion.reason == "the CPU time has passed"
@@ -388,7 +388,7 @@ def own_cache(tmp_path, monkeypatch):
     return tmp_path / "mbref" / "references"
 
 
-def test_a_motion_that_is_given_up_ends_and_is_not_kept(own_cache):
+def test_reference_that_is_given_up_ends_and_is_not_cached(own_cache):
     scene, times = SCENES["flyball_governor"]().with_(duration=1e4), np.linspace(0.0, 1e4, 11)
     with ThreadPoolExecutor(1) as beside:
         motion = beside.submit(reference, scene, times, 600.0)
@@ -413,7 +413,7 @@ def test_an_interrupt_does_not_wait_for_the_truth(own_cache):
 
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50] + b"x" + b[51:], lambda b: b""])
-def test_a_damaged_file_is_made_again(own_cache, damage):
+def test_damaged_cache_file_of_a_reference_is_made_again(own_cache, damage):
     scene, _ = free_fall()
     first = reference(scene, [0.5])
     (file,) = own_cache.iterdir()
@@ -424,14 +424,14 @@ def test_a_damaged_file_is_made_again(own_cache, damage):
     assert cache.load(scene)["bound"].shape == (1,)
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
+def test_reference_needs_no_cache_that_can_be_written(tmp_path, monkeypatch):
     (tmp_path / "mbref").write_text("a file where a folder should be")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert isinstance(reference(free_fall()[0], [0.5]), Reference)
 
 
 # --- the truth of a scene ---------------------------------------------------------------------------------
-def test_truth_of_any_scene_is_its_reference(own_cache):
+def test_truth_of_a_scene_without_closed_form_is_its_reference(own_cache):
     scene = random_mechanism(3)
     assert truth_for(scene, 0.0) is None
     truth = truth_for(scene)

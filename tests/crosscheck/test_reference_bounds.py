@@ -52,7 +52,7 @@ def test_every_hard_mechanism_is_within_its_bound(name):
 
 
 @pytest.mark.parametrize("move", [natural_motion, tree_motion])
-def test_given_rates_near_a_singular_position_are_kept(move):
+def test_given_rate_near_a_singular_position_is_kept_to_1e_17(move):
     """Taken in double precision, the rule's velocities let the crank start off by 1e-16 rad/s.
 
     Extended precision leaves up to 1e-18 rad/s of rounding, depending on the processor.
@@ -61,7 +61,7 @@ def test_given_rates_near_a_singular_position_are_kept(move):
     assert np.abs(motion.angular_velocity[0, 0] - EXTENDED.array([0.0, 0.0, 1e-3])).max() < 1e-17
 
 
-def test_start_velocities_obey_the_rule():
+def test_start_velocities_fit_given_ones_and_minimise_the_kinetic_energy():
     """Five velocities and one row: two given ones contradict it and are fitted."""
     rows, rates = EXTENDED.array([[1.0, 2.0, 0.0, 0.0, 0.0]]), EXTENDED.array([3.0])
     fit, wanted = EXTENDED.array(np.eye(5)[:2]), EXTENDED.array([0.0, 1.0])
@@ -82,7 +82,7 @@ def test_least_squares_of_nearly_dependent_columns():
     assert np.abs(found - exact).max() < 1e-12, "a millionth of the digits of double precision is lost"
 
 
-def test_null_space_is_one_to_the_last_digit():
+def test_null_space_basis_is_exact_to_the_last_digit():
     matrix = EXTENDED.array(np.random.default_rng(1).normal(size=(3, 7)))
     basis = null_space(EXTENDED, matrix)
     assert basis.shape == (7, 4)
@@ -97,7 +97,7 @@ def drawn(seed: int, joint: str) -> Scene:
     return scene.with_(load=(*scene.load, spring))
 
 
-def test_a_position_at_which_other_rows_are_independent_is_not_leapt_over():
+def test_formulations_agree_where_retained_rows_become_dependent():
     """The held rows become dependent at 0.407 s; a leap there once lost five digits."""
     scene, times = drawn(83, "J0"), np.linspace(0.0, 0.5, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
@@ -106,7 +106,7 @@ def test_a_position_at_which_other_rows_are_independent_is_not_leapt_over():
 
 
 @pytest.mark.slow
-def test_both_formulations_pass_a_singular_position_without_redundant_rows():
+def test_both_formulations_cross_a_singular_position_at_the_same_time():
     scene, times = drawn(100, "J2"), np.linspace(0.0, 0.5, 3)
     a, b = (move(scene, times, EXTENDED, seconds=SECONDS) for move in (natural_motion, tree_motion))
     assert not b.reason

@@ -69,7 +69,7 @@ def replayed(*moments: float, **parts: Any) -> Scene | Outside:
 
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
-def test_a_moment_about_an_axis_of_any_length(size):
+def test_constant_driving_moment_replaces_the_driver(size):
     found = replayed(size, size * (1 + 0.9e-6), load=(Moment(body="c", moment=X),))
     assert [load.body for load in found.load] == ["c", "b"] and not found.driver
     assert found.load[1].moment == pytest.approx((0.0, 0.0, size * (1 + 0.45e-6)), rel=1e-9)
@@ -77,7 +77,7 @@ def test_a_moment_about_an_axis_of_any_length(size):
     assert [body.angular_velocity for body in found.body] == [(0.0, 0.0, 0.5), (0.0, 0.0, 0.0)]
 
 
-def test_a_replayed_motion_has_the_velocities_of_its_first_sample():
+def test_replayed_scene_starts_with_the_velocities_of_the_first_sample():
     spin = np.arange(12.0).reshape(2, 2, 3)
     run = motion(angular_velocity=spin, reactions={"crank": np.ones((2, 6))})
     found = replays.replayed(scene(joint=(SHAFT, CRANK), driver=(DRIVER,)), run)
@@ -85,15 +85,15 @@ def test_a_replayed_motion_has_the_velocities_of_its_first_sample():
 
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
-def test_a_moment_that_varies(size):
+def test_driving_moment_that_varies_by_over_1e_6_is_refused(size):
     assert "varies" in replayed(size, size * (1 + 1.1e-6)).reason
 
 
-def test_a_driver_without_a_moment():
+def test_driver_without_a_moment_is_replaced_by_zero():
     assert replayed(0.0, 0.0).load[-1].moment == (0.0, 0.0, 0.0)
 
 
-def test_drivers_that_no_constant_moment_replaces():
+def test_drivers_that_a_moment_on_the_ground_cannot_replace_are_refused():
     slide = Translational(name="crank", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=Z)
     turned = CRANK.model_copy(update={"bodies": ("c", "b")})
     for joint in (slide, turned):
