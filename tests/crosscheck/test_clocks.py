@@ -1,7 +1,7 @@
-"""The clock of every family of each adapter / a clock that ticks once a look.
+"""Costs of runs are CPU seconds, of building and of stepping, in every family of each adapter.
 
-Stepping is CPU time, apart from building.  A run over three samples looks twice for building, and twice for
-each sample, or twice for all.
+A clock that advances by 1 s at each reading replaces the CPU clock. It is read at the start and end of
+building: 1 s. It is read at the start and end of stepping to each of three samples, 3 s, or to all, 1 s.
 """
 
 from __future__ import annotations
@@ -22,16 +22,18 @@ from mbref.trajectory import Outcome
 from tests.crosscheck.driven_arm import ENGINES, able, coarsest, driven_arm
 
 IN_ONE_CALL = ("mbref", "exudyn", "casadi", "heyoka")  # other engines step from sample to sample
-BUILD, STEPPING = 1.0, 3.0
-OTHER_TICKS = {  # building and stepping of families that look at the clock at other places
-    ("mbref", "taylor, generated"): (3.0, 1.0),  # generating the code is building, too
+BUILD, STEPPING = 1.0, 3.0  # s
+OTHER_TICKS = {  # building and stepping (s) of families that read the clock at other places
+    ("mbref", "taylor, generated"): (3.0, 1.0),  # code is generated in the middle of building
     ("exudyn", "tuned"): (3.0, 3.0),  # three runs with different steps
 }
 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
-def test_seconds_are_ticks_of_the_cpu_clock(name: str, part: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The CPU clock gives 1, 2, 3, …; a wall clock gives fractions, an interval that counts twice more."""
+def test_cost_of_a_run_is_cpu_time_of_building_and_of_stepping(
+    name: str, part: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A wall clock would give fractions of a second, and an interval that counts twice would give more."""
     scene = able(name, driven_arm(), SCENES["planar_slider_crank_gravity"]().with_(duration=0.01))
     for setting in coarsest(name, scene, part):
         own = OTHER_TICKS.get((name, setting.family))
@@ -50,7 +52,7 @@ def check(
     assert (run.cost.build_seconds, run.cost.seconds) == ticks, setting
 
 
-def test_the_model_of_a_file_is_run_by_the_cpu_clock(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cost_of_a_run_of_a_files_own_model_is_cpu_time(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:
     pendulum = '<body name="b"><joint type="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -1"/></body>'
     path = tmp_path / "pendulum.xml"
     path.write_text(f"<mujoco><worldbody>{pendulum}</worldbody></mujoco>")

@@ -1,4 +1,4 @@
-"""Motions of closed forms worked out by hand, and scenes that have none."""
+"""Closed forms of the judge against formulas, and scenes that have no closed form."""
 
 from __future__ import annotations
 
@@ -78,30 +78,30 @@ BOX = scene(
         {"coupling": (Coupling(name="G", joints=("B", "B"), ratio=1.0),)},
     ],
 )
-def test_scenes_that_need_a_reference(parts):
+def test_a_pendulum_with_a_part_outside_its_closed_form_has_none(parts):
+    """The cylindrical joint on the hinge's axis constrains nothing: with it the closed form remains."""
     sleeve = Cylindrical(name="B", bodies=("ground", "bar"), anchor=(0.0, 0.0, 0.5), axis=Z)
-    assert closed_form(PENDULUM).name == "pendulum"
     given = PENDULUM.with_(joint=(*PENDULUM.joint, sleeve))
     assert closed_form(given).name == "pendulum"
-    assert (
-        closed_form(
-            given.with_(**{**parts, **({"joint": (*parts["joint"], sleeve)} if "joint" in parts else {})})
-        )
-        is None
-    )
+    changes = {**parts, "joint": (*parts.get("joint", PENDULUM.joint), sleeve)}
+    assert closed_form(given.with_(**changes)) is None
 
 
-def test_two_drivers_have_no_closed_form():
+def test_a_parallelogram_with_two_drivers_has_no_closed_form():
     drivers = tuple(Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD")
     assert closed_form(BOX.with_(driver=drivers[:1])).name == "parallelogram"
     assert closed_form(BOX.with_(driver=drivers)) is None
+
+
+def test_a_parallelogram_without_masses_has_a_closed_form_only_if_it_is_driven():
+    driver = Driver(joint="A", polynomial=(0.0, 1.0))
     plain = tuple(Body(name=b.name, position=b.position) for b in BOX.body)
-    assert closed_form(BOX.with_(body=plain)) is None, "no masses and no driver"
-    assert closed_form(BOX.with_(body=plain, driver=drivers[:1])).name == "parallelogram"
+    assert closed_form(BOX.with_(body=plain)) is None
+    assert closed_form(BOX.with_(body=plain, driver=(driver,))).name == "parallelogram"
 
 
-def test_the_motion_of_a_free_body():
-    """It falls by half of g t² and turns about its principal axis z at 2 rad/s."""
+def test_a_free_body_falls_and_spins_uniformly_about_a_principal_axis():
+    """It falls by g t² / 2 and turns about z at 2 rad/s; a moment of 1.5 N m on 0.5 kg m² adds 3 rad/s²."""
     falling = scene(
         [body("bar", velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0))],
         [],
@@ -115,20 +115,23 @@ def test_the_motion_of_a_free_body():
     assert found.orientation[1, 0] == pytest.approx([math.cos(0.5), 0.0, 0.0, math.sin(0.5)])
     pushed = falling.with_(load=(Moment(body="bar", moment=(0.0, 0.0, 1.5)),))
     found = free_body(pushed).poses(np.array([0.5]))
-    assert found.angular_velocity[0, 0] == pytest.approx([0.0, 0.0, 3.5]), "1.5 N m on 0.5 kg m²"
+    assert found.angular_velocity[0, 0] == pytest.approx([0.0, 0.0, 3.5]), "2 rad/s + 3 rad/s² · 0.5 s"
     assert found.angular_acceleration[0, 0] == pytest.approx([0.0, 0.0, 3.0])
 
 
-def test_mechanisms_that_cannot_move():
+def test_a_welded_body_rests_at_its_place():
     weld = Fixed(name="W", bodies=("ground", "bar"), anchor=O)
     held = scene([body("bar", 1.0, 2.0, 3.0)], [weld])
     found = locked(held).poses(np.array([0.0, 1.0]))
     assert found.position.tolist() == [[[1.0, 2.0, 3.0]]] * 2 and not found.velocity.any()
     assert found.orientation.tolist() == [[[1.0, 0.0, 0.0, 0.0]]] * 2 and not found.angular_acceleration.any()
     assert found.t_end == 1.0 and found.method == "locked" and found.bodies == ("bar",)
+
+
+def test_a_body_on_one_hinge_or_on_two_coaxial_hinges_is_not_locked():
+    """Two hinges have ten constraint rows, of which five are redundant: one freedom is left."""
     assert locked(PENDULUM) is None
-    twice = held.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))
-    assert locked(twice) is None, "ten rows that leave one freedom"
+    assert locked(PENDULUM.with_(joint=(*PENDULUM.joint, pin("B", "ground", "bar", 0.0, 0.0, 0.0)))) is None
 
 
 # --- slider-cranks in space -------------------------------------------------------------------------------
@@ -162,8 +165,13 @@ def spatial(line: tuple[float, ...], order: str = "crs", reverse: bool = False, 
         ((0.6, 0.0, 0.8), "scr", True, -1.0),
     ],
 )
-def test_the_path_of_a_spatial_slider_crank(line, order, reverse, way, q):
-    """Its joints stay closed, and rates and second derivatives are differences of its poses."""
+def test_path_of_a_spatial_slider_crank_keeps_its_joints_and_matches_differences(
+    line, order, reverse, way, q
+):
+    """Poses at crank angle q close the joints; their derivatives by q are differences of fourth order.
+
+    Only a driver of the hinge A prescribes q.
+    """
     given = spatial(line, order, reverse, way)
     path, h = spatial_slider_crank(given), 1e-4
     places = q + h * np.arange(-2, 3)
@@ -184,15 +192,15 @@ def test_the_path_of_a_spatial_slider_crank(line, order, reverse, way, q):
     assert slopes[2].astype(float) == pytest.approx(pose.dspin[2].astype(float), rel=1e-8, abs=1e-8)
     second = np.tensordot(weights, pose.dposition, 1)
     assert second.astype(float) == pytest.approx(pose.ddposition[2].astype(float), rel=1e-8, abs=1e-8)
-    crank, rod, block = (order.index(name) for name in "crs")
+    crank, rod, block = (order.index(name) for name in "crs")  # the rod turns about no fixed axis
     assert pose.turn[2, [crank, block]].tolist() == [q, 0.0] and math.isnan(pose.turn[2, rod])
     signs = [path.driven_sign(Driver(joint=name, polynomial=(0.0, 1.0))) for name in "AD"]
     assert signs == [1.0, None]
 
 
 # --- motions along a path ---------------------------------------------------------------------------------
-def test_a_pendulum_that_turns_freely():
-    """2 m at -3 rad/s without weight: 18 m/s² towards the hinge, at any time."""
+def test_a_weightless_pendulum_turns_at_constant_speed():
+    """2 m at -3 rad/s: 6 m/s, and 18 m/s² towards the hinge, at any time; full turns are counted."""
     moving = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, -3.0)),))
     truth = one_dof(moving, parallelogram(moving))
     found = truth.poses(np.array([0.0, math.pi / 6]))
@@ -202,16 +210,15 @@ def test_a_pendulum_that_turns_freely():
     assert found.angular_velocity[:, 0] == pytest.approx(np.tile([0.0, 0.0, -3.0], (2, 1)))
     assert found.angular_acceleration[:, 0] == pytest.approx(np.zeros((2, 3)), abs=1e-11)
     assert truth.coordinate(np.array([0.0, 0.5])) == pytest.approx(np.array([[0.0, -3.0], [-1.5, -3.0]]))
-    assert truth.name == "pendulum" and truth.accuracy == 1e-12
     late = truth.coordinate(np.array([100.0, 0.25, 40.0]))
-    assert late == pytest.approx(np.array([[-300.0, -3.0], [-0.75, -3.0], [-120.0, -3.0]])), "many turns"
+    assert late == pytest.approx(np.array([[-300.0, -3.0], [-0.75, -3.0], [-120.0, -3.0]]))
     forwards = PENDULUM.with_(body=(body("bar", 0.0, -2.0, 0.5, angular_velocity=(0.0, 0.0, 3.0)),))
     late = one_dof(forwards, parallelogram(forwards)).coordinate(np.array([100.0, 0.0]))
     assert late == pytest.approx(np.array([[300.0, 3.0], [0.0, 3.0]]))
 
 
-def test_a_driven_pendulum():
-    """q = t + t²/2 of a joint whose first body is the bar: it turns by -q; at 1 s 2 rad/s and 1 rad/s²."""
+def test_a_driven_pendulum_whose_hinge_goes_from_the_bar_to_the_ground_turns_backwards():
+    """q = t + t²/2 is the ground's angle relative to the bar, which turns by -q: at 1 s 2 rad/s, 1 rad/s²."""
     hinge = pin("A", "bar", "ground", 0.0, 0.0, 0.5)
     driven = PENDULUM.with_(joint=(hinge,), driver=(Driver(joint="A", polynomial=(0.0, 1.0, 0.5)),))
     truth = closed_form(driven)
@@ -221,5 +228,5 @@ def test_a_driven_pendulum():
     wanted = [-2 * cosine + 8 * sine, 2 * sine + 8 * cosine, 0.0]
     assert found.acceleration[0, 0] == pytest.approx(wanted)
     assert found.angular_velocity[0, 0].tolist() == [0.0, 0.0, -2.0]
-    assert found.angular_acceleration[0, 0].tolist() == [0.0, 0.0, -1.0] and truth.accuracy == 1e-13
+    assert found.angular_acceleration[0, 0].tolist() == [0.0, 0.0, -1.0]
     assert truth.coordinate(np.array([1.0, 0.0])).tolist() == [[-1.5, -2.0], [0.0, -1.0]]

@@ -1,4 +1,4 @@
-"""The table of closed loops / grades by hand, records that supersede others, the committed page."""
+"""The table of closed loops: its mechanisms, the cells of records, and the committed page."""
 
 from __future__ import annotations
 
@@ -36,12 +36,13 @@ def run(error: float | None, family: str = "tuned", outcome: str = "COMPLETED", 
 
 
 def refusal() -> dict:
+    """Return the record of MuJoCo's refusal of the first mechanism."""
     record = run(None, outcome=records.REFUSED, key="mujoco refuses", owner="missing in the engine")
     return {**record, "message": "no hinge"}
 
 
 @pytest.mark.parametrize("column", DIFFICULTIES, ids=lambda column: column.heading)
-def test_every_mechanism_can_be_named_in_a_command_and_has_a_truth(column) -> None:
+def test_every_mechanism_of_the_table_is_found_by_its_name_moves_and_has_a_truth(column) -> None:
     scene = column.make()
     place = column.place()
     found = find_scene(str(ROOT / place) if place.endswith(".toml") else place)
@@ -50,14 +51,21 @@ def test_every_mechanism_can_be_named_in_a_command_and_has_a_truth(column) -> No
     assert scene.load or scene.driver or any(scene.gravity), "nothing moves it"
 
 
-def test_turned_four_bar_is_the_four_bar() -> None:
+def test_column_turned_has_the_four_bar_rotated_about_the_origin() -> None:
+    """Distances of the joints from the origin remain, and axes turn by 0.3 to 0.7 rad."""
     by_heading = {column.heading: column.make() for column in DIFFICULTIES}
     plain, turned = by_heading["four-bar"], by_heading["turned"]
     for one, other in zip(plain.joint, turned.joint, strict=True):
         assert np.linalg.norm(one.anchor) == pytest.approx(np.linalg.norm(other.anchor), abs=1e-12)
     angle = np.arccos(np.dot(plain.joint[0].axis, turned.joint[0].axis))
-    assert 0.3 < angle < 0.7, "an axis along no axis of the world"
-    assert by_heading["long run"].with_(name=plain.name, duration=1.0) == plain
+    assert 0.3 < angle < 0.7
+
+
+def test_column_long_run_differs_from_the_four_bar_in_its_duration_alone() -> None:
+    by_heading = {column.heading: column.make() for column in DIFFICULTIES}
+    plain, long = by_heading["four-bar"], by_heading["long run"]
+    assert long.duration > plain.duration == 1.0
+    assert long.with_(name=plain.name, duration=1.0) == plain
 
 
 @pytest.mark.parametrize(
@@ -76,31 +84,36 @@ def test_turned_four_bar_is_the_four_bar() -> None:
         (None, "○"),
     ],
 )
-def test_cells_by_hand(record, text) -> None:
+def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
+    """Right ✓ up to 1e-8, close ≈ up to 1e-2, wrong ✗ above, ! ended early, – refused, ○ no record."""
     assert shown(record) == text
-    assert any(text[:1] == sign[:1] for sign in LEGEND)
+    assert any(text[:1] == sign[:1] for sign in LEGEND), "the legend explains the sign"
 
 
-def test_best_and_default_runs_of_a_cell() -> None:
+def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
     found = [run(1e-3, "defaults"), run(1e-9), run(1e-5, "euler"), run(None, "other", "CRASHED")]
     cell = matrix(found)["mujoco"][FIRST.heading]
     assert cell.best() is found[1] and cell.defaults() is found[0]
     assert list(cell.families()) == ["defaults", "tuned", "euler", "other"]
     assert matrix(found)["mujoco"]["Bennett"].best() is None
-    assert "tuned (step 0.001)" in sentence(found[1]) and "1e-09" in sentence(found[1])
-    assert rerun(found[1]).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
+
+
+def test_sentence_on_a_run_states_its_setting_and_error_or_its_failure() -> None:
+    right = run(1e-9)
+    assert "tuned (step 0.001)" in sentence(right) and "1e-09" in sentence(right)
+    assert rerun(right).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
     assert "the Jacobian is singular" in sentence(run(None, outcome="STEP_FAILED"))
 
 
-def test_a_refusal_is_shown_with_its_owner_and_has_no_command() -> None:
+def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:
     cell = matrix([refusal()])["mujoco"][FIRST.heading]
     assert cell.best() is cell.defaults() is cell.records[0]
     assert sentence(cell.records[0]) == "refused: no hinge (missing in the engine)"
     assert rerun(cell.records[0]) == "" and not cell.families()
 
 
-def test_terms_of_an_engine_have_a_row_of_their_own() -> None:
-    """An engine whose loops crosscheck closes does not count as closing them."""
+def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
+    """In the family `terms` the engine gives only the terms of its equations; crosscheck closes the loops."""
     driven = next(c for c in DIFFICULTIES if c.heading == "driven")
     found = [
         run(1e-3, "discrete", engine="drake"),
@@ -116,7 +129,7 @@ def test_terms_of_an_engine_have_a_row_of_their_own() -> None:
     assert len({cell.place for row in rows.values() for cell in row.values()}) == 2 * len(DIFFICULTIES)
 
 
-def test_new_records_supersede_old_ones() -> None:
+def test_a_record_supersedes_those_of_its_run_of_older_versions_and_refusals() -> None:
     new = run(1e-9)
     assert records.supersedes(new, run(1e-9)), "the same key"
     assert not records.supersedes(new, run(1e-3, "defaults"))

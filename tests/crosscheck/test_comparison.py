@@ -1,4 +1,4 @@
-"""`crosscheck.compare` and its runs: the object / the command's output; runs in chains / their order."""
+"""`crosscheck.compare` gives what the command prints; runs of one engine follow each other."""
 
 import json
 import threading
@@ -29,7 +29,7 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
     return crosscheck.compare(BLOCK, [FAKE], samples=3, out=tmp_path_factory.mktemp("records"))
 
 
-def test_a_comparison_says_what_the_command_prints(compared, tmp_path, capsys):
+def test_a_comparison_in_python_equals_the_json_of_the_command(compared, tmp_path, capsys):
     BLOCK.save(tmp_path / "block.toml")
     asked = ("compare", str(tmp_path / "block.toml"), "--engine", FAKE, "--samples", "3", "--json")
     assert main(asked) == 0
@@ -39,13 +39,17 @@ def test_a_comparison_says_what_the_command_prints(compared, tmp_path, capsys):
     assert saved.keys() == printed.keys() and saved["verdict"]["headline"] == printed["verdict"]["headline"]
     for ours, theirs in zip(saved["records"], printed["records"], strict=True):
         assert (ours["settings"], ours["metrics"]) == (theirs["settings"], theirs["metrics"])
+
+
+def test_text_of_a_comparison_has_its_headline_in_eighty_columns(compared):
     assert str(compared).startswith("\nblock, 0.5 s: bodies: 1")
     assert compared.verdict.headline in " ".join(str(compared).split())
     assert all(len(line) <= 80 for line in str(compared).splitlines() if "crosscheck run" not in line)
     assert repr(compared) == f"<Comparison of fake: {compared.verdict.headline}>"
 
 
-def test_rows_of_a_comparison_are_its_records(compared):
+def test_rows_and_data_frame_of_a_comparison_have_one_row_a_run(compared):
+    """The fake has three settings, and a body at rest has no error."""
     rows, frame = compared.rows, compared.to_dataframe()
     assert [row["verdict"] for row in rows] == ["right"] * 3 and frame.shape[0] == 3
     assert {(row["family"], row["settings"]["seconds"]) for row in rows} == {
@@ -57,15 +61,15 @@ def test_rows_of_a_comparison_are_its_records(compared):
     assert compared.difference is None
 
 
-def test_a_comparison_that_cannot_be_made():
+def test_a_comparison_refuses_an_unknown_depth_or_engine():
     with pytest.raises(RequestError, match="depth: must be quick or whole, got 'deep'"):
         crosscheck.compare(BLOCK, [FAKE], depth="deep")
     with pytest.raises(RequestError, match="unknown engine 'none'"):
         crosscheck.compare(BLOCK, ["none"])
 
 
-def test_runs_of_an_engine_follow_each_other_and_are_measured_aside():
-    """Two engines of three runs each; measuring waits until all six are run."""
+def test_runs_of_one_engine_follow_each_other_and_do_not_wait_for_their_measurement():
+    """Two engines with three runs each; ``measure`` returns only after all six runs have ended."""
     cases = [
         Case(BLOCK, np.array([0.0, 1.0]), engine, Setting("f", {"k": k}))
         for k in range(3)
@@ -93,7 +97,7 @@ def test_runs_of_an_engine_follow_each_other_and_are_measured_aside():
         assert [k for name, k in order if name == engine] == [0, 1, 2]
 
 
-def test_a_run_that_raises_is_told_to_the_owner_of_its_future():
+def test_an_exception_in_a_run_is_raised_by_the_study():
     def run(asked):
         raise OSError("no disk")
 
@@ -101,9 +105,11 @@ def test_a_run_that_raises_is_told_to_the_owner_of_its_future():
         study([Case(BLOCK, np.array([0.0, 1.0]), "e", Setting("f", {}))], threads, run=run)
 
 
-def test_one_engine_and_one_family_are_named_without_a_list(tmp_path):
+def test_compare_takes_one_engine_and_one_family_without_a_list():
     found = crosscheck.compare(BLOCK, FAKE, families="plain", samples=3)
-    assert {row["engine"] for row in found.rows} == {"fake"}, "one name for the engine"
-    assert {row["family"] for row in found.rows} == {"plain"}
+    assert {(row["engine"], row["family"]) for row in found.rows} == {("fake", "plain")}
+
+
+def test_a_comparison_is_saved_as_json_only(compared, tmp_path):
     with pytest.raises(ValueError, match=r"a.mp4: a comparison is saved as .json"):
-        found.save(tmp_path / "a.mp4")
+        compared.save(tmp_path / "a.mp4")
