@@ -52,14 +52,23 @@ def on_a_turntable() -> Scene:
     )
 
 
+RIGHT = "All 3 engines are right at their best settings"
+FOUND = {
+    hanging: RIGHT,
+    held_boom: RIGHT,
+    falling: RIGHT,
+    on_a_turntable: "Who is right: mbref and MuJoCo agree with the truth to",
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("make", [hanging, held_boom, falling, on_a_turntable])
-def test_compare_blames_no_engine_for_rounding(make, tmp_path, capsys):
-    scene = make()
-    scene.save(tmp_path / "scene.toml")
+@pytest.mark.parametrize(("make", "found"), FOUND.items())
+def test_compare_blames_no_engine_for_rounding(make, found, tmp_path, capsys):
+    """Exudyn reaches the truth only with larger errors on the turntable, which is said of its accuracy."""
+    make().save(tmp_path / "scene.toml")
     words = [word for name in ENGINES for word in ("--engine", name)]
     assert main(["compare", str(tmp_path / "scene.toml"), *words]) == 0
-    said = " ".join(capsys.readouterr().out.split())
+    page = " ".join(capsys.readouterr().out.split())
     for alarm in ("different mechanisms", "the adapter or the scene differs", "completes no run"):
-        assert alarm not in said, said
-    assert "Who is right: mbref" in said or "All 3 engines are right" in said, said
+        assert alarm not in page, page
+    assert found in page, page

@@ -10,10 +10,7 @@ import pytest
 from crosscheck.conformance import suite, trial
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.specimens import specimens
-from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.precision import grain, not_finite, single_precision
-from mbref.scene import Body, Scene
-from mbref.scenes import SCENES
 from tests.zoo.defects import DEFECTS, engine
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}
@@ -31,26 +28,34 @@ def rounded(array: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ARRAYS)
 def test_array_in_single_precision_is_named(bench, name):
+    """The exact run of the bench has one array rounded to single precision; without it none is named."""
     single = replace(bench.close, **{name: rounded(getattr(bench.close, name))})
-    told = {item.partition(" of ")[0] for item in single_precision(bench.scene, single)}
-    assert told == {name.replace("_", " ")}, told
+    named = {item.partition(" of ")[0] for item in single_precision(bench.scene, single)}
+    assert named == {name.replace("_", " ")}, named
     assert not single_precision(bench.scene, bench.close)
 
 
-def test_rounded_reactions_and_noise(bench):
-    """Reactions of one joint are told by its name; velocities of single precision are noise of 1e-8."""
-    run = bench.close
-    single = replace(run, reactions={n: rounded(w) if n == "J" else w for n, w in run.reactions.items()})
+def test_reaction_in_single_precision_is_named_with_its_joint(bench):
+    wrenches = bench.close.reactions.items()
+    single = replace(bench.close, reactions={n: rounded(w) if n == "J" else w for n, w in wrenches})
     assert single_precision(bench.scene, single) == ["reaction in J"]
-    noise, of = grain(bench.scene, replace(run, velocity=rounded(run.velocity)))
+
+
+def test_noise_of_velocities_in_single_precision_is_measured(bench):
+    """Single precision rounds by up to 2⁻²⁴ = 6e-8 of a number; the exact run has only double rounding."""
+    noise, of = grain(bench.scene, replace(bench.close, velocity=rounded(bench.close.velocity)))
     assert 1e-9 < noise < 1e-7 and of == "velocities", (noise, of)
+    assert grain(bench.scene, bench.close)[0] < 1e-14
+
+
+def test_quaternions_of_alternating_sign_are_no_noise(bench):
+    signs = np.resize([1.0, -1.0], (len(bench.close.times), 1, 1))
+    run = replace(bench.close, orientation=bench.close.orientation * signs)
     assert grain(bench.scene, run)[0] < 1e-14
-    signs = np.resize([1.0, -1.0], (len(run.times), 1, 1))
-    assert grain(bench.scene, replace(run, orientation=run.orientation * signs))[0] < 1e-14, "q and -q"
 
 
 def test_constant_simple_and_tiny_numbers_do_not_count_as_single_precision(bench):
-    """Constant, simple and small numbers may be of few bits in double precision too."""
+    """Such numbers may have few bits in double precision too: a constant, multiples of 1/8, up to 1e-7."""
     run = bench.close
     shape = run.acceleration.shape
     steps = np.arange(shape[0])[:, None, None] * np.ones(shape)
@@ -65,21 +70,11 @@ def test_arrays_that_are_not_finite_are_named(bench):
 
 
 def test_engine_that_claims_single_precision_is_not_failed_for_it():
-    """An engine whose velocities are of single precision and which says so / an engine that does not."""
+    """Velocities are rounded to single precision. An engine that claims double precision (2⁻⁵²) fails the
+    checks of digits and of smoothness; one that claims single precision (2⁻²³) does not."""
     faulty = engine(DEFECTS["velocities rounded to single precision"])
-    for claimed, status in ((2.0**-52, suite.FAIL), (2.0**-23, suite.OUTSIDE)):
+    for claimed, digits, is_failed in ((2.0**-52, suite.FAIL, True), (2.0**-23, suite.OUTSIDE, False)):
         type(faulty).rounding = claimed
         bench = trial.set_up(InProcess(faulty), SPECIMENS["heavy top"])
-        assert suite.verdict_on("digits", bench).status == status
-        assert (suite.verdict_on("smooth", bench).status == suite.FAIL) == (claimed < 1e-9)
-
-
-def test_length_of_a_body_in_flight_is_its_way():
-    """The characteristic length of a body in flight is its way, at rest its radius of gyration."""
-    body = Body(name="body", mass=2.0, inertia=(0.02, 0.08, 0.07), position=(0.3, 0.0, 0.0))
-    still = Scene(name="alone", duration=0.5, body=(body,))
-    assert scene_length(still) == pytest.approx(0.2)
-    assert scene_length(still.with_(gravity=(0.0, -8.0, 0.0))) == pytest.approx(1.0)
-    bare = body.model_copy(update={"mass": None, "inertia": None})
-    assert scene_length(still.with_(body=(bare,))) == 1.0
-    assert scene_length(SCENES["four_bar"]()) == pytest.approx(np.sqrt(0.5))
+        assert suite.verdict_on("digits", bench).status == digits
+        assert (suite.verdict_on("smooth", bench).status == suite.FAIL) == is_failed

@@ -19,7 +19,7 @@ from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
 
 SECONDS = 100.0
-FREEDOMS = {
+FREEDOMS = {  # published degrees of freedom and redundant rows
     "point_pendulum": (1, 0),
     "andrews_squeezer": (1, 9),
     "bricard": (1, 1),
@@ -56,6 +56,7 @@ def test_freedoms_and_redundant_rows_are_as_published(name):
 
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_mbref_moves_as_the_reference(name):
+    """The problem's own measure accepts mbref's motion too, and refuses one that is slightly wrong."""
     scene = SCENES[name]()
     times = np.linspace(0.0, BRIEF.get(name, 0.2), 4)
     run = simulate(scene, times=times)
@@ -76,7 +77,8 @@ def exact(run: Trajectory, motion: Motion) -> Trajectory:
 
 
 def assert_own_measure(name: str, run: Trajectory, true: Trajectory) -> None:
-    """The measure of the problem accepts a run, and not the same slightly moved, turned and sped up."""
+    """Assert that the problem's measure accepts a run, and refuses it when moved by 1 mm in each direction,
+    turned by some milliradians and 2 % faster."""
     scene, (_, problem) = SCENES[name](), BY_SCENE[name]
     slight = rotations.from_vector(np.outer(np.arange(1, len(scene.body) + 1), (1e-3, 2e-3, 3e-3)))
     wrong = replace(
@@ -107,15 +109,17 @@ def test_problem_names_its_scene_measure_source_and_sample_times():
 
 
 def test_sarrus_platform_stays_level_and_on_its_line():
+    """Sarrus' linkage guides its platform along the vertical z; it falls by over 0.1 m in 0.3 s."""
     motion = natural_motion(SCENES["sarrus"](), np.linspace(0, 0.3, 5), EXTENDED, seconds=SECONDS)
     platform = doubles(motion.position[:, 0])
     assert np.abs(platform[:, :2]).max() < 1e-15
-    assert platform[-1, 2] < platform[0, 2] - 0.1, "it falls"
+    assert platform[-1, 2] < platform[0, 2] - 0.1
     assert np.abs(doubles(motion.orientation[:, 0, 1:])).max() < 1e-15
 
 
 @pytest.mark.slow
 def test_andrews_reference_of_the_test_set_is_wrong_from_the_eleventh_digit():
+    """The printed β at the end is 1.1e-9 to 1.2e-9 rad off the judge's integration in extended precision."""
     problem = PUBLISHED["A03"]
     motion = natural_motion(find_scene(problem.scene), problem.times(), EXTENDED, seconds=SECONDS)
     deviation = problem.deviations(motion)
@@ -123,6 +127,7 @@ def test_andrews_reference_of_the_test_set_is_wrong_from_the_eleventh_digit():
 
 
 def test_published_chain_is_within_a_micrometre_of_the_closed_form():
+    """The printed coordinates are of the end of a four-bar's crank, at twice its centre."""
     problem = PUBLISHED["A02"]
     exact = closed_form(find_scene(problem.scene)).poses(np.array([problem.time]))
     ours = 2 * exact.position[0, 0, :2]
@@ -132,7 +137,7 @@ def test_published_chain_is_within_a_micrometre_of_the_closed_form():
 
 @pytest.mark.slow
 def test_published_governor_is_off_by_the_error_of_its_step():
-    """Steps of 0.5 ms of a method of second order are 6e-6 m off after 10 s."""
+    """The printed s comes from a method of second order with steps of 0.5 ms: 6e-6 m off after 10 s."""
     problem = PUBLISHED["A05"]
     motion = tree_motion(find_scene(problem.scene), problem.times(), EXTENDED, seconds=SECONDS)
     deviation = problem.deviations(motion)
@@ -141,7 +146,7 @@ def test_published_governor_is_off_by_the_error_of_its_step():
 
 @pytest.mark.parametrize("name", sorted(BY_SCENE))
 def test_the_best_family_of_mbref_runs_every_problem(name):
-    """Bodies without moments of inertia had only families whose mass matrix is then singular."""
+    """Also bodies without moments of inertia, whose mass matrix is singular, have a family."""
     scene = SCENES[name]()
     setting = engine("mbref").best_settings(scene)[0]
     run = engine("mbref").run(scene, np.array([0.0, 1e-3]), setting)

@@ -45,22 +45,21 @@ def test_energy_measure_is_the_largest_change_in_joule():
 
 
 def test_distance_measures_compare_a_centre_with_the_truth():
-    """The second body is 5 m from the origin; it is off by 0.5 m once in three samples."""
+    """Body "far" is 5 m from the origin, and off by 0.5 m at one of three samples: largest distance, distance
+    over 5 m, and root mean square. A truth that ends earlier judges only its own samples."""
     off, true = moved(1, 1, (0.3, 0.0, 0.4)), at_rest()
     assert measures.distance("far")(SCENE, off, true) == pytest.approx(0.5)
     assert measures.distance("arm")(SCENE, off, true) == 0.0
     assert measures.relative_distance("far")(SCENE, off, true) == pytest.approx(0.1)
     assert measures.mean_square_distance("far")(SCENE, off, true) == pytest.approx(0.5 / np.sqrt(3))
     for measure in (measures.distance, measures.relative_distance, measures.mean_square_distance):
-        assert measure("far")(SCENE, off, None) is None, "there is no truth"
-        assert measure("far")(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0, (
-            "truth to the second sample"
-        )
+        assert measure("far")(SCENE, off, None) is None
+        assert measure("far")(SCENE, moved(2, 1, (9.0, 0.0, 0.0)), at_rest(2)) == 0.0
     assert measures.mean_square_distance("far")(SCENE, at_rest(0), at_rest(0)) is None
 
 
 def test_relative_measure_is_the_largest_over_all_observed_numbers():
-    """Numbers 2 and 1e-5 are off by 0.02 and 1e-5: 0.01, and 0.01 of the least denominator 1e-3."""
+    """2 m is off by 0.02 m: 0.01. 1e-5 m is off by 3e-5 m: 0.03, over the least denominator 1e-3 m."""
 
     def first(motion: Trajectory) -> np.ndarray:
         return motion.position[:, :, 0]
@@ -72,10 +71,13 @@ def test_relative_measure_is_the_largest_over_all_observed_numbers():
     assert measure(SCENE, run, true) == pytest.approx(0.01) and measure(SCENE, run, None) is None
     run.position[2, 1, 0] -= 3e-5
     assert measure(SCENE, run, true) == pytest.approx(0.03)
-    assert measure(SCENE, run, at_rest(0)) == 0.0, "a truth without a sample"
+    assert measure(SCENE, run, at_rest(0)) == 0.0
 
 
 def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
+    """x is off by 0.25 of 1 m and y by 2 of 4 m at the end; earlier samples do not count. Without a truth at
+    the end there is no measure."""
+
     def seen(scene: Scene, motion: Trajectory) -> dict[str, float]:
         return {"x": float(motion.position[-1, 0, 0]), "y": float(motion.position[-1, 1, 1]), "z": 1.0}
 
@@ -83,13 +85,13 @@ def test_end_measure_is_the_largest_relative_error_of_the_last_sample():
     run = moved(2, 0, (-0.25, 0.0, 0.0))
     run.position[2, 1, 1] += 2.0
     run.position[1] += 100.0
-    assert measure(SCENE, run, at_rest()) == pytest.approx(0.5), "y is off by 2 of 4, x by 0.25 of 1"
+    assert measure(SCENE, run, at_rest()) == pytest.approx(0.5)
     assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, at_rest()) == pytest.approx(0.25)
     negative = at_rest()
     negative.position[2, 0, 0] = -1.0
     assert measures.relative_at_the_end(seen, ("x",))(SCENE, run, negative) == pytest.approx(1.75)
     assert measure(SCENE, run, None) is None
-    assert measure(SCENE, run, at_rest(2)) is None, "the truth ends before"
+    assert measure(SCENE, run, at_rest(2)) is None
     assert measure(SCENE, at_rest(0), at_rest(0)) is None
 
 
@@ -106,6 +108,7 @@ def turning(angles: tuple[tuple[float, float], ...]) -> Trajectory:
 
 
 def test_opposite_hinges_measure_is_the_largest_sum_of_both_angles():
+    """Angles of hinges A and B at three samples; in the published mechanism their sum stays zero."""
     pair = measures.opposite_hinges([("A", "B")])
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.2), (0.5, -0.5))), None) == pytest.approx(0.0, abs=1e-15)
     assert pair(SCENE, turning(((0.0, 0.0), (0.2, -0.3), (0.5, -0.44))), None) == pytest.approx(0.1)
@@ -114,13 +117,12 @@ def test_opposite_hinges_measure_is_the_largest_sum_of_both_angles():
 
 
 def test_guided_measure_is_the_distance_off_the_line_or_the_tilt():
+    """The larger of the horizontal distance (m) from the first sample's vertical line and the tilt (rad)."""
     guided = measures.guided("far")
-    assert guided(SCENE, moved(1, 1, (0.03, 0.04, 7.0)), None) == pytest.approx(0.05), "its height is free"
+    assert guided(SCENE, moved(1, 1, (0.03, 0.04, 7.0)), None) == pytest.approx(0.05)
     tilted = at_rest()
     tilted.orientation[2, 1] = rotations.from_vector(np.array([0.0, 0.2, 0.0]))
     assert guided(SCENE, tilted, None) == pytest.approx(0.2)
     tilted.position[0, 1, 0] += 0.3
-    assert (
-        guided(SCENE, tilted, None) == pytest.approx(0.3)
-        and measures.guided("arm")(SCENE, tilted, None) == 0.0
-    )
+    assert guided(SCENE, tilted, None) == pytest.approx(0.3)
+    assert measures.guided("arm")(SCENE, tilted, None) == 0.0

@@ -7,7 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from crosscheck.conformance.findings import shrunk, violates
@@ -48,16 +47,19 @@ def held(
 
 
 def test_resume_repeats_no_test_that_passed_before(tmp_path):
+    """A sound engine passes; then it loses its gravity. With --resume its stored pass counts, and without it
+    the suite fails."""
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
     first = held(tmp_path, "free_fall")
     assert first.returncode == 0 and " passed" in first.stdout, first.stdout[-1500:] + first.stderr[-500:]
     faulty = SOURCE.read_text().replace("np.array(self.scene.gravity)", "np.zeros(3)")
     (tmp_path / "spatial_engine.py").write_text(faulty)
-    assert held(tmp_path, "free_fall", "--resume").returncode == 0, "passes of the run before were not taken"
-    assert held(tmp_path, "free_fall").returncode == 1, "an engine without gravity passed"
+    assert held(tmp_path, "free_fall", "--resume").returncode == 0
+    assert held(tmp_path, "free_fall").returncode == 1
 
 
 def test_plugin_finds_an_engine_of_the_working_directory_in_child_processes(tmp_path):
+    """PYTHONPATH does not name the working directory; without --in-process the engine runs in children."""
     (tmp_path / "spatial_engine.py").write_text(SOURCE.read_text())
     run = held(tmp_path, "free_fall and refusal", path=str(ROOT))
     assert run.returncode == 0 and " passed" in run.stdout, run.stdout[-1500:] + run.stderr[-500:]
@@ -75,17 +77,15 @@ def test_unknown_engine_is_a_usage_error_before_any_test(tmp_path, name, says):
 
 @pytest.mark.slow
 def test_violation_of_a_real_defect_is_shrunk_to_a_smaller_scene():
-    """A scene gets smaller only as long as the check fails; a sound engine's stays as it is."""
+    """The engine damps springs with the wrong sign; the smaller scene has fewer joints and still fails."""
     scene = moving_probes()["spring load"]
     faulty = violates(InProcess(engine(DEFECTS["spring's damping with the wrong sign"])), "truth")
     small = shrunk(scene, faulty, tries=12)
     assert faulty(small) and len(small.joint) < len(scene.joint), small
-    assert shrunk(scene, lambda candidate: False) == scene
 
 
-@pytest.mark.parametrize("defect", ["spring's damping ignored"])
-def test_check_fails_for_a_defect_and_passes_for_the_sound_engine(defect):
+def test_check_fails_for_a_defect_and_passes_for_the_sound_engine():
+    """The check compares with the truth; the defective engine ignores the damping of springs."""
     scene = moving_probes()["spring load"].with_(gravity=(0.0, 0.0, 0.0))
-    assert np.all(np.array(scene.gravity) == 0.0)
-    assert violates(InProcess(engine(DEFECTS[defect])), "truth")(scene)
+    assert violates(InProcess(engine(DEFECTS["spring's damping ignored"])), "truth")(scene)
     assert not violates(InProcess(engine()), "truth")(scene)

@@ -50,7 +50,7 @@ def door(kind: type) -> Scene:
 
 
 def test_two_ball_hinges_share_only_the_force_along_their_line():
-    """Only the force along the line of both is statically open."""
+    """Statics leaves one component open: equal and opposite forces along the line through both balls."""
     shared = shared_wrenches(door(Spherical), 0.0, *initial_poses(door(Spherical)))
     for name, basis in shared.items():
         assert basis.shape == (6, 1), f"{name}: {basis.shape[1]} shared wrenches, by hand 1"
@@ -59,7 +59,7 @@ def test_two_ball_hinges_share_only_the_force_along_their_line():
 
 
 def test_two_revolute_hinges_share_all_five_components():
-    """Each alone holds the door: all five components of either are open."""
+    """Each hinge alone holds the door, so that statics leaves all five components of either open."""
     shared = shared_wrenches(door(Revolute), 0.0, *initial_poses(door(Revolute)))
     sizes = {name: basis.shape[1] for name, basis in shared.items()}
     assert sizes == {"low": 5, "high": 5}, sizes
@@ -69,6 +69,8 @@ def test_two_revolute_hinges_share_all_five_components():
 
 @pytest.mark.parametrize("name", SCENES_COMPARED)
 def test_engines_have_mbref_s_unique_reactions_and_resultants(name):
+    """Parts that statics leaves open are not compared. Limits: 10 times the measured differences, relative to
+    the largest reaction."""
     scene = door(Spherical) if name == "door" else SCENES[name]()
     runs = {engine: run(engine, scene) for engine in ("mbref", *MEASURED)}
     for label, measured in MEASURED.items():
@@ -81,24 +83,29 @@ def test_engines_have_mbref_s_unique_reactions_and_resultants(name):
 
 
 def test_one_redundant_row_shares_at_most_one_component_at_a_joint():
-    """One redundant row opens at most one dimension at a joint, no redundant row none."""
+    """The spatial slider-crank has no redundant row and shares nothing; the planar one has redundant rows and
+    shares one component at most."""
     for name, most in {"spatial_slider_crank_gravity": 0, "planar_slider_crank_gravity": 1}.items():
         scene = SCENES[name]()
         sizes = {j: b.shape[1] for j, b in shared_wrenches(scene, 0.0, *initial_poses(scene)).items()}
         assert max(sizes.values()) == most, f"{name}: {sizes}, by its redundant rows {most} at most"
 
 
-def test_choices_side_by_side_and_weight():
-    """Whatever the shares of the hinges, together they carry the door."""
+def test_hinges_of_a_door_carry_its_weight_together():
+    """10 kg · 9.81 m/s² = 98.1 N; resultants of several samples in one call are those of single calls."""
     scene = door(Spherical)
     motion = run("mbref", scene)
-    shares = side_by_side(scene, {"mbref": motion}, 0)
-    assert set(shares) == {"low", "high"}, shares
-    lifted = resultants(scene, motion, 0)[0, 2]
-    assert lifted == pytest.approx(98.1, rel=1e-9), f"hinges carry {lifted} N of 98.1 N"
+    assert resultants(scene, motion, 0)[0, 2] == pytest.approx(98.1, rel=1e-9)
     some = np.array([3, 0, 1])
     one_by_one = [resultants(scene, motion, int(k)) for k in some]
-    assert np.array_equal(resultants(scene, motion, some), one_by_one), "samples in one call"
+    assert np.array_equal(resultants(scene, motion, some), one_by_one)
+
+
+def test_another_share_between_hinges_differs_neither_in_unique_parts_nor_in_resultants():
+    """7 N of the vertical force move from the upper hinge to the lower one; only the chosen shares differ."""
+    scene = door(Spherical)
+    motion = run("mbref", scene)
+    assert set(side_by_side(scene, {"mbref": motion}, 0)) == {"low", "high"}
     moved = dict(motion.reactions)
     moved["low"] = moved["low"] + [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]
     moved["high"] = moved["high"] - [0.0, 0.0, 7.0, 0.0, 0.0, 0.0]
@@ -109,7 +116,7 @@ def test_choices_side_by_side_and_weight():
 
 @pytest.mark.parametrize("name", SCENES_COMPARED)
 def test_mbref_has_the_exact_unique_reactions(name):
-    """The unique parts by Newton, Euler and the exact accelerations, mbref apart."""
+    """Exact reactions follow from the judge's accelerations by Newton's and Euler's equations."""
     scene = door(Spherical) if name == "door" else SCENES[name]()
     exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))
     found = compare(scene, exact, run("mbref", scene))
@@ -118,7 +125,8 @@ def test_mbref_has_the_exact_unique_reactions(name):
 
 
 def test_reactions_of_ten_meganewtons_are_called_absurd():
-    """Ten million newtons where a hundred are right show as what they are, and are named."""
+    """1e7 N are added at each hinge, where 100 N are right: a sentence names size and joint; the exact
+    reactions have none."""
     scene = door(Spherical)
     exact = with_exact_reactions(scene, gauss_motion(scene, tuple(TIMES.tolist())))
     assert absurd(scene, exact, exact) == []

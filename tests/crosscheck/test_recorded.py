@@ -130,10 +130,11 @@ def test_exact_motion_is_right_in_every_column(table):
     ("tolerance", "right"), [(FLOOR, (True, False)), (2e-8, (True, True)), (0.0, (False, False))]
 )
 def test_a_column_is_right_within_the_tolerance_of_its_size(table, tolerance, right):
-    """The mechanism's length scales positions; the largest angular velocity of a body scales rates."""
+    """Errors: 0.9e-8 of the mechanism's length in a position, 1.9e-8 of the largest angular velocity in a
+    rate. FLOOR is 1e-8. Of right columns no begin of an error is stated."""
     spin = max(abs(table[f"{b}.angular_velocity.{a}"]).max() for b in ("upper", "lower") for a in "xyz")
     errors = {"upper.position.x": 0.9e-8 * scene_length(SCENE), "upper.angular_velocity.z": 1.9e-8 * spin}
-    once = np.arange(len(TIMES)) == 40  # one cell of a column, which no explanation is searched for
+    once = np.arange(len(TIMES)) == 40  # one sample of a column, for which no explanation is searched
     off = {"time": TIMES, **{name: table[name] + error * once for name, error in errors.items()}}
     found = judge_motion(SCENE, off, tolerance=tolerance)
     assert tuple(c.is_right for c in found.columns) == right
@@ -148,6 +149,7 @@ SELDOM = ("mass", "missing body", "damping", "interpolation")
     "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SELDOM)) for name in PLANTED]
 )
 def test_planted_difference_is_the_first_explanation(name, table):
+    """It leaves less than 1e-3 of the difference between recorded motion and reference."""
     plant, says = PLANTED[name]
     found = judge_motion(SPRUNG if name in ("mass", "missing body") else SCENE, plant(table))
     assert not found.is_right
@@ -157,7 +159,7 @@ def test_planted_difference_is_the_first_explanation(name, table):
 
 @pytest.mark.slow
 def test_motion_of_a_weightless_body_has_no_explanation():
-    """The changes' fits leave the range of numbers."""
+    """The recorded motion has a body of 1e-5 of its mass; fits of changes leave the range of numbers."""
     assert not judge_motion(SPRUNG, of_other(SPRUNG, body=lighter("lower", 1e-5))).explanations
 
 
@@ -201,6 +203,8 @@ def test_two_planted_differences_are_the_first_explanation(name, table):
 
 
 def test_column_states_the_time_at_which_its_error_begins(table):
+    """1 mm is added to one column after 0.2501 s: samples are 5 ms apart, so the first wrong one is 0.255
+    s."""
     late = {**table, "upper.position.x": table["upper.position.x"] + 1e-3 * (TIMES > 0.2501)}
     column = next(c for c in judge_motion(SCENE, late).columns if not c.is_right)
     assert column.name == "upper.position.x" and column.begins == pytest.approx(0.255)
@@ -216,7 +220,8 @@ def test_written_reference_table_is_judged_right(table, tmp_path):
 
 
 def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
-    """Numbers of columns, units in headers or given, decimal commas, quaternions with w last."""
+    """A table without header in ms, mm and degrees; one with decimal commas and units in its header; one with
+    quaternions whose w comes last."""
     x, angle = table["lower.position.x"] * 1e3, np.degrees(table["A.angle"])
     rows = zip(TIMES * 1e3, x, angle, strict=True)
     text = "\n".join(" ".join(f"{v:.9f}" for v in row) for row in rows)
@@ -255,6 +260,8 @@ def test_faulty_table_is_refused_with_its_fault(text, columns, says, tmp_path):
 
 
 def test_reference_command_writes_a_table_that_judge_finds_right(tmp_path, capsys):
+    """Exit status 0 for a right table, 1 for a wrong one (quaternions read in another order), 2 for options,
+    columns or files that cannot be read."""
     SCENE.save(tmp_path / "s.toml")
     scene, out = str(tmp_path / "s.toml"), str(tmp_path / "ref.csv")
     assert main(["reference", scene, "--out", out, "--samples", "81"]) == 0

@@ -65,7 +65,7 @@ BRIEF = {
 
 
 def samples(scene: Scene, duration: float, count: int = 9, seconds: float = SECONDS) -> tuple[Reference, str]:
-    """A reference that is not taken from the cache, and why it ends."""
+    """A reference that is not taken from the cache, and the reason of an early end, or ""."""
     times = np.linspace(0.0, duration, count)
     return judged(scene, times, *runs(scene, times, seconds))
 
@@ -91,6 +91,7 @@ def test_reference_is_within_its_bound_of_the_closed_form(make):
 
 
 def test_bound_of_a_mechanism_far_from_the_origin_holds_the_rounding_of_its_samples():
+    """A pendulum 1e6 m from the origin: samples are rounded to doubles, 1e-10 of its length."""
     scene, _ = pendulum()
     far = Isometry(np.eye(3), np.array([1e6, 0.0, 0.0])).change(scene)
     motion = natural_motion(far, [0.0, 0.4, 0.8], EXTENDED, seconds=SECONDS)
@@ -153,13 +154,15 @@ def test_formulations_agree_on_every_feature(feature):
 
 
 def test_tree_formulation_passes_the_flat_linkage_of_bennett_in_few_panels():
-    """Where Bennett's linkage is flat, one of two rows that close it vanishes, and panels grew short."""
+    """One of two rows that close Bennett's linkage vanishes where it is flat; a solver that keeps this row
+    needs many short panels."""
     motion = tree_motion(SCENES["bennett"](), np.linspace(0.0, 1.0, 3), EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 10
 
 
 def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
-    """Dampers of the governor act in 40 µs, and Picard's iteration takes 20 panels to 7 ms."""
+    """Dampers of the governor act in 40 µs, but its motion is smooth: 0.4 s need fewer than 40 panels.
+    Picard's iteration would take 20 panels to 7 ms."""
     scene, times = SCENES["flyball_governor"](), np.linspace(0.0, 0.4, 5)
     motion = tree_motion(scene, times, EXTENDED, seconds=SECONDS)
     assert not motion.reason and motion.steps < 40
@@ -167,7 +170,8 @@ def test_panels_of_a_stiff_governor_are_as_long_as_its_smooth_motion_allows():
 
 
 def test_seed_of_the_rows_moves_contradicting_joints_by_rounding_only():
-    """B on other rows of a linkage turned askew moves apart by the rounding of its axes, and no more."""
+    """Bennett's linkage with rounded axes, in formulation B: another seed selects other rows, and the motion
+    differs by at most 1e-14; with an equal seed it is the same to the last bit."""
     scene = Isometry(ASKEW, np.array([0.3, -0.5, 0.2])).change(SCENES["bennett"]())
     one, same, other = (
         tree_motion(scene, [0.5], EXTENDED, seconds=SECONDS, seed=seed, displaced=displaced)
@@ -196,7 +200,7 @@ def test_references_of_more_random_mechanisms_have_a_bound_of_1e_11(seed):
 
 
 def test_rows_that_become_dependent_do_not_magnify_contradictions():
-    """With one choice of rows two hinges that contradict each other by 1e-16 moved 3e-13 apart."""
+    """Two hinges contradict each other by 1e-16; a bad choice of rows magnifies this to 3e-13."""
     spring = TorsionSpring(joint="J1", stiffness=5.0, damping=0.1, natural_angle=0.3)
     drawn = random_mechanism(12)
     scene = drawn.with_(load=(*drawn.load, spring))
@@ -241,7 +245,7 @@ def test_twenty_digits_are_certified_by_both_formulations():
     [(SCENES["heavy_top"], [0.05, 0.06]), (SCENES["andrews_squeezer"], [1e-3]), (several_springs, [0.02])],
 )
 def test_thirty_digits_and_extended_precision_move_alike(make, times):
-    """Rounding does not grow from step to step; every load has its digits."""
+    """Formulation A in 30 and in 19 digits: positions agree to 1e-15 m, whatever the loads."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = make()
     motion = natural_motion(scene, times, many_digits(30), order=30, tolerance=1e-20, seconds=SECONDS)
@@ -251,7 +255,8 @@ def test_thirty_digits_and_extended_precision_move_alike(make, times):
 
 
 def test_redundant_joints_are_moved_in_ball_arithmetic():
-    """A residual below the radius of its ball divided the equations by zero on redundant joints."""
+    """Residuals of redundant joints are balls around zero in python-flint's arithmetic, by which nothing may
+    be divided."""
     pytest.importorskip("flint", reason="python-flint is the extra `certify`")
     scene = random_mechanism(3)
     assert scene.counts().redundant == 1
@@ -285,7 +290,8 @@ def test_isostatic_scene_keeps_the_freedoms_and_has_no_redundant_row(name):
 
 
 def test_isostatic_scene_along_a_motion_has_no_singular_position():
-    """With the joints that serve at the start, Bennett's linkage is singular where it is flat."""
+    """Joints weakened by the rank at the start alone make Bennett's linkage singular where it is flat; those
+    weakened by the rank along the motion do not, and contradict each other by less than 1e-17."""
     scene = SCENES["bennett"]()
     motion = natural_motion(scene, np.linspace(0.0, 1.0, 41), EXTENDED, seconds=SECONDS)
     along = list(
@@ -375,6 +381,7 @@ def test_reference_moves_massless_bodies_only_if_driven():
 
 
 def test_reference_ends_after_its_cpu_time():
+    """0.2 s of CPU time do not suffice for 50 s of motion: the state at 0 is given, and the time reached."""
     scene = SCENES["planar_slider_crank"]()
     motion = natural_motion(scene, np.linspace(0.0, 100.0, 3), EXTENDED, seconds=0.2)
     assert motion.reason == "the CPU time has passed"
@@ -389,6 +396,7 @@ def own_cache(tmp_path, monkeypatch):
 
 
 def test_reference_that_is_given_up_ends_and_is_not_cached(own_cache):
+    """A reference that would take ten minutes is given up from another thread, and ends within a minute."""
     scene, times = SCENES["flyball_governor"]().with_(duration=1e4), np.linspace(0.0, 1e4, 11)
     with ThreadPoolExecutor(1) as beside:
         motion = beside.submit(reference, scene, times, 600.0)
@@ -414,6 +422,7 @@ def test_an_interrupt_does_not_wait_for_the_truth(own_cache):
 
 @pytest.mark.parametrize("damage", [lambda b: b[:-7], lambda b: b[:50] + b"x" + b[51:], lambda b: b""])
 def test_damaged_cache_file_of_a_reference_is_made_again(own_cache, damage):
+    """A file that is cut short, has a changed byte or is empty is not read."""
     scene, _ = free_fall()
     first = reference(scene, [0.5])
     (file,) = own_cache.iterdir()
@@ -425,13 +434,16 @@ def test_damaged_cache_file_of_a_reference_is_made_again(own_cache, damage):
 
 
 def test_reference_needs_no_cache_that_can_be_written(tmp_path, monkeypatch):
-    (tmp_path / "mbref").write_text("a file where a folder should be")
+    """A file stands where the folder of the cache should be."""
+    (tmp_path / "mbref").write_text("no folder")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert isinstance(reference(free_fall()[0], [0.5]), Reference)
 
 
 # --- the truth of a scene ---------------------------------------------------------------------------------
 def test_truth_of_a_scene_without_closed_form_is_its_reference(own_cache):
+    """The truth of a random mechanism is the reference, that of the rhombus the parallelogram's closed form;
+    without CPU time there is none."""
     scene = random_mechanism(3)
     assert truth_for(scene, 0.0) is None
     truth = truth_for(scene)

@@ -70,6 +70,7 @@ def replayed(*moments: float, **parts: Any) -> Scene | Outside:
 
 @pytest.mark.parametrize("size", [4.0, -4.0])
 def test_constant_driving_moment_replaces_the_driver(size):
+    """The axis has length 2; moments of ±4 N m vary by 0.9e-6 and the mean is taken. Other loads stay."""
     found = replayed(size, size * (1 + 0.9e-6), load=(Moment(body="c", moment=X),))
     assert [load.body for load in found.load] == ["c", "b"] and not found.driver
     assert found.load[1].moment == pytest.approx((0.0, 0.0, size * (1 + 0.45e-6)), rel=1e-9)
@@ -94,6 +95,7 @@ def test_driver_without_a_moment_is_replaced_by_zero():
 
 
 def test_drivers_that_a_moment_on_the_ground_cannot_replace_are_refused():
+    """A slide's driver, a hinge between two moving bodies, two drivers, and a run without reactions."""
     slide = Translational(name="crank", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=Z)
     turned = CRANK.model_copy(update={"bodies": ("c", "b")})
     for joint in (slide, turned):
