@@ -54,7 +54,7 @@ print(code.address("three_times") != 0)
 """
 
 
-def test_what_is_written_is_read(tmp_path: Path):
+def test_file_is_read_as_it_was_written_and_nothing_else_is_left(tmp_path: Path):
     checked_file.write(tmp_path / "new" / "a", b"data")
     assert checked_file.read(tmp_path / "new" / "a") == b"data"
     assert checked_file.read(tmp_path / "b") is None
@@ -72,7 +72,7 @@ def test_what_is_written_is_read(tmp_path: Path):
         lambda data: b"something else",
     ],
 )
-def test_damaged_files_are_told_and_removed(damage, tmp_path: Path, capsys):
+def test_damaged_file_is_reported_removed_and_not_read(damage, tmp_path: Path, capsys):
     path = tmp_path / "a"
     checked_file.write(path, b"data " * 10)
     path.write_bytes(damage(path.read_bytes()))
@@ -81,7 +81,7 @@ def test_damaged_files_are_told_and_removed(damage, tmp_path: Path, capsys):
     assert not path.exists()
 
 
-def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path, capsys):
+def test_unwritable_folder_is_reported_once(tmp_path: Path, capsys):
     (tmp_path / "file").write_text("no folder")
     for name in "ab":
         checked_file.write(tmp_path / "file" / name, b"data")
@@ -90,7 +90,7 @@ def test_a_folder_that_cannot_be_written_is_told_once(tmp_path: Path, capsys):
     assert error.count("cannot write to") == 1, error
 
 
-def test_a_folder_in_place_of_a_file_is_told(tmp_path: Path, capsys):
+def test_folder_in_place_of_a_file_is_reported(tmp_path: Path, capsys):
     (tmp_path / "a").mkdir()
     assert checked_file.read(tmp_path / "a") is None
     assert "cannot be read (Is a directory)" in capsys.readouterr().err
@@ -132,7 +132,7 @@ def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
 
 
 def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
-    """The output of a program that has its cache there; it is to end well."""
+    """Return the output and errors of a program that ends with status 0 and has its cache in a folder."""
     file = folder / "program.py"
     if not file.exists():
         file.write_text(script.format(root=str(ROOT)))
@@ -144,7 +144,7 @@ def ran(script: str, folder: Path, cache: Path) -> tuple[str, str]:
     return done.stdout, done.stderr
 
 
-def kept(cache: Path, pattern: str) -> list[Path]:
+def files_in(cache: Path, pattern: str) -> list[Path]:
     return sorted(cache.rglob(pattern))
 
 
@@ -164,23 +164,25 @@ DAMAGES = (
     ],
 )
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_code_is_made_anew(script, pattern, says, damage, tmp_path: Path):
+def test_damaged_machine_code_is_reported_compiled_again_and_stored(
+    script, pattern, says, damage, tmp_path: Path
+):
     cache = tmp_path / "cache"
     assert ran(script, tmp_path, cache)[0] == says
-    files = kept(cache, pattern)
+    files = files_in(cache, pattern)
     assert files
     good = {file: file.read_bytes() for file in files}
     for file in files:
         file.write_bytes(damage(good[file]))
     out, error = ran(script, tmp_path, cache)
     assert out == says and "is damaged and will be written again" in error and "Traceback" not in error, error
-    assert kept(cache, pattern) == files
+    assert files_in(cache, pattern) == files
     out, error = ran(script, tmp_path, cache)
     assert (out, "damaged" in error) == (says, False), error
 
 
 @pytest.mark.parametrize(("script", "says"), [(SMALL_KERNEL, "7.0\n"), (SCENE, "True\n")])
-def test_without_a_place_for_the_cache_code_is_made_each_time(script, says, tmp_path: Path):
+def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
     (tmp_path / "file").write_text("no folder")
     out, error = ran(script, tmp_path, tmp_path / "file")
     assert out == says and "cannot write to" in error and "Traceback" not in error, error
@@ -199,15 +201,15 @@ def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
 
 
 @pytest.mark.parametrize("program", ["mbref", "crosscheck"])
-def test_help_touches_no_cache(program, tmp_path: Path):
+def test_printing_help_creates_no_cache(program, tmp_path: Path):
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     command = [sys.executable, "-m", program, "--help"]
     subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, check=True)
     assert not (tmp_path / "cache").exists()
 
 
-def test_a_warm_run_compiles_nothing():
-    """Helpers are compiled with the kernels that call them, and never for a call from Python."""
+def test_second_run_of_a_scene_compiles_nothing():
+    """numba announces each compilation by the event numba:compile; the second process prints none."""
     simulate("four_bar_gravity", times=[0.01])
     code = "from numba.core.event import Listener, register\nimport mbref\n"
     code += (
@@ -219,8 +221,8 @@ def test_a_warm_run_compiles_nothing():
     assert run.stdout == ""
 
 
-def test_a_warm_start_imports_no_large_parts_of_scipy():
-    simulate("four_bar_gravity", times=[0.01])  # which keeps what SciPy has found
+def test_second_run_of_a_scene_imports_neither_scipy_sparse_nor_scipy_integrate():
+    simulate("four_bar_gravity", times=[0.01])  # writes the caches
     code = "import sys, mbref; mbref.simulate('four_bar_gravity', times=[0.01])\n"
     code += "print(*{'scipy.' + name for name in ('sparse', 'integrate')} & set(sys.modules))"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -20,13 +20,13 @@ def greedy(n):
 
 
 @pytest.mark.skipif(PLAIN, reason="without the JIT kernels are plain functions")
-def test_only_a_kernel_that_says_so_can_allocate():
+def test_array_is_allocated_only_by_a_kernel_with_the_decorator_allocating():
     assert total(3) == 3.0
     with pytest.raises(numba.core.errors.NumbaError, match="of array passed into"):
         greedy(3)
 
 
-def test_every_kernel_of_the_series_is_prepared():
+def test_every_kernel_that_a_series_calls_is_compiled_before_a_run():
     """A missing kernel would compile while the clock of a run counts."""
     from mbref.taylor import stepper
     from mbref.taylor.crossing import branch_follower

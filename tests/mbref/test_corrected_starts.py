@@ -27,8 +27,8 @@ def pairs(count, gap=0.0, **of_first):
 
 
 @pytest.mark.parametrize("count", PAIRS)
-def test_positions_change_least_in_the_metric_of_the_masses(count):
-    """The gap g along the rod closes by displacements in the ratio of the other's mass."""
+def test_gap_closes_by_displacements_in_inverse_ratio_of_the_masses(count):
+    """A gap g between masses 1 and 3 closes by 3/4 g and 1/4 g: least Σ m |x|², with x₁ - x₂ = g."""
     model, gap = pairs(count), 1e-3
     q = model.start().copy().reshape(-1, 2, 7)
     q[:, 1, 2] += gap
@@ -37,12 +37,13 @@ def test_positions_change_least_in_the_metric_of_the_masses(count):
     assert np.abs(phi).max() < 1e-14
     assert moved[:, 0, 2] == pytest.approx(0.75 * gap, rel=1e-9)
     assert moved[:, 1, 2] == pytest.approx(-0.25 * gap, rel=1e-9)
-    assert np.abs(np.delete(moved, 2, axis=2)).max() < 1e-15
+    assert np.abs(np.delete(moved, 2, axis=2)).max() < 1e-12 * gap
 
 
 @pytest.mark.parametrize("count", PAIRS)
-def test_velocities_that_are_not_given_have_the_least_kinetic_energy(count):
-    """A joint that moves by u across the rod: the rod's centre moves by u I / (I + m l²)."""
+def test_missing_velocities_minimise_the_kinetic_energy(count):
+    """The joint moves at 1 m/s across the rod: least kinetic energy gives the rod's centre I / (I + m l²)
+    and the rod the rate -m l / (I + m l²)."""
     found = consistent_start(pairs(count, velocity=(1.0, 0.0, 0.0)))
     v = found.v.reshape(-1, 2, 6)
     effective = INERTIA + 3.0 * ARM**2
@@ -56,7 +57,7 @@ def test_velocities_that_are_not_given_have_the_least_kinetic_energy(count):
 
 
 @pytest.mark.parametrize("count", PAIRS)
-def test_given_velocities_that_contradict_each_other_are_a_fault_of_the_joint(count):
+def test_velocities_of_two_bodies_that_contradict_their_joint_are_refused(count):
     bodies = pairs(count).scene
     wrong = bodies.with_("body[b0].velocity", [1.0, 0.0, 0.0])
     wrong = wrong.with_("body[b0].angular_velocity", [0.0, 0.0, 0.0])
@@ -66,15 +67,16 @@ def test_given_velocities_that_contradict_each_other_are_a_fault_of_the_joint(co
 
 
 @pytest.mark.parametrize("speed", [0.01, 2.0])
-def test_violation_of_rates_is_of_unit_rows_and_relative_to_the_largest_velocity(speed):
-    """The row of x has the entries 1, -1 and ARM, a length of 1.5."""
+def test_velocity_violation_is_divided_by_row_length_and_largest_velocity(speed):
+    """Body a moves at the speed u along x. The joint's row for x is (1, -1, ARM) of length 1.5, so that its
+    violation is u / 1.5 / u."""
     model, v = pairs(1), np.zeros(12)
     v[0], v[7] = speed, 0.1 * speed
     q = model.start().ravel()
     assert rate_violation(model, q, v) == pytest.approx(1.0 / 1.5)
 
 
-def test_the_report_names_what_was_corrected():
+def test_report_of_a_start_names_corrections_of_more_than_a_billionth():
     state = dict.fromkeys(("q", "v", "given"), np.zeros(0))
     for off, says in (
         ((1e-10, 1e-10), "^$"),

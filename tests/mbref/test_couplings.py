@@ -33,6 +33,7 @@ def agree(found: np.ndarray, exact: np.ndarray) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_gear_pair_turns_as_its_closed_form_over_many_turns(method):
+    """A torque M = 2 N m on inertia J = 0.03 + r² 0.2 kg m², r = -0.5: φ = M t² / 2 J, more than 15 turns."""
     times = np.linspace(0, 3, 61)
     inertia = 0.03 + 0.5**2 * 0.2
     angle = 2.0 / inertia * times**2 / 2
@@ -41,7 +42,8 @@ def test_gear_pair_turns_as_its_closed_form_over_many_turns(method):
     agree(coordinates(gear_pair(), method, "B", times)[0], -0.5 * angle)
 
 
-def test_violation_counts_full_turns_of_coupled_angles():
+def test_violation_of_a_coupling_counts_full_turns():
+    """With a ratio that is off by 0.01 the violation of φ_B = r φ_A is 0.01 φ_A, also after 15 turns."""
     motion = mbref.simulate(gear_pair(), times=np.linspace(0, 3, 61), rtol=1e-13)
     turned = motion.joint("A").angle
     assert turned[-1] > 15 * 2 * np.pi and motion.violation.position.max() < 1e-12
@@ -51,6 +53,8 @@ def test_violation_counts_full_turns_of_coupled_angles():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_rack_falls_as_its_closed_form(method):
+    """A mass m = 1.5 kg turns a pinion of J = 0.2 kg m² by r = 0.05 m/rad: acceleration -m g / (m + J /
+    r²)."""
     times = np.linspace(0, 2, 21)
     falls = -1.5 * G / (1.5 + 0.2 / 0.05**2) * times**2 / 2
     agree(coordinates(rack(), method, "B", times)[1], falls)
@@ -59,6 +63,7 @@ def test_rack_falls_as_its_closed_form(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nut_turns_down_a_screw_as_its_closed_form(method):
+    """A nut of m = 2 kg, J = 0.02 kg m² and lead h = 0.01 m/rad: angular acceleration -m g h / (J + m h²)."""
     times = np.linspace(0, 2, 21)
     turns = -2.0 * G * 0.01 / (0.02 + 2.0 * 0.01**2) * times**2 / 2
     angle, displacement = coordinates(screw(), method, "S", times)
@@ -67,8 +72,9 @@ def test_nut_turns_down_a_screw_as_its_closed_form(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_pendulum_with_armature_swings_as_jacobi_has_it(method):
-    """From rest at 90° the angle from below φ has sin(φ/2) = k cd(ω t), k = sin 45°."""
+def test_pendulum_with_armature_swings_as_its_elliptic_function(method):
+    """From rest at 90° the angle from below φ has sin(φ/2) = k sn(ω t + K), k = sin 45°, with
+    ω² = m g l / (J + m l² + I) of the armature I = 0.3 kg m²."""
     times = np.linspace(0, 3, 16)
     frequency = np.sqrt(1.2 * G * 0.5 / (0.03 + 1.2 * 0.5**2 + 0.3))
     sn = ellipj(frequency * times + ellipk(0.5), 0.5)[0]
@@ -78,20 +84,24 @@ def test_pendulum_with_armature_swings_as_jacobi_has_it(method):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_reflected_mass_slows_a_slide(method):
+    """A cart of m = 2 kg on a slope of sine 0.6 with a reflected mass M = 1.5 kg: acceleration 0.6 m g / (m
+    + M)."""
     times = np.linspace(0, 1, 6)
     exact = 2.0 * G * 0.6 / (2.0 + 1.5) * times**2 / 2
     agree(coordinates(slide_with_motor(), method, "A", times)[1], exact)
 
 
-def test_counts_have_couplings_and_rotors():
+def test_counts_list_the_rows_of_couplings_and_rotors():
+    """A hinge has 5 rows; an armature is a rotor, a body of its own, held by 6; a coupling has 1."""
     counts = mbref.diagnose(coupled_mechanisms.planetary()).counts
     assert counts.rows_by_joint == {"A": 5, "B": 5, "armature of A": 6, "armature of B": 6, "mesh": 1}
     assert counts.degrees_of_freedom == 1
 
 
 @pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
-def test_jacobian_and_gamma_are_derivatives_of_phi_anywhere(make):
-    """Also off the constraints, where the axes of a joint are not parallel."""
+def test_jacobian_and_gamma_of_coupled_mechanisms_are_differences_of_phi(make):
+    """Φ_q = ∂Φ/∂q and γ = -(Φ_q v)_q v, by central differences, also off the constraints, where the axes of a
+    joint are not parallel."""
     model, rng, e = Model(make()), np.random.default_rng(3), 1e-6
     q = displaced(model.start(), 0.3 * rng.normal(size=model.n))
     v = rng.normal(size=model.n)
@@ -105,14 +115,16 @@ def test_jacobian_and_gamma_are_derivatives_of_phi_anywhere(make):
     assert np.abs((ahead - behind) / (2 * e) + found.gamma).max() < 2e-8
 
 
-def test_teeth_carry_the_torque_that_turns_the_wheel():
+def test_bearings_carry_the_tooth_torques_of_a_gear_pair():
+    """With the pinion's acceleration α = M / (J_A + r² J_B), the torques are r α J_B and α J_A - M."""
     motion = mbref.simulate(gear_pair(), times=[0.0, 1.0])
     change = 2.0 / (0.03 + 0.5**2 * 0.2)
     assert motion.joint("B").moment[:, 2] == pytest.approx(-0.5 * change * 0.2, rel=1e-12)
     assert motion.joint("A").moment[:, 2] == pytest.approx(change * 0.03 - 2.0, rel=1e-12)
 
 
-def test_armature_acts_on_its_joint():
+def test_reaction_of_a_hinge_includes_the_torque_of_its_armature():
+    """The rotor of I = 0.3 kg m² resists by -I φ̈ about the axis."""
     motion = mbref.simulate(pendulum(), times=[0.0])
     change = motion.angular_acceleration[0, 0, 2]
     assert motion.joint("A").moment[0, 2] == pytest.approx(-0.3 * change, rel=1e-12)
@@ -128,7 +140,7 @@ def test_armature_acts_on_its_joint():
         ("inline", "displacement"),
     ],
 )
-def test_default_coordinate_of_a_coupled_joint(kind, coordinate):
+def test_coupling_takes_the_angle_of_a_joint_that_has_one_and_else_the_displacement(kind, coordinate):
     axle = JOINT_TYPES[kind].at("A", ("ground", "disc"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     scene = gear_pair()
     scene = scene.with_(joint=(axle.model_copy(update={"bodies": scene.joint[0].bodies}), scene.joint[1]))
@@ -147,7 +159,7 @@ def test_default_coordinate_of_a_coupled_joint(kind, coordinate):
         ({"ratios": 1.0}, "coupling[teeth].ratios: is not a known field; did you mean 'ratio'?"),
     ],
 )
-def test_faulty_couplings_are_named(change, fault):
+def test_fault_of_a_coupling_is_named_by_its_field(change, fault):
     entry = {"name": "teeth", "joints": ["A", "B"], "ratio": -0.5} | change
     with pytest.raises(SceneError) as found:
         gear_pair(coupling=[entry])
@@ -159,7 +171,7 @@ def test_armature_must_not_be_negative():
         pendulum().with_("joint[A].armature", -1.0)
 
 
-def test_files_keep_couplings_and_armatures(tmp_path):
+def test_saved_scene_keeps_couplings_and_armatures(tmp_path):
     for make in EVERY:
         make().save(tmp_path / "scene.toml")
         assert Scene.from_file(tmp_path / "scene.toml") == make()
@@ -171,6 +183,6 @@ def test_velocities_that_contradict_a_coupling_are_refused():
         mbref.simulate(gear_pair().with_(body=tuple(bodies)), times=[0.0])
 
 
-def test_drawing_shows_a_coupling():
+def test_drawing_shows_a_coupling_as_a_dotted_line():
     assert 'stroke-dasharray="1 5"' in gear_pair()._repr_html_()
     assert 'stroke-dasharray="1 5"' not in pendulum()._repr_html_()

@@ -20,7 +20,7 @@ def holder(path):
     return process
 
 
-def test_a_lock_is_held_inside_its_block_alone(tmp_path):
+def test_lock_is_held_only_inside_its_with_statement(tmp_path):
     path = tmp_path / "new folder" / "lock"
     assert not is_held(path) and not path.parent.exists()
     with held(path):
@@ -29,7 +29,7 @@ def test_a_lock_is_held_inside_its_block_alone(tmp_path):
 
 
 @pytest.mark.parametrize("end", [lambda process: process.stdin.close(), lambda process: process.kill()])
-def test_another_process_holds_a_lock_until_its_end(end, tmp_path):
+def test_lock_of_another_process_is_free_after_it_ends_or_is_killed(end, tmp_path):
     with holder(tmp_path / "lock") as process:
         assert is_held(tmp_path / "lock")
         end(process)
