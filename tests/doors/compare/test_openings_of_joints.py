@@ -10,7 +10,7 @@ import pytest
 from crosscheck.judge.openings import opening
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
+from mbref.trajectory import Trajectory
 from tests.helpers.geared_arms import arms
 
 TIMES = np.array([0.0, 1.0])
@@ -31,7 +31,8 @@ def standing(scene: Scene, moved: np.ndarray, turned: np.ndarray) -> Trajectory:
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("seed", range(4))
-def test_gap_is_the_distance_of_points_and_angle_the_tilt(size: float, seed: int):
+def test_opening_has_the_distance_of_the_joints_points_and_the_tilt_of_its_axis(size: float, seed: int):
+    """The arm is shifted by a random vector, and tilted about x while its hinge turns about z."""
     random = np.random.default_rng(seed)
     moved, tilt = 0.01 * size * random.normal(size=3), random.uniform(0.1, 1.0)
     found = opening(arms(size), standing(arms(size), moved, np.array([tilt, 0.0, 0.0])))
@@ -42,15 +43,9 @@ def test_gap_is_the_distance_of_points_and_angle_the_tilt(size: float, seed: int
 def test_coupling_that_is_off_by_an_angle_opens_no_gap():
     scene = arms(2.0, coupled=True)
     found = opening(scene, standing(scene, np.zeros(3), np.array([0.0, 0.0, 0.3])))
-    assert found.gap < 1e-14 and found.angle == pytest.approx(0.3, rel=1e-9)
+    assert found.gap < 10 * np.finfo(float).eps * 2.0 and found.angle == pytest.approx(0.3, rel=1e-9)
 
 
-def test_run_without_samples_or_without_numbers_has_no_finite_opening():
+def test_gap_of_a_run_whose_positions_are_not_numbers_is_infinite():
     scene = arms(1.0)
-    failed = Trajectory.failed(
-        scene=scene.name, engine="by hand", version="", method="", settings={}, bodies=("a", "b"),
-        outcome=Outcome.TIMED_OUT, message="",
-    )  # fmt: skip
-    assert opening(scene, failed) == (math.inf, math.inf)
-    lost = standing(scene, np.full(3, np.nan), np.zeros(3))
-    assert opening(scene, lost).gap == math.inf
+    assert opening(scene, standing(scene, np.full(3, np.nan), np.zeros(3))).gap == math.inf

@@ -1,4 +1,4 @@
-"""A run without samples is a result: it has no numbers, and every command reports it."""
+"""A run without samples is a result: it has no metrics, and commands report its outcome."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def _own_children() -> Iterator[None]:
 
 
 @pytest.mark.parametrize("scene", [each.scene for each in specimens()], ids=lambda scene: scene.name)
-def test_run_without_samples_has_no_metric(scene: Scene):
+def test_run_without_samples_has_no_metric_and_an_infinite_opening(scene: Scene):
     run = Trajectory.failed(
         scene=scene.name, engine="by hand", version="", method="", settings={},
         bodies=tuple(body.name for body in scene.body), outcome=Outcome.TIMED_OUT, message="no result",
@@ -37,7 +37,7 @@ def test_run_without_samples_has_no_metric(scene: Scene):
     assert opening(scene, run) == (math.inf, math.inf)
 
 
-def test_comparison_has_runs_without_samples_as_results():
+def test_comparison_keeps_the_row_of_an_engine_that_crashes_before_its_first_sample():
     scene = arms(1.0, coupled=True).with_(duration=0.1)
     found = crosscheck.compare(scene, FAILING, samples=3, reference_time=1.0)
     assert [row["outcome"] for row in found.rows] == ["CRASHED"] and found.rows[0]["error"] is None
@@ -45,14 +45,30 @@ def test_comparison_has_runs_without_samples_as_results():
     assert json.loads(json.dumps(found.document(), allow_nan=False))["records"][0]["times"] == []
 
 
+def printed(capsys: pytest.CaptureFixture[str], folder: Path, name: str, *options: str) -> str:
+    """Return the output of a command, with exit status 1, for the engine that raises an error in each run."""
+    path = str(folder / "arms.toml")
+    arms(1.0, coupled=True).with_(duration=0.1).save(path)
+    words = {"run": [path, "--engine", FAILING], "tune": [FAILING, path]}[name]
+    assert main([name, *words, *options, "--reference-time", "0"]) == 1
+    return capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
-    "command", [["run"], ["run", "--json"], ["tune"], ["tune", "--json"], ["tune", "--closure", "1mm"]]
+    ("command", "says"),
+    [
+        (["run"], "still plain : CRASHED: RuntimeError"),
+        (["tune"], "no run completes"),
+        (["tune", "--closure", "1mm"], "no run completes"),
+    ],
 )
-def test_command_reports_runs_without_samples(command: list[str], tmp_path: Path, capsys):
-    arms(1.0, coupled=True).with_(duration=0.1).save(tmp_path / "arms.toml")
-    name, *options = command
-    asked = {"run": ["arms.toml", "--engine", FAILING], "tune": [FAILING, "arms.toml"]}[name]
-    asked = [str(tmp_path / word) if word.endswith(".toml") else word for word in asked]
-    assert main([name, *asked, *options, "--reference-time", "0"]) == 1
-    said = capsys.readouterr().out
-    assert "crashed" in said.lower() or "no run completes" in said or json.loads(said)["records"] == []
+def test_command_prints_that_an_engine_crashed(command: list[str], says: str, tmp_path: Path, capsys):
+    assert says in " ".join(printed(capsys, tmp_path, *command).split())
+
+
+def test_json_of_run_has_the_outcome_of_an_engine_that_crashed_and_that_of_tune_no_setting(
+    tmp_path: Path, capsys
+):
+    (run,) = json.loads(printed(capsys, tmp_path, "run", "--json"))["records"]
+    assert (run["outcome"], run["times"]) == ("CRASHED", [])
+    assert json.loads(printed(capsys, tmp_path, "tune", "--json"))["records"] == []

@@ -24,14 +24,14 @@ def stuck() -> Motion:
 
 @pytest.mark.parametrize("columns", [[], ["--columns", "slider.position", "energy"]])
 @pytest.mark.parametrize("estimate", [pytest.param("auto", marks=pytest.mark.slow), "no"])
-def test_run_prints_its_outcome_and_advice(columns, estimate, capsys):
+def test_run_that_reaches_no_sample_prints_its_outcome_and_cause(columns, estimate, capsys):
     assert main(["run", *STUCK, *columns, "--estimate", estimate]) == 1
     said = capsys.readouterr().out
     assert "SINGULAR_MATRIX at t = 0 s" in said and "the leading matrix is singular" in said
 
 
 @pytest.mark.slow
-def test_files_have_headers_and_no_rows(tmp_path, capsys):
+def test_files_of_a_run_without_samples_have_all_headers_and_no_rows(tmp_path, capsys):
     table, whole = tmp_path / "m.csv", tmp_path / "m.json"
     assert main(["run", *STUCK, "--out", str(table)]) == 1
     rows = list(csv.reader(table.read_text().splitlines()))
@@ -39,21 +39,25 @@ def test_files_have_headers_and_no_rows(tmp_path, capsys):
     assert main(["run", *STUCK, "--out", str(whole)]) == 1
     again = Motion.load(whole)
     assert again.outcome is Outcome.SINGULAR_MATRIX and set(again.columns()) >= set(rows[0])
-    assert main(["run", *STUCK, "--json"]) == 1
-    capsys.readouterr()
-    assert main(["run", *STUCK, "--json", "--columns", "energy"]) == 1
-    assert json.loads(capsys.readouterr().out)["records"][0]["times"] == []
 
 
 @pytest.mark.slow
-def test_pictures_are_empty_or_refused(tmp_path, capsys):
+@pytest.mark.parametrize("columns", [[], ["--columns", "energy"]])
+def test_json_of_a_run_without_samples_has_its_outcome_and_no_times(columns, capsys):
+    assert main(["run", *STUCK, "--json", *columns]) == 1
+    (record,) = json.loads(capsys.readouterr().out)["records"]
+    assert (record["outcome"], record["times"]) == ("SINGULAR_MATRIX", [])
+
+
+@pytest.mark.slow
+def test_plot_of_a_run_without_samples_is_empty_and_its_animation_is_refused(tmp_path, capsys):
     assert main(["plot", *STUCK, "--out", str(tmp_path / "p.svg")]) == 1
     assert main(["animate", *STUCK, "--out", str(tmp_path / "a.svg")]) == 2
     assert "no sample to draw: the leading matrix is singular" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["p.svg"]
 
 
-def test_every_number_of_a_motion_has_no_sample(stuck, tmp_path):
+def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
     stuck.to_csv(tmp_path / "m.csv")
     assert (tmp_path / "m.csv").read_text().count("\n") == 1
     columns = stuck.columns()
@@ -64,7 +68,8 @@ def test_every_number_of_a_motion_has_no_sample(stuck, tmp_path):
     assert "SINGULAR_MATRIX" in stuck._repr_html_()
 
 
-def test_empty_motion_of_another_engine_has_all_columns():
+def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts():
+    """The scene has bodies, every type of joint and four loads, of which the last are springs."""
     scene = mbref.Scene(**EVERYTHING)
     failed = Trajectory.failed(
         scene=scene.name,
@@ -76,6 +81,8 @@ def test_empty_motion_of_another_engine_has_all_columns():
         outcome=Outcome.CRASHED,
         message="ended",
     )
-    motion = Motion.of(scene, failed)
-    assert all(values.shape == (0,) for values in motion.columns().values())
-    assert len(motion.load_at(2).power) == len(motion.energy) == 0
+    columns = Motion.of(scene, failed).columns()
+    assert all(values.shape == (0,) for values in columns.values())
+    bodies = {f"{body.name}.position.x" for body in scene.body}
+    parts = {"c.angle", "t.displacement", *(f"load({k}).power" for k in range(4)), "load(3).energy", "energy"}
+    assert bodies | parts <= set(columns)

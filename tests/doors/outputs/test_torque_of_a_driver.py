@@ -1,4 +1,8 @@
-"""Torque and force of a driver: what a motor delivers at its joint for bodies, armature and couplings."""
+"""Torque and force of a driver, by closed forms: what its motor delivers for bodies, armature and couplings.
+
+Driver A turns by φ(t) = 0.4 t + 1.5 t² + 0.3 sin 4t rad, or slides by as many m. ANGLE, RATE and SECOND are
+φ, φ' and φ''. A torque is the inertia that the motor sees times φ'', and the power torque times φ'.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +44,7 @@ def agree(found: np.ndarray | None, exact: np.ndarray) -> None:
 
 
 def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tuple[list[Entry], list[Entry]]:
-    """Return wheels of 0.1, 0.2, … kg m² on the ground, on joints A, B, … with armatures."""
+    """Return wheels of 0.1, 0.2, … kg m² on the ground, on joints A, B, … with armatures (kg m²)."""
     made = [ball(f"w{k}", (0.5 * k, 0.0, 0.0), 1.0 + k, 0.1 * (k + 1)) for k in range(len(armatures))]
     names = "ABC"[: len(armatures)]
     return made, [
@@ -51,7 +55,8 @@ def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tupl
 
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection", "lm1+projection"])
 @pytest.mark.parametrize(("bodies", "axis"), [(("ground", "w{}"), Z), (("w{}", "ground"), (0.0, -3.0, 4.0))])
-def test_motor_accelerates_its_armature(bodies, axis, method):
+def test_motor_accelerates_its_wheel_and_its_armature(bodies, axis, method):
+    """(J + I) φ'' with J = 0.1 and I = 2.3 kg m², whichever body is the first and whatever the axis."""
     found = moved(*wheels(2.3, bodies=bodies, axis=axis), method).driver("A")
     agree(found.torque, (0.1 + 2.3) * SECOND)
     agree(found.power, (0.1 + 2.3) * SECOND * RATE)
@@ -68,25 +73,26 @@ def test_motor_drives_the_wheel_that_meshes_with_its_own(kind):
     agree(found.torque, (0.1 + 0.4 + turns**2 * (0.2 + 0.7)) * SECOND)
 
 
-def test_motor_drives_a_train_of_wheels():
+def test_motor_drives_all_wheels_of_a_train():
+    """A turn of A gives n = 2 turns of B and n = 1 of C: each adds n² (J + I)."""
     ratios = {"AB": -2.0, "BC": 0.5}
     train = [{"name": f"{a}{b}", "joints": [a, b], "ratio": ratios[a + b]} for a, b in pairwise("ABC")]
     found = moved(*wheels(0.0, 0.3, 0.2), coupling=train).driver("A")
-    agree(found.torque, (0.1 + 4.0 * (0.2 + 0.3) + 1.0 * (0.3 + 0.2)) * SECOND)
+    agree(found.torque, (0.1 + 2.0**2 * (0.2 + 0.3) + 1.0**2 * (0.3 + 0.2)) * SECOND)
 
 
-def test_two_motors_share_a_differential():
-    """Wheels A and B turn independently, and each drives its own wheel of a further pair."""
+def test_each_of_two_motors_delivers_the_torque_of_its_own_wheels():
+    """Motor A drives wheel A. Motor B, at 4 rad/s², drives wheel B, and wheel C at twice its rate."""
     bodies, joints = wheels(0.2, 0.5, 0.0)
     mesh = [{"name": "mesh", "joints": ["B", "C"], "ratio": 2.0}]
     motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, 2.0]}]
     motion = moved(bodies, joints, coupling=mesh, driver=motors)
     agree(motion.driver("A").torque, (0.1 + 0.2) * SECOND)
-    agree(motion.driver("B").torque, np.full(TIMES.size, (0.2 + 0.5 + 4.0 * 0.3) * 4.0))
+    agree(motion.driver("B").torque, np.full(TIMES.size, (0.2 + 0.5 + 2.0**2 * 0.3) * 4.0))
 
 
 def test_motor_lifts_a_nut_by_its_screw():
-    """The angle of a cylindrical joint is driven; the thread moves the nut along the axis against gravity."""
+    """The thread moves the nut by p φ against gravity: (J + I + p² m) φ'' + m g p."""
     mass, inertia, armature, pitch = 1.4, 0.05, 0.3, 0.2
     screw = joint("A", "cylindrical", "ground", "nut", axis=list(Z), armature=armature)
     thread = [{"name": "thread", "joints": ["A", "A"], "ratio": pitch}]
@@ -97,7 +103,7 @@ def test_motor_lifts_a_nut_by_its_screw():
 
 
 def test_driven_rack_turns_its_pinion():
-    """The driver moves the rack, with its own reflected mass, and the pinion with the rotor on its shaft."""
+    """Force of the rack: (m + I + (J + I') / r²) x'' - m g along it; I' is the rotor of the pinion."""
     radius, mass, armature, inertia, rotor = 0.25, 2.0, 1.1, 0.06, 0.04
     bodies = [ball("rack", (0.0, 0.4, 0.0), mass, 0.1), ball("pinion", (0.0, 0.0, 0.0), 1.0, inertia)]
     joints = [
@@ -111,8 +117,8 @@ def test_driven_rack_turns_its_pinion():
     assert found.torque is None
 
 
-def test_slide_with_armature_on_a_turning_arm():
-    """The rotor does not turn with the arm: its mass meets r'', without the centripetal acceleration."""
+def test_reflected_mass_of_a_slide_on_a_turning_arm_meets_no_centripetal_acceleration():
+    """Force (m + I) r'' - m r φ'², and torque (J + m r²) φ'' + 2 m r r' φ', at r = 0.5 + 0.2 t - 0.3 t² m."""
     mass, inertia, armature, start = 0.9, 0.02, 1.6, 0.5
     bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, 0.3), ball("cart", (start, 0.0, 0.0), mass, inertia)]
     joints = [
@@ -127,19 +133,23 @@ def test_slide_with_armature_on_a_turning_arm():
     agree(motion.driver("A").torque, turning)
 
 
-def test_hinge_with_armature_between_turning_links_has_the_relative_acceleration():
-    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, 0.3), ball("hand", (0.0, 0.4, 0.0), 1.0, 0.2)]
+def test_armature_of_a_hinge_between_turning_links_meets_their_relative_acceleration():
+    """The hand turns by φ - t², about its centre of mass at r: torque J (φ'' - 2) - 2 I of B, and
+    (J' + m r²) φ'' + J (φ'' - 2) of A, whose arm has J'."""
+    arm, hand, armature, mass, reach = 0.3, 0.2, 0.7, 1.0, 0.4
+    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, arm), ball("hand", (0.0, reach, 0.0), mass, hand)]
     joints = [
         hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
-        hinge("B", "arm", "hand", (0.0, 0.4, 0.0), armature=0.7),
+        hinge("B", "arm", "hand", (0.0, reach, 0.0), armature=armature),
     ]
     motors = [{"joint": "A", **TURN}, {"joint": "B", "polynomial": [0.0, 0.0, -1.0]}]
     motion = moved(bodies, joints, driver=motors)
-    agree(motion.driver("B").torque, 0.2 * (SECOND - 2.0) + 0.7 * -2.0)
-    agree(motion.driver("A").torque, (0.3 + 0.16) * SECOND + 0.2 * (SECOND - 2.0))
+    agree(motion.driver("B").torque, hand * (SECOND - 2.0) + armature * -2.0)
+    agree(motion.driver("A").torque, (arm + mass * reach**2) * SECOND + hand * (SECOND - 2.0))
 
 
-def test_spring_and_motor_of_known_torque_act_beside_the_driver():
+def test_driver_delivers_what_spring_and_torque_of_its_joint_leave_over():
+    """(J + I) φ'' = M - 5 (φ - 40) - 0.6 φ' + 1.5 for the torque M of the driver."""
     loads = [
         {"type": "torsion_spring", "joint": "A", "stiffness": 5.0, "damping": 0.6, "natural_angle": 40.0},
         {"type": "joint_torque", "joint": "A", "torque": 1.5},
@@ -150,8 +160,8 @@ def test_spring_and_motor_of_known_torque_act_beside_the_driver():
     agree(motion.driver("A").torque, (0.1 + 0.5) * SECOND - spring - 1.5)
 
 
-def contradicted() -> Scene:
-    """Return two wheels that mesh and are both driven, as their ratio demands."""
+def both_driven() -> Scene:
+    """Return two wheels that mesh, B with -2 turns a turn of A, and are both driven so: A turns by t²."""
     bodies, joints = wheels(0.4, 0.7)
     mesh = [{"name": "mesh", "joints": ["A", "B"], "ratio": -2.0}]
     motors = [{"joint": "A", "polynomial": [0.0, 0.0, 1.0]}, {"joint": "B", "polynomial": [0.0, 0.0, -2.0]}]
@@ -159,18 +169,21 @@ def contradicted() -> Scene:
 
 
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection"])
-def test_drivers_that_can_replace_each_other_are_marked_and_balance_together(method):
-    motion = simulate(contradicted(), method, TIMES)
+def test_two_drivers_of_one_freedom_are_open_and_their_powers_sum_to_the_power_of_the_motion(method):
+    """The power is J φ'' φ' with J = J₁ + I₁ + n² (J₂ + I₂), φ'' = 2 rad/s², φ' = 2 t rad/s. Equilibrium
+    determines one component less than the two drivers have, and all if A is driven alone."""
+    motion = simulate(both_driven(), method, TIMES)
     first, second = motion.driver("A"), motion.driver("B")
-    agree(first.power + second.power, (0.1 + 0.4 + 4.0 * (0.2 + 0.7)) * 2.0 * 2.0 * TIMES)
+    seen = 0.1 + 0.4 + 2.0**2 * (0.2 + 0.7)
+    agree(first.power + second.power, seen * 2.0 * 2.0 * TIMES)
     assert first.open.tolist() == second.open.tolist() == [1] * TIMES.size
-    alone = simulate(contradicted().with_(driver=contradicted().driver[:1]), method, TIMES)
+    alone = simulate(both_driven().with_(driver=both_driven().driver[:1]), method, TIMES)
     assert alone.driver("A").open.tolist() == [0] * TIMES.size
 
 
-def test_commands_say_which_torque_is_not_determined(tmp_path, capsys):
+def test_run_states_that_the_torque_of_a_driver_that_it_prints_is_not_determined(tmp_path, capsys):
     path = str(tmp_path / "shared.toml")
-    contradicted().save(path)
+    both_driven().save(path)
     asked = ["run", path, "--samples", "3", "--estimate", "no", "--columns"]
     assert main([*asked, "driver(B).torque"]) == 0
     shown = " ".join(capsys.readouterr().out.split())
@@ -188,10 +201,11 @@ def test_motion_of_an_engine_has_the_torque_of_its_motor(name):
     run = simulator.run(scene, TIMES, simulator.best_settings(scene)[-1])
     found = Motion.of(scene, run).driver("A").torque
     assert found is not None
-    assert np.abs(found - 0.5 * SECOND).max() < 1e-6 * np.abs(SECOND).max()
+    exact = (0.1 + 0.4) * SECOND  # the wheel and its armature
+    assert np.abs(found - exact).max() < 1e-6 * np.abs(exact).max()
 
 
-def test_torque_needs_masses_and_reactions():
+def test_driver_of_a_body_without_mass_has_no_torque_and_no_power():
     bodies, joints = wheels(0.4)
     bare = [{key: body[key] for key in ("name", "position")} for body in bodies]
     found = moved(bare, joints).driver("A")
