@@ -1,7 +1,7 @@
-"""Constraint polynomials / mbref's Φ, Φ_q and γ / joint equations from poses / difference quotients.
+"""Constraint equations of engines' adapters, of mbref and of the judge describe equal constraints.
 
-Three sets of rows that share no code: at consistent states their null spaces, ranks and accelerations are
-the same, though no two rows need be.
+The three sets share no code, and their rows differ. At states that meet the constraints, all have equal row
+spaces, ranks and least-norm accelerations.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from tests.crosscheck.truth_scenes import CLOSED
 from tests.helpers.joint_strategies import DRIVABLE, one_joint_scenes
 
 SPACES, ACCELERATIONS = 2.1e-14, 8e-13  # measured differences, of the largest acceleration
-QUOTIENT = 1.7e-7  # relative, of difference quotients over 2e-6 s
+QUOTIENT = 1.7e-7  # measured relative difference of derivatives and difference quotients over 2e-6 s
 KINDS = tuple(JOINT_TYPES.values())
 MECHANISMS = {scene.name: scene for scene in (every_joint(), driven(), ring("revolute"), ring("universal"))}
 # without the chain, whose redundant rows lead Newton's method from disturbed states to a singular position
@@ -84,8 +84,8 @@ class Consistent:
         )
 
 
-def assert_alike(state: Consistent) -> None:
-    """Same closedness, rank, null space and least acceleration."""
+def assert_equal_constraints(state: Consistent) -> None:
+    """Compare Φ = 0, rank and row space of the Jacobian J, and the least-norm solution of J a = γ."""
     sets = {"polynomials": state.polynomials(), "mbref": state.mbref(), "poses": state.poses()}
     spaces, accelerations = {}, {}
     for name, (phi, jacobian, gamma) in sets.items():
@@ -108,21 +108,25 @@ def assert_alike(state: Consistent) -> None:
 
 @pytest.mark.parametrize("name", MECHANISMS)
 @pytest.mark.parametrize("seed", [1, 2])
-def test_three_sets_of_rows_on_mechanisms(name: str, seed: int) -> None:
-    assert_alike(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
+def test_polynomials_mbref_and_judge_have_equal_constraints_of_mechanisms(name: str, seed: int) -> None:
+    assert_equal_constraints(Consistent(MECHANISMS[name], 0.001 * seed, seed, 0.02))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 @given(data=st.data())
-def test_three_sets_of_rows_on_random_joints(kind: type, data: st.DataObject) -> None:
+def test_polynomials_mbref_and_judge_have_equal_constraints_of_random_joints(
+    kind: type, data: st.DataObject
+) -> None:
     is_driven = kind in DRIVABLE and data.draw(st.booleans())
     scene = data.draw(one_joint_scenes(kind, is_driven))
-    assert_alike(Consistent(scene, data.draw(st.floats(0, 0.3)), data.draw(st.integers(0, 99)), 0.1))
+    assert_equal_constraints(
+        Consistent(scene, data.draw(st.floats(0, 0.3)), data.draw(st.integers(0, 99)), 0.1)
+    )
 
 
 @pytest.mark.parametrize("name", ["every_joint", "driven", "five_bar", "spatial_slider_crank_driven"])
-def test_rates_and_difference_quotients(name: str) -> None:
-    """Φ' and Φ'' along a motion with constant v and ω', and the Jacobian by single velocities."""
+def test_derivatives_of_constraint_polynomials_are_difference_quotients(name: str) -> None:
+    """Φ' and Φ'' along a motion with constant v and body-fixed ω; Φ' = Φ_q v plus the drivers' rates."""
     scene, h = MECHANISMS[name], 1e-6
     s = Consistent(scene, 0.002, 7, 0.02)
     c = Constraints(scene)
@@ -143,8 +147,8 @@ def test_rates_and_difference_quotients(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["every_joint", "planar_slider_crank_gravity"])
-def test_forces_and_mbref(name: str) -> None:
-    """Gravity, loads and gyroscopic moments as generalised forces on world twists."""
+def test_generalised_forces_of_adapters_equal_mbrefs(name: str) -> None:
+    """Gravity, loads and gyroscopic moments (6 nb,), as forces and moments in world axes."""
     scene = MECHANISMS[name]
     s = Consistent(scene, 0.0, 3, 0.02)
     forces = Forces(scene)

@@ -1,4 +1,4 @@
-"""Orders of convergence / errors with a known order and floor, and the committed page."""
+"""Orders of convergence of made-up errors with a known order and floor, and the committed page."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from crosscheck.convergence.ladders import (
     ROWS,
     VAIN,
     climb,
-    fineness,
     in_vain,
     ladder,
 )
@@ -43,18 +42,26 @@ def runs(power: float, floor: float, count: int = 12) -> list[dict]:
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
-def test_order_above_a_floor(power: float) -> None:
-    found = runs(power, 1e-9)
-    assert order(found) == pytest.approx(power, abs=0.05)
+def test_order_is_the_power_of_the_step_in_errors_above_their_floor(power: float) -> None:
+    assert order(runs(power, 1e-9)) == pytest.approx(power, abs=0.05)
+
+
+def test_two_runs_or_errors_that_do_not_fall_have_no_order() -> None:
+    assert order(runs(4.0, 1e-9)[:2]) is None
     assert order([run(0.1 / 2**k, 1e-9) for k in range(5)]) is None
-    assert order(found[:2]) is None
+
+
+@pytest.mark.parametrize("power", [1.0, 2.0, 4.0])
+def test_an_error_at_the_bound_of_the_truth_shows_no_order(power: float) -> None:
+    """Three errors of a known order, the last equal to the bound of the truth's error, or 1 % above it."""
     for least, is_measured in ((1.0, False), (0.99, True)):
-        last = found[2] | {"metrics": {"error": 1e-3, "error_bound": least * 1e-3}}
+        last = run(0.025, 1e-3) | {"metrics": {"error": 1e-3, "error_bound": least * 1e-3}}
         line = [run(0.1 / 2**k, 1e-3 * 2 ** (power * (2 - k))) for k in range(2)]
-        assert (order([*line, last]) is not None) is is_measured, "the truth's own bound shows no order"
+        assert (order([*line, last]) is not None) is is_measured
 
 
-def test_cells_by_hand() -> None:
+def test_cell_shows_the_least_error_and_the_order() -> None:
+    """An arrow: the finest step has the least error. Signs: ! no run completes, – refused, ○ no record."""
     assert cell(runs(4.0, 3e-12)) == "3e-12 (4.0)"
     assert cell(runs(1.0, 0.0, 6)) == "3e-03 ↓ (1.0)"
     assert cell([*runs(4.0, 0.0, 8), run(1e-4, 2e-15)]) == "<1e-14 (4.0)"
@@ -62,21 +69,28 @@ def test_cells_by_hand() -> None:
     assert cell([{"outcome": "REFUSED"}]) == "–" and cell([]) == "○"
 
 
-def test_runs_in_vain() -> None:
+def test_runs_count_as_vain_while_none_lowers_the_least_error() -> None:
+    """An error of 0.5 and more is no right motion; a smaller tolerance with as many steps is no finer run."""
     assert in_vain(runs(4.0, 1e-6)[:3]) == 0
-    assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0, "no right motion yet"
+    assert in_vain([run(0.1, 0.5), run(0.05, 0.9), run(0.02, 0.8)]) == 0
     found = [run(0.1, 1e-6), run(0.05, 0.8e-6), run(0.02, 0.9e-6)]
     assert in_vain(found) == VAIN and in_vain([*found, run(0.01, 1e-9)]) == 0
     equal = [run(0.1, 1e-9), *(run(0.1, 1e-9, cost={"seconds": 0.1, "steps": 10}) for _ in range(3))]
-    assert in_vain(equal) == 0, "a smaller tolerance with as many steps"
+    assert in_vain(equal) == 0
 
 
-def test_a_ladder_ends_where_finer_runs_are_in_vain_or_take_too_long() -> None:
+def test_steps_of_a_ladder_are_halved_and_divide_the_interval_of_samples() -> None:
     row = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
     cases = ladder(row, MECHANISMS[5])
     steps = [case.setting.options["step"] for case in cases]
     assert all(a == 2 * b for a, b in pairwise(steps)) and len(steps) > 10
     assert (MECHANISMS[5].end / 10) / steps[0] == round((MECHANISMS[5].end / 10) / steps[0])
+
+
+def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> None:
+    """Errors 1e4 h⁴ + 1e-10 reach their floor; runs of 1.5 s would take 3 s at half the step."""
+    row = next(row for row in ROWS if (row.engine, row.family) == ("mujoco", "tuned"))
+    cases = ladder(row, MECHANISMS[5])
 
     def fourth(case: Case) -> dict:
         h = case.setting.options["step"]
@@ -85,10 +99,10 @@ def test_a_ladder_ends_where_finer_runs_are_in_vain_or_take_too_long() -> None:
     found = climb(cases, fourth)
     assert in_vain(found) == VAIN and len(found) < len(cases)
     slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
-    assert len(slow) == 1, "the second run would take 3 s"
+    assert len(slow) == 1
 
 
-def test_rows_name_families_of_engines() -> None:
+def test_every_row_names_a_family_that_its_engine_has() -> None:
     assert all(row.family in engine(row.engine).families for row in ROWS)
     assert len({row.name for row in ROWS}) == len(ROWS)
 
@@ -97,4 +111,3 @@ def test_committed_page_follows_from_the_committed_records() -> None:
     assert DOCUMENT.read_text() == document.page(read(FILE)), (
         "docs/convergence.md is stale: crosscheck convergence --page docs/convergence.md renews it"
     )
-    assert fineness({"outcome": "REFUSED"}) == 0.0

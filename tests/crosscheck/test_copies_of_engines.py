@@ -1,5 +1,5 @@
-"""Engines on copies of one four-bar / the original's motion: turned, mirrored, bodies and joints in other
-orders, and the loop cut at each of its joints.
+"""Engines move copies of a four-bar as the four-bar: rotated, mirrored, bodies and joints in other orders,
+and the loop cut at each of its joints.
 
 Single and double precision of MJX and MuJoCo Warp are compared in test_ports.py.
 """
@@ -22,7 +22,7 @@ from mbref.trajectory import Outcome, Trajectory
 
 TIMES = np.array([0.0, 0.1, 0.2])
 TERMS = {"rtol": 1e-9, "min_step": 1e-3}
-WAYS = {  # engine and setting; its own steps are short enough that errors are below 1e-2
+WAYS = {  # engine and setting, whose error on the original is below 1e-2
     "mujoco tuned": ("mujoco", Setting("tuned", {"step": 2e-4, "beta": 100.0, "hard": 1e-7})),
     "pinocchio tuned": ("pinocchio", Setting("tuned", TERMS)),
     "drake discrete": ("drake", Setting("discrete", {"step": 1e-3})),
@@ -87,6 +87,7 @@ def four_bar(way: str = "") -> tuple[Scene, Trajectory]:
 
 
 def off(way: str, scene: Scene, expected: Trajectory) -> float:
+    """Return the largest error of an engine's run, relative to the scene's length or in rad."""
     name, setting = WAYS[way]
     run = engine(name).run(scene, TIMES, setting)
     assert run.outcome is Outcome.COMPLETED, f"{way}: {run.outcome.label} {run.message}"
@@ -102,7 +103,8 @@ def own_error(way: str) -> float:
     "way", [pytest.param(way, marks=pytest.mark.slow if way in SLOW else ()) for way in WAYS]
 )
 @pytest.mark.parametrize("copy", COPIES)
-def test_a_copy_moves_as_the_original(way: str, copy: str) -> None:
+def test_an_engine_moves_a_copy_within_four_times_its_error_on_the_original(way: str, copy: str) -> None:
+    """Errors are those of the exact motion, changed as the scene; REFUSED lists refused copies."""
     pytest.importorskip(MODULES[WAYS[way][0]])
     scene, exact = four_bar(way)
     changed = COPIES[copy].change(scene, exact)
@@ -131,11 +133,11 @@ def test_darts_own_hinge_closure_moves_a_turned_copy_as_the_original() -> None:
     assert float(error_series(turned, copy, expected).max()) <= WORSE * error + FLOOR
 
 
-def test_every_engine_is_asked() -> None:
+def test_every_engine_but_mbref_runs_the_copies() -> None:
     assert {"mbref", *(name for name, _ in WAYS.values())} == set(engine_names())
 
 
-def test_the_loop_is_cut_at_each_of_its_joints() -> None:
+def test_the_copies_cut_the_loop_at_each_of_its_joints() -> None:
     scene, exact = four_bar()
     cuts = {scene.joint[spanning_tree(scene).closures[0].joint].name}
     for name, relation in COPIES.items():

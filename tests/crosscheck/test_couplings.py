@@ -1,4 +1,4 @@
-"""Couplings and armatures: engines and mbref move as the reference, or refuse."""
+"""Couplings and armatures: engines and mbref move as the judge's reference, or refuse them by name."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from crosscheck.judge.truth import truth_for
 from tests.helpers.coupled_mechanisms import EVERY, gear_pair, pendulum, planetary, spatial_chain
 
 TIMES = np.array([0.0, 0.2, 0.5, 0.8])
-ENGINES = 1e-8  # at best settings
+ENGINES = 1e-8  # error (relative to the scene's length, or rad) of engines at fine settings
 TERMS = Setting("terms", {"rtol": 1e-11, "min_step": 1e-4})
 FINE = {
     "drake": TERMS,
@@ -29,12 +29,16 @@ FINE = {
 }
 MODULES = {"drake": "pydrake", "dart": "dartpy", "pinocchio": "pinocchio", "simbody": "opensim"}
 LACKS = {"pinocchio": ("coupling",), "simbody": ("armature",)}  # missing in the engines
-APART = 1e-13  # of both formulations
+APART = 1e-13  # m; difference of both formulations of the reference
 every = pytest.mark.parametrize("make", EVERY, ids=lambda make: make.__name__)
 
 
 @every
-def test_mbref_moves_as_the_reference(make):
+def test_mbref_moves_coupled_joints_as_the_reference(make):
+    """Poses, reactions, violations and energy within 1e-11; accelerations solve the judge's equations.
+
+    The reactions balance every body and do no work.
+    """
     scene = make().with_(duration=0.8)
     motion = mbref.simulate(scene, times=TIMES, rtol=1e-12)
     found = measure(scene, motion, truth_for(scene))
@@ -45,7 +49,11 @@ def test_mbref_moves_as_the_reference(make):
     assert balance(scene, motion, motion) <= 1e-12 and idle(scene, motion, motion) <= 1e-12
 
 
-def test_a_slipping_gear_violates_its_coupling():
+def test_violation_of_a_coupling_is_its_slip_over_the_scene_with_another_ratio():
+    """A gear that turns by -0.51 q₁ instead of -0.5 q₁ violates q₂ + 0.5 q₁ = 0 by 0.01 q₁.
+
+    The pair starts from rest under a constant torque, so that the rate at t = 1 s is 2 q₁.
+    """
     scene = gear_pair()
     motion = mbref.simulate(scene.with_("coupling[teeth].ratio", -0.51), times=np.linspace(0, 1, 21))
     turned = motion.joint("A").angle
@@ -54,14 +62,16 @@ def test_a_slipping_gear_violates_its_coupling():
 
 
 @pytest.mark.parametrize("name", ["sundials", "ondsel", "casadi", "heyoka"])
-def test_engines_without_couplings_refuse_them(name):
+def test_engines_without_couplings_and_armatures_refuse_them_by_name(name):
+    """Ondsel refuses both scenes for an earlier reason: it moves driven mechanisms alone."""
     for scene, part in ((gear_pair(), "coupling 'teeth'"), (pendulum(), "joint 'A' has an armature")):
         refusal = engine(name).cannot(scene)
         assert refusal is not None and refusal.owner in (Owner.ADAPTER, Owner.ENGINE, Owner.MODEL)
         assert part in refusal.reason or name in ("ondsel",), refusal
 
 
-def test_free_velocities_have_the_least_kinetic_energy_with_armatures():
+def test_armatures_count_in_the_start_velocities_of_least_kinetic_energy():
+    """Velocities that the scene leaves open minimise the kinetic energy, as in the reference."""
     scene = spatial_chain()
     exact = natural_motion(scene, TIMES[:1], EXTENDED, seconds=60.0)
     assert np.abs(mbref.simulate(scene, times=[0.0]).velocity[0] - doubles(exact.velocity[0])).max() < 1e-13
@@ -75,7 +85,7 @@ def refused_parts(name, scene):
 
 @every
 @pytest.mark.parametrize("name", FINE)
-def test_tree_engines_move_as_the_reference_or_refuse(name, make):
+def test_tree_engines_move_coupled_joints_as_the_reference_or_refuse_them(name, make):
     pytest.importorskip(MODULES[name])
     scene, simulator = make().with_(duration=0.4), engine(name)
     if lacking := refused_parts(name, scene):
@@ -88,8 +98,8 @@ def test_tree_engines_move_as_the_reference_or_refuse(name, make):
     assert found["reaction_error"] is None or found["reaction_error"] <= 1e-6, found
 
 
-def test_drakes_own_steps_couple_and_turn_rotors():
-    """Its step is of first order: a coupling that is lost would leave 0.1 and more."""
+def test_drakes_own_stepping_keeps_couplings_and_armatures():
+    """Its step of 1e-4 s is of first order; a lost coupling or armature would give an error above 0.1."""
     pytest.importorskip("pydrake")
     scene = planetary().with_(duration=0.2)
     run = engine("drake").run(scene, np.array([0.0, 0.2]), Setting("discrete", {"step": 1e-4}))
@@ -98,7 +108,8 @@ def test_drakes_own_steps_couple_and_turn_rotors():
 
 
 @every
-def test_bullet_couples_joints_to_first_order_and_refuses_armatures(make):
+def test_bullet_moves_coupled_joints_to_first_order_or_refuses_armatures(make):
+    """Half the step gives half the error."""
     pytest.importorskip("pybullet")
     scene, bullet = make().with_(duration=0.2), engine("bullet")
     rotor = next((joint.name for joint in scene.joint if joint.reflected_inertia), "")
@@ -116,7 +127,7 @@ def test_bullet_couples_joints_to_first_order_and_refuses_armatures(make):
 
 
 @every
-def test_mujoco_moves_as_the_reference(make):
+def test_mujoco_moves_coupled_joints_as_the_reference(make):
     scene, mujoco = make().with_(duration=0.8), engine("mujoco")
     found = measure(
         scene, mujoco.run(scene, TIMES, mujoco.settings_of(scene, "projected")[-1]), truth_for(scene)
@@ -125,7 +136,7 @@ def test_mujoco_moves_as_the_reference(make):
 
 
 @every
-def test_exudyn_moves_as_the_reference(make):
+def test_exudyn_moves_coupled_joints_as_the_reference(make):
     scene, exudyn = make(), engine("exudyn")
     scene = scene.with_(duration=0.5)
     run = exudyn.run(scene, np.array([0.0, 0.2, 0.5]), exudyn.settings_of(scene, "tuned")[-1])
@@ -134,8 +145,8 @@ def test_exudyn_moves_as_the_reference(make):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_random_mechanisms_with_gears(seed):
-    """Accelerations of mbref, the judge, MuJoCo and both formulations, at the start."""
+def test_start_accelerations_of_random_geared_mechanisms_agree(seed):
+    """mbref's, MuJoCo's and Gauss's principle; and both formulations of the reference over 2 ms."""
     scene = geared_mechanism(seed)
     assert scene.coupling
     found = compare(scene, ["mujoco"])

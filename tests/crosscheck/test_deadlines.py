@@ -1,4 +1,4 @@
-"""Limits of CPU time: hard and random scenes with 1 s / the CPU time that was spent, never wall time."""
+"""Limits of CPU time end the judge's searches for references and certified tables."""
 
 from __future__ import annotations
 
@@ -21,16 +21,18 @@ from mbref.scenes import SCENES
 from mbref.scenes.four_bar_chain import four_bar_chain
 
 LIMIT = 1.0  # s
-FACTOR, ALLOWED = 2.0, 2.0  # CPU time: so many times the limit, and s of set-up that no limit covers
+FACTOR, ALLOWED = 2.0, 2.0  # CPU time allowed: this multiple of the limit, and s of set-up without a limit
 
 
 def uneven_five_bar() -> Scene:
-    """The paper's five-bar with errors of 1e-8 m in its anchors: correcting the coordinates near its first
-    singular position makes the rows four times blunter, and no step was short enough."""
+    """Return the paper's five-bar with errors of 1e-8 m in its anchors, which is hard to pass by its first
+    singular position."""
     return settings.imprecise(settings.kinematic(SCENES["five_bar"]()), 1e-8, 0)
 
 
-HARD: dict[str, tuple[Callable[[], Scene], float]] = {
+HARD: dict[
+    str, tuple[Callable[[], Scene], float]
+] = {  # scenes whose reference takes more than 1 s, and end (s)
     "uneven five-bar": (uneven_five_bar, 20.0),
     "chain of 12 loops": (lambda: four_bar_chain(12), 20.0),
     "squeezer": (SCENES["andrews_squeezer"], 1.0),
@@ -47,21 +49,21 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 
 @pytest.mark.parametrize("name", HARD)
-def test_reference_and_its_limit(name):
+def test_search_for_a_reference_ends_at_its_limit_of_cpu_time(name):
     make, end = HARD[name]
     scene, times = make(), np.linspace(0.0, end, 101)
     spent = cpu_seconds(lambda: runs(scene, times, LIMIT))
     assert spent < FACTOR * LIMIT + ALLOWED, f"{name}: {spent:.1f} s of CPU time, the limit was {LIMIT} s"
 
 
-def test_sharpness_and_the_coordinates_that_a_step_begins_with():
-    """Correcting the coordinates makes them four times blunter: judged by the sharpness before, no step from
-    there is short enough, and the motion ends at 0.01259 s."""
+def test_reference_passes_the_singular_position_of_an_uneven_five_bar():
+    """Before, it ended at 0.01259 s: correcting the coordinates made the constraints four times less sharp,
+    and the length of the next step was judged by the sharpness before the correction."""
     motion = natural_motion(uneven_five_bar(), [0.0126], EXTENDED, seconds=20.0)
     assert not motion.reason and len(motion.times), f"{motion.reason} at {motion.reached:.6f} s"
 
 
-def test_digits_and_their_limit():
+def test_computation_of_a_certified_table_ends_at_its_limit_of_cpu_time():
     pytest.importorskip("flint")
     scene = SCENES["andrews_squeezer"]()
 
@@ -73,7 +75,8 @@ def test_digits_and_their_limit():
     assert spent < FACTOR * LIMIT + ALLOWED, f"{spent:.1f} s of CPU time, the limit was {LIMIT} s"
 
 
-def test_limit_within_a_limit_and_the_sooner_one():
+def test_the_nearer_of_two_nested_limits_counts():
+    """A limit of -1 s has passed already, outside and inside a limit of 100 s; afterwards it is forgotten."""
     with within(100.0):
         with within(-1.0), pytest.raises(TimeIsUp):
             ask()

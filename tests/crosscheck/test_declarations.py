@@ -1,4 +1,4 @@
-"""Declarations of adapters / joints, drivers and loads of types none of them knows; facts / equations."""
+"""Adapters refuse joints, drivers and loads that they do not declare; facts of joints match all equations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Telescopic(Revolute):
 
 
 def with_unknown(**parts: tuple) -> Scene:
-    """A swinging body with parts that a scene file could not have."""
+    """Return a body on a hinge with parts that a scene file could not have."""
     scene = Scene(name="unknown", body=(BODY,), joint=(JOINTS["revolute"],))
     return scene.model_copy(update=parts)
 
@@ -94,12 +94,12 @@ class Bare(Engine):
         raise NotImplementedError
 
 
-def test_an_engine_without_declarations_takes_a_free_body_alone() -> None:
+def test_an_engine_without_declarations_accepts_a_free_body_and_refuses_a_joint() -> None:
     assert Bare().cannot(with_unknown(joint=())) is None
     assert isinstance(Bare().cannot(with_unknown()), Cannot)
 
 
-def test_the_first_undeclared_part_is_named() -> None:
+def test_reason_names_an_undeclared_driver_of_a_declared_joint() -> None:
     supports = Supports(joints=("revolute",), loads=("moment",))
     assert supports.missing(with_unknown()) is None
     driven = supports.missing(with_unknown(driver=(Driver(joint="J"),)))
@@ -107,7 +107,8 @@ def test_the_first_undeclared_part_is_named() -> None:
 
 
 @pytest.mark.parametrize("kind", JOINT_TYPES)
-def test_rows_and_freedoms_of_the_facts_and_of_all_equations(kind: str) -> None:
+def test_a_joint_has_as_many_rows_in_all_equations_as_its_facts_say(kind: str) -> None:
+    """Rows of mbref and of adapters, rank of the judge's Jacobian, and freedoms that a tree joint removes."""
     joint, facts = JOINTS[kind], JOINT_TYPES[kind].facts
     scene = Scene(name="one", body=(BODY,), joint=(joint,))
     assert facts.rows + facts.free_translations + facts.free_rotations == 6, facts

@@ -66,7 +66,10 @@ CONTROLS = [0.4, -0.7, 0.5, 1.2, -0.3, 0.8, 0.0, 0.9]
 
 
 def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
-    """Angles, speeds (random) and controls are in a keyframe with a name, and in one with a number only."""
+    """MuJoCo's qacc at a keyframe with random angles and speeds is the truth.
+
+    The keyframe is chosen by its name, or by its number if it has none.
+    """
     random = np.random.default_rng(3)
     for name in ("pose", ""):
         qpos = " ".join(map(str, random.uniform(-4, 4, len(SERVOS))))
@@ -80,8 +83,11 @@ def test_servos_of_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
 
 
 def test_servos_without_a_keyframe_accelerate_their_joints_as_in_mujoco(files):
-    """Position servos hold the control 0 of the file; motor and damper have no control and no force."""
-    text = model_of(SERVOS)
+    """Without a keyframe all controls are 0: position servos hold 0, and motor and damper give no force.
+
+    MuJoCo's qacc at the reference pose is the truth; the import reports motor and damper as left out.
+    """
+    text = model_of(SERVOS)  # one motor, one damper, and six servos
     scene, out = files.scene(text, "servos.xml")
     theirs = accelerations(text, -1)
     assert "left out: 2 actuators without a control value: no force" in out
