@@ -56,7 +56,7 @@ def follow_drivers(memory):
     if status != OK:
         return status
     if counts.steps == 0:
-        progress.entry_pivot = least_pivot(memory)
+        memory.distance.entry_pivot = least_pivot(memory)
         set_predictor(memory)
     for _ in range(int(control.steps_per_call)):
         if counts.steps >= control.most_steps:
@@ -84,10 +84,10 @@ def take_accurate_step(memory):
     if step.crossed:
         memory.kernels.record(memory)
     pivot = least_pivot(memory)
-    is_behind = step.crossed or pivot >= step.start_pivot
-    if is_behind and pivot >= PIVOT_AHEAD * memory.progress.largest_pivot:
+    is_behind = step.crossed or pivot >= memory.distance.start_pivot
+    if is_behind and pivot >= PIVOT_AHEAD * memory.distance.largest_pivot:
         set_predictor(memory)
-        step.crossed, step.start_pivot = 0, 0.0
+        step.crossed, memory.distance.start_pivot = 0, 0.0
     return OK
 
 
@@ -98,16 +98,14 @@ def take_predictor_step(memory):
     The status is SINGULAR_AHEAD, and memory is ready for high-accuracy steps, if the step may come to a
     singular position.
     """
-    control, counts, clock, step = (
-        memory.run.control, memory.run.equations.system.counts, memory.run.loop.clock, memory.step,
-    )  # fmt: skip
-    fall = (step.start_pivot - least_pivot(memory)) / max(clock.length, control.smallest_step)
+    control, counts, clock = memory.run.control, memory.run.equations.system.counts, memory.run.loop.clock
+    fall = (memory.distance.start_pivot - least_pivot(memory)) / max(clock.length, control.smallest_step)
     save_start(memory)
     stop = end_of_step(memory)
     left = stop - clock.time
     h = min(longest_predictor_step(memory), left)
-    if h * fall > step.start_pivot:
-        return start_accurate_steps(step.start_pivot / fall, stop, memory)
+    if h * fall > memory.distance.start_pivot:
+        return start_accurate_steps(memory.distance.start_pivot / fall, stop, memory)
     while True:
         status = attempt_predictor_step(h, is_last(h, stop, memory), memory)
         if status == OK:
@@ -131,7 +129,7 @@ def longest_predictor_step(memory):
     """
     step, control, full = memory.step, memory.run.control, memory.mode.order
     best, step.used_order, largest = -inf, full, log(control.largest_step)
-    fewest = 2 if step.start_pivot < PIVOT_NEAR * memory.progress.largest_pivot else 4
+    fewest = 2 if memory.distance.start_pivot < PIVOT_NEAR * memory.distance.largest_pivot else 4
     for quarters in range(4, fewest - 1, -1):
         order, longest = full * quarters // 4, largest
         for k in range(order - 1, order + 1):
@@ -182,7 +180,7 @@ def start_accurate_steps(ahead, stop, memory):
             memory.kernels.return_to_start(memory)
             memory.step.crossed = 0
     set_high_accuracy(memory)
-    memory.step.time_to_crossing = ahead
+    memory.distance.time_to_crossing = ahead
     status = memory.kernels.expand(memory.run.loop.clock.time, memory)
     return SINGULAR_AHEAD if status == OK else status
 

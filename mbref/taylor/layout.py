@@ -102,15 +102,12 @@ class Step(NamedTuple):
 
     start_partition_id: int = 0
     start_parity: int = 0
-    start_pivot: float = 1.0  # least pivot of G
     start_negative: int = 0  # 1 if det G of a square gradient is negative
     start_logarithm: float = 0.0  # logarithm of the size of det G
     start_violation: float = 0.0  # violation of the rows; computed after a failed attempt
-    approaching: int = 1  # 1 if the pivot falls since the previous step, which did not cross
     last_order: int = 0  # last order that rounding does not dominate
     used_order: int = 0  # the last order that an attempt evaluates
     time_to_pole: float = 0.0  # s to the rounding pole that is subtracted; 0 without one
-    time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
     deceleration: float = 0.0  # 1/s, relative rate of the speed if orders are computed by power; otherwise 0
     violation: float = 0.0  # largest violation before the last correction
     correction: float = 0.0  # largest change of a variable by the last correction
@@ -120,19 +117,26 @@ class Step(NamedTuple):
 
 
 class Progress(NamedTuple):
-    """Progress of a run: its end, what is recorded, and its largest pivots."""
+    """Progress of a run: its end, and what is recorded."""
 
     end: float = 0.0  # s, end of the last step
     begun: int = 0  # 1 after the first Taylor series of the run has begun
     recorded: int = 0  # singular positions in ``Crossings``
     completed: int = 0  # samples that have accelerations and multipliers
+
+
+class SingularDistance(NamedTuple):
+    """Distance of the motion from singular positions, by the pivots of G."""
+
+    start_pivot: float = 1.0  # least pivot at the start of the step
     largest_pivot: float = 0.1  # largest value of the least pivot so far
-    entry_pivot: float = 0.0  # least pivot of G at the start of the high-accuracy steps
+    entry_pivot: float = 0.0  # least pivot at the start of the high-accuracy steps
+    approaching: int = 1  # 1 if the pivot falls since the previous step, which did not cross
     leaving: int = 0  # 1 if the motion leaves a singular position that it has crossed
     rests_near: int = 0  # 1 if the motion started at rest near a singular position and is still near
-    # distance from singular positions, relative to the distance at which a long crossing may end
-    clearance: float = 0.0
-    is_clear: int = 0  # 1 if the distance from a singular position is large enough to end a long crossing
+    time_to_crossing: float = 0.0  # s to a singular position, from the pivots of an attempt; 0 without one
+    clearance: float = 0.0  # distance / distance at which a long crossing may end
+    is_clear: int = 0  # 1 if the distance is large enough to end a long crossing
 
 
 class SeriesKernels(NamedTuple):
@@ -240,6 +244,7 @@ class TaylorMemory(NamedTuple):
     partition: Partition
     step: Step
     progress: Progress
+    distance: SingularDistance
     kernels: SeriesKernels
     code: SceneCode
     crossing_start: SavedState  # state from which the last long crossing started

@@ -80,10 +80,10 @@ def least_pivot(memory):
 @kernel
 def save_start_pivots(memory):
     """Save pivots, null vector and partition of the last factorisation for the start of a step."""
-    solver, step, partition, progress = memory.solver, memory.step, memory.partition, memory.progress
+    solver, step, partition, distance = memory.solver, memory.step, memory.partition, memory.distance
     copy(solver.last, solver.past)
     for i in range(solver.pivot_columns.shape[0]):
         solver.past_motion[i] = solver.null_space[0, i]
     step.start_partition_id, step.start_parity = partition.partition_id, partition.parity
-    step.start_pivot = least_pivot(memory)
-    progress.largest_pivot = max(progress.largest_pivot, step.start_pivot)
+    distance.start_pivot = least_pivot(memory)
+    distance.largest_pivot = max(distance.largest_pivot, distance.start_pivot)

@@ -73,7 +73,7 @@ def longest_step(tolerance, memory):
     shortest, of_rates = log(h), tolerance * max(1.0, largest_used(1, memory))
     if is_accurate(memory):
         of_rates *= LOOSER_RATES
-    is_far = step.start_pivot >= CROSSING_START * memory.progress.largest_pivot
+    is_far = memory.distance.start_pivot >= CROSSING_START * memory.distance.largest_pivot
     for k in range(step.last_order - 1, min(step.last_order + 1, memory.mode.order) + 1):
         size = largest_used(k, memory)
         if size > 0.0:
@@ -96,8 +96,8 @@ def first_lengths(left, memory):
     tight, loose = step_tolerance(memory), crossing_tolerance(memory)
     regular = min(longest_step(tight, memory), left)
     across = regular if loose == tight else min(longest_step(loose, memory), left)
-    ahead = step.time_to_pole if step.time_to_pole > 0.0 else step.time_to_crossing
-    step.time_to_crossing = 0.0
+    ahead = step.time_to_pole if step.time_to_pole > 0.0 else memory.distance.time_to_crossing
+    memory.distance.time_to_crossing = 0.0
     if across < CROSSING_MARGIN * ahead and regular > (1.0 - MIN_PIVOT_RATIO) * ahead:
         regular = across = ahead - CROSSING_START * across
     return regular, across
@@ -111,7 +111,7 @@ def next_length(h, regular, memory):
     the series above rounding allow this length. If not, the step ends before the position.
     """
     step = memory.step
-    near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * step.start_pivot
+    near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * memory.distance.start_pivot
     if step.used_order == step.last_order and near and h > regular:
         across = OVERSHOOT * time_to_singular_position(h, memory)
         step.used_order = order_of_least_term(across, memory)
@@ -182,7 +182,7 @@ def judge_step(h, last, memory):
     status = judge_branch(h, last, memory)
     if status != OK:
         return status
-    if memory.progress.rests_near and is_turned(memory):
+    if memory.distance.rests_near and is_turned(memory):
         return UNDECIDED
     off, size = error_of_motion(h, memory)
     if not isfinite(off):
@@ -236,7 +236,8 @@ def take_step(memory):
         if status == OK and (state.crossed or h <= regular):
             break
         if status == SINGULAR_AHEAD or (status == UNDECIDED and (state.crossed or h <= regular)):
-            clock.attempt_end, state.time_to_crossing = clock.time + h, time_to_singular_position(h, memory)
+            clock.attempt_end = clock.time + h
+            memory.distance.time_to_crossing = time_to_singular_position(h, memory)
             return status
         counts.rejected += 1
         h = min(next_length(h, regular, memory), left)
@@ -306,6 +307,6 @@ def begin_series(memory):
     begin_turns(memory)
     expand_functions(t, memory)
     memory.kernels.partition(memory)
-    memory.step.crossed, memory.progress.leaving, memory.progress.rests_near = 0, 0, 0
+    memory.step.crossed, memory.distance.leaving, memory.distance.rests_near = 0, 0, 0
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else memory.kernels.judge_start(status, memory)

@@ -36,7 +36,7 @@ def with_pole(motion: np.ndarray, gap: float, distance: float) -> Run:
     orders = np.arange(ORDER + 1)[:, None]
     past[:] = 0.0
     past[: ORDER + 1, :nz] = motion[:, :nz] + gap * np.arange(1, nz + 1) / distance**orders
-    step.start_pivot, taylor.progress.largest_pivot = abs(distance), 1.0
+    taylor.distance.start_pivot, taylor.distance.largest_pivot = abs(distance), 1.0
     step.last_order = step.used_order = ORDER
     without_pole(run.stepper.argument)
     return run

@@ -50,7 +50,7 @@ from mbref.taylor.samples import evaluate_series
 @kernel
 def relative_distance(memory):
     """Return the least pivot at the start of the step relative to the largest pivot."""
-    return memory.step.start_pivot / memory.progress.largest_pivot
+    return memory.distance.start_pivot / memory.distance.largest_pivot
 
 
 @kernel
@@ -65,7 +65,7 @@ def crossing_tolerance(memory):
     """Return the tolerance of a step that crosses; the last terms of its series are rounding divided by the
     distance."""
     distance = relative_distance(memory)
-    if is_accurate(memory) and memory.step.approaching and distance < CROSSING_START:
+    if is_accurate(memory) and memory.distance.approaching and distance < CROSSING_START:
         return max(memory.mode.tolerance, CROSSING_NOISE / distance)
     return step_tolerance(memory)
 
@@ -107,12 +107,12 @@ def judge_branch(h, last, memory):
 @kernel
 def judge_crossing(pivot, turned, last, memory):
     """Return OK, or the status that refuses a high-accuracy step that crosses a singular position."""
-    step, progress = memory.step, memory.progress
+    step, distance = memory.step, memory.distance
     if turned:
         return STEP_TOO_SMALL
-    if step.start_pivot < min(MIN_PIVOT_ACROSS * progress.largest_pivot, progress.entry_pivot):
+    if distance.start_pivot < min(MIN_PIVOT_ACROSS * distance.largest_pivot, distance.entry_pivot):
         return UNDECIDED
-    is_shallow = pivot < MIN_PIVOT_RATIO_ACROSS * step.start_pivot and not last
+    is_shallow = pivot < MIN_PIVOT_RATIO_ACROSS * distance.start_pivot and not last
     if (
         is_shallow
         or not step.violation <= violation_by_rounding(memory)
@@ -125,19 +125,19 @@ def judge_crossing(pivot, turned, last, memory):
 @kernel
 def judge_approach(h, pivot, turned, last, memory):
     """Return OK, or the status that refuses a high-accuracy step near a singular position."""
-    step, progress = memory.step, memory.progress
-    is_deep = pivot < MIN_PIVOT_RATIO * step.start_pivot and not last
+    step, distance = memory.step, memory.distance
+    is_deep = pivot < MIN_PIVOT_RATIO * distance.start_pivot and not last
     if is_deep or not step.violation <= violation_by_rounding(memory):
         return STEP_TOO_SMALL
     if step.correction > MAX_SHIFT * pivot:
         return STEP_TOO_SMALL if last else UNDECIDED
     resolved = MIN_PIVOT_FREE if freedoms(memory) > 0 else MIN_PIVOT_RESOLVED
-    resolved = min(resolved, ENTRY_RATIO * progress.entry_pivot)
+    resolved = min(resolved, ENTRY_RATIO * distance.entry_pivot)
     if turned and memory.kernels.turning_pivot(h, memory) < resolved:
         return UNDECIDED
-    if pivot >= step.start_pivot:
+    if pivot >= distance.start_pivot:
         return OK
-    return OK if pivot >= max(resolved, MIN_PIVOT * progress.largest_pivot) else UNDECIDED
+    return OK if pivot >= max(resolved, MIN_PIVOT * distance.largest_pivot) else UNDECIDED
 
 
 @exchangeable(TURNING_PIVOT)

@@ -92,7 +92,7 @@ class BranchFollower:
             if branch is not None:
                 counts.crossings = len(self._run.crossings) + len(crossed)
                 status = self._departure.along_branch(branch)
-            elif status == DONE or self._taylor.progress.is_clear:
+            elif status == DONE or self._taylor.distance.is_clear:
                 break
             else:
                 status = int(continue_crossing(self._argument))

@@ -104,7 +104,7 @@ class Departure:
 
         ``moved`` is a state near the motion, which is corrected. Return PAUSED or the failure status.
         """
-        memory, progress = self._run.memory, self._taylor.progress
+        memory, distance = self._run.memory, self._taylor.distance
         memory.loop.clock.time = start.time + ahead
         settings: Any = memory.equations.system.settings
         usual, settings.rank_tolerance = (
@@ -115,9 +115,9 @@ class Departure:
         settings.rank_tolerance = usual
         if status != OK:
             return status
-        self._taylor.step.start_pivot, progress.clearance, progress.is_clear = 0.0, 0.0, 0
+        distance.start_pivot, distance.clearance, distance.is_clear = 0.0, 0.0, 0
         pivots = self._taylor.solver.last[: int(self._taylor.partition.rank)]
-        progress.entry_pivot = np.abs(pivots).min(initial=1.0)
+        distance.entry_pivot = np.abs(pivots).min(initial=1.0)
         self._keep_beginning()
         return PAUSED
 

@@ -47,31 +47,31 @@ from mbref.taylor.samples import evaluate_series
 @kernel
 def save_pivots(memory):
     """Save the pivots at the start of a step, and whether they fall towards a singular position."""
-    step, progress, before = memory.step, memory.progress, memory.step.start_pivot
+    distance, before = memory.distance, memory.distance.start_pivot
     save_start_pivots(memory)
-    step.approaching = step.start_pivot <= before and not step.crossed
-    progress.leaving = progress.leaving and step.start_pivot < PIVOT_AHEAD * progress.largest_pivot
+    distance.approaching = distance.start_pivot <= before and not memory.step.crossed
+    distance.leaving = distance.leaving and distance.start_pivot < PIVOT_AHEAD * distance.largest_pivot
 
 
 @kernel
 def is_near_singular(pivot, memory):
     """Return whether a step with a least pivot at its end starts or ends near a singular position."""
-    return min(pivot, memory.step.start_pivot) < PIVOT_NEAR * memory.progress.largest_pivot
+    return min(pivot, memory.distance.start_pivot) < PIVOT_NEAR * memory.distance.largest_pivot
 
 
 @kernel
 def ends_near_singular(pivot, memory):
     """Return whether a step of low accuracy ends near a singular position, and does not leave a singular
     position."""
-    leaves = memory.progress.leaving and pivot > memory.step.start_pivot
-    return pivot < PIVOT_AHEAD * memory.progress.largest_pivot and not leaves
+    leaves = memory.distance.leaving and pivot > memory.distance.start_pivot
+    return pivot < PIVOT_AHEAD * memory.distance.largest_pivot and not leaves
 
 
 @kernel
 def time_to_singular_position(h, memory):
     """Return the time (s) at which the least pivot vanishes by linear extrapolation, from both ends of an
     attempt of h seconds."""
-    pivot, past = least_pivot(memory), memory.step.start_pivot
+    pivot, past = least_pivot(memory), memory.distance.start_pivot
     return h * past / (past + pivot if memory.step.crossed else past - pivot)
 
 
@@ -99,7 +99,7 @@ def changes_signs(memory):
 @exchangeable(DETECT)
 def contains_singular_position(h, pivot, memory):
     """Return whether a step of h seconds, with a least pivot at its end, contains a singular position."""
-    start, moved, kept = memory.step.start_pivot, distance_moved(h, memory), keeps_signs(memory)
+    start, moved, kept = memory.distance.start_pivot, distance_moved(h, memory), keeps_signs(memory)
     is_short = start + pivot > PIVOT_SLOPE * moved
     if (is_short and kept) or start + replaced_pivot(memory) > PIVOT_SLOPE * moved:
         return False
@@ -176,9 +176,9 @@ def dips_to_zero(h, pivot, memory):
     A high-accuracy step that starts far away spans the position; for such a step the minimum itself is
     evaluated.
     """
-    start, (ends, _) = memory.step.start_pivot, end_logarithms(memory)
+    start, (ends, _) = memory.distance.start_pivot, end_logarithms(memory)
     vanishes = logarithm_at(h * start / (start + pivot), memory) - ends < LOG_DIP
-    is_far = is_accurate(memory) and start >= CROSSING_START * memory.progress.largest_pivot
+    is_far = is_accurate(memory) and start >= CROSSING_START * memory.distance.largest_pivot
     if vanishes and is_far:
         vanishes = logarithm_at(time_of_minimum(h, SECTIONS, memory), memory) < LOG_ZERO + ends
     evaluate_series(h, memory)

@@ -31,10 +31,10 @@ def begin_crossing(memory):
 @kernel
 def start_crossing(memory):
     """Start a crossing by high-accuracy steps at the present state."""
-    mode, progress = memory.mode, memory.progress
+    mode, distance = memory.mode, memory.distance
     set_high_accuracy(memory)
-    memory.step.start_pivot = 1.0
-    mode.order, progress.clearance, progress.is_clear = min(mode.order, LONG_CROSSING_ORDER), 0.0, 0
+    mode.order = min(mode.order, LONG_CROSSING_ORDER)
+    distance.start_pivot, distance.clearance, distance.is_clear = 1.0, 0.0, 0
     save_state(memory.run, memory.crossing_start)
 
 
@@ -44,7 +44,7 @@ def cross_position(memory):
     (``continue_crossing``)."""
     start_crossing(memory)
     status = memory.kernels.begin(memory)
-    memory.progress.entry_pivot = least_pivot(memory)
+    memory.distance.entry_pivot = least_pivot(memory)
     return step_until_clear(memory) if status == OK else status
 
 
@@ -52,7 +52,7 @@ def cross_position(memory):
 def continue_crossing(memory):
     """Cross the next singular position, which is recorded, or continue until no singular position is near.
 
-    Return PAUSED, DONE at the end, or the failure status.  ``progress.is_clear``
+    Return PAUSED, DONE at the end, or the failure status.  ``distance.is_clear``
     is set when regular steps can follow: the least pivot is large enough, and not smaller than a step ago.
     """
     return step_until_clear(memory)
@@ -74,7 +74,7 @@ def step_until_clear(memory):
         if clock.time >= progress.end:
             return DONE
         judge_clearance(memory)
-        if progress.is_clear or counts.crossings != crossings:
+        if memory.distance.is_clear or counts.crossings != crossings:
             return PAUSED
     return TOO_MANY_STEPS
 
@@ -82,9 +82,9 @@ def step_until_clear(memory):
 @kernel
 def judge_clearance(memory):
     """Decide whether regular steps can follow."""
-    progress, clock, before = memory.progress, memory.run.loop.clock, memory.progress.clearance
-    progress.clearance = least_pivot(memory) / (PIVOT_CLEAR * progress.largest_pivot)
-    progress.is_clear = progress.clearance >= max(before, 1.0) and clock.time >= clock.attempt_end
+    distance, clock, before = memory.distance, memory.run.loop.clock, memory.distance.clearance
+    distance.clearance = least_pivot(memory) / (PIVOT_CLEAR * distance.largest_pivot)
+    distance.is_clear = distance.clearance >= max(before, 1.0) and clock.time >= clock.attempt_end
 
 
 @entry(INT(INT, SERIES))

@@ -33,8 +33,8 @@ def time_of_pole(memory):
     The last coefficients must contain a pole only, with a gap that rounding explains. A negative time belongs
     to a position in the past.
     """
-    past, order, start_pivot = memory.series.past, memory.mode.order, memory.step.start_pivot
-    is_near = start_pivot < CROSSING_START * memory.progress.largest_pivot
+    past, order, start_pivot = memory.series.past, memory.mode.order, memory.distance.start_pivot
+    is_near = start_pivot < CROSSING_START * memory.distance.largest_pivot
     if order < MIN_SERIES_ORDER or not (is_accurate(memory) or is_near) or start_pivot == 0.0:
         return 0.0
     i = variable_of_largest_term(order, memory)

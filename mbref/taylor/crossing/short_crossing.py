@@ -56,7 +56,7 @@ def cross_briefly(memory):
     save_variables(memory.series.past, memory.run.equations.angles, memory.step_start)
     memory.kernels.return_to_start(memory)
     set_high_accuracy(memory)
-    memory.step.start_pivot = 1.0
+    memory.distance.start_pivot = 1.0
     status = memory.kernels.expand(time, memory)
     if time == 0.0:
         status = memory.kernels.judge_start(status, memory)
@@ -77,7 +77,7 @@ def take_crossing_steps(memory):
     clock, counts, progress = memory.run.loop.clock, memory.run.equations.system.counts, memory.progress
     crossings, is_free = counts.crossings, freedoms(memory) > 0
     first, slower, delay = kinetic_energy(memory.series.terms, memory), 1.0, 0.0
-    progress.entry_pivot = least_pivot(memory)
+    memory.distance.entry_pivot = least_pivot(memory)
     for _ in range(MAX_SHORT_STEPS):
         if clock.time >= progress.end or memory.kernels.step(memory) != OK:
             return False
@@ -89,10 +89,10 @@ def take_crossing_steps(memory):
             slower = first / after
         if counts.crossings != crossings:
             is_determined = not is_free or is_bounded(delay, memory)
-            progress.leaving = is_determined and not switches_branch_in_pair(crossings, memory)
-            if progress.leaving:
+            memory.distance.leaving = is_determined and not switches_branch_in_pair(crossings, memory)
+            if memory.distance.leaving:
                 memory.kernels.record(memory)
-            return progress.leaving
+            return memory.distance.leaving
     return False
 
 

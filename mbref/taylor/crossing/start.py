@@ -32,7 +32,7 @@ def judge_start(status, memory):
     nearly_dependent = memory.run.equations.system.settings.nearly_dependent
     if nearly_dependent and (status == SINGULAR or (status == OK and hides_rank(memory))):
         return UNDECIDED
-    memory.progress.rests_near = rests_near(memory)
+    memory.distance.rests_near = rests_near(memory)
     if status == OK and (misses_state(memory) or is_turned(memory)):
         return UNDECIDED
     return status
@@ -86,6 +86,6 @@ def is_turned(memory):
     error also changes the direction of the motion, which gains a fraction √p of its speed over a distance p.
     Rows of loops with equal dimensions may have no rounding error.
     """
-    progress, pivot = memory.progress, least_pivot(memory)
-    progress.rests_near = progress.rests_near and pivot < REST_PIVOT
-    return progress.rests_near and not memory.step.correction <= REST_TURN * sqrt(pivot)
+    distance, pivot = memory.distance, least_pivot(memory)
+    distance.rests_near = distance.rests_near and pivot < REST_PIVOT
+    return distance.rests_near and not memory.step.correction <= REST_TURN * sqrt(pivot)
