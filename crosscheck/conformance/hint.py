@@ -123,7 +123,7 @@ def _rates(scene: Scene, bench: Bench) -> tuple[np.ndarray, float]:
     """Return the velocities of neighbouring samples (k, nb, 6), angular ones multiplied by the scene's
     length, and the time between two samples (s)."""
     motion = bench.close
-    rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=2)
+    rates = np.concatenate([motion.velocity, scene_length(scene) * motion.angular_velocity], axis=-1)
     return rates, float(motion.times[1] - motion.times[0])
 
 

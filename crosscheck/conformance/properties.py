@@ -72,7 +72,7 @@ def sample_times(bench: Bench) -> Finding:
 
 def unit_orientations(bench: Bench) -> Finding:
     """Orientations are unit quaternions."""
-    norms = np.linalg.norm(bench.motion.orientation, axis=2)
+    norms = np.linalg.norm(bench.motion.orientation, axis=-1)
     return Finding(float(np.abs(norms - 1).max()), max(UNIT_NORM, NORMS * bench.rounding))
 
 

@@ -83,7 +83,7 @@ def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
     rank = rank_of(values)
     if reference is None:
         raise RuntimeError(f"{scene.name}: mbref gives no initial acceleration")
-    scale = np.linalg.norm(reference, axis=1).max()
+    scale = np.linalg.norm(reference, axis=-1).max()
     others = {name: initial_accelerations(scene, name) for name in engines}
     others[PRINCIPLE] = gauss(scene)
     errors = {name: _apart(found, reference) / scale for name, found in others.items()}
@@ -106,7 +106,7 @@ def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
 
 
 def _apart(found: np.ndarray | None, reference: np.ndarray) -> float:
-    return np.inf if found is None else float(np.linalg.norm(found - reference, axis=1).max())
+    return np.inf if found is None else float(np.linalg.norm(found - reference, axis=-1).max())
 
 
 class _Drawing:

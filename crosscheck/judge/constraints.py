@@ -229,7 +229,7 @@ def scene_length(scene: Scene) -> float:
     for joint in scene.joint:
         points += joint.anchor_pair
     array = np.array(points)
-    length = float(np.linalg.norm(array[:, None] - array[None], axis=2).max())
+    length = float(np.linalg.norm(array[:, None] - array[None], axis=-1).max())
     return length if length > COINCIDENT * np.abs(array).max() else _of_one_point(scene) or 1.0
 
 

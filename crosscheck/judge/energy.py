@@ -101,7 +101,7 @@ def potential_energy(scene: Scene, position: np.ndarray, orientation: np.ndarray
         if isinstance(load, Spring):
             ends = zip(load.bodies, load.points, strict=True)
             first, second = (_point(scene, *end, position, orientation) for end in ends)
-            stretch = np.linalg.norm(second - first, axis=1) - load.natural_length
+            stretch = np.linalg.norm(second - first, axis=-1) - load.natural_length
             energy = energy + load.stiffness * stretch**2 / 2
     return energy
 

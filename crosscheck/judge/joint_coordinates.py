@@ -99,7 +99,7 @@ def counted(times: np.ndarray, angle: np.ndarray, rate: np.ndarray) -> np.ndarra
     expected = step * (rate + before) / 2
     change = expected + wrapped(np.diff(angle, prepend=0.0) - expected)
     near = np.lib.stride_tricks.sliding_window_view(np.pad(rate, 2, mode="edge"), 5, axis=0)
-    doubt = step * (near.max(axis=1) - near.min(axis=1))
+    doubt = step * (near.max(axis=-1) - near.min(axis=-1))
     doubt[:1] = np.abs(step[:1] * rate[:1])
     return np.where(np.cumsum(doubt >= np.pi) > 0, np.nan, np.cumsum(change))
 

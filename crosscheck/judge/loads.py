@@ -89,9 +89,9 @@ def _spring(
     ends = [attachment(scene, *end) for end in zip(load.bodies, load.points, strict=True)]
     (start, start_rate), (stop, stop_rate) = (_point(motion, *end) for end in ends)
     offset = stop - start
-    length = np.sqrt(np.sum(offset**2, axis=1, keepdims=True))
+    length = np.sqrt(np.sum(offset**2, axis=-1, keepdims=True))
     direction = _direction(np.where(length > 0.0, offset, stop_rate - start_rate))
-    rate = np.sum((stop_rate - start_rate) * direction, axis=1, keepdims=True)
+    rate = np.sum((stop_rate - start_rate) * direction, axis=-1, keepdims=True)
     pull = (load.stiffness * (length - load.natural_length) + load.damping * rate) * direction
     for (body, local), sign in zip(ends, (1, -1), strict=True):
         if body >= 0:

@@ -116,13 +116,13 @@ def in_scene_order(scene: Scene, trajectory: Trajectory) -> Trajectory:
 def position_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
     """Return the largest distance (k,) of a body's centre from its true position, divided by the scene's
     length."""
-    distance = np.linalg.norm(trajectory.position - exact.position, axis=2)
-    return distance.max(axis=1) / constraints.scene_length(scene)
+    distance = np.linalg.norm(trajectory.position - exact.position, axis=-1)
+    return distance.max(axis=-1) / constraints.scene_length(scene)
 
 
 def rotation_error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
     """Return the largest geodesic angle (k,) between a body's orientation and its true orientation, rad."""
-    return rotations.angle_between(trajectory.orientation, exact.orientation).max(axis=1)
+    return rotations.angle_between(trajectory.orientation, exact.orientation).max(axis=-1)
 
 
 def error_series(scene: Scene, trajectory: Trajectory, exact: Trajectory) -> np.ndarray:
@@ -201,8 +201,8 @@ def _velocity_error(scene: Scene, trajectory: Trajectory, exact: Trajectory | No
         (trajectory.velocity, exact.velocity),
         (length * trajectory.angular_velocity, length * exact.angular_velocity),
     ]
-    scale = max(np.linalg.norm(true, axis=2).max() for _, true in pairs)
-    worst = [_largest(np.linalg.norm(got - true, axis=2)) or 0.0 for got, true in pairs]
+    scale = max(np.linalg.norm(true, axis=-1).max() for _, true in pairs)
+    worst = [_largest(np.linalg.norm(got - true, axis=-1)) or 0.0 for got, true in pairs]
     return max(worst) / float(scale) if scale > 0 else None
 
 

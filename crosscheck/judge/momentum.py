@@ -29,7 +29,7 @@ def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:
         return None
     if any(load.over_time for load in scene.load if load.acts_on == "body"):
         return None
-    start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=1)
+    start = np.concatenate(_momenta(scene, *(a[None] for a in _initial(scene))), axis=-1)
     state = (trajectory.position, trajectory.orientation, trajectory.velocity, trajectory.angular_velocity)
     linear, angular = _momenta(scene, *state)
     time = trajectory.times[:, None]
@@ -77,8 +77,8 @@ def _sizes(
     scene: Scene, position: np.ndarray, orientation: np.ndarray, velocity: np.ndarray, spin: np.ndarray
 ) -> tuple[float, float]:
     """Return the largest Σ m |v| and Σ |J ω| of the samples."""
-    along = np.linalg.norm(velocity, axis=2) @ _masses(scene)
-    turning = np.linalg.norm(_own(scene, orientation, spin), axis=2).sum(axis=1)
+    along = np.linalg.norm(velocity, axis=-1) @ _masses(scene)
+    turning = np.linalg.norm(_own(scene, orientation, spin), axis=-1).sum(axis=1)
     return float(along.max(initial=0.0)), float(turning.max(initial=0.0))
 
 

@@ -106,8 +106,8 @@ def grain(scene: Scene, run: Trajectory) -> tuple[float, str]:
 def motion_rate(scene: Scene, run: Trajectory) -> float:
     """Return the largest rate (1/s) of a motion: angular velocity, or speed over the scene's length; at least
     one over the scene's duration."""
-    moved = np.linalg.norm(run.velocity, axis=2).max() / scene_length(scene)
-    turned = np.linalg.norm(run.angular_velocity, axis=2).max()
+    moved = np.linalg.norm(run.velocity, axis=-1).max() / scene_length(scene)
+    turned = np.linalg.norm(run.angular_velocity, axis=-1).max()
     return max(float(moved), float(turned), 1 / scene.duration)
 
 

@@ -70,7 +70,7 @@ def relative_distance(body: str) -> Measure:
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         if exact is None:
             return None
-        true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=1)
+        true = np.linalg.norm(exact.position[:, scene.body_index(body)], axis=-1)
         return float((_off(scene, body, motion, exact) / true).max(initial=0.0))
 
     return measure
@@ -107,7 +107,7 @@ def guided(body: str) -> Measure:
     def measure(scene: Scene, motion: Trajectory, exact: Trajectory | None) -> float | None:
         b = scene.body_index(body)
         place, turn = (a[b] for a in constraints.initial_poses(scene))
-        aside = np.linalg.norm((motion.position[:, b] - place)[:, :2], axis=1)
+        aside = np.linalg.norm((motion.position[:, b] - place)[:, :2], axis=-1)
         tilt = rotations.angle_between(motion.orientation[:, b], np.broadcast_to(turn, (len(aside), 4)))
         return float(max(aside.max(initial=0.0), tilt.max(initial=0.0)))
 
@@ -117,4 +117,4 @@ def guided(body: str) -> Measure:
 def _off(scene: Scene, body: str, motion: Trajectory, exact: Trajectory) -> np.ndarray:
     """Return the distances (k,) of a body's centre from its true position, m."""
     b, k = scene.body_index(body), len(exact.times)
-    return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=1))
+    return np.asarray(np.linalg.norm(motion.position[:k, b] - exact.position[:, b], axis=-1))

@@ -70,11 +70,11 @@ def absurd(scene: Scene, run: Trajectory, exact: Trajectory) -> list[str]:
     """
     units = np.repeat([1.0, scene_length(scene)], 3)
     sizes = {
-        name: float(np.linalg.norm(w / units, axis=1).max(initial=0.0))
+        name: float(np.linalg.norm(w / units, axis=-1).max(initial=0.0))
         for name, w in (run.reactions or {}).items()
     }
     true = [
-        float(np.linalg.norm(w / units, axis=1).max(initial=0.0)) for w in (exact.reactions or {}).values()
+        float(np.linalg.norm(w / units, axis=-1).max(initial=0.0)) for w in (exact.reactions or {}).values()
     ]
     largest = max(*true, 0.0)
     return [

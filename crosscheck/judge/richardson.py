@@ -73,6 +73,6 @@ def _order(steps: tuple[float, float, float], apart: Sequence[float]) -> float |
 
 def _beyond(last: np.ndarray, before: np.ndarray, weight: float) -> np.ndarray:
     """Return unit quaternions last + weight (last - before), after their signs are made equal."""
-    same = np.where(np.sum(last * before, axis=2, keepdims=True) < 0, -before, before)
+    same = np.where(np.sum(last * before, axis=-1, keepdims=True) < 0, -before, before)
     found = last + weight * (last - same)
-    return found / np.linalg.norm(found, axis=2, keepdims=True)
+    return found / np.linalg.norm(found, axis=-1, keepdims=True)

@@ -51,7 +51,7 @@ def well_formed(answer: Any, scene: Scene, times: np.ndarray) -> Trajectory:
         for name, width in (WIDTHS | OPTIONAL).items()
         if name in WIDTHS or getattr(answer, name) is not None
     }
-    if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=2) - 1) > UNIT_TOLERANCE):
+    if np.any(np.abs(np.linalg.norm(plain["orientation"], axis=-1) - 1) > UNIT_TOLERANCE):
         raise MalformedAnswer("orientation: has a quaternion that is not of unit length")
     texts: dict[str, Any] = {name: str(getattr(answer, name)) for name in ("version", "method")}
     return replace(

@@ -135,8 +135,8 @@ def scales(scene: Scene, motion: Trajectory, columns: Mapping[str, np.ndarray]) 
     ``columns``, at least what the mechanism's mass, length, gravity and the scene's duration give.
     """
     length, duration = scene_length(scene), scene.duration
-    speed = float(np.linalg.norm(motion.velocity, axis=2).max(initial=0.0))
-    turning = float(np.linalg.norm(motion.angular_velocity, axis=2).max(initial=0.0))
+    speed = float(np.linalg.norm(motion.velocity, axis=-1).max(initial=0.0))
+    turning = float(np.linalg.norm(motion.angular_velocity, axis=-1).max(initial=0.0))
     acceleration = float(np.linalg.norm(scene.gravity)) + length / duration**2
     weight = sum(body.mass or 0.0 for body in scene.body) * acceleration
     found = {kind: {"m": length}.get(unit, 1.0) for kind, unit in SI.items()}

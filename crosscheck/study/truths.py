@@ -64,7 +64,7 @@ def shown(exact: Trajectory) -> np.ndarray:
     FRAMES cover the whole motion, or only its beginning if a body would turn by more than TURN between two
     frames.
     """
-    speed = np.linalg.norm(exact.angular_velocity, axis=2).max(axis=1, initial=0.0)
+    speed = np.linalg.norm(exact.angular_velocity, axis=-1).max(axis=-1, initial=0.0)
     turned = np.concatenate([[0.0], np.cumsum(np.diff(exact.times) * (speed[1:] + speed[:-1]) / 2)])
     last = int(np.searchsorted(turned, FRAMES * TURN, side="right")) - 1
     return np.linspace(0, last, min(FRAMES, last) + 1).round().astype(int)

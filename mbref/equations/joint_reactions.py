@@ -76,7 +76,7 @@ def reactions(
     pose, force = q[:, body], wrench[..., :3]  # about the centre of mass, moments in body axes
     arm = model.anchors(q) - pose[..., :3]
     moment = rotations.rotate(pose[..., 3:], wrench[..., 3:]) - rotations.cross(arm, force)
-    found = np.concatenate([force, moment], axis=2)
+    found = np.concatenate([force, moment], axis=-1)
     _add_coupled(model, q, multipliers, names, found)
     return {name: found[:, j] for j, name in enumerate(names)}
 

@@ -64,7 +64,7 @@ def grow_springs(k, memory):
     """Compute order k of the springs' vectors, lengths and inverses; order k - 1 of their rates."""
     springs, variables = memory.polynomials.springs, memory.series.terms
     for s in range(springs.stiffness.shape[0]):
-        of = memory.series.springs[SPRING_SERIES * s :]
+        of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         grow_forms(springs.constant[s], springs.form[3 * s : 3 * s + 3], k, variables, of)
         square = 0.0
         for c in range(3):
@@ -90,7 +90,7 @@ def add_springs(k, memory):
     vector."""
     springs, sums, nz = memory.polynomials.springs, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(springs.stiffness.shape[0]):
-        of = memory.series.springs[SPRING_SERIES * s :]
+        of = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)]
         pull = springs.damping[s] * product_order(of[SPRING_RATE], of[SPRING_INVERSE], k)
         pull -= springs.stiffness[s] * springs.natural[s] * of[SPRING_INVERSE, k]
         of[SPRING_PULL, k] = pull + springs.stiffness[s] if k == 0 else pull
@@ -110,7 +110,7 @@ def time_to_no_length(memory):
     """
     springs, shortest = memory.polynomials.springs, inf
     for s in range(springs.stiffness.shape[0]):
-        of, speed = memory.series.springs[SPRING_SERIES * s :], 0.0
+        of, speed = memory.series.springs[SPRING_SERIES * s : SPRING_SERIES * (s + 1)], 0.0
         for c in range(3):
             speed += of[SPRING_VECTOR + c, 1] * of[SPRING_VECTOR + c, 1]
         if has_direction(s, springs) and speed > 0.0:
@@ -145,7 +145,7 @@ def grow_torsions(k, memory):
     """Compute order k of directions, cosine and sine; of the angle, whose rate is C S' - S C'."""
     torsions, variables = memory.polynomials.torsions, memory.series.terms
     for s in range(torsions.stiffness.shape[0]):
-        of = memory.series.torsions[TORSION_SERIES * s :]
+        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         grow_forms(torsions.constant[s], torsions.form[9 * s : 9 * s + 9], k, variables, of)
         cosine, sine = 0.0, 0.0
         for c in range(3):
@@ -168,7 +168,7 @@ def add_torsions(k, memory):
     δS - S δC)."""
     torsions, sums, nz = memory.polynomials.torsions, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(torsions.stiffness.shape[0]):
-        of = memory.series.torsions[TORSION_SERIES * s :]
+        of = memory.series.torsions[TORSION_SERIES * s : TORSION_SERIES * (s + 1)]
         angle = of[TORSION, k] - torsions.natural[s] if k == 0 else of[TORSION, k]
         of[TORQUE, k] = torsions.stiffness[s] * angle + torsions.damping[s] * (k + 1) * of[TORSION, k + 1]
         of[TORQUE, k] -= applied_order(torsions.amount[s], torsions.function[s], k, memory.series.factors)
@@ -219,7 +219,7 @@ def grow_slides(k, memory):
     """Compute order k of axes, of vectors between the anchors, and of displacements a · d."""
     slides, variables = memory.polynomials.slides, memory.series.terms
     for s in range(slides.stiffness.shape[0]):
-        of = memory.series.slides[SLIDE_SERIES * s :]
+        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
         grow_forms(slides.constant[s], slides.form[6 * s : 6 * s + 6], k, variables, of)
         along = 0.0
         for c in range(3):
@@ -233,7 +233,7 @@ def add_slides(k, memory):
     + d δa)."""
     slides, sums, nz = memory.polynomials.slides, memory.series.sums, memory.solver.pivot_columns.shape[0]
     for s in range(slides.stiffness.shape[0]):
-        of = memory.series.slides[SLIDE_SERIES * s :]
+        of = memory.series.slides[SLIDE_SERIES * s : SLIDE_SERIES * (s + 1)]
         along = of[SLID, k] - slides.natural[s] if k == 0 else of[SLID, k]
         of[PUSH, k] = slides.stiffness[s] * along + slides.damping[s] * (k + 1) * of[SLID, k + 1]
         of[PUSH, k] -= applied_order(slides.amount[s], slides.function[s], k, memory.series.factors)

@@ -87,14 +87,14 @@ def put_state(memory):
     q, v, pose = memory.run.state.coordinates, memory.run.state.velocities, memory.pose
     acceleration = memory.run.equations.system.acceleration
     for b in range(v.shape[0] // 6):
-        place, axes, turning = 12 * b, 12 * b + 3, 6 * b + 3
+        place, axes, turning = 12 * b, slice(12 * b + 3, 12 * b + 12), slice(6 * b + 3, 6 * b + 6)
         for k in range(3):
             q[7 * b + k] = pose[0, place + k]
             v[6 * b + k] = pose[1, place + k]
             acceleration[6 * b + k] = pose[2, place + k]
-        put_quaternion(pose[0, axes:], q[7 * b + 3 :])
-        put_axial_vector(pose[0, axes:], pose[1, axes:], v[turning:])
-        put_axial_vector(pose[0, axes:], pose[2, axes:], acceleration[turning:])
+        put_quaternion(pose[0, axes], q[7 * b + 3 : 7 * b + 7])
+        put_axial_vector(pose[0, axes], pose[1, axes], v[turning])
+        put_axial_vector(pose[0, axes], pose[2, axes], acceleration[turning])
 
 
 @kernel

@@ -20,12 +20,12 @@ def render(scene_runs: SceneRuns) -> list[Block]:
     if not scene_runs.scene.has_mass():
         return []
     exact = gauss(scene_runs.scene)
-    scale = np.linalg.norm(exact, axis=1).max() or 1.0
+    scale = np.linalg.norm(exact, axis=-1).max() or 1.0
     rows = []
     for curve, run in scene_runs.best().items():
         motion = run.trajectory
         if motion.acceleration is not None and len(motion.times) and motion.times[0] == 0:
-            off = np.linalg.norm(stacked(scene_runs.scene, motion, 0) - exact, axis=1).max() / scale
+            off = np.linalg.norm(stacked(scene_runs.scene, motion, 0) - exact, axis=-1).max() / scale
             rows.append((*curve, beyond_rounding(float(off))))
     caption = (
         "Largest difference of an initial acceleration (angular ones times the mechanism's length) from "

@@ -184,7 +184,7 @@ def _accelerations(paper: int, runs: Named) -> Figure:
 def _crank_acceleration(run: Run) -> np.ndarray:
     """Return the magnitude (k,) of the crank's angular acceleration, rad/s²."""
     assert run.trajectory.angular_acceleration is not None
-    return np.linalg.norm(run.trajectory.angular_acceleration[:, 0], axis=1)
+    return np.linalg.norm(run.trajectory.angular_acceleration[:, 0], axis=-1)
 
 
 def plot_accelerations(runs: Named) -> Drawing:

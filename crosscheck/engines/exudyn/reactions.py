@@ -32,7 +32,7 @@ def reactions(
             outputs.append(forces[:, at : at + size])
             at += size
         axes = [_turn(scene, body, turn) @ marker_frame(joint) for body in joint.bodies]
-        found[joint.name] = np.concatenate(_wrench(scene, joint, axes, moved, turn, outputs), axis=1)
+        found[joint.name] = np.concatenate(_wrench(scene, joint, axes, moved, turn, outputs), axis=-1)
     for n, driver in enumerate(scene.driver):
         joint = scene.joint_named(driver.joint)
         _push(scene, found[joint.name], joint, joint.facts.driven, turn, -forces[:, at + n])

@@ -28,8 +28,8 @@ def differences(scene: Scene, one: Motion, other: Motion) -> np.ndarray:
     distance, over the scene's length, and angle (rad)."""
     k = min(len(one.times), len(other.times))
     apart = doubles(one.position[:k] - other.position[:k])
-    distance = np.linalg.norm(apart, axis=2).max(axis=1, initial=0.0) / scene_length(scene)
-    return np.maximum(distance, _angles(one.orientation[:k], other.orientation[:k]).max(axis=1, initial=0.0))
+    distance = np.linalg.norm(apart, axis=-1).max(axis=1, initial=0.0) / scene_length(scene)
+    return np.maximum(distance, _angles(one.orientation[:k], other.orientation[:k]).max(axis=-1, initial=0.0))
 
 
 def bounds(apart: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ def rounding(scene: Scene, motion: Motion) -> np.ndarray:
 
     Far from the origin it exceeds LEAST.
     """
-    farthest = np.linalg.norm(doubles(motion.position), axis=2).max(axis=1, initial=0.0)
+    farthest = np.linalg.norm(doubles(motion.position), axis=-1).max(axis=1, initial=0.0)
     return np.finfo(float).eps * farthest / scene_length(scene)
 
 
@@ -54,4 +54,4 @@ def _angles(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     )
     relative = doubles(pw * qv - qw * pv - across)
     along = doubles((p * q).sum(axis=-1))
-    return 2 * np.arctan2(np.linalg.norm(relative, axis=2), np.abs(along))
+    return 2 * np.arctan2(np.linalg.norm(relative, axis=-1), np.abs(along))

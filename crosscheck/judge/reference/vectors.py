@@ -19,7 +19,7 @@ REFINEMENTS = 40
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Return vector products (…, 3)."""
     a, b = (np.concatenate([v, v[..., :2]], axis=-1) for v in (a, b))
-    return a[..., 1:4] * b[..., 2:] - a[..., 2:] * b[..., 1:4]
+    return a[..., 1:4] * b[..., 2:5] - a[..., 2:5] * b[..., 1:4]
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -67,7 +67,7 @@ def saddle_solve(
     proportional to the least singular value of G near singularity. The distance is infinite without
     coordinates.
     """
-    n = rows.shape[2]
+    n = mass.shape[-1]
     scale, inverse = _scaled_inverse(doubles(mass), doubles(rows))
     matrix = _saddle(mass, rows, rows[:, :, :1] * 0 * np.zeros(rows.shape[1], dtype=int))
     wanted = np.concatenate([force, right], axis=1)
@@ -90,7 +90,7 @@ def _scaled_inverse(mass: np.ndarray, rows: np.ndarray) -> tuple[np.ndarray, np.
 
     The matrix is made quasi-definite, so that it has an inverse at singular positions, too.
     """
-    m, n = rows.shape[1:]
+    n, m = mass.shape[-1], rows.shape[-2]
     diagonal = np.diagonal(mass, axis1=1, axis2=2)
     light = LIGHT * diagonal.max(axis=1, initial=0.0, keepdims=True) + np.finfo(float).tiny
     across = 1 / np.sqrt(np.maximum(diagonal, light))

@@ -43,7 +43,7 @@ class FreeBody:
         times = np.asarray(times, dtype=float)
         state = self._solution(times)
         motion, force, moment = self._loaded(state)
-        momentum = state[:, 10:]
+        momentum = state[:, 10:13]
         spin = motion.angular_velocity[:, 0]
         rate = self._spin_of(motion.rotation[:, 0], moment[:, 0] - cross(spin, momentum))
         return trajectory(
@@ -65,7 +65,7 @@ class FreeBody:
 
     def _loaded(self, state: np.ndarray) -> tuple[Motion, np.ndarray, np.ndarray]:
         rotation = _matrix(state[:, 6:10])
-        spin = self._spin_of(rotation, state[:, 10:])
+        spin = self._spin_of(rotation, state[:, 10:13])
         motion = Motion(
             state[:, None, :3], rotation[:, None], state[:, None, 3:6], spin[:, None], state[:, :1] * np.nan
         )

@@ -98,7 +98,7 @@ class OneDof:
 
     def coordinate(self, times: np.ndarray) -> np.ndarray:
         """Return the path coordinate and its rate (k, 2) at times (k,)."""
-        return np.stack(self._coordinate(np.asarray(times, dtype=float))[:2], axis=1).astype(float)
+        return np.stack(self._coordinate(np.asarray(times, dtype=float))[:2], axis=-1).astype(float)
 
     def _coordinate(self, times: np.ndarray) -> tuple[np.ndarray, ...]:
         """Return q, q', q'' (k,) at times (k,)."""
@@ -167,7 +167,7 @@ class Reduced:
         root, push, _ = self._terms(q, s)
         if self._damped:
             push = self._terms(q, s / root)[1]
-        return np.stack([s, push, root], axis=1)
+        return np.stack([s, push, root], axis=-1)
 
     def _terms(self, q: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return sqrt(I), Q and I'/2 (n,) at coordinates q and rates (n,)."""

@@ -31,7 +31,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     e0, z0 = unit(pin.axes[first]), unit(pin.axes[1 - first])
     centre, b0, c0 = (np.array(joint.anchor, dtype=REAL) for joint in (pivot, pin, end))
     x0 = unit(c0 - b0)
-    if is_along(z0, x0) or is_along(e0, x0):
+    if _is_along(z0, x0) or _is_along(e0, x0):
         return None
     arm, length, lean = b0 - centre, np.sqrt(np.sum((c0 - b0) ** 2)), z0 @ x0
     side = float(np.sign((c0 - b0) @ line))
@@ -75,7 +75,7 @@ def spatial_slider_crank(scene: Scene) -> Path | None:
     return Path("spatial_slider_crank", poses, axis, turning_driver(scene, axis, with_q))
 
 
-def is_along(first: np.ndarray, second: np.ndarray) -> bool:
+def _is_along(first: np.ndarray, second: np.ndarray) -> bool:
     """Return whether two unit vectors (3,) are so nearly parallel that they span no plane."""
     return bool(abs(first @ second) > ALONG)
 
@@ -86,18 +86,18 @@ def _slide(
     """Return the displacement s (k,) along the line that keeps |c0 + s line - pin| = length, and s', s''."""
     gap = c0 - pins[0]
     along = gap @ line
-    root = side * np.sqrt(along**2 - np.sum(gap * gap, axis=1) + length**2)
+    root = side * np.sqrt(along**2 - np.sum(gap * gap, axis=-1) + length**2)
     s = root - along
     rod = gap + s[:, None] * line
-    ds = np.sum(rod * pins[1], axis=1) / root
+    ds = np.sum(rod * pins[1], axis=-1) / root
     rate = ds[:, None] * line - pins[1]
-    return s, ds, (np.sum(rod * pins[2], axis=1) - np.sum(rate * rate, axis=1)) / root
+    return s, ds, (np.sum(rod * pins[2], axis=-1) - np.sum(rate * rate, axis=-1)) / root
 
 
 def _held(x: np.ndarray, e: np.ndarray, lean: float, hand: float) -> np.ndarray:
     """Return unit vectors z with z·e = 0, z·x = lean, on the given side of the plane of e and x."""
-    p = x - e * np.sum(x * e, axis=1, keepdims=True)
-    size = np.sqrt(np.sum(p * p, axis=1, keepdims=True))
+    p = x - e * np.sum(x * e, axis=-1, keepdims=True)
+    size = np.sqrt(np.sum(p * p, axis=-1, keepdims=True))
     share = lean / size
     return share * p / size + hand * np.sqrt(1 - share**2) * cross(e, p / size)
 
@@ -107,17 +107,17 @@ def _spin(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the rod's angular velocity for unit crank rate, and its derivative by the crank angle."""
     normal = cross(z, e)
-    base, down = axis - cross(x, dx), np.sum(x * normal, axis=1, keepdims=True)
-    roll = np.sum(base * normal, axis=1, keepdims=True) / down
+    base, down = axis - cross(x, dx), np.sum(x * normal, axis=-1, keepdims=True)
+    roll = np.sum(base * normal, axis=-1, keepdims=True) / down
     w = cross(x, dx) + roll * x
     dnormal = cross(cross(w, z), e) + cross(z, cross(axis, e))
-    up = np.sum(base * dnormal - cross(x, ddx) * normal, axis=1, keepdims=True)
-    droll = (up - roll * np.sum(dx * normal + x * dnormal, axis=1, keepdims=True)) / down
+    up = np.sum(base * dnormal - cross(x, ddx) * normal, axis=-1, keepdims=True)
+    droll = (up - roll * np.sum(dx * normal + x * dnormal, axis=-1, keepdims=True)) / down
     return w, cross(x, ddx) + droll * x + roll * dx
 
 
 def _triad(x: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return rotation matrices (k, 3, 3) with x as first column and z in the plane of first and third."""
-    third = z - x * np.sum(x * z, axis=1, keepdims=True)
-    third = third / np.sqrt(np.sum(third * third, axis=1, keepdims=True))
+    third = z - x * np.sum(x * z, axis=-1, keepdims=True)
+    third = third / np.sqrt(np.sum(third * third, axis=-1, keepdims=True))
     return np.stack([x, cross(third, x), third], axis=-1)
