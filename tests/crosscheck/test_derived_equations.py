@@ -1,4 +1,4 @@
-"""Equations that are derived as symbols, and forces on bodies / known equations and the judge's own."""
+"""Symbolic equations of motion of adapters, and their forces on bodies, against textbook equations."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ PIVOT = Revolute(name="H", bodies=("cart", "rod"), anchor=(0.0, 0.0, 0.0), axis=
 
 
 def crane(**parts: Any) -> Scene:
+    """Return a rod on a hinge of a cart that slides along x."""
     given = {
         "name": "s",
         "body": (CART, ROD),
@@ -45,14 +46,15 @@ def crane(**parts: Any) -> Scene:
 
 
 def expected(angle: float, rate: float, moment: float = 0.0) -> np.ndarray:
-    """x'' and φ'' of a rod of 3 kg at 1 m, with 0.5 kg m², on a cart of 2 kg."""
+    """Return x'' and φ'' by Lagrange's equations: 5 x'' - 3 sin φ φ'' = 3 cos φ φ'² and
+    -3 sin φ x'' + 3.5 φ'' = -3 g cos φ + M, for a cart of 2 kg, and 3 kg and 0.5 kg m² at 1 m."""
     s, c = math.sin(angle), math.cos(angle)
     mass = np.array([[5.0, -3.0 * s], [-3.0 * s, 3.5]])
     return np.linalg.solve(mass, [3.0 * c * rate**2, -3.0 * G * c + moment])
 
 
 @pytest.mark.parametrize("moment", [0.0, 7.0])
-def test_a_rod_on_a_cart(moment: float) -> None:
+def test_symbolic_equations_of_a_crane_give_its_accelerations(moment: float) -> None:
     load = (Moment(body="rod", moment=(5.0, 6.0, moment)),) if moment else ()
     equations = TreeEquations(crane(load=load))
     assert equations.n == 2 and equations.rows == [] and equations.has_own_joints
@@ -63,7 +65,8 @@ def test_a_rod_on_a_cart(moment: float) -> None:
     assert q.tolist() == [0.7, 0.3] and v.tolist() == [1.1, 1.2]
 
 
-def test_the_motion_of_links_of_a_rod_on_a_cart() -> None:
+def test_motion_of_a_cranes_bodies_follows_from_its_coordinates() -> None:
+    """The rod's centre is at (x + cos φ, sin φ): velocities and accelerations are its derivatives."""
     equations = TreeEquations(crane())
     motion, closing = equations.link_motion(np.array([0.7, 0.3, 1.1, 1.2]))
     a, phi = expected(0.3, 1.2)
@@ -77,7 +80,7 @@ def test_the_motion_of_links_of_a_rod_on_a_cart() -> None:
     assert motion.rotation[1] == pytest.approx(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]))
 
 
-def test_a_slide_on_a_rod_that_turns_has_a_coriolis_acceleration() -> None:
+def test_symbolic_equations_of_a_bead_on_a_turning_rod_have_the_coriolis_force() -> None:
     """A bead of 2 kg on a rod that turns about z: r'' = r w², and (4.5 + 2 r²) w' = -4 r r' w."""
     rod = ROD.model_copy(update={"position": (0.0, 0.0, 0.0), "inertia": (1.0, 1.0, 4.0)})
     bead = CART.model_copy(update={"name": "bead", "position": (1.0, 0.0, 0.0), "inertia": (0.1, 0.2, 0.5)})
@@ -101,24 +104,30 @@ def test_a_slide_on_a_rod_that_turns_has_a_coriolis_acceleration() -> None:
         ),
     ],
 )
-def test_scenes_without_derived_equations(parts: dict[str, Any], says: str) -> None:
+def test_no_symbolic_equations_are_derived_for_free_bodies_drivers_and_forces(
+    parts: dict[str, Any], says: str
+) -> None:
     with pytest.raises(ValueError, match=says):
         TreeEquations(crane(**parts))
 
 
-def test_the_solution_of_a_symmetric_system() -> None:
+def test_symbolic_solution_of_a_symmetric_system_equals_numpys() -> None:
     matrix = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, 0.25], [0.5, 0.25, 2.0]])
     right = np.array([1.0, -2.0, 3.0])
     assert solved(matrix, right).astype(float) == pytest.approx(np.linalg.solve(matrix, right))
 
 
-def test_turns_about_an_axis_add_up() -> None:
+def test_rotations_about_one_axis_are_joined_by_adding_their_angles() -> None:
+    """0.25 and 0.5 rad about z give 0.75 rad, and 0.5 rad about -z gives -0.25 rad; others do not join."""
     z = np.array([0.0, 0.0, 1.0])
     first = Turned(np.eye(3), z, 0.25)
     for axis, angle in ((z, 0.75), (-z, -0.25)):
         again = first.further(axis, 0.5)
         assert again is not None and again.angle == angle and again.axis is z
     assert first.further(np.array([0.0, 0.6, 0.8]), 0.5) is None
+
+
+def test_symbolic_rotation_matrix_equals_that_of_the_rotation_vector() -> None:
     axis = np.array([0.6, 0.0, 0.8])
     wanted = rotations.to_matrix(rotations.from_vector(0.7 * axis))
     assert turn(axis, 0.7, NUMBERS).astype(float) == pytest.approx(wanted)
@@ -151,8 +160,10 @@ def forces(
 
 
 @pytest.mark.parametrize(("turns", "angle"), [(0.0, 0.0), (6.0, 2 * math.pi), (-13.0, -4 * math.pi)])
-def test_a_torsion_spring_counts_turns(turns: float, angle: float) -> None:
-    """At its start the joint's angle is 0 up to full turns; the estimate says which."""
+def test_torsion_spring_of_an_adapter_counts_the_full_turns_of_an_estimated_angle(
+    turns: float, angle: float
+) -> None:
+    """The pose gives an angle of 0 up to full turns; the estimate (for example 6 rad) gives their number."""
     spring = TorsionSpring(joint="H", stiffness=4.0, damping=0.5, natural_angle=0.25)
     found = forces(spring, omega=(7.0, 8.0, 3.0), angle=turns)
     gyroscopic = -np.cross([7.0, 8.0, 3.0], [7.0, 16.0, 9.0])
@@ -161,7 +172,8 @@ def test_a_torsion_spring_counts_turns(turns: float, angle: float) -> None:
     assert not found[:3].any()
 
 
-def test_a_spring_between_bodies_acts_on_both() -> None:
+def test_a_torsion_spring_between_two_bodies_has_opposite_moments_on_them() -> None:
+    """4 N m/rad · (0.5 - 0.25) rad; the angle 0.5 rad and its rate 3 - 1 rad/s follow from the poses."""
     other = TURNED.model_copy(update={"name": "c", "orientation": (1.0, 0.0, 0.0, 0.0)})
     joint = Revolute(name="J", bodies=("b", "c"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     ball = Spherical(name="B", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0))

@@ -1,4 +1,4 @@
-"""Differences of two sets of records, worked out by hand / the sentences at the limits of noise."""
+"""Differences of two sets of records: sentences on numbers just below and just above the limits of noise."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ SAME = {"cpu": "a"}
 def one(
     error: float, *, bound: float = 0.0, seconds: float = 1.0, repeated: bool = False, **metrics: float
 ) -> dict[str, dict[str, Any]]:
-    """A set of one run."""
+    """Return a set of one completed run."""
     found = {"error": error, "error_bound": bound, **metrics}
     return {
         "run": {
@@ -35,19 +35,20 @@ def one(
 
 
 def said(old: dict[str, Any], new: dict[str, Any]) -> list[str]:
+    """Return the sentences on the differences of two sets of one run."""
     [change] = changes(old, new)
     return list(change.sentences)
 
 
 @pytest.mark.parametrize(("first", "second"), [(2e-9, 1e-12), (1e-12, 2e-9)])
 def test_errors_below_the_larger_bound_of_both_truths_do_not_differ(first, second):
-    """The truth of one set is known to 2e-9, of the other to 1e-12: 1e-10 and 9e-10 are not apart."""
+    """1e-10 and 9e-10 differ only if the truths of both sets are known better than that."""
     assert said(one(1e-10, bound=first), one(9e-10, bound=second)) == []
     assert said(one(1e-10, bound=1e-12), one(9e-10, bound=1e-12)) == ["error 1.00e-10 → 9.00e-10"]
 
 
 @pytest.mark.parametrize(("ratio", "changed"), [(1.9, False), (2.0, False), (2.1, True)])
-def test_errors_change_by_more_than_twofold(ratio, changed):
+def test_errors_differ_if_one_is_more_than_twice_the_other(ratio, changed):
     for old, new in ((1e-5, ratio * 1e-5), (ratio * 1e-5, 1e-5)):
         assert bool(said(one(old), one(new))) is changed, (old, new)
 
@@ -63,7 +64,7 @@ def test_errors_change_by_more_than_twofold(ratio, changed):
         ((False, False), 2.05, True),
     ],
 )
-def test_times_that_were_repeated_change_by_half_and_single_ones_by_twofold(both, ratio, changed):
+def test_repeated_times_differ_above_a_ratio_of_1_5_and_single_times_above_2(both, ratio, changed):
     old, new = (one(1e-5, seconds=s, repeated=r) for s, r in zip((1.0, ratio), both, strict=True))
     assert bool(said(old, new)) is changed and bool(said(new, old)) is changed
     if changed:
@@ -71,11 +72,12 @@ def test_times_that_were_repeated_change_by_half_and_single_ones_by_twofold(both
 
 
 @pytest.mark.parametrize(("noise", "changed"), [(4e-13, False), (1.9e-12, False), (2.1e-12, True)])
-def test_errors_are_raised_to_the_rounding_first(noise, changed):
+def test_errors_below_1e_12_count_as_1e_12(noise, changed):
+    """1e-16 differs from errors above 2e-12."""
     assert bool(said(one(1e-16), one(noise))) is changed
 
 
-def test_another_measure_is_compared_where_the_error_is_the_same():
+def test_other_errors_of_a_run_are_compared_if_the_positions_agree():
     pairs = {
         "velocity_error": "velocities",
         "violation_position": "closure",
@@ -103,42 +105,53 @@ def stored(place, *lines: dict[str, Any], **timings: float):
     return place
 
 
-def test_times_of_a_folder_are_the_interleaved_ones_where_they_exist(tmp_path):
+def test_interleaved_times_of_a_folder_replace_those_of_its_records(tmp_path):
+    """The run k2 has an interleaved time of 0.5 s, k1 has none."""
     place = stored(tmp_path, {"key": "k1"}, {"key": "k2", "family": "g"}, k2=0.5)
     found = {record["key"]: record for record in load(place).values()}
     assert [(found[k]["cost"], found[k]["repeated"]) for k in ("k1", "k2")] == [
         ({"seconds": 4.0, "steps": 7}, False),
         ({"seconds": 0.5, "steps": 7}, True),
     ]
-    assert load(place / "records.jsonl") == load(place), "a file stands for its folder"
+
+
+def test_records_are_loaded_by_scene_engine_family_options_and_samples(tmp_path):
+    place = stored(tmp_path, {"key": "k1"}, {"key": "k2", "family": "g"})
+    assert load(place / "records.jsonl") == load(place), "the path of the file, or of its folder"
     [first, second] = load(place)
     assert first == ("s", "a", "f", '{"step": 0.1}', '{"samples": 3, "end": 1.0}') and second[2] == "g"
 
 
-def test_records_that_cannot_be_compared_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"none/records.jsonl: no such file|none: no such file"):
+def test_a_missing_file_or_field_of_records_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"none\S*: no such file"):
         load(tmp_path / "none")
     (tmp_path / "records.jsonl").write_text('{"key": "k", "scene": "s", "cost": {"seconds": 1.0}}\n')
     with pytest.raises(ValueError, match="lack the field `asked`"):
         load(tmp_path)
 
 
-def test_records_of_a_scene_that_was_changed_since_are_left_out(tmp_path):
+def test_records_of_another_version_of_a_scene_are_left_out(tmp_path):
+    """The folder's scene decides which version counts; without it, the last record does."""
     scene = Scene(name="s", body=(Body(name="b", mass=1.0, inertia=(1.0,) * 3, position=(0.0,) * 3),))
     heavier = scene.with_(body=(scene.body[0].model_copy(update={"mass": 2.0}),))
     place = stored(
         tmp_path, {"key": "k1", "mechanism": mechanism(scene)}, {"key": "k2", "mechanism": mechanism(heavier)}
     )
-    assert [record["key"] for record in load(place).values()] == ["k2"], "of two, the later one is kept"
+    assert [record["key"] for record in load(place).values()] == ["k2"]
     (place / "scenes").mkdir()
     scene.save(place / "scenes" / "s.toml")
     assert [record["key"] for record in load(place).values()] == ["k1"]
+
+
+def test_a_faulty_scene_of_a_folder_of_records_is_refused(tmp_path):
+    place = stored(tmp_path, {"key": "k1"})
+    (place / "scenes").mkdir()
     (place / "scenes" / "s.toml").write_text("gravity = 3\n")
     with pytest.raises(ValueError, match="scenes: "):
         load(place)
 
 
-def test_a_changed_mechanism_is_two_runs_and_a_missing_run_has_one_side():
+def test_runs_of_different_mechanisms_are_each_in_one_set_only():
     old, new = one(1e-5), one(1e-4)
     old["run"]["mechanism"], new["run"]["mechanism"] = "m1", "m2"
     first, second = changes(old, new)
@@ -147,12 +160,16 @@ def test_a_changed_mechanism_is_two_runs_and_a_missing_run_has_one_side():
     new["run"]["mechanism"] = "m1"
     assert len(changes(old, new)) == 1
     del new["run"]["mechanism"]
-    assert len(changes(old, new)) == 1, "a record without its mechanism is compared"
+    assert len(changes(old, new)) == 1, "a record that names no mechanism is compared"
+
+
+def test_runs_of_the_new_set_come_first_in_its_order():
+    old, new = one(1e-5), one(1e-4)
     order = [change.identity for change in changes({"b": old["run"], "a": old["run"]}, {"a": new["run"]})]
-    assert order == ["a", "b"], "the order of the new set, and then the others"
+    assert order == ["a", "b"]
 
 
-def test_ends_of_runs_that_fail_in_both_sets():
+def test_failed_runs_differ_by_their_outcome_or_by_their_end_beyond_rounding():
     def failed(t_end: float, outcome: str = "STEP_FAILED") -> dict[str, Any]:
         return {"run": {**one(1e-5)["run"], "outcome": outcome, "t_end": t_end, "message": ""}}
 
@@ -170,7 +187,7 @@ def circumstance(engine: str, version: str, cpu: str, **more: Any) -> dict[str, 
     return {"scene": "s", **made, **more}
 
 
-def test_versions_machines_and_mechanisms_that_differ():
+def test_circumstances_name_changed_versions_machines_and_mechanisms():
     old = {
         "1": circumstance("a", "1.0", "x", commit="c1"),
         "2": circumstance("a", "1.1", "x", mechanism="m1"),

@@ -1,4 +1,4 @@
-"""Drivers with phases in every family of each adapter / the motion that they prescribe, written down."""
+"""Every family of each adapter follows two drivers with phases, whose motion is known in closed form."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ ROUGH = ("cpodes",)  # off by more than SEEN on a prescribed motion; it runs the
 
 
 @pytest.mark.parametrize(("name", "part"), ENGINES)
-def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name, part):
+def test_an_engine_follows_drivers_that_turn_an_arm_and_slide_a_block_along_it(name, part):
+    """Arm at 0.5 m · e(φ), block at (1 m + s) · e(φ), with the drivers' φ(t) and s(t)."""
     scene = able(name, driven_arm())
     angle, rate = TURN.value(TIMES), TURN.rate(TIMES)
     along, speed = 1.0 + SLIDE.value(TIMES), SLIDE.rate(TIMES)
@@ -34,7 +35,9 @@ def test_two_drivers_with_phases_turn_an_arm_and_slide_a_block(name, part):
         assert abs(run.angular_velocity - spin).max() < 10 * WITHIN, setting
 
 
-def test_exchanged_phases_would_be_seen():
+def test_exchanged_or_negative_phases_would_move_the_bodies_beyond_the_tolerance():
+    """The test of engines allows WITHIN; exchanged phases change φ or s by more than SEEN."""
+    assert SEEN > 3 * WITHIN
     first, second = TURN._replace(phase=SLIDE.phase), SLIDE._replace(phase=TURN.phase)
     assert abs(first.value(TIMES) - TURN.value(TIMES)).max() > SEEN
     assert abs(second.value(TIMES) - SLIDE.value(TIMES)).max() > SEEN

@@ -1,4 +1,4 @@
-"""Energies and works of one body whose states are put in / each term worked out by hand, J."""
+"""Energies and works of one body in given states, against the numbers of their formulas (J)."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def drift(of: Scene, run: Trajectory) -> list[float]:
     return [float(value) for value in found]
 
 
-def test_kinetic_energy_of_translation_and_turning_about_world_axes():
+def test_kinetic_energy_takes_the_angular_velocity_about_world_axes():
     """Turned by a quarter about z, the body's x and y axes exchange: ½ (3·4 + 0.4·1 + 0.2·9 + 0.6·16)."""
     quarter = [[math.cos(math.pi / 4), 0.0, 0.0, math.sin(math.pi / 4)]]
     states = ([START], quarter, [[0.0, 2.0, 0.0]], [[1.0, 3.0, 4.0]])
@@ -56,7 +56,7 @@ def test_kinetic_energy_of_translation_and_turning_about_world_axes():
     assert found == pytest.approx([(12.0 + 0.4 + 1.8 + 9.6) / 2])
 
 
-def test_armature_turns_with_its_joint():
+def test_armature_adds_the_kinetic_energy_of_its_rotor():
     """½ · 0.5 kg m² · (4 rad/s)² beside the body's own."""
     hinge = HINGE.model_copy(update={"armature": 0.5})
     states = ([START], [[1.0, 0.0, 0.0, 0.0]], [[0.0, 8.0, 0.0]], [[0.0, 0.0, 4.0]])
@@ -64,7 +64,7 @@ def test_armature_turns_with_its_joint():
     assert found == pytest.approx([(3.0 * 64.0 + 0.6 * 16.0 + 0.5 * 16.0) / 2])
 
 
-def test_potential_of_weight_and_spring():
+def test_potential_energy_is_that_of_weight_and_springs():
     """Weight along -y and a spring of 50 N/m, 1 m long, from (2, 0, 3): at (2, 4, 0) it has 5 m."""
     spring = Spring(
         bodies=("ground", "b"), points=((2.0, 0.0, 3.0), START), stiffness=50.0, natural_length=1.0
@@ -77,14 +77,14 @@ def test_potential_of_weight_and_spring():
     assert found == pytest.approx([50.0 * 2.0**2 / 2, 3.0 * 10.0 * 4.0 + 50.0 * 4.0**2 / 2])
 
 
-def test_work_of_a_force_at_a_point_of_the_body():
+def test_a_force_works_along_the_path_of_its_point():
     """A force of 5 N along y at 1 m beside the centre, which rises by 0.2 m and turns by a quarter."""
     force = Force(body="b", point=(3.0, 0.0, 0.0), force=(0.0, 5.0, 0.0))
     run = still(START, (2.0, 0.2, 0.0), angles=(0.0, math.pi / 2))
     assert drift(scene(force, hinge=False), run) == pytest.approx([0.0, 5.0 * (0.2 + 1.0)])
 
 
-def test_work_of_a_torsion_spring_from_its_natural_angle():
+def test_a_torsion_spring_stores_half_of_stiffness_times_squared_angle():
     """½ · 8 · ((0.5 + 0.3)² - 0.3²) J for a natural angle of -0.3 rad, at 0.5 rad."""
     twist = TorsionSpring(joint="A", stiffness=8.0, natural_angle=-0.3)
     turning = np.array([[[0.0, 0.0, 1.0]], [[0.0, 0.0, 1.0]]])
@@ -96,8 +96,8 @@ def test_work_of_a_torsion_spring_from_its_natural_angle():
 
 
 @pytest.mark.parametrize("hinge", [True, False])
-def test_work_of_a_moment_about_the_hinge_and_on_a_free_body(hinge):
-    """2 N m over 0.5 rad: by the angle where the hinge keeps the axis, else by the power at the samples."""
+def test_a_moment_works_along_the_angle_of_a_hinge_or_of_a_free_body(hinge):
+    """2 N m over 0.5 rad: by the hinge's angle, or on a free body by the power at the samples."""
     spin = np.full((3, 1, 3), (0.0, 0.0, 0.5))
     body = scene().body[0].model_copy(update={"angular_velocity": (0.0, 0.0, 0.5)})
     of = scene(Moment(body="b", moment=(0.0, 0.0, 2.0)), hinge=hinge).with_(body=(body,))
@@ -111,16 +111,16 @@ def test_work_of_a_moment_about_the_hinge_and_on_a_free_body(hinge):
     assert drift(of, run) == pytest.approx([0.0, 0.5, 1.0], abs=1e-12)
 
 
-def test_drift_over_the_largest_energy_seen():
-    """Lifted by 2 m against 10 m/s² and at rest: all of the 60 J that are seen are drift."""
+def test_energy_error_is_the_drift_relative_to_the_largest_energy():
+    """A body at rest that rises by 2 m against 10 m/s² drifts by 60 J, the largest energy of the run."""
     of = scene(gravity=(0.0, -10.0, 0.0), hinge=False)
     run = still(START, (2.0, 2.0, 0.0), (2.0, -1.0, 0.0))
     assert drift(of, run) == pytest.approx([0.0, 60.0, 30.0])
     assert energy_series(of, run) == pytest.approx([0.0, 1.0, 0.5])
 
 
-def test_energies_below_rounding_have_no_drift():
-    """2e-12 of what weight and motion can cause is an energy, 0.5e-12 is rounding."""
+def test_an_energy_below_rounding_has_no_error():
+    """Relative to what weight and motion can cause, 2e-12 is an energy, and 0.5e-12 is rounding."""
     of = scene(gravity=(0.0, -10.0, 0.0))
     possible = 2.0 * 30.0 + 3.0 * (2.0 / 0.5) ** 2 / 2
     for part, is_known in ((2e-12, True), (0.5e-12, False)):

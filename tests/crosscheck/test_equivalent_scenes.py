@@ -1,4 +1,4 @@
-"""Equivalent forms of a mechanism / names, exchanged fields and halves worked out by hand."""
+"""Equivalent forms of a scene: other names, negative quaternions, a body split in halves."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
     return Scene(**{"name": "s", "body": bodies or (body(),), "gravity": ORIGIN, "duration": 1.0, **parts})
 
 
-def test_names_of_more_than_26_parts():
-    """Letters fall from z to a, and begin again, so that the alphabet does not keep the order."""
+def test_new_names_begin_with_letters_that_fall_from_z_to_a_and_begin_again():
+    """Bodies and joints are numbered from 0: part 25 begins with a, part 26 with z."""
     many = scene(
         *(body(f"b{k}", position=(float(k), 0.0, 0.0)) for k in range(28)),
         joint=tuple(Spherical(name=f"j{k}", bodies=("ground", f"b{k}"), anchor=ORIGIN) for k in range(28)),
@@ -42,19 +42,22 @@ def test_names_of_more_than_26_parts():
 # --- two halves -------------------------------------------------------------------------------------------
 
 
-def test_halves_that_are_no_bodies_of_the_scene():
+def test_a_body_is_not_split_if_a_name_is_taken_or_a_half_is_too_thin():
     taken = rewritings.split(scene(body("b half", position=ORIGIN), body()))
     assert isinstance(taken, Outside) and taken.reason.startswith("the halves are not valid bodies: ")
     assert "b half" in taken.reason
     thin = rewritings.split(scene(body(inertia=(1.5 * SMALLEST, 0.4, 0.4))))
     assert isinstance(thin, Outside) and "too thin" in thin.reason
+
+
+def test_halves_of_a_rod_have_no_moment_of_inertia_along_it():
     rod, _ = rewritings.split(scene(body(inertia=(0.0, 0.4, 0.4)))).body
-    assert np.array(rod.inertia) == pytest.approx(np.diag([0.0, 0.16, 0.16])), "a rod has no moment along it"
+    assert np.array(rod.inertia) == pytest.approx(np.diag([0.0, 0.16, 0.16]))
 
 
 @pytest.mark.parametrize(("off", "is_split"), [(0.5e-12, True), (2e-12, False)])
-def test_velocities_that_differ_from_the_joints_by_rounding(off, is_split):
-    """A hinge at the origin, 2 rad/s: the centre at (1, 2, 0) moves at (-4, 2, 0) m/s, so that 4e-12 m/s are
+def test_a_body_is_split_only_if_its_velocity_meets_the_joint_to_rounding(off, is_split):
+    """A hinge at the origin, 2 rad/s: the centre at (1, 2, 0) moves at (-4, 2, 0) m/s; 4e-12 m/s are
     rounding."""
     hinge = Revolute(name="J", bodies=("ground", "b"), anchor=ORIGIN, axis=Z)
     spun = body(velocity=(-4.0, 2.0 + 4 * off, 0.0), angular_velocity=(0.0, 0.0, 2.0))
@@ -62,7 +65,7 @@ def test_velocities_that_differ_from_the_joints_by_rounding(off, is_split):
     assert isinstance(found, Scene) is is_split
 
 
-def test_negative_quaternions_turn_alike():
+def test_negated_quaternions_rotate_vectors_alike():
     turned = body(orientation=(0.5, 0.5, -0.5, 0.5))
     [found] = rewritings.negated(scene(turned)).body
     assert found.orientation == (-0.5, -0.5, 0.5, -0.5)
@@ -71,7 +74,7 @@ def test_negative_quaternions_turn_alike():
     )
 
 
-def test_a_scene_without_joints_is_split():
+def test_halves_of_a_driven_body_are_welded_and_keep_joint_and_driver():
     driver = Driver(joint="J", polynomial=(0.0, 1.0))
     hinge = Revolute(name="J", bodies=("ground", "b"), anchor=(1.0, 2.0, 0.0), axis=Z)
     still = rewritings.split(scene(body(angular_velocity=Z), joint=(hinge,), driver=(driver,)))

@@ -1,4 +1,4 @@
-"""Errors that an engine estimates / records of a study, the time limit, engines without estimates."""
+"""Errors that an engine estimates itself: in records of a study, within a limit of time, or not at all."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ TIMES = np.linspace(0.0, 0.3, 7)
 LOOSE = Setting("mpi-svd+projection", {"rtol": 1e-4})
 
 
-def test_a_record_of_mbref_has_the_estimate_beside_the_error():
+def test_error_that_mbref_estimates_equals_the_error_against_the_truth():
+    """Within 0.1 %; the record of a study has both."""
     record = run_case(Case(SCENE, TIMES, "mbref", LOOSE))
     found = record["error_estimate"]
     assert found["largest"] == max(found["error"]) and len(found["error"]) == len(TIMES)
@@ -30,25 +31,26 @@ def test_a_record_of_mbref_has_the_estimate_beside_the_error():
     assert json.loads(json.dumps(public(record)))["error_estimate"]["rtol"] == 1e-4
 
 
-def test_a_run_that_takes_longer_than_the_estimate_may_has_none():
+def test_an_estimate_that_needs_more_than_its_time_is_left_out_and_the_run_is_unchanged():
+    """The limit is 0 s."""
     run = serve.run_estimated("mbref", SCENE, TIMES, LOOSE, 0.0)
     found = run.to_record()["error_estimate"]
     assert found["largest"] is None and "more than 0 s" in found["reason"]
     assert np.array_equal(run.position, serve.run_once("mbref", SCENE, TIMES, LOOSE).position)
 
 
-def test_runs_that_are_not_of_a_study_have_no_estimate():
+def test_a_run_outside_a_study_has_no_estimate():
     assert run_isolated("mbref", SCENE, TIMES, LOOSE, 60.0).to_record()["error_estimate"] is None
 
 
-def test_an_engine_without_estimates_gives_its_run():
+def test_an_engine_without_estimates_has_none_in_its_record():
     record = run_case(Case(SCENE, TIMES, f"{FAKES}:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
     assert run.with_error_estimate(1.0) is run
 
 
-def test_a_sensitive_motion_is_reported_in_the_message():
+def test_the_message_of_an_estimated_run_says_that_its_motion_is_sensitive():
     """Three rods in a row, released from a horizontal line, are chaotic."""
     bodies = tuple(
         Body(name=f"rod{k}", mass=1.0, inertia=(0.02, 0.02, 0.02), position=(0.4 * k + 0.2, 0.0, 0.0))
