@@ -15,9 +15,13 @@ ROUNDING = 1e-14  # stands for measured errors that are smaller
 
 
 def completed_error(run: Trajectory, scene: Scene) -> float:
-    """Return the largest error of a position (m) or an orientation (rad), by the truth; the run must have
-    completed."""
+    """Return `error_of_samples` of a run that must have completed."""
     assert run.outcome is Outcome.COMPLETED, f"{run.outcome.label} at {run.t_end} s: {run.message}"
+    return error_of_samples(run, scene)
+
+
+def error_of_samples(run: Trajectory, scene: Scene) -> float:
+    """Return the largest error of a position (m) or an orientation (rad) at the samples, by the truth."""
     truth = truth_for(scene).poses(run.times)
     turned = rotations.angle_between(run.orientation, truth.orientation).max()
     return max(abs(run.position - truth.position).max(), turned)

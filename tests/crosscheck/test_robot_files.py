@@ -101,7 +101,8 @@ def original(name: str, found: Source) -> mujoco.MjModel:
 
 
 @pytest.mark.parametrize("name", sorted(FREEDOMS))
-def test_robot_files_are_read_whole(name):
+def test_robot_file_gives_its_freedoms_and_leaves_out_dampings_only(name):
+    """Joints, loops and mimic joints leave the freedoms counted by hand; no other part changes the motion."""
     found = read(name)
     scene, left_out = found.imported.scene, found.imported.left_out
     assert scene.counts().degrees_of_freedom == FREEDOMS[name]
@@ -112,13 +113,13 @@ def test_robot_files_are_read_whole(name):
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in LASTING else n for n in sorted(FREEDOMS)]
 )
-def test_robot_files_move_as_their_original_models(name):
+def test_scene_of_a_robot_file_moves_as_mujoco_s_model(name):
     found = read(name)
     assert apart(original(name, found), found, 0.05) < SAME
 
 
-def test_a_scene_that_differs_from_its_file_moves_otherwise():
-    """A hundredth of a percent of one mass, and of one armature, is seen in the motion."""
+def test_error_of_1e_4_in_a_mass_or_armature_shows_in_the_motion():
+    """The mass of a foot or the armature of a motor, times 1.0001: over 100 times the allowed difference."""
     found = read("ankle.xml")
     model = found.original
     rotor = int(model.joint("left_motor").dofadr[0])
@@ -148,11 +149,13 @@ MAKERS = (random_models.mjcf, random_models.urdf)
 
 
 @pytest.mark.parametrize("make", MAKERS, ids=["mjcf", "urdf"])
-def test_random_files_move_as_their_original_models(make, tmp_path):
+def test_scenes_of_random_files_move_as_mujoco_s_models(make, tmp_path):
+    """Three files, of which at least one is read; the others are refused for a known reason."""
     assert any([random_file_moves_alike(make, seed, tmp_path) for seed in range(1000, 1003)])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("make", MAKERS, ids=["mjcf", "urdf"])
-def test_many_random_files_move_as_their_original_models(make, tmp_path):
+def test_scenes_of_a_hundred_random_files_move_as_mujoco_s_models(make, tmp_path):
+    """At least 60 of the files are read; the others are refused for a known reason."""
     assert sum(random_file_moves_alike(make, seed, tmp_path) for seed in range(100)) >= 60

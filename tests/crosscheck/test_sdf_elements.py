@@ -35,7 +35,7 @@ def hinge(more: str = "", kind: str = "revolute", ends: str = "", name: str = "j
 
 
 # --- Links ------------------------------------------------------------------------------------------------
-def test_a_link_has_its_mass_and_inertia_at_its_centre(tmp_path: Path) -> None:
+def test_link_becomes_a_body_with_its_inertial_pose_and_moments(tmp_path: Path) -> None:
     """The inertial pose moves the centre and turns the moments by a quarter turn about z."""
     moved = MASS.replace("<inertial>", f"<inertial><pose>0.5 0 0 0 0 {math.pi / 2!r}</pose>")
     link = f'<link name="b"><pose>1 2 3 0 0 {math.pi / 2!r}</pose>{moved}</link>'
@@ -46,7 +46,8 @@ def test_a_link_has_its_mass_and_inertia_at_its_centre(tmp_path: Path) -> None:
     assert body.inertia == pytest.approx((2.0, 1.0, 2.5))
 
 
-def test_defaults_of_the_format(tmp_path: Path) -> None:
+def test_links_without_inertial_and_worlds_without_gravity_get_sdf_s_defaults(tmp_path: Path) -> None:
+    """1 kg and 1 kg m² about each axis; 9.8 m/s² downwards. Notes say so, for a link without ``inertial``."""
     bare = '<link name="b"/><link name="c"><inertial/></link>'
     bare += '<link name="d"><inertial><inertia/></inertial></link>'
     found = read(tmp_path, bare, gravity="")
@@ -68,7 +69,7 @@ def test_defaults_of_the_format(tmp_path: Path) -> None:
         ("</link>", "<velocity_decay/></link>", "damping", "velocity_decay of link 'b'"),
     ],
 )
-def test_parts_of_links_that_change_the_motion(
+def test_link_element_that_changes_the_motion_is_refused_or_left_out(
     old: str, new: str, kind: str, sentence: str, tmp_path: Path
 ) -> None:
     with pytest.raises(
@@ -81,7 +82,7 @@ def test_parts_of_links_that_change_the_motion(
 
 # --- Joints -----------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("kind", ["revolute", "prismatic", "ball", "fixed", "universal", "continuous"])
-def test_joints_are_at_the_child_with_their_axes(kind: str, tmp_path: Path) -> None:
+def test_joint_lies_at_its_child_with_its_axes(kind: str, tmp_path: Path) -> None:
     found = read(tmp_path, LINK + hinge(kind=kind, axes="axis axis2" if kind == "universal" else "axis"))
     [joint] = found.scene.joint
     assert joint.bodies == ("ground", "b") and joint.anchor_pair[0] == (1.0, 2.0, 3.0)
@@ -89,19 +90,16 @@ def test_joints_are_at_the_child_with_their_axes(kind: str, tmp_path: Path) -> N
     assert [tuple(axis) for axis in joint.directions] == wanted.get(kind, [(0.0, 0.0, 1.0)])
 
 
-def test_axes_are_of_length_one_in_the_frame_that_is_named(tmp_path: Path) -> None:
-    """The link is turned by a quarter turn about x, so that its z axis is the world's -y."""
+def test_axis_is_normalised_in_the_frame_that_it_names(tmp_path: Path) -> None:
+    """The link is turned by a quarter turn about x, so that its z axis is the world's -y. The axis is (0, 0,
+    4) of the link or of the model; without numbers it is z of the link, SDF's default."""
     turned = LINK.replace("1 2 3 0 0 0", f"1 2 3 {math.pi / 2!r} 0 0")
     long = hinge().replace("<xyz>0 0 1", "<xyz>0 0 4")
-    assert read(tmp_path, turned + long).scene.joint[0].directions[0] == pytest.approx(
-        (0.0, -1.0, 0.0), abs=1e-15
-    )
-    own = long.replace("<xyz>", '<xyz expressed_in="__model__">')
-    assert read(tmp_path, turned + own).scene.joint[0].directions[0] == (0.0, 0.0, 1.0)
-    without = hinge(axes="").replace("</joint>", "<axis/></joint>")
-    assert read(tmp_path, turned + without).scene.joint[0].directions[0] == pytest.approx(
-        (0, -1, 0), abs=1e-15
-    )
+    of_model = long.replace("<xyz>", '<xyz expressed_in="__model__">')
+    default = hinge(axes="").replace("</joint>", "<axis/></joint>")
+    for joint, axis in ((long, (0, -1, 0)), (of_model, (0, 0, 1)), (default, (0, -1, 0))):
+        found = read(tmp_path, turned + joint).scene.joint[0].directions[0]
+        assert found == pytest.approx(axis, abs=1e-15)
 
 
 DYNAMICS = (
@@ -110,26 +108,26 @@ DYNAMICS = (
 )
 
 
-def test_friction_and_springs_of_other_joints_are_parts(tmp_path: Path) -> None:
+def test_friction_of_a_hinge_is_left_out_on_request_and_its_spring_stays(tmp_path: Path) -> None:
     rough = DYNAMICS.replace("<friction>0", "<friction>7")
     found = read(tmp_path, LINK + hinge(rough), without=["friction"])
-    assert (
-        found.left_out == ("dry friction of joint 'j' (--without friction)",) and len(found.scene.load) == 1
-    )
+    assert found.left_out == ("dry friction of joint 'j' (--without friction)",)
+    assert len(found.scene.load) == 1
+
+
+def test_damping_and_spring_of_a_ball_joint_are_refused_by_name(tmp_path: Path) -> None:
     with pytest.raises(SceneError) as refused:
         read(tmp_path, LINK + hinge(DYNAMICS, "ball"))
-    assert [fault.partition(":")[0] for fault in refused.value.faults] == [
-        "damping of joint 'j'",
-        "springs of joint 'j'",
-    ]
-    damped = DYNAMICS.replace(">3<", ">0<")
+    causes = [fault.partition(":")[0] for fault in refused.value.faults]
+    assert causes == ["damping of joint 'j'", "springs of joint 'j'"]
+
+
+def test_damping_of_a_ball_joint_is_left_out_on_request(tmp_path: Path) -> None:
+    damped = DYNAMICS.replace(">3<", ">0<")  # no stiffness
     found = read(tmp_path, LINK + hinge(damped, "ball"), without=["damping"])
     assert found.left_out == ("damping of joint 'j' (--without damping)",)
 
 
-def test_sdf_is_read_only(tmp_path: Path) -> None:
-    (tmp_path / "m.sdf").write_text(f'<sdf version="1.11"><model name="m">{LINK}</model></sdf>')
-    assert reading.FORMAT.read(tmp_path / "m.sdf", ImportOptions()).scene.name == "m"
+def test_export_of_sdf_is_refused_with_a_format_that_works(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match=r"SDF: is read only; export as \.xml"):
         reading.FORMAT.write(read(tmp_path, LINK).scene)
-    assert reading.FORMAT.reads == (".sdf",) and reading.FORMAT.writes == ()

@@ -25,7 +25,9 @@ def finger(version: str) -> str:
 
 @pytest.mark.parametrize(("version", "axis"), [("1.4", (0, 1, 0)), ("1.10", (0, 0, 1))])
 @pytest.mark.parametrize("uri", ["model://finger", "finger", "file://finger/old.sdf"])
-def test_a_model_beside_the_file_is_included_with_the_axes_of_its_version(uri, version, axis, tmp_path):
+def test_included_model_has_the_axes_of_its_own_version(uri, version, axis, tmp_path):
+    """The axis is y of the model before SDF 1.5, and y of the link, turned to z, from then on. Name and pose
+    are the include's."""
     (tmp_path / "finger").mkdir()
     (tmp_path / "finger" / "old.sdf").write_text(finger(version))
     config = '<model><sdf version="1.2">older.sdf</sdf><sdf version="1.4">old.sdf</sdf></model>'
@@ -37,7 +39,7 @@ def test_a_model_beside_the_file_is_included_with_the_axes_of_its_version(uri, v
     assert np.allclose(scene.joint_named("thumb::knuckle").axis, axis)
 
 
-def test_a_model_without_overrides_keeps_its_name_and_pose_and_is_found_by_a_variable(tmp_path, monkeypatch):
+def test_sdf_path_finds_an_included_model_with_its_own_pose(tmp_path, monkeypatch):
     (tmp_path / "models" / "finger").mkdir(parents=True)
     (tmp_path / "models" / "finger" / "model.sdf").write_text(finger("1.7"))
     monkeypatch.setenv("SDF_PATH", str(tmp_path / "models"))
@@ -45,7 +47,7 @@ def test_a_model_without_overrides_keeps_its_name_and_pose_and_is_found_by_a_var
     assert np.allclose(scene.body[2].position, (0.1, 7, 0))
 
 
-def test_the_ground_and_the_sun_of_a_world_are_left_out(tmp_path):
+def test_included_sun_and_ground_plane_are_left_out(tmp_path):
     still = "".join(f"<include><uri>{uri}</uri></include>" for uri in ("model://sun", "model://ground_plane"))
     text = pair().replace("<model", f'<world name="w">{still}<model').replace("</sdf>", "</world></sdf>")
     assert [body.name for body in read(tmp_path, text).scene.body] == ["a", "b"]
@@ -69,14 +71,15 @@ def gears(parent: str = "one", child: str = "two", sense: int = 1, swapped: bool
 
 @pytest.mark.parametrize("swapped", [False, True])
 @pytest.mark.parametrize("sense", [1, -1])
-def test_a_gearbox_turns_its_child_by_minus_its_ratio_times_its_parent(sense, swapped, tmp_path):
-    """The angle of the child about its axis is -3 times the parent's, whatever the hinges' senses are."""
+def test_gearbox_turns_its_child_by_minus_ratio_times_the_parent(sense, swapped, tmp_path):
+    """About its axis2 the child turns at -3 times the parent's rate about its axis, whatever the senses of
+    the hinges are; accelerations from rest by Gauss's principle."""
     scene = read(tmp_path, gears(sense=sense, swapped=swapped)).scene
     spins = gauss(scene)[len(scene.body) :, 1]
     of_parent, of_child = spins[1] - spins[0], sense * (spins[2] - spins[0])
     assert abs(of_parent) > 1 and of_child == pytest.approx(-3 * of_parent, rel=1e-9)
 
 
-def test_a_gearbox_without_hinges_on_its_reference_is_refused(tmp_path):
+def test_gearbox_without_hinges_on_its_reference_body_is_refused(tmp_path):
     with pytest.raises(SceneError, match="joint 'G': a gearbox needs a hinge along its axis between 'frame'"):
         read(tmp_path, gears(parent="frame", child="one"))

@@ -51,7 +51,7 @@ def scene(*bodies: Body, **parts: Any) -> Scene:
 # --- frames -----------------------------------------------------------------------------------------------
 
 
-def test_world_vectors_in_the_axes_of_a_body():
+def test_world_vectors_and_points_are_given_in_a_body_s_axes():
     """The body is turned by 90° about z: X of the world is -y of the body, Y is x."""
     turned = scene(body(orientation=(HALF, 0.0, 0.0, HALF)))
     assert in_body(turned, "b", np.array([X, Y])) == pytest.approx(np.array([[0, -1, 0], [1, 0, 0.0]]))
@@ -63,7 +63,8 @@ def test_world_vectors_in_the_axes_of_a_body():
 # --- steps ------------------------------------------------------------------------------------------------
 
 
-def test_each_state_is_settled_and_must_be_finite():
+def test_rk4_corrects_each_state_and_fails_if_it_is_not_finite():
+    """A correction adds 1 after each of two steps; a state that becomes infinite at 0.5 s ends the run."""
     settled: list[float] = []
 
     def settle(t: float, y: np.ndarray) -> np.ndarray:
@@ -85,7 +86,8 @@ def test_each_state_is_settled_and_must_be_finite():
     assert caught.value.outcome is Outcome.NOT_FINITE and caught.value.t == 0.5
 
 
-def test_loads_that_change_between_steps():
+def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_there():
+    """A factor that is smooth over the motion needs no end of a step."""
     table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
     smooth = Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0)))
     switched = Force(body="b", point=X, force=Z, factor=Factor(start=0.5))
@@ -108,7 +110,8 @@ def sampled(t: float, **parts: Any) -> Sample:
 LABELS = {"engine": "e", "version": "1", "method": "m", "settings": {}}
 
 
-def test_a_run_from_sample_to_sample():
+def test_run_advances_from_sample_to_sample_and_stores_states_and_costs():
+    """Samples at 0, 0.5 and 2 s: two intervals are advanced; states and reactions are functions of time."""
     moved: list[tuple[float, float]] = []
     found = run_through(
         scene(),
@@ -119,7 +122,7 @@ def test_a_run_from_sample_to_sample():
         0.25,
         LABELS,
     )
-    assert moved == [(0.0, 0.5), (0.5, 2.0)], "nothing is advanced to the start"
+    assert moved == [(0.0, 0.5), (0.5, 2.0)]
     assert found.outcome is Outcome.COMPLETED and (found.t_end, found.message) == (2.0, "")
     assert found.position[:, 0, 0].tolist() == [0.0, 0.5, 2.0] and found.bodies == ("b",)
     assert found.reactions["H"][:, 5].tolist() == [0.0, 0.5, 2.0]
@@ -127,7 +130,9 @@ def test_a_run_from_sample_to_sample():
     assert (cost.build_seconds, cost.steps, cost.rejected, cost.rhs) == (0.25, 3, 2, 1) and cost.seconds >= 0
 
 
-def test_a_run_that_ends_early_keeps_its_samples():
+def test_run_that_fails_keeps_its_samples_and_states_the_reason():
+    """One run fails at 0.75 s between its samples 0.5 s and 2 s; another has no finite position at 2 s."""
+
     def advance(t0: float, t1: float) -> None:
         if t1 > 1.0:
             raise Failed(Outcome.STEP_FAILED, 0.75, "no step")
@@ -151,19 +156,21 @@ def one_ball(in_child: bool, places: tuple[Any, ...] = ()) -> JointCoordinates:
 
 
 @pytest.mark.parametrize("in_child", [True, False])
-def test_rates_of_a_quaternion(in_child):
-    """Half of the product with the angular velocity, in the axes of the child or of the parent."""
+def test_ball_s_quaternion_rate_is_half_its_product_with_the_spin(in_child):
+    """q' = q (0, ω) / 2 in the child's axes, (0, ω) q / 2 in the parent's. A turn by π / 2 about y composes
+    in the matching order; quaternions are normalised first."""
     q, spin = np.array([HALF, HALF, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
     other = rotations.multiply
     wanted = other(q, np.array([0.0, *spin])) / 2 if in_child else other(np.array([0.0, *spin]), q) / 2
-    assert one_ball(in_child).rates(3 * q, spin) == pytest.approx(wanted), "of a unit quaternion"
+    assert one_ball(in_child).rates(3 * q, spin) == pytest.approx(wanted)
     moved = one_ball(in_child).moved(q, np.array([0.0, math.pi / 2, 0.0]))
     turn = np.array([HALF, 0.0, HALF, 0.0])
     assert moved == pytest.approx(other(q, turn) if in_child else other(turn, q))
     assert one_ball(in_child).normalised(5 * q) == pytest.approx(q)
 
 
-def test_a_free_link_turns_about_axes_of_the_world():
+def test_free_link_moves_along_and_turns_about_world_axes():
+    """q = (position, quaternion), v = (velocity, spin) in world axes: q' = (v, (0, ω) q / 2)."""
     none = np.zeros(0, dtype=int)
     free = JointCoordinates(6, 7, none, none, ((3, 3),), ((0, 0),), True)
     q = np.array([1.0, 2.0, 3.0, HALF, HALF, 0.0, 0.0])
@@ -172,21 +179,19 @@ def test_a_free_link_turns_about_axes_of_the_world():
     assert free.rates(q, v)[:3].tolist() == [4.0, 5.0, 6.0]
     assert free.rates(q, v)[3:] == pytest.approx(rotations.multiply(spin, q[3:]) / 2)
     assert free.moved(q, v)[:3].tolist() == [5.0, 7.0, 9.0]
-    line = JointCoordinates(1, 1, np.array([0]), np.array([0]), (), (), False)
-    same = np.array([3.0])
-    assert line.normalised(same) is same and line.moved(same, np.array([0.5])).tolist() == [3.5]
 
 
 # --- drivers ----------------------------------------------------------------------------------------------
-def test_value_rate_and_acceleration_of_a_driver():
-    """1 + 2 t + 3 t² + t³, and 0.5 sin(4 t + 0.3), at 2 s."""
+def test_driver_has_the_value_rate_and_acceleration_of_its_function():
+    """f = 1 + 2 t + 3 t² + t³ + 0.5 sin(4 t + 0.3), from 1 s to 3 s, at 2 s: f, f' and f''. At a switch the
+    piece that acts since an earlier time still acts. A table of t³ is the cubic."""
     wave = Sine(amplitude=0.5, frequency=4.0, phase=0.3)
     factor = Factor(polynomial=(1.0, 2.0, 3.0, 1.0), sine=wave, start=1.0, stop=3.0)
     s, c = math.sin(8.3), math.cos(8.3)
     wanted = (25.0 + 0.5 * s, 26.0 + 2.0 * c, 18.0 - 8.0 * s)
     assert driver_motion.motion(factor, 2.0) == pytest.approx(wanted)
     assert driver_motion.motion(factor, 0.999) == driver_motion.motion(factor, 3.0) == (0.0, 0.0, 0.0)
-    assert driver_motion.motion(factor, 3.0, since=2.0)[0] > 0, "the piece before acts until its end"
+    assert driver_motion.motion(factor, 3.0, since=2.0)[0] > 0
     cubic = Driver(joint="H", table=tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0)))
     assert driver_motion.motion(cubic, 1.5) == pytest.approx((3.375, 6.75, 9.0))
     assert driver_motion.mean_rate(cubic, 1.0, 0.5) == pytest.approx(4.75)
@@ -221,8 +226,9 @@ def test_value_rate_and_acceleration_of_a_driver():
         ({"load": (JointTorque(joint="H", torque=99.0),)}, 0.5),
     ],
 )
-def test_the_fastest_rate_that_is_stated(parts, rate):
-    """One over the duration of 2 s; springs act on the least mass, 4 kg, or middle moment, 2 kg m²."""
+def test_stated_rate_is_the_largest_of_drivers_springs_loads_and_spins(parts, rate):
+    """rad/s: 1 / duration (2 s), largest rate and frequency of drivers and loads, √(k/m) and d/m of springs
+    with the least mass, 4 kg, or middle moment, 2 kg m². A spin of √(6² + 8²) exceeds them all."""
     slide = Translational(name="S", bodies=("ground", "c"), anchor=(1.0, 2.0, 3.0), axis=X)
     given = scene(body(), body("c", mass=5.0, inertia=(9.0, 9.0, 9.0)), joint=(HINGE, slide), **parts)
     assert driver_motion.stated_rate(given) == pytest.approx(rate)
@@ -231,7 +237,8 @@ def test_the_fastest_rate_that_is_stated(parts, rate):
 
 
 # --- compilers and code -----------------------------------------------------------------------------------
-def test_the_compiler_that_is_installed(monkeypatch):
+def test_compiler_is_the_environment_variable_s_or_the_first_installed(monkeypatch):
+    """Of programs "one" and "two" only "two" is installed; an empty variable CC counts as none."""
     compiler = Compiler("C", "CC", ("one", "two"))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: None if name == "one" else f"/bin/{name}")
@@ -242,9 +249,9 @@ def test_the_compiler_that_is_installed(monkeypatch):
     with pytest.raises(NoLibrary, match=r"no C compiler is installed \(one\)"):
         compiler.path()
     monkeypatch.setenv("CC", "")
-    assert compiler.path() == "/bin/two", "an empty variable names none"
+    assert compiler.path() == "/bin/two"
 
 
-def test_a_compiler_that_cannot_be_run():
+def test_compiler_that_cannot_be_started_is_reported():
     with pytest.raises(NoLibrary, match="the C compiler could not be run"):
         Compiler("C", "CC", ()).run(["/nowhere/compiler"])

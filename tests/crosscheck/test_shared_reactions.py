@@ -36,7 +36,7 @@ PAIR = Scene(
 POSE = initial_poses(PAIR)
 
 
-def test_a_coupling_acts_along_both_coordinates():
+def test_unit_multiplier_of_a_coupling_acts_along_both_coordinates():
     """The unit multiplier of x = θ / 2 is a force of 1 N along x and a moment of -1/2 N m about z."""
     rows, _ = jacobian(PAIR, 0.0, *POSE)
     found = {joint.name: wrench for joint, wrench in joint_reactions.of_multipliers(PAIR, rows, *POSE)}
@@ -49,7 +49,7 @@ def test_a_coupling_acts_along_both_coordinates():
 
 
 @pytest.mark.parametrize(("bodies", "sign"), [(("ground", "a"), 1.0), (("a", "ground"), -1.0)])
-def test_a_wrench_acts_on_the_second_body_at_its_anchor(bodies, sign):
+def test_multiplier_s_wrench_acts_on_the_second_body_at_its_anchor(bodies, sign):
     """A row of velocity along y at 2 m and a spin of 5 about z: a force along y, a moment of 5 + 1 N m."""
     scene = Scene(name="s", body=(body("a", 3.0),), joint=(hinge("A", *bodies, x=2.0),))
     rows = np.array([[0.0, 1.0, 0.0, 0.0, 0.0, 5.0]])
@@ -75,12 +75,13 @@ DOOR = PAIR.with_(
 )
 
 
-def test_shared_components_side_by_side():
-    """The hinges of a door share the force along their axis; a run without reactions is left out."""
+def test_reactions_shared_by_a_door_s_hinges_are_shown_by_run():
+    """Hinges A and B of a door share the force along their axis, with 3 and 1 N or 1 and 3 N; C's reaction, 7
+    N, is unique. A run without reactions is left out. The shares differ by 2 N of the largest force, 7 N."""
     one = run(A=(0, 0, 3, 0, 0, 0), B=(0, 0, 1, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
     other = run(A=(0, 0, 1, 0, 0, 0), B=(0, 0, 3, 0, 0, 0), C=(7, 0, 0, 0, 0, 0))
     found = joint_reactions.side_by_side(DOOR, {"one": one, "none": run(), "other": other}, 1)
-    assert set(found) == {"A", "B"}, "the reaction of C is unique"
+    assert set(found) == {"A", "B"}
     assert {label: round(size, 9) for label, size in found["A"].items()} == {"one": 3.0, "other": 1.0}
     compared = joint_reactions.compare(DOOR, one, other)
     assert compared.joints["C"].shared == 0 and compared.joints["C"].unique == 0.0

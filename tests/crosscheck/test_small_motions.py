@@ -43,7 +43,8 @@ def judged(request):
 
 
 def test_the_judge_finds_the_eigenvalues_of_closed_forms(judged):
-    """To 1e-13, and to fifty times the uncertainty that it states."""
+    """Relative errors of the best of the poses found are below 1e-13, and below fifty times the uncertainty
+    that the judge states; a positive real part is called unstable."""
     mechanism, found = judged
     for exact in mechanism.known():
         errors = [error(each.eigenvalues, np.array(exact)) for each in found]
@@ -55,7 +56,8 @@ def test_the_judge_finds_the_eigenvalues_of_closed_forms(judged):
         assert found[best].stability == ("unstable" if unstable else "stable")
 
 
-def test_poses_are_balanced_and_eigenvalues_come_in_conjugate_pairs(judged):
+def test_steady_poses_are_balanced_with_symmetric_positive_mass_matrix(judged):
+    """Unbalanced forces are below 1e-13, and eigenvalues come in conjugate pairs, of real equations."""
     _, found = judged
     for each in found:
         assert np.abs(each.balance.unbalanced(each.state).astype(float)).max() < 1e-13
@@ -64,14 +66,15 @@ def test_poses_are_balanced_and_eigenvalues_come_in_conjugate_pairs(judged):
         assert np.allclose(mass, mass.T, rtol=1e-14) and np.linalg.eigvalsh(mass)[0] > 0
 
 
-def test_stiffness_is_symmetric_at_rest_and_damping_without_rotation():
+def test_damped_slides_have_symmetric_stiffness_and_positive_damping():
     [each] = steady_poses(damped_slides(), starts=1)
     assert np.allclose(each.small.stiffness, each.small.stiffness.T, rtol=1e-13)
     assert np.linalg.eigvalsh(each.small.damping)[0] > 0
 
 
-def test_the_four_bar_with_a_diagonal_spring_to_thirty_digits():
-    """I s² + c d'² s + V'' = 0 by python-flint; the IFToMM benchmark prints the angle, 4e-11 from it."""
+def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
+    """I s² + c d'² s + V'' = 0, solved in thirty digits by python-flint. Newton's method gives V' = 0; the
+    angle is the one that the IFToMM benchmark prints, up to its 4e-11 rad."""
     flint = pytest.importorskip("flint")
     flint.ctx.dps = 30
     angle, two, gravity = flint.arb("2.2343"), flint.arb(2), flint.arb("9.81")
@@ -98,7 +101,7 @@ def test_the_four_bar_with_a_diagonal_spring_to_thirty_digits():
     assert error(found[0].eigenvalues, exact) < 4e-15 and pytest.approx(2**0.5, rel=1e-16) == DIAGONAL
 
 
-def test_a_ball_on_a_turning_spindle_has_the_roots_of_eulers_equations():
+def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
     """s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), seen from the spindle."""
     rate, (a, b, c) = 6.0, (0.02, 0.03, 0.045)
     bodies = [
@@ -114,8 +117,9 @@ def test_a_ball_on_a_turning_spindle_has_the_roots_of_eulers_equations():
     assert np.abs(found[:, None] - exact).min(axis=0).max() < 1e-12 * rate
 
 
-def test_a_steady_motion_is_a_motion():
-    """The judge's integration from the judge's steady pose keeps the mechanism's shape."""
+def test_steady_pose_of_the_governor_stays_steady_when_integrated():
+    """Over 0.2 s of the judge's own integration, a ball's distance from the axis and the sleeve's height
+    stay."""
     [each] = [e for e in steady_poses(governor(), starts=1) if e.stability == "stable"]
     scene = at_pose(each.balance, each.state)
     moved = gauss_motion(scene, (0.0, 0.2))
@@ -125,8 +129,10 @@ def test_a_steady_motion_is_a_motion():
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_accelerations_of_engines_give_the_eigenvalues(name):
-    pytest.importorskip({"pinocchio": "pinocchio"}.get(name, name))
+def test_engine_s_accelerations_give_the_judge_s_eigenvalues(name):
+    """Differences of its accelerations about the judge's pose, of a pendulum at rest and of one that
+    turns."""
+    pytest.importorskip(name)
     for scene in (pendulum(), turning_pendulum()):
         each = steady_poses(scene, starts=1)[0]
         found = by_accelerations(engine(name), each)
@@ -134,27 +140,32 @@ def test_accelerations_of_engines_give_the_eigenvalues(name):
         assert error(found.eigenvalues, each.eigenvalues) < 1e-9
 
 
-def test_a_wrong_acceleration_is_seen():
-    """The eigenvalues of a scene with another gravity differ by the root of the gravities."""
+def test_eigenvalues_differ_by_half_the_relative_error_of_gravity():
+    """s² ∝ g for a pendulum: with g · (1 + 1e-4) eigenvalues differ by 1e-4 / 2 = 5e-5."""
     heavy = pendulum().with_(gravity=(0.0, 0.0, -9.81 * 1.0001))
     each, other = steady_poses(pendulum(), starts=1)[0], steady_poses(heavy, starts=1)[0]
     assert error(other.eigenvalues, each.eigenvalues) == pytest.approx(5e-5, rel=1e-3)
 
 
-def test_functions_of_engines_that_linearise():
-    """MuJoCo's differences are right to 1e-6; Exudyn's function leaves out how constraint forces turn."""
+def test_mujoco_s_own_linearisation_has_the_judge_s_eigenvalues():
+    """Its finite differences of a step: to 1e-6 for a pendulum, to 1e-4 for damped slides."""
     pytest.importorskip("mujoco")
     [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
-    scene = at_pose(below.balance, below.state)
     [slides] = steady_poses(damped_slides(), starts=1)
     mujoco = engine("mujoco")
     assert isinstance(mujoco, Linearising) and not isinstance(engine("pinocchio"), Linearising)
-    assert error(mujoco.own_eigenvalues(scene), below.eigenvalues) < 1e-6
+    assert error(mujoco.own_eigenvalues(at_pose(below.balance, below.state)), below.eigenvalues) < 1e-6
     assert error(mujoco.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-4
+
+
+def test_exudyn_s_own_linearisation_leaves_out_how_constraint_forces_turn():
+    """Slides, whose forces do not turn, have the judge's eigenvalues; those of a pendulum are zero."""
     pytest.importorskip("exudyn")
+    [below] = [each for each in steady_poses(pendulum(), starts=4) if each.stability == "stable"]
+    [slides] = steady_poses(damped_slides(), starts=1)
     exudyn = engine("exudyn")
     assert isinstance(exudyn, Linearising)
-    assert np.abs(exudyn.own_eigenvalues(scene)).max() < 1e-6
+    assert np.abs(exudyn.own_eigenvalues(at_pose(below.balance, below.state))).max() < 1e-6
     assert error(exudyn.own_eigenvalues(damped_slides()), slides.eigenvalues) < 1e-6
 
 
@@ -172,8 +183,9 @@ def test_scenes_without_small_motions_are_refused(change, says):
         steady_poses(pendulum().with_(**change), starts=1)
 
 
-def test_poses_on_the_branch_are_found_and_bodies_turned_by_half_a_turn_are_not():
-    """The slider of a slider-crank cannot turn; its crank can hang."""
+def test_poses_of_a_slider_crank_close_its_joints_and_hang_or_stand():
+    """Under gravity the crank hangs (stable) or stands (unstable). Starts with a slider turned by half a
+    turn, on another branch, would open the joints."""
     scene = find_scene("planar_slider_crank").with_(gravity=(0.0, -9.81, 0.0), load=[])
     found = steady_poses(scene)
     assert {"stable", "unstable"} <= {each.stability for each in found}
@@ -182,20 +194,22 @@ def test_poses_on_the_branch_are_found_and_bodies_turned_by_half_a_turn_are_not(
             assert np.abs(rows).max(initial=0.0) < 1e-8
 
 
-def test_differences_of_accelerations_include_dampers():
+def test_differences_of_mujoco_s_accelerations_include_dampers():
     [slides] = steady_poses(damped_slides(), starts=1)
     found = by_accelerations(engine("mujoco"), slides)
     assert found.eigenvalues is not None and error(found.eigenvalues, slides.eigenvalues) < 1e-9
 
 
-def test_a_scene_at_an_equilibrium_begins_without_accelerations():
-    """Its torsion spring keeps its torque: the natural angle counts from the new pose."""
+def test_scene_at_an_equilibrium_starts_without_acceleration():
+    """Also with a torsion spring, whose natural angle then counts from the new pose."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 30.0, "damping": 0.0, "natural_angle": 0.3}
     [each, *_] = steady_poses(pendulum().with_(load=[spring]), starts=2)
     assert np.abs(gauss(at_pose(each.balance, each.state))).max() < 1e-9
 
 
-def test_the_sense_of_a_steady_rotation_is_of_the_second_body():
+def test_steady_rotation_has_the_second_body_s_sense():
+    """The joint's rate of 6 rad/s is that of its second body: with (spindle, ground) the spindle turns
+    back."""
     scene = turning_pendulum()
     backwards = scene.joint[0].model_copy(update={"bodies": ("spindle", "ground")})
     assert np.allclose(turning(scene).spin, [0.0, 0.0, 6.0])
@@ -203,7 +217,7 @@ def test_the_sense_of_a_steady_rotation_is_of_the_second_body():
 
 
 @pytest.mark.parametrize(("sine", "is_steady"), [(0.9e-12, True), (1.1e-12, False)])
-def test_an_axis_along_gravity_up_to_rounding(sine, is_steady):
+def test_driven_axis_may_lean_from_gravity_by_1e_12(sine, is_steady):
     """The driver turns about z; gravity is inclined in the plane of x and z."""
     scene = turning_pendulum().with_(gravity=(sine * 9.81, 0.0, -9.81))
     if is_steady:
@@ -213,14 +227,17 @@ def test_an_axis_along_gravity_up_to_rounding(sine, is_steady):
             turning(scene)
 
 
-def test_a_rotation_that_the_loads_do_not_follow_is_not_steady():
-    load = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [0.0, 0.1, 0.0]}
-    assert turning(turning_pendulum()).rate == 6.0 and len(steady_poses(turning_pendulum(), starts=2)) > 0
-    pushed = {**load, "force": [0.1, 0.0, 0.0]}
-    assert steady_poses(turning_pendulum().with_(load=[pushed]), starts=4) == []
+def test_horizontal_force_fixed_in_space_allows_no_steady_rotation():
+    """The spindle turns at 6 rad/s about the vertical; a force of 0.1 N along the x axis of space turns
+    relative to it. Without the force there are steady poses."""
+    push = {"type": "force", "body": "ball", "point": [0.3, 0.0, -0.4], "force": [0.1, 0.0, 0.0]}
+    assert steady_poses(turning_pendulum(), starts=2)
+    assert steady_poses(turning_pendulum().with_(load=[push]), starts=4) == []
 
 
-def test_the_page_shows_the_stored_records():
+def test_page_on_small_motions_is_rendered_from_the_stored_records():
+    """The records have every mechanism; the judge is off the closed forms by less than 1e-13, mbref by
+    1e-11."""
     path = ROOT / "docs" / "small-motions.md"
     stored = records.read()
     assert path.read_text() == document.page(stored), (
@@ -234,7 +251,9 @@ def test_the_page_shows_the_stored_records():
         )
 
 
-def test_a_command_compares_a_scene_and_shows_the_table(tmp_path, capsys):
+def test_modes_command_compares_a_scene_with_an_engine(tmp_path, capsys):
+    """Its table names pose, engine and judge; its JSON has mbref's error; without a scene it shows the stored
+    records."""
     path = str(tmp_path / "my.toml")
     pendulum().save(path)
     assert main(["modes", path, "--engine", "mujoco", "--starts", "3"]) == 0

@@ -27,8 +27,11 @@ def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
 
 
 @pytest.mark.parametrize(("stiffness", "rate", "runs"), [(1e8, 5e2, 1), (1.0, 3.0, 1), (0.0, 2e3, 2)])
-def test_a_stated_rate_asks_for_no_second_coarse_run(stiffness: float, rate: float, runs: int) -> None:
-    """A mass on a stiff spring turns slowly; without one the body spins faster than 2000 steps resolve."""
+def test_fastest_rate_needs_a_second_coarse_run_only_above_the_first_s_resolution(
+    stiffness: float, rate: float, runs: int
+) -> None:
+    """rad/s: a stiff spring states √(1e8 / 400) = 500, and a spin of 3 is resolved by one coarse run. A spin
+    of 2e3 exceeds the 500 that 2000 steps resolve, so that a run with more steps follows."""
     scene = Scene(
         name="mass",
         duration=2.0,
@@ -57,7 +60,7 @@ def test_a_stated_rate_asks_for_no_second_coarse_run(stiffness: float, rate: flo
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
-def test_adaptive_steps_and_cosine(rtol: float) -> None:
+def test_adaptive_steps_stay_within_ten_tolerances_of_the_cosine(rtol: float) -> None:
     stepper, y = adaptive(oscillator, rtol), cosine(0.0)
     for t0, t1 in ((0.0, 0.7), (0.7, 0.701), (0.701, 3.0)):
         y = stepper.advance(y, t0, t1)
@@ -65,7 +68,8 @@ def test_adaptive_steps_and_cosine(rtol: float) -> None:
         assert gap < 10 * rtol, f"{gap:.1e} from the cosine at {t1}, tolerance {rtol:.0e}"
 
 
-def test_right_hand_sides_are_counted() -> None:
+def test_every_evaluation_of_dop853_is_counted() -> None:
+    """DOP853 evaluates 12 times a step, taken or rejected, and once at the start."""
     calls = 0
 
     def counted(t: float, y: np.ndarray) -> np.ndarray:
@@ -79,8 +83,8 @@ def test_right_hand_sides_are_counted() -> None:
     assert stepper.counts.rhs == calls == expected, f"{calls} calls, {stepper.counts}, expected {expected}"
 
 
-def test_noise_at_one_position_is_stepped_over() -> None:
-    """The slope is garbage where a stage of the first and shortest step evaluates it."""
+def test_noise_in_one_stage_of_the_shortest_step_is_stepped_over() -> None:
+    """y' = 1, except for 1e9 where the sixth stage of the first, shortest step evaluates it: y(1) is 1."""
     shortest = 1e-3
     noisy = DOP853.C[5] * shortest
 
@@ -93,8 +97,9 @@ def test_noise_at_one_position_is_stepped_over() -> None:
     assert abs(y[0] - 1.0) < 1e-12, f"y(1) = {y[0]}, expected 1"
 
 
-def test_step_does_not_go_on_from_where_settling_finds_noise() -> None:
-    """The slope is garbage just where the first and shortest step would be settled."""
+def test_noise_where_a_shortest_step_is_corrected_does_not_spoil_the_result() -> None:
+    """y' = 1, except for 1e9 just where the first, shortest step is corrected, by 1e-9; the sum of the
+    corrections and the time is y(1)."""
     shortest, moved = 1e-3, 1e-9
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -106,7 +111,7 @@ def test_step_does_not_go_on_from_where_settling_finds_noise() -> None:
     assert gap < 1e-12, f"{gap:.1e} from the time it is: {stepper.counts}"
 
 
-def test_state_that_cannot_be_settled_says_why() -> None:
+def test_failed_correction_of_a_state_ends_the_run_with_its_reason() -> None:
     def refuse(t: float, y: np.ndarray) -> np.ndarray:
         raise Failed(Outcome.NOT_CONVERGED, t, "no way")
 
@@ -114,8 +119,8 @@ def test_state_that_cannot_be_settled_says_why() -> None:
         Adaptive(oscillator, refuse, 1e-6, 1e-3, np.inf, Counts()).advance(cosine(0.0), 0.0, 1.0)
 
 
-def test_noise_before_a_sample_that_a_stretched_step_reaches_is_stepped_over() -> None:
-    """The interval is a little longer than the shortest step, which would be tried for ever."""
+def test_noisy_step_a_little_longer_than_the_shortest_ends() -> None:
+    """The interval is 1.005 shortest steps and every slope is noise: the step must not be tried for ever."""
     shortest, calls = 1e-3, 0
 
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
@@ -128,7 +133,9 @@ def test_noise_before_a_sample_that_a_stretched_step_reaches_is_stepped_over() -
     assert np.isfinite(y).all(), y
 
 
-def test_a_motion_that_ends_is_not_finite_and_says_when() -> None:
+def test_motion_that_is_not_finite_after_half_a_second_fails_there() -> None:
+    """y' = 1 + 0 · √(0.5 - t)."""
+
     def rhs(t: float, y: np.ndarray) -> np.ndarray:
         with np.errstate(all="ignore"):
             return np.sqrt(0.5 - np.array([t])) * 0 + 1
@@ -139,7 +146,8 @@ def test_a_motion_that_ends_is_not_finite_and_says_when() -> None:
     assert 0.45 < failure.value.t <= 0.5, f"reached {failure.value.t}, the right-hand side ends at 0.5"
 
 
-def test_fixed_steps_have_fourth_order_and_divide_the_interval() -> None:
+def test_rk4_has_fourth_order_and_divides_the_interval_evenly() -> None:
+    """On x = cos 5 t over 1 s, whose length is no multiple of the steps of 11 and 5.5 ms."""
     steps, errors = (0.011, 0.0055), []
     for h in steps:
         counts = Counts()

@@ -36,7 +36,7 @@ def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: flo
     )
 
 
-def test_record_and_trajectory_agree():
+def test_record_of_a_study_holds_the_engine_s_trajectory():
     wanted = case("a")
     [record] = study([wanted], ThreadPoolExecutor(1))
     there = Trajectory.from_record("still", json.loads(json.dumps(record)))
@@ -49,19 +49,21 @@ def test_record_and_trajectory_agree():
     assert record["metrics"], "no metric was computed"
 
 
-def test_stored_lines_and_returned_records_agree(tmp_path: Path):
+def test_study_stores_one_record_for_each_different_case(tmp_path: Path):
+    """Case "a" is asked twice; an engine that crashes has a record too; progress counts three cases."""
     path, seen = tmp_path / "records.jsonl", []
     cases = [case("a"), case("b"), case("c", "SEGFAULT"), case("a")]
     records = study(cases, None, path, lambda done, total, record: seen.append((done, total)))
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     assert [r["family"] for r in records] == ["a", "b", "c", "a"]
     assert [r["outcome"] for r in records] == ["COMPLETED", "COMPLETED", "CRASHED", "COMPLETED"]
-    assert sorted(r["family"] for r in lines) == ["a", "b", "c"], "one line for each different case"
+    assert sorted(r["family"] for r in lines) == ["a", "b", "c"]
     assert all(r in records for r in lines), (lines, records)
     assert seen == [(1, 3), (2, 3), (3, 3)], seen
 
 
-def test_rerun_and_first_run_agree_without_running_again(tmp_path: Path):
+def test_second_study_runs_only_cases_that_are_not_stored(tmp_path: Path):
+    """Cases a and b are stored, then a line that is cut short; the engine logs each run."""
     path, log = tmp_path / "records.jsonl", tmp_path / "log"
     cases = [case(family, "RECORDER", still(str(log))) for family in "abc"]
     study(cases[:2], None, path)
@@ -74,7 +76,7 @@ def test_rerun_and_first_run_agree_without_running_again(tmp_path: Path):
     assert sorted(stored, key=lambda r: r["family"]) == records
 
 
-def test_interrupted_study_keeps_what_has_ended(tmp_path: Path):
+def test_interrupted_study_stores_the_runs_that_have_ended(tmp_path: Path):
     path = tmp_path / "records.jsonl"
 
     def interrupt(done: int, total: int, record: dict) -> None:
@@ -87,7 +89,8 @@ def test_interrupted_study_keeps_what_has_ended(tmp_path: Path):
     assert stored == ["a"], stored
 
 
-def test_timed_out_case_is_repeated_with_a_longer_limit_only(tmp_path: Path):
+def test_case_that_timed_out_is_repeated_only_with_a_longer_limit(tmp_path: Path):
+    """An engine that hangs: limits of 1, 0.5 and 1.5 s, in this order."""
     path, scene = tmp_path / "records.jsonl", still(str(tmp_path / "pid"))
     short, shorter, longer = (case("a", "HANG", scene, limit) for limit in (1.0, 0.5, 1.5))
     [first] = study([short], None, path)
@@ -111,14 +114,15 @@ def everywhere() -> list[Case]:
     return [real, case("a"), case("b", "RAISE")]
 
 
-def test_process_pool_and_serial_run_agree(one_after_the_other: list[dict]):
+def test_process_pool_gives_the_records_of_a_serial_study(one_after_the_other: list[dict]):
     with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
         records = study(everywhere(), pool)
     assert untimed(records) == untimed(one_after_the_other)
     assert [r["outcome"] for r in records] == ["COMPLETED", "COMPLETED", "CRASHED"]
 
 
-def test_run_here_and_run_in_a_child_agree():
+def test_run_in_a_child_gives_the_record_of_a_run_here():
+    """Except for the estimate of the error, which only the child makes, and times."""
     wanted = Case(SCENES["four_bar"](), TIMES, "mbref", Setting("mpi-svd+projection", {"rtol": 1e-6}))
     here, child = untimed([run_here(wanted)]), untimed([run_case(wanted)])
     assert here[0].pop("error_estimate") is None and child[0].pop("error_estimate")["largest"] > 0
@@ -126,7 +130,9 @@ def test_run_here_and_run_in_a_child_agree():
 
 
 @pytest.mark.slow
-def test_cluster_of_two_workers_and_serial_run_agree(one_after_the_other: list[dict], tmp_path: Path):
+def test_cluster_of_two_workers_gives_the_records_of_a_serial_study(
+    one_after_the_other: list[dict], tmp_path: Path
+):
     from distributed import Client, LocalCluster
 
     path = tmp_path / "records.jsonl"
@@ -161,14 +167,15 @@ def untimed(records: list[dict]) -> list[dict]:
     ],
     ids=["family", "engine", "scene", "fewer times", "times", "options", "engine with threads"],
 )
-def test_keys_of_different_cases_differ(other: Case, monkeypatch: pytest.MonkeyPatch):
+def test_key_depends_on_all_of_a_case_except_its_time_limit(other: Case, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "1")
     monkeypatch.setenv("OMP_NUM_THREADS", "1")
     assert key(other) != key(case("a"))
-    assert key(other) == key(other._replace(time_limit=1.0)), "the time limit is no part of a result"
+    assert key(other) == key(other._replace(time_limit=1.0))
 
 
-def test_default_cases_are_the_settings_of_the_engines_that_can():
+def test_default_cases_are_the_settings_of_engines_that_map_the_scene():
+    """A fake engine maps scenes without loads; it has two settings of family "plain" and one of another."""
     pushed = still(load=(Force(body="block", point=(1.0, 2.0, 3.0), force=(1.0, 0.0, 0.0)),))
     cases, unable = default_cases(still(), [f"{FAKES}:FAKE"], families=["plain"])
     assert [str(c.setting) for c in cases] == ["plain seconds=0.1", "plain seconds=0.2"]

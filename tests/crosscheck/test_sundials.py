@@ -13,7 +13,7 @@ from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from mbref.trajectory import Outcome, Trajectory
-from tests.crosscheck.measured import MARGIN, completed_error
+from tests.crosscheck.measured import MARGIN, completed_error, error_of_samples
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 
 pytest.importorskip("sksundae", reason="the optional engine SUNDIALS needs scikit-sundae")
@@ -36,8 +36,6 @@ ALIKE = {  # measured differences from Pinocchio: m, m/s, rad/s, m/s², rad/s²
     "angular_acceleration": 2.5e-3,
 }
 REACTION = 3e-5  # of the largest
-FREE_FALL, TURN, BARE, SPRUNG = 1.9e-7, 1.5e-3, 8.8e-9, 2.9e-7  # m, rad
-STOP, BEFORE = 2.6e-6, 2.9e-6  # s from the singular position; m, rad before it
 
 
 def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Trajectory:
@@ -45,27 +43,19 @@ def simulate(scene: Scene, duration: float, rtol: float, samples: int = 6) -> Tr
 
 
 @pytest.mark.parametrize("name", REGULAR)
-def test_ida_and_truth(name: str) -> None:
-    """A tolerance of one step: over a thousand of them its errors grow by orders."""
+def test_ida_stays_within_its_measured_error_of_the_truth(name: str) -> None:
+    """The tolerance of 1e-8 holds for a step: over a thousand steps errors grow by orders."""
     scene = SCENES[name]()
     duration, measured = REGULAR[name]
-    run = simulate(scene, duration, 1e-8)
-    assert run.outcome is Outcome.COMPLETED, f"{name}: {run.outcome.label} {run.message}"
-    assert completed_error(run, scene) < MARGIN * measured, (
-        f"{name}: {completed_error(run, scene):.2e} from the truth"
-    )
+    assert completed_error(simulate(scene, duration, 1e-8), scene) < MARGIN * measured
 
 
-def test_body_without_joints_and_truth() -> None:
+def test_ida_lets_a_body_without_joints_fall_as_the_closed_form() -> None:
     scene, _ = free_fall()
-    run = simulate(scene, 0.5, 1e-8)
-    assert run.outcome is Outcome.COMPLETED, run.message
-    assert completed_error(run, scene) < MARGIN * FREE_FALL, (
-        f"{completed_error(run, scene):.2e} from the truth"
-    )
+    assert completed_error(simulate(scene, 0.5, 1e-8), scene) < MARGIN * 1.9e-7, "measured, m or rad"
 
 
-def test_tighter_tolerances_and_smaller_errors() -> None:
+def test_tolerance_of_a_hundredth_reduces_ida_s_error_fivefold() -> None:
     scene = SCENES["spatial_slider_crank"]()
     errors = [completed_error(simulate(scene, 0.01, rtol), scene) for rtol in (1e-4, 1e-6, 1e-8)]
     assert errors[1] < errors[0] / 5 and errors[2] < errors[1] / 5, (
@@ -91,8 +81,9 @@ def test_ida_and_pinocchio_move_alike(scene: Scene) -> None:
             assert gap < MARGIN * REACTION, f"reaction in {joint}: relative difference {gap:.2e}"
 
 
-def test_torsion_spring_beyond_a_turn_and_closed_form_agree() -> None:
-    """Released at 0 with a natural angle of 8 rad: swings about it, past 14 rad."""
+def test_ida_swings_a_torsion_spring_past_two_turns_as_the_closed_form() -> None:
+    """Released at 0 with a natural angle of 8 rad, it swings about it, past 14 rad, as the damped oscillator;
+    the measured deviation is 2.9e-7 rad."""
     inertia, stiffness, damping, natural = 0.5, 2.0, 0.05, 8.0
     wheel = Body(name="wheel", mass=1.0, inertia=(0.3, 0.3, inertia), position=(0.0, 0.0, 0.0))
     axle = Revolute(name="J", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
@@ -104,39 +95,36 @@ def test_torsion_spring_beyond_a_turn_and_closed_form_agree() -> None:
     angle = natural * (1 - swing * (np.cos(damped * t) + decay / damped * np.sin(damped * t)))
     turned = rotations.from_vector(angle[:, None] * np.array([0.0, 0.0, 1.0]))
     gap = rotations.angle_between(run.orientation[:, 0], turned).max()
-    assert angle.max() > 14 and gap < MARGIN * SPRUNG, f"{gap:.1e} rad off, past {angle.max():.1f} rad"
+    assert run.outcome is Outcome.COMPLETED and angle.max() > 14, run.message
+    assert gap < MARGIN * 2.9e-7, f"{gap:.1e} rad off"
 
 
-def test_the_end_of_a_run_and_the_singular_position() -> None:
-    """The driven four-bar is first singular where its crank lies on the ground line: quarter turn."""
+def test_ida_stops_at_the_singular_position_of_a_driven_four_bar() -> None:
+    """After a quarter turn at 124.8 rad/s its crank lies on the ground line. Measured: the run ends 2.6e-6 s
+    off this time, and its samples are off the truth by 2.9e-6 m or rad."""
     scene = SCENES["four_bar"]()
     run = simulate(scene, 0.02, 1e-6, 21)
     singular = math.pi / 2 / 124.8
-    assert run.outcome is not Outcome.COMPLETED, (
-        f"completed, {completed_error(run, scene):.2e} from the truth"
-    )
-    assert abs(run.t_end - singular) < MARGIN * STOP, (
-        f"stopped at {run.t_end:.6f} s, singular at {singular:.6f} s"
-    )
-    assert completed_error(run, scene) < MARGIN * BEFORE, (
-        f"before that: {completed_error(run, scene):.2e} from the truth"
-    )
+    assert run.outcome is Outcome.NOT_CONVERGED and abs(run.t_end - singular) < MARGIN * 2.6e-6, run.message
+    assert len(run.times) == 13 and error_of_samples(run, scene) < MARGIN * 2.9e-6
 
 
-def test_a_row_that_only_seemed_redundant_at_the_start_is_told() -> None:
+def test_row_redundant_only_at_the_start_ends_the_run_with_a_violation() -> None:
+    """The straight four-bar starts flat, where one more row is dependent than behind: IDA gets too few
+    rows."""
     run = simulate(SCENES["four_bar_straight"](), 0.02, 1e-6)
     assert run.outcome is Outcome.VIOLATION, f"{run.outcome.label}: {run.message}"
 
 
 @pytest.mark.slow
-def test_rows_chosen_at_the_start_and_a_full_turn() -> None:
-    """Of the redundant planar mechanism; one choice, or its replacements, must serve in every position."""
+def test_ida_turns_a_redundant_crank_by_more_than_a_turn() -> None:
+    """Rows of the planar slider-crank are chosen at the start and replaced where they become dependent. The
+    measured error is 1.5e-3 m or rad."""
     scene = SCENES["planar_slider_crank"]()
     run = simulate(scene, 0.25, 1e-6, 26)
     turned = run.angular_velocity[:, 0, 2].mean() * 0.25
     assert turned > 2 * math.pi, f"the crank has only turned by {turned:.3g} rad"
-    assert run.outcome is Outcome.COMPLETED, run.message
-    assert completed_error(run, scene) < MARGIN * TURN, f"{completed_error(run, scene):.2e} from the truth"
+    assert completed_error(run, scene) < MARGIN * 1.5e-3
 
 
 def test_the_same_motion_with_and_without_masses() -> None:
@@ -144,7 +132,8 @@ def test_the_same_motion_with_and_without_masses() -> None:
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     runs = [simulate(scene, 0.02, 1e-7) for scene in (base, bare)]
     gap = abs(runs[0].position - runs[1].position).max()
-    assert gap < MARGIN * BARE, f"positions with and without masses differ by {gap:.1e} m"
+    assert runs[0].outcome is runs[1].outcome is Outcome.COMPLETED
+    assert gap < MARGIN * 8.8e-9, f"positions with and without masses differ by {gap:.1e} m"
     assert runs[1].reactions is None, "reactions without masses"
     assert engine("sundials").cannot(bare.with_(driver=())) is not None, "free motion without masses"
 

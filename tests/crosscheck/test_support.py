@@ -21,14 +21,14 @@ from mbref.trajectory import Outcome
 DOCUMENT = Path(__file__).parents[2] / "docs" / "engines.md"
 
 
-def test_document_and_generated_block():
+def test_support_matrix_of_the_page_is_up_to_date():
     block = support.block_of(DOCUMENT.read_text())
     assert block == support.markdown(support.KNOWN), (
         "the support matrix is stale: python -m crosscheck.cli.support docs/engines.md renews it"
     )
 
 
-def test_probes_and_the_kinds_a_scene_may_have():
+def test_probes_have_every_joint_load_and_driver_type_and_their_loops():
     def kinds(union) -> set[str]:
         return {kind.model_fields["type"].default for kind in union.__args__[0].__args__}
 
@@ -43,8 +43,8 @@ def test_probes_and_the_kinds_a_scene_may_have():
 
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
-def test_support_and_a_short_run(name):
-    """Features said to work run, without a compiler: the probe over a hundredth of its time."""
+def test_features_that_an_engine_supports_run(name):
+    """Each probe that is not refused completes a hundredth of its time, at a setting without a compiler."""
     engine_here = engine(name)
     for feature, scene in feature_scenes().items():
         if engine_here.cannot(scene) is None:
@@ -55,6 +55,7 @@ def test_support_and_a_short_run(name):
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn", "dart"])
 def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
+    """Two hinges on a link without mass are a universal joint, in the reference; within 1e-6 m."""
     pytest.importorskip({"dart": "dartpy"}.get(name, name))
     scene, simulator = massless_link(), engine(name)
     joint = Universal(name="U", bodies=("ground", "body"), anchor=PIVOT, axes=PLACES["axes"])
@@ -63,10 +64,13 @@ def test_engines_that_map_massless_links_move_them_as_a_universal_joint(name):
     times = np.linspace(0.0, scene.duration, 5)
     run = simulator.run(scene, times, simulator.best_settings(scene)[-1])
     exact = natural_motion(whole, times, EXTENDED, seconds=20.0).position
+    assert run.outcome is Outcome.COMPLETED, run.message
     assert np.abs(run["body"].position - doubles(exact)[:, 0]).max() < 1e-6, run.message
 
 
-def test_gaps_and_their_sentences():
+def test_unsupported_feature_gets_a_numbered_note_with_its_cause():
+    """Engine "b" lacks every joint: "– 1" in its column, and note 1 names the joint and who lacks it."""
+
     def ask(name: str, scene: Scene) -> Cannot | None:
         return Cannot(Owner.ENGINE, f"no {scene.joint[0].type}") if name == "b" and scene.joint else None
 
@@ -87,6 +91,6 @@ def test_engines_with_one_cause_share_a_note():
     assert found.row("loop", found.notes()) == ["✓", "– 1", "– 1"], found.row("loop", found.notes())
 
 
-def test_every_built_in_engine_and_refusal_of_undetermined_motion():
+def test_every_built_in_engine_refuses_motion_without_masses():
     found = support.of_features(BUILT_IN).answers["motion without masses"]
     assert all(isinstance(gap, Cannot) for gap in found.values()), found

@@ -20,6 +20,8 @@ def able(name: str, scene: str) -> bool:
 
 @pytest.mark.parametrize("name", [n for n in engine_names() if n != WITHOUT_RUNS])
 def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
+    """Within a family one option (step, tolerance or accuracy) falls from setting to setting, at least
+    thrice."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     simulator, count = engine(name), 0
@@ -37,7 +39,7 @@ def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in engine_names() if n not in (WITHOUT_RUNS, "mbref")])
-def test_an_unknown_family_is_refused(name: str) -> None:
+def test_engine_refuses_an_unknown_family_by_name(name: str) -> None:
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     with pytest.raises(ValueError, match=f"{name} has no family of settings 'best'"):
@@ -48,8 +50,8 @@ FIXED = {"mujoco": "tuned", "pinocchio": "proximal", "exudyn": "tuned"}  # famil
 
 
 @pytest.mark.parametrize("name", FIXED)
-def test_a_faster_scene_has_shorter_steps(name: str) -> None:
-    """The same linkage is driven twice as fast; steps are shares of the time of a turn."""
+def test_scene_driven_twice_as_fast_has_steps_half_as_long(name: str) -> None:
+    """The four-bar is driven twice as fast; steps are fractions of the time of a turn."""
     scene = SCENES["four_bar"]()
     (driver,), at_rest = scene.driver, {"velocity": None, "angular_velocity": None}
     scene = scene.with_(body=[body.model_copy(update=at_rest) for body in scene.body])

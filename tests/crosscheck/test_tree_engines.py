@@ -123,8 +123,9 @@ def exact(name: str) -> Trajectory:
 
 @pytest.mark.parametrize("name", ALL)
 @pytest.mark.parametrize("setting", FINE)
-def test_tree_engines_move_and_are_held_as_gauss_s_principle_says(name: str, setting: str) -> None:
-    """Poses, rates, accelerations, unique reactions, and the resultant of all reactions on each body."""
+def test_mujoco_and_pinocchio_move_and_react_by_gauss_s_principle(name: str, setting: str) -> None:
+    """Poses, rates, accelerations, unique reactions and the resultants on each body, relative to the largest;
+    allowed is 10 times the difference measured (MEASURED)."""
     scene, true = ALL[name], exact(name)
     simulator = engine("mujoco" if setting == "forward" else setting)
     run = simulator.run(scene, true.times, FINE[setting])
@@ -143,7 +144,8 @@ def test_tree_engines_move_and_are_held_as_gauss_s_principle_says(name: str, set
 @pytest.mark.parametrize(
     "name", ["every joint", "spherical", "ring universal", "free and spinning", "distance"]
 )
-def test_accelerations_are_the_slopes_of_the_velocities(name: str) -> None:
+def test_accelerations_of_pinocchio_are_slopes_of_its_velocities(name: str) -> None:
+    """Central differences with h = 1e-4 s, to 2e-5 of the largest."""
     scene, h = ALL[name], 1e-4
     times = np.array([0.1 - h, 0.1, 0.1 + h])
     run = engine("pinocchio").run(scene, times, FINE["pinocchio"])

@@ -41,8 +41,9 @@ class Family:
         return Trajectory("s", "truth", "", "", {}, times, ("b",), still, turned, still, spin)
 
 
-def test_frames_cover_the_motion_until_a_body_turns_too_far():
-    """90 steps of 0.35 rad are 31.5 rad: at 6.99 rad/s until 4.5 s, at a tenth of it all."""
+def test_frames_end_after_ninety_steps_of_a_body_s_turn():
+    """Frames are at most 0.35 rad of a body apart: 90 steps are 31.5 rad, at 6.99 rad/s until 4.5 s. At a
+    tenth of this rate they cover all of the 9 s. A motion of four samples has four frames."""
     times = np.linspace(0.0, 9.0, 901)
     fast = Family(9.0).poses(times)
     chosen = truths.shown(fast)

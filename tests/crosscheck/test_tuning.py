@@ -24,8 +24,9 @@ SCENE = Scene(name="block", body=(BLOCK,), duration=1.0)
 
 
 class Modelled:
-    """An engine on paper: a family of order p with error C hᵖ, cost c / h seconds and 1 / h right-hand sides,
-    that ``breaks`` above a step."""
+    """A model of runs: a family is (order p, factor C, cost c, longest step h₁). A run with step h has the
+    error C hᵖ, c / h seconds and 1 / h right-hand sides, and fails above h₁; ``asked`` lists family and
+    step."""
 
     def __init__(self, **families: tuple[float, float, float, float]) -> None:
         self.families, self.asked = families, []
@@ -61,15 +62,17 @@ def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] =
 
 
 @pytest.mark.parametrize("level", [1e-2, 3e-4, 1e-6])
-def test_the_cheapest_step_is_found_between_coarser_and_finer_than_the_grid(level):
-    """An error of h⁴ reaches the level at h = level^¼; the grid of steps begins finer, or has it inside."""
+def test_cheapest_step_is_found_inside_and_beyond_the_grid_of_steps(level):
+    """An error of h⁴ reaches the level at h = level^¼, found to 15 %; the grid of steps is finer, or around
+    it."""
     best = level**0.25
     for steps in ((0.01, 0.003, 0.001), (0.9, 0.3, 0.1, 0.03, 0.01)):
         step = found(Modelled(rk4=(4.0, 1.0, 1e-3, 1.0)), level, *steps)["rk4"]
         assert best / 1.15 < step <= best, (level, steps, step, best)
 
 
-def test_the_most_accurate_setting_is_not_the_answer():
+def test_cheapest_setting_is_no_more_accurate_than_needed():
+    """Of settings within 1e-3 it has the least work, and an error above 1e-4; finer settings are not run."""
     engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
     done = tuned(engine.cases(0.1, 0.01, 0.001), 1e-3, engine)
     [cheapest] = done.reached
@@ -77,16 +80,16 @@ def test_the_most_accurate_setting_is_not_the_answer():
     assert cheapest["cost"]["rhs"] == min(
         r["cost"]["rhs"] for r in done.records if r["metrics"]["error"] <= 1e-3
     )
-    assert 0.001 not in [h for _, h in engine.asked], "a setting finer than the first that reaches was run"
+    assert 0.001 not in [h for _, h in engine.asked]
 
 
-def test_a_step_that_breaks_bounds_the_search_from_above():
+def test_cheapest_step_is_below_the_one_at_which_runs_fail():
     """Any step that runs is accurate: the answer is the largest that runs, 0.05."""
     step = found(Modelled(soft=(1.0, 1e-9, 1e-3, 0.05)), 1e-3, 0.004, 0.002)["soft"]
     assert 0.05 / 1.15 < step <= 0.05, step
 
 
-def test_a_family_that_gains_nothing_by_coarser_steps_is_left():
+def test_no_coarser_step_is_tried_that_costs_as_much():
     """Samples bound the step: beyond 0.1 the work stays, and no further setting is tried."""
     engine = Modelled(f=(4.0, 1e-12, 1e-3, 1.0))
     engine.record = lambda case, record=engine.record: _bounded(record(case))  # type: ignore[method-assign]
@@ -99,13 +102,14 @@ def _bounded(record: dict[str, Any]) -> dict[str, Any]:
     return {**record, "cost": {"seconds": seconds, "rhs": max(record["cost"]["rhs"], 10.0)}}
 
 
-def test_families_dearer_than_the_cheapest_are_given_up_before_they_reach():
-    engine = Modelled(cheap=(4.0, 1.0, 1e-3, 1.0), dear=(1.0, 1.0, 1.0, 1.0))
+def test_family_more_expensive_than_the_cheapest_is_abandoned():
+    """After its coarsest run, of 10 s, which the cheap family undercuts, it is not run at finer steps."""
+    engine = Modelled(cheap=(4.0, 1.0, 1e-3, 1.0), expensive=(1.0, 1.0, 1.0, 1.0))
     assert list(found(engine, 1e-6, 0.1, 0.01, 0.001)) == ["cheap"]
-    assert [h for family, h in engine.asked if family == "dear"] == [0.1], engine.asked
+    assert [h for family, h in engine.asked if family == "expensive"] == [0.1], engine.asked
 
 
-def test_a_family_is_given_up_only_for_twice_the_cost():
+def test_family_is_abandoned_only_at_twice_the_cheapest_cost():
     """The cheap family needs 0.1 s; after a coarsest run of 0.19 s a family goes on, after 0.2 s not."""
     for cost, goes_on in ((0.019, True), (0.02, False)):
         engine = Modelled(cheap=(2.0, 1.0, 0.01, 1.0), other=(2.0, 4.0, cost, 1.0))
@@ -113,20 +117,23 @@ def test_a_family_is_given_up_only_for_twice_the_cost():
         assert ([family for family, _ in engine.asked].count("other") > 1) == goes_on, engine.asked
 
 
-def test_an_integrator_of_crosscheck_ends_no_search_of_the_engines_own():
-    engine = Modelled(ours=(8.0, 1.0, 1e-6, 1.0), own=(2.0, 1.0, 1.0, 1.0), dearer=(1.0, 1.0, 1.0, 1.0))
+def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_families():
+    """Family "ours" costs 1e-6 of "own"; both are tuned. "slower" costs more than "own" and is abandoned. The
+    error h² of "own" reaches 1e-4 at h = 1e-2."""
+    engine = Modelled(ours=(8.0, 1.0, 1e-6, 1.0), own=(2.0, 1.0, 1.0, 1.0), slower=(1.0, 1.0, 1.0, 1.0))
     both = found(engine, 1e-4, 0.1, 0.01, 0.001, 0.0001, ours=("ours",))
     assert list(both) == ["ours", "own"], both
     assert both["own"] == pytest.approx(1e-2, rel=0.15)
 
 
-def test_a_family_that_ran_out_of_time_is_given_up():
+def test_family_that_timed_out_is_abandoned():
     engine = Modelled(slow=(4.0, 1.0, 1.0, 1.0))
     engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
 
 
-def test_no_setting_reaches_an_error_below_what_the_truth_may_be_off():
+def test_no_setting_reaches_an_error_below_the_truth_s_bound():
+    """Level 1e-10; the truth is known to 2e-9 (no setting) or to 1e-11 (one setting)."""
     for bound, count in ((2e-9, 0), (1e-11, 1)):
         engine = Modelled(f=(4.0, 1e-3, 1e-3, 1.0))
         engine.record = lambda case, record=engine.record, bound=bound: _rough(record(case), bound)  # type: ignore
@@ -137,36 +144,43 @@ def _rough(record: dict[str, Any], bound: float) -> dict[str, Any]:
     return {**record, "metrics": {**record["metrics"], "error_bound": bound}}
 
 
-def test_settings_between_and_beyond():
+def test_setting_between_two_is_their_geometric_mean():
+    """Step and gain are interpolated, a constant stays; equal settings and counts have none between."""
     first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
     assert between(first, second) == Setting("f", {"step": 0.05, "beta": 4.0, "hard": 1e-7})
+    assert between(first, first) is None
+    assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None
+
+
+def test_coarser_setting_continues_the_ratio_up_to_the_longest_step_or_tolerance_0_5():
+    first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
     assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
     assert coarser(first, second, longest=0.2) == Setting("f", {"step": 0.2, "beta": 1.0, "hard": 1e-7})
-    assert coarser(first, second, longest=0.1) is None, "the longest step has run"
+    assert coarser(first, second, longest=0.1) is None and coarser(first, first, 1.0) is None
     loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
-    assert coarser(*loose, longest=0.01) == Setting("f", {"rtol": 0.5}), "a tolerance of 1 asks for nothing"
+    assert coarser(*loose, longest=0.01) == Setting("f", {"rtol": 0.5})
     assert coarser(Setting("f", {"rtol": 0.5}), loose[0], 9.0) is None
     assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
-    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), 9.0) is None, "nothing grows"
-    assert between(first, first) is None and coarser(first, first, 1.0) is None
-    assert between(Setting("f", {"n": 1}), Setting("f", {"n": 4})) is None, "a count is not halved"
+    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), 9.0) is None
 
 
-def test_no_setting_has_a_step_longer_than_the_interval_between_samples():
-    """Runs end their steps at samples: 0.4 and 0.3 would run with 0.2, the interval from 0.1 to 0.3."""
-    assert longest_step([0.1, 0.3, 0.4]) == pytest.approx(0.2, rel=1e-15)
-    assert longest_step([0.5]) == 0.5, "the first interval begins at 0"
+def test_steps_are_limited_by_the_longest_interval_between_samples():
+    """Steps end at samples: with samples at 0.1, 0.3 and 0.4 s, longer steps run as 0.2 s. The first interval
+    begins at 0; a tolerance is no step."""
+    assert longest_step([0.1, 0.3, 0.4]) == pytest.approx(0.2, rel=1e-14)
+    assert longest_step([0.5]) == 0.5
     steps = [Setting("f", {"step": h, "beta": 0.2 / h}) for h in (0.4, 0.1, 0.025)]
     assert within(steps, 0.2) == [Setting("f", {"step": 0.2, "beta": 1.0}), *steps[1:]]
     assert within(steps, 0.1) == steps[1:] and within(steps, 0.4) == steps
     assert within(steps, 0.05) == [Setting("f", {"step": 0.05, "beta": 4.0}), steps[2]]
     assert within(steps, 0.02) == [Setting("f", {"step": 0.02, "beta": 8.0})]
     loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
-    assert within(loose, 1e-3) == loose, "a tolerance is no step"
+    assert within(loose, 1e-3) == loose
 
 
-def test_a_gain_that_follows_a_longer_step_is_not_the_answer():
-    """The error is small by chance at a gain that belongs to steps near 0.5, which run with 0.1."""
+def test_settings_of_steps_longer_than_the_samples_allow_are_not_chosen():
+    """Samples are 0.1 s apart, so that longer steps run as 0.1 s. The error h² is zero by chance for settings
+    of steps near 0.5 s: these are not run, and the answer is √1e-3 s."""
 
     class Stabilised(Modelled):
         def record(self, case):
@@ -183,13 +197,14 @@ def test_a_gain_that_follows_a_longer_step_is_not_the_answer():
     assert max(h for _, h in engine.asked) == 0.1
 
 
-def test_work_is_counted_where_it_can_be():
+def test_work_is_evaluations_otherwise_steps_otherwise_seconds():
     costs = ({"rhs": 8, "steps": 2, "seconds": 0.5}, {"rhs": 0, "steps": 2, "seconds": 0.5}, {"seconds": 0.5})
     assert [work({"cost": cost}) for cost in costs] == [8, 2, 0.5]
 
 
-def test_closure_gap_is_a_distance_of_points():
-    """A family of order 2: the block is h² m off, and tilts by an angle that does not count."""
+def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
+    """The block is h² m off, and tilted by 0.5 rad, which does not count: a gap of 1 mm is reached at √1e-3
+    s."""
     scene = SCENE.with_(
         joint=[{"name": "A", "type": "fixed", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}]
     )
@@ -215,11 +230,11 @@ def test_closure_gap_is_a_distance_of_points():
 
 
 @pytest.mark.parametrize(("text", "metres"), [("1mm", 1e-3), ("0.5 in", 0.0127), ("2e-4", 2e-4)])
-def test_a_length_of_a_command_line_has_a_unit(text, metres):
+def test_length_option_takes_a_unit_and_means_metres_without(text, metres):
     assert length(text) == pytest.approx(metres, rel=1e-15)
 
 
 @pytest.mark.parametrize("text", ["0mm", "-1 mm", "3 parsec", "wide", ""])
-def test_a_length_that_is_none_is_refused(text):
+def test_length_option_refuses_zero_negative_and_unknown_units(text):
     with pytest.raises(ArgumentTypeError):
         length(text)

@@ -14,7 +14,7 @@ STEP, COUNT = 1e-3, 20
 
 
 @pytest.mark.parametrize("family", ["stock", "euler", "defaults"])
-def test_recorded_steps_of_mujoco_warp_are_its_steps(family: str) -> None:
+def test_recorded_graph_of_mujoco_warp_moves_as_its_single_steps(family: str) -> None:
     warp = pytest.importorskip("mujoco_warp")
     scene = DIFFICULTIES[0].make()
     recorded, plain = (of_warp.ENGINE.world(scene, Setting(family, {"step": STEP})) for _ in range(2))

@@ -7,7 +7,7 @@ import pytest
 from crosscheck.study import wording
 
 
-def test_lists_of_none_one_and_more():
+def test_list_is_joined_by_commas_and_and():
     assert [wording.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
 
 
@@ -21,19 +21,22 @@ def test_lists_of_none_one_and_more():
         (5e-15, 3e-14, "less than the truth's own bound, 3e-14"),
     ],
 )
-def test_errors_are_rounded_up_or_below_the_bound(value, bound, said):
+def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
     assert wording.at_most(value, bound) == said
 
 
-def test_one_and_several():
+def test_verbs_and_pronouns_agree_with_the_number():
     assert [wording.runs(n) for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
     for names, words in ((["a"], ("is", "its", "agrees")), (["a", "b"], ("are", "their", "agree"))):
         assert (wording.is_or_are(names), wording.its_or_their(names), wording.agree(names)) == words
+
+
+def test_first_word_loses_its_capital_except_for_names():
     assert wording.uncapitalised("Both engines") == "both engines"
     assert wording.uncapitalised("MuJoCo is") == "MuJoCo is"
 
 
-def test_times_and_multiples_at_the_ends_of_their_units():
+def test_times_and_ratios_are_rounded_across_their_units():
     assert [wording.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
     assert [wording.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
     assert [wording.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
