@@ -81,7 +81,7 @@ def group(records=RECORDS, scene=REDUNDANT, **known: Any) -> Judged:
         (None, Grade.UNJUDGED),
     ],
 )
-def test_grades_by_the_error_alone(error, verdict):
+def test_grade_follows_from_the_error_of_a_completed_run(error, verdict):
     assert grade(record("a", "b", error)) is verdict
     assert grade(record("a", "b", error, outcome="TIMED_OUT")) is Grade.FAILED
 
@@ -136,6 +136,7 @@ SITUATIONS = {
 
 @pytest.mark.parametrize("situation", SITUATIONS)
 def test_verdict_in_sentences(situation, snapshot):
+    """The stored sentences state the situation: errors and times are those of its records."""
     groups = SITUATIONS[situation]
     said = {"headline": headline(groups), "right": right(groups), "fast": fast(groups)}
     assert {**said, "breaks": breaks(groups), "truth": truth(groups)} == snapshot
@@ -146,22 +147,22 @@ def test_defaults_without_a_truth_are_not_judged(snapshot):
     assert breaks([group(unjudged, **UNKNOWN)]) == snapshot
 
 
-def test_an_unknown_motion_is_judged_by_no_run_that_ends_at_its_start():
-    """Every run agrees with the scene at t = 0."""
+def test_runs_that_end_at_the_start_of_an_unknown_motion_are_not_judged():
+    """At t = 0 every run agrees with the scene; this error of zero is no verdict on it."""
     completed = [{**record(n, TUNED, None), "times": [0.0, 1.0]} for n in ("mbref", "mujoco")]
     assert not any(group([ENDED, *more], **UNKNOWN).is_judged for more in ([], completed))
-    assert group([ENDED]).is_judged, "the motion is known, and no engine completes it"
+    assert group([ENDED]).is_judged
 
 
-def test_engines_of_another_mechanism_are_not_judged():
-    """Each one is right at its best settings, but no verdict counts it."""
+def test_engine_that_moves_another_mechanism_is_not_judged():
+    """MuJoCo agrees with the truth to 4e-9, but its short motion differs: speed and ends leave it out."""
     [found] = SITUATIONS["another mechanism"]
     assert "MuJoCo" not in fast([found]) and "MuJoCo" not in breaks([found])
     assert [found.grade(r) for r in RECORDS[:2]] == [Grade.RIGHT, Grade.UNJUDGED]
 
 
-def test_engines_without_a_truth_are_compared_at_the_same_times():
-    """Two motions that are 1e-3 of the scene's length apart, and one at other times."""
+def test_distance_of_two_runs_is_measured_only_at_equal_times():
+    """Motions a and b are off the truth by 1e-3 and 2e-3 of the scene's length; c has other times."""
     first, second = (synthetic.record(name, "x", error, 0.1) for name, error in (("a", 1e-3), ("b", 2e-3)))
     scene, other = synthetic.scene(), {**first, "engine": "c", "times": [0.5 * t for t in first["times"]]}
     found = Judged(scene, {}, [first, second, other]).agreement()
@@ -175,14 +176,16 @@ def saved(folder: Path, records: list[dict]) -> Path:
     return folder
 
 
-def test_a_comparison_leaves_files_as_they_are(tmp_path):
+def test_reading_records_does_not_change_a_file_with_a_cut_line(tmp_path):
+    """The last line was cut short, as by a study that is being written."""
     path = saved(tmp_path / "cut", [record("a", "x", 1e-5, 0.1)]) / "records.jsonl"
     path.write_text(path.read_text() + '{"key": "cut sho')
     before = path.read_text()
     assert len(load(path)) == 1 and path.read_text() == before
 
 
-def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
+def test_runs_that_only_one_set_has_are_counted_or_listed(tmp_path):
+    """Two runs of engine b are in the old set only: one line counts them, and --all lists each."""
     both, gone = record("a", "x", 1e-5, 0.1), [record("b", family, 1e-5, 0.1) for family in "pq"]
     folders = [saved(tmp_path / name, runs) for name, runs in (("old", [both, *gone]), ("new", [both]))]
     said = []
@@ -195,14 +198,16 @@ def test_runs_of_one_set_alone_are_counted_by_engine(tmp_path):
     assert "0 of 1 runs of both sets changed." in said[0]
 
 
-def test_errors_are_drawn_no_lower_than_they_are_known():
+def test_errors_below_the_truth_s_bound_are_drawn_at_the_bound():
+    """The truth is known to 3e-14; the run's error is 1e-17."""
     below = record("a", "x", 1e-17, 0.1)
     assert Run(below).drawn == (3e-14, 0.1)
     drawn = scatter([below], {("a", "x"): "A"}).plain
     assert "1e-14" in drawn and "1e-16" not in drawn, drawn
 
 
-def test_tables_of_eighty_columns_and_whole_numbers():
+def test_tables_of_eighty_columns_cut_no_number():
+    """Each number is in the tables of comparison and of runs; a run that ends at t = -1e-8 s has none."""
     measured = {
         "error": 2.71e-5,
         "error_bound": 1e-14,
@@ -223,4 +228,4 @@ def test_tables_of_eighty_columns_and_whole_numbers():
     text = console.export_text()
     for number in ("2.71e-05", "1.13e-13", "2.50e-12", "7.81e-06", "accuracy=0.0001", "7.8125e-06"):
         assert len(re.findall(rf"{re.escape(number)}(?!\d)", text)) >= 2, (number, text)
-    assert "0.00e+00" not in text and "-1e-08" not in text, "a run that never moved has no numbers"
+    assert "0.00e+00" not in text and "-1e-08" not in text
