@@ -81,7 +81,7 @@ def example(name: str, tmp_path: Path) -> str:
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,  # s; Pinocchio compiles C++ code
         check=False,
     )
     assert run.returncode == 0, f"{name}: status {run.returncode}: {run.stderr[-800:]}"

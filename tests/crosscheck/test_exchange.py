@@ -1,4 +1,4 @@
-"""MJCF and URDF: the scene's accelerations / those of MuJoCo's own matrices; round trips by the gate."""
+"""MJCF and URDF: scenes accelerate as MuJoCo's matrices of the file say, and survive a round trip."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mbref.scenes import find_scene
 from mbref.trajectory import Trajectory
 from tests.crosscheck.measured import MARGIN
 
-ALIKE = 6.1e-10  # measured difference of accelerations, of the largest
+ALIKE = 6.1e-10  # measured difference of accelerations / the largest acceleration
 
 MODELS = Path(__file__).parent / "models"
 NAMES = ("four_bar", "five_bar", "delta_leg", "stewart_legs", "slider_crank", "scissor")
@@ -30,7 +30,7 @@ EXPORTED = ("four_bar_gravity", "bennett", "andrews_squeezer", "flyball_governor
 
 @pytest.fixture(autouse=True)
 def installed(monkeypatch):
-    """The plug-in, whether or not the installed metadata has it yet."""
+    """Register the format of MuJoCo's files, whether or not the installed metadata has it."""
     point = EntryPoint("mujoco", "crosscheck.engines.mujoco.files:FORMAT", formats.GROUP)
     monkeypatch.setattr(formats, "entry_points", lambda group: [point])
 
@@ -47,7 +47,7 @@ def held_acceleration(model, data) -> np.ndarray:
 
 
 def same_accelerations(scene: Scene, model) -> None:
-    """Of the scene's bodies at rest at qpos0 (m/s², world), at the scene's centres of mass."""
+    """Compare accelerations (m/s²) of centres of mass at rest at qpos0, by mbref and by MuJoCo's matrices."""
     start = simulate(scene, "mpi-svd+projection", [0.0])
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -83,18 +83,19 @@ def in_frames_of(scene: Scene, trajectory: Trajectory, own: Scene) -> Trajectory
 
 
 def passes_the_gate(scene: Scene, again: Scene) -> None:
+    """Compare poses and changes of velocity of short runs of two scenes by the judge's check of models."""
     runs = [simulate(s, "mpi-svd+projection", gate_times(scene)) for s in (scene, again)]
     assert gate(scene, [runs[0], in_frames_of(scene, runs[1], again)]) is None
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_model_s_scene_accelerates_as_its_own_matrices_say(name):
+def test_scene_of_an_mjcf_file_accelerates_as_mujocos_matrices_say(name):
     scene = formats.read(MODELS / f"{name}.xml").scene
     same_accelerations(scene, mujoco.MjModel.from_xml_path(str(MODELS / f"{name}.xml")))
 
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name != "slider_crank"])
-def test_round_trip_of_a_model_passes_the_gate(name, tmp_path):
+def test_an_mjcf_file_written_and_read_again_is_the_mechanism(name, tmp_path):
     scene = formats.read(MODELS / f"{name}.xml").scene
     formats.write(scene.with_(driver=()), tmp_path / "again.xml")
     again = formats.read(tmp_path / "again.xml").scene
@@ -102,6 +103,7 @@ def test_round_trip_of_a_model_passes_the_gate(name, tmp_path):
 
 
 def test_bodies_welded_by_an_equality_are_one_body_after_a_round_trip(tmp_path):
+    """The written file has a loop of hinges and a slide; it is opened by a second part of the piston."""
     formats.write(formats.read(MODELS / "slider_crank.xml").scene, tmp_path / "again.xml")
     again = formats.read(tmp_path / "again.xml")
     assert {body.name for body in again.scene.body} == {"crank", "rod", "pin", "piston (share 4)"}
@@ -110,7 +112,7 @@ def test_bodies_welded_by_an_equality_are_one_body_after_a_round_trip(tmp_path):
 
 
 @pytest.mark.parametrize("name", EXPORTED)
-def test_an_exported_scene_is_the_same_mechanism(name, tmp_path):
+def test_an_exported_scene_is_the_mechanism_in_mujoco_and_when_read_again(name, tmp_path):
     scene = find_scene(name)
     loads = [load for load in scene.load if load.type in ("spring", "torsion_spring")]
     bodies = [b.model_copy(update={"velocity": None, "angular_velocity": None}) for b in scene.body]
@@ -120,7 +122,8 @@ def test_an_exported_scene_is_the_same_mechanism(name, tmp_path):
     passes_the_gate(scene, formats.read(tmp_path / "scene.xml").scene)
 
 
-def test_joints_of_every_kind_are_named():
+def test_joints_of_a_file_become_joints_of_the_scene_by_name_and_kind():
+    """px is a row of slides and hinges in a plane, u1 two hinges that cross."""
     scene = formats.read(MODELS / "delta_leg.xml").scene
     assert {joint.name: joint.type for joint in scene.joint} == {
         "motor": "revolute",
@@ -130,18 +133,21 @@ def test_joints_of_every_kind_are_named():
         "end_a": "spherical",
         "end_b": "spherical",
     }
+
+
+def test_a_body_without_a_joint_is_part_of_its_parent():
     scissor = formats.read(MODELS / "scissor.xml")
-    kinds = {joint.name: joint.type for joint in scissor.scene.joint}
-    assert kinds["rail"] == "cylindrical" and "label" not in {body.name for body in scissor.scene.body}
+    assert scissor.scene.joint_named("rail").type == "cylindrical"
+    assert "label" not in {body.name for body in scissor.scene.body}
     assert "fixed to 'top' and part of it: 'label'" in scissor.notes
 
 
-def test_a_joint_held_by_an_equality_is_a_driver_that_stands():
+def test_a_joint_that_an_equality_holds_has_a_driver_that_keeps_it_at_zero():
     scene = formats.read(MODELS / "stewart_legs.xml").scene
     assert [driver.joint for driver in scene.driver] == ["s2"] and scene.driver[0].polynomial == (0.0,)
 
 
-def test_parts_without_a_counterpart_are_told():
+def test_import_and_export_report_parts_that_they_leave_out():
     told = formats.read(MODELS / "five_bar.xml").left_out
     assert "2 actuators without a control value: no force" in told and any(
         "softness of equalities" in sentence for sentence in told
@@ -169,7 +175,7 @@ def changed(tmp_path, old: str, new: str) -> Path:
         ("</equality>", '</equality><sensor><jointpos joint="A"/></sensor>', "1 sensor"),
     ],
 )
-def test_parts_that_do_not_change_the_motion_are_listed(old, new, says, tmp_path):
+def test_parts_that_do_not_change_the_motion_are_reported(old, new, says, tmp_path):
     found = formats.read(changed(tmp_path, old, new))
     sentences = (*found.left_out, *found.notes)
     assert any(says in sentence for sentence in sentences), sentences
@@ -204,7 +210,7 @@ def test_a_model_without_a_body_is_refused_by_its_file(tmp_path):
         formats.read(path)
 
 
-def test_what_no_scene_can_hold_is_refused_by_name(tmp_path):
+def test_joints_with_dependent_motions_and_broken_xml_are_refused(tmp_path):
     text = (MODELS / "four_bar.xml").read_text()
     twice = text.replace('<joint name="B"/>', '<joint name="B"/><joint name="B2"/>')
     (tmp_path / "twice.xml").write_text(twice)
@@ -215,7 +221,8 @@ def test_what_no_scene_can_hold_is_refused_by_name(tmp_path):
         formats.read(tmp_path / "broken.xml")
 
 
-def test_a_urdf_with_a_loop_is_the_mechanism_of_its_numbers():
+def test_a_urdf_with_a_loop_is_a_four_bar_with_the_numbers_of_the_file():
+    """The loop closes 0.4 m from the coupler's hinge at (0, 0, 0.2); Tr J of the crank is unchanged."""
     scene = formats.read(MODELS / "four_bar.urdf").scene
     assert [joint.type for joint in scene.joint] == ["revolute"] * 4
     assert scene.joint_named("C").anchor == pytest.approx((0.4, 0.0, 0.2))
@@ -228,7 +235,7 @@ def test_a_urdf_with_a_loop_is_the_mechanism_of_its_numbers():
 
 
 def test_roll_pitch_and_yaw_of_a_loop_turn_its_axis(tmp_path):
-    """About the fixed axes x, then y, then z."""
+    """URDF turns about the fixed axes x, then y, then z."""
     text = (MODELS / "four_bar.urdf").read_text()
     old = '<origin xyz="0.4 0 0"/></pre'
     assert old in text
@@ -258,24 +265,30 @@ def test_faulty_urdf_is_refused(old, new, says, tmp_path):
         formats.read(tmp_path / "faulty.urdf")
 
 
-def test_commands_import_and_export(tmp_path, capsys):
+def test_import_writes_a_scene_that_export_writes_as_mjcf(tmp_path, capsys):
     assert main(["import", str(MODELS / "five_bar.xml"), "--out", str(tmp_path / "five.toml")]) == 0
     assert "left out: 2 actuators" in capsys.readouterr().out
     assert Scene.from_file(tmp_path / "five.toml").load[0].stiffness == 40
     assert main(["export", str(tmp_path / "five.toml"), "--out", str(tmp_path / "five.xml")]) == 0
+    again = formats.read(tmp_path / "five.xml").scene
+    assert again.counts() == Scene.from_file(tmp_path / "five.toml").counts(), "also the names of joints"
+
+
+def test_export_refuses_an_unknown_format_and_import_a_missing_file(tmp_path, capsys):
     assert main(["export", "bricard", "--out", str(tmp_path / "five.obj")]) == 2
     assert "no format writes .obj; known: .xml" in capsys.readouterr().err
     assert main(["import", str(tmp_path / "none.xml")]) == 2
+    assert "none.xml" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("name", ["robot.xml", "robot.urdf", "robot.sdf"])
-def test_a_file_of_another_program_is_no_scene_but_can_be_imported(name, capsys):
+def test_diagnose_of_a_file_of_another_program_names_the_import_command(name, capsys):
     assert main(["diagnose", name]) == 2
     said = capsys.readouterr().err
     assert f"{name}: is no scene file; `mbref import {name}` makes one" in said
 
 
-def test_the_project_declares_the_plug_in():
+def test_the_project_declares_the_formats_of_mujoco_and_sdf():
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]
     assert project["entry-points"][formats.GROUP] == {
         "mujoco": "crosscheck.engines.mujoco.files:FORMAT",

@@ -39,6 +39,9 @@ def write(scene: Scene) -> Exported:
         body = spec.body(f"link {k}")
         _true_inertia(body, link)
         body.name = names[k]
+    for k, closure in enumerate(tree.closures):
+        if closure.kind == "point":  # a weld joins two parts of a body
+            spec.equality(f"closure {k}").name = scene.joint[closure.joint].name
     new = _name_joints(spec, scene, tree)
     motors = [(new[name], amount) for name, amount, _ in pushed]
     return Exported(_text(spec, new, motors), tuple(_left_out(scene)))
