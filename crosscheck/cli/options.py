@@ -154,7 +154,10 @@ def seconds(text: str) -> float:
 
 def time_limit(text: str) -> float:
     """Parse a positive CPU time (s) up to MOST_SECONDS."""
-    return seconds(repr(positive(text)))
+    number = _number(text)
+    if not 0 < number <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(f"must be positive and at most {MOST_SECONDS:g} s, got {text}")
+    return number
 
 
 def numbers(text: str) -> list[float]:
@@ -204,10 +207,10 @@ def length(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """Parse a positive number."""
+    """Parse a positive finite number."""
     number = _number(text)
     if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be positive, got {text}")
+        raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
     return number
 
 

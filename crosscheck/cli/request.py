@@ -104,7 +104,8 @@ def lasting(scene: Scene, times: Sequence[float] | None, duration: float | None)
         _check_times(times)
     end = duration if duration is not None else times[-1] if times else scene.duration
     if not 0 < end <= MOST_DURATION:
-        raise RequestError(f"--duration: must be positive and at most {MOST_DURATION:g} s, got {end:g}")
+        option = "--times: the end" if times and duration is None else "--duration:"
+        raise RequestError(f"{option} must be positive and at most {MOST_DURATION:g} s, got {end:g}")
     if times and times[-1] > end:
         raise RequestError(f"--times: must end by --duration {end:g}, got {times[-1]:g}")
     return scene if end == scene.duration else scene.with_(duration=end)

@@ -115,7 +115,7 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
     """Return the sample times that the options request; raises InputError that names the faulty option."""
     duration = scene.duration if options.duration is None else options.duration
     if not 0 < duration < np.inf:
-        raise InputError(f"--duration: must be positive, got {duration:g}")
+        raise InputError(f"--duration: must be positive and finite, got {duration:g}")
     if options.times is None:
         samples = 101 if options.samples is None else options.samples
         if samples * len(scene.body) > MOST_STATES:

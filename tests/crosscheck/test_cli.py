@@ -146,7 +146,7 @@ def test_a_crashed_run_has_exit_status_one_and_names_the_signal(capsys, still):
         (["--duration", "inf"], "--duration: must be positive and at most 1e+09 s, got inf"),
         (["--reference-time", "-1"], "--reference-time: must be from 0 to 1e+07 s, got -1"),
         (["--rtol", "0"], "--rtol: must be positive and at most 0.99, got 0"),
-        (["--time-limit", "0"], "--time-limit: must be positive, got 0"),
+        (["--time-limit", "0"], "--time-limit: must be positive and at most 1e+07 s, got 0"),
         (["--setting", "gentle"], "unknown method or setting 'gentle'; known: 'plain', 'noisy'"),
         (["--setting", "noisi"], "did you mean 'noisy'?"),
         (["--engine", "mujco"], "did you mean 'mujoco'?"),

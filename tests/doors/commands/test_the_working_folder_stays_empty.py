@@ -1,4 +1,4 @@
-"""Commands write nothing into the working folder: no logs of engines, no folders of their solvers."""
+"""Commands leave the working folder empty: no logs of engines, no folders of their solvers."""
 
 from __future__ import annotations
 
@@ -16,20 +16,21 @@ NEARLY_SINGULAR = """<mujoco><worldbody><body name="a"><joint axis="0 1 0"/>
 <inertial pos="0 0 0" mass="1e-12" diaginertia="1e-13 1e-13 1e-13"/></body></body></worldbody></mujoco>"""
 
 
-@pytest.mark.parametrize("text", [NOT_A_NUMBER, NEARLY_SINGULAR])
-def test_an_import_with_warnings_leaves_the_scene_file_alone(text, tmp_path, monkeypatch, capfd):
+@pytest.mark.parametrize(("text", "status"), [(NOT_A_NUMBER, 2), (NEARLY_SINGULAR, 0)])
+def test_import_of_a_file_that_mujoco_warns_about_leaves_no_log(text, status, tmp_path, monkeypatch, capfd):
+    """MuJoCo writes its warnings to the terminal and to MUJOCO_LOG.TXT in the working folder."""
     file, here = tmp_path / "a.xml", tmp_path / "here"
     file.write_text(text)
     here.mkdir()
     monkeypatch.chdir(here)
-    mbref(["import", str(file), "--out", str(tmp_path / "a.toml")])
+    assert mbref(["import", str(file), "--out", str(tmp_path / "a.toml")]) == status
     assert "WARNING" not in "".join(capfd.readouterr())
     assert not os.listdir(here)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scene", ["four_bar", "four_bar_gravity"])
-def test_runs_of_engines_leave_nothing(scene, tmp_path, monkeypatch):
+def test_runs_and_modes_of_engines_leave_no_file(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     engines = [word for name in ("mbref", "mujoco", "pinocchio", "exudyn") for word in ("--engine", name)]
     crosscheck(["run", scene, *engines, "--samples", "3", "--duration", "0.01"])

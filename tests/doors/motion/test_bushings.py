@@ -1,4 +1,4 @@
-"""Damped springs whose ends coincide at the start / closed forms of a slide and of a hinge."""
+"""Bushings: damped springs whose ends coincide at the start, by the equations of a slide and of a hinge."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def on_a_slide() -> Scene:
 
 
 def test_a_block_on_a_bushing_is_a_damped_oscillator():
-    """m x'' = -k x - c x', also where the ends meet again."""
+    """m x'' = -k x - c x', so x = v/ω e^(-δt) sin ωt: the ends meet again twice a period."""
     run = simulate(on_a_slide(), times=[0.0, *TIMES])
     decay = DAMPING / (2 * MASS)
     rate = np.sqrt(STIFFNESS / MASS - decay**2)
@@ -49,8 +49,9 @@ def test_a_block_on_a_bushing_is_a_damped_oscillator():
     assert "the ends of the damped spring load[0] coincide at the start" in run.message
 
 
-def test_a_pendulum_on_a_bushing_obeys_its_power():
-    """I a'' = -m g l cos a - k r² sin a - c r² cos²(a/2) a', from l' = r cos(a/2) a'."""
+def test_a_pendulum_on_a_bushing_moves_by_its_own_equation_of_motion():
+    """I a'' = -m g l cos a - k r² sin a - c r² cos²(a/2) a', integrated by scipy; the bushing's length is
+    2 r sin(a/2), whose rate is r cos(a/2) a'."""
     reach, arm, about = 1.1, 0.7, 0.3 + 2.0 * 0.49
     run = simulate(pendulum(load=[bushing("rod", (reach, 0.0, 0.0))]), times=TIMES)
 
@@ -63,7 +64,7 @@ def test_a_pendulum_on_a_bushing_obeys_its_power():
     assert np.allclose(np.arctan2(run.position[:, 0, 1], run.position[:, 0, 0]), exact, rtol=0.0, atol=1e-8)
 
 
-def test_taylor_refuses_a_bushing_with_the_method_to_use(tmp_path, capsys):
+def test_taylor_refuses_a_bushing_and_names_the_method_to_use(tmp_path, capsys):
     with pytest.raises(
         MethodError, match=r"load\[0\] coincide at the start.*use alf-dual\+projection/dop853"
     ):
@@ -74,8 +75,9 @@ def test_taylor_refuses_a_bushing_with_the_method_to_use(tmp_path, capsys):
     assert "use alf-dual+projection/dop853" in " ".join(capsys.readouterr().err.split())
 
 
-def test_the_judge_knows_the_damping_of_a_bushing_that_parts():
-    """A division by the length of zero would be a warning, which fails."""
+def test_acceleration_by_the_judge_has_the_damping_of_a_bushing_whose_ends_part():
+    """-c v / m of the block, and -m g l² / I of a pendulum at rest: its bushing is left without a division by
+    the length zero, whose warning would fail the test."""
     assert gauss(on_a_slide())[0, 0] == pytest.approx(-DAMPING / MASS * SPEED, rel=1e-12)
     hanging = Scene(
         name="rest",

@@ -70,7 +70,10 @@ def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
 
 
 def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: float) -> None:
-    """Check that the run completes, on a branch of the linkage and with its kinetic energy."""
+    """Check that the run completes, on a branch of the linkage (m) and with its energy (relative).
+
+    A singular position magnifies the errors of the fixed steps, so that its tolerance is ten times as large.
+    """
     scene = crank_rocker(lengths, angle)
     motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, END, 6))
     assert motion.outcome is mbref.Outcome.COMPLETED, motion.message
@@ -82,12 +85,12 @@ def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: floa
 
 
 @pytest.mark.parametrize("step", [2e-3, 5e-3])
-def test_partitioning_completes_an_ordinary_crank_rocker(step):
+def test_partitioning_keeps_the_branch_and_the_energy_of_a_crank_rocker(step):
     check(ORDINARY, 0.3 * math.pi, step, 1e-4)
 
 
 @pytest.mark.parametrize("step", [2e-3, 5e-3])
-def test_partitioning_goes_on_behind_the_singular_position_beside_its_start(step):
+def test_partitioning_passes_a_singular_position_in_its_first_step(step):
     """The crank passes half a turn in the first step; its coordinate turns back at a full turn."""
     check(CHANGE_POINT, 0.9998 * math.pi, step, 1e-3)
 
@@ -96,5 +99,5 @@ def test_partitioning_goes_on_behind_the_singular_position_beside_its_start(step
 @pytest.mark.parametrize("step", [1e-4, 5e-4, 1e-3, 2e-3, 3e-3, 5e-3])
 @pytest.mark.parametrize("part", [0.9998, 0.99, 0.5, 1.0002, 1.5])
 @pytest.mark.parametrize("lengths", [ORDINARY, CHANGE_POINT, (0.1, 0.5, 0.45, 0.5)])
-def test_partitioning_completes_crank_rockers_from_many_starts(lengths, part, step):
+def test_partitioning_keeps_branches_and_energies_of_crank_rockers_from_many_starts(lengths, part, step):
     check(lengths, part * math.pi, step, 2e-3)

@@ -1,4 +1,4 @@
-"""Outcome and message of a run do not depend on the size of the mechanism."""
+"""Outcome, message and motion of a run do not depend on the size of the mechanism."""
 
 from __future__ import annotations
 
@@ -7,22 +7,23 @@ import pytest
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.conformance.relations import in_other_units, scaled
-from mbref import Scene, find_scene, simulate
+from mbref import Outcome, Scene, find_scene, simulate
 from tests.helpers.statics import ORIGIN, hinge, rod
 
 
-def ends(scene):
+def ends(scene: Scene) -> tuple[tuple[Outcome, str, int], np.ndarray]:
+    """Return outcome, message and number of singular positions of a run, and its last positions."""
     run = simulate(scene, times=[scene.duration])
     return (run.outcome, run.message, len(run.crossings)), run.position
 
 
 @pytest.mark.parametrize(("length", "time"), [(1e-6, 1.0), (1e6, 1.0), (1.0, 1e3)])
 @pytest.mark.parametrize("name", ["four_bar_quarter", "flyball_governor", "bennett"])
-def test_built_in_scenes_end_alike_at_every_size(name, length, time):
+def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name, length, time):
     scene = find_scene(name)
     scene = scene.with_(duration=min(scene.duration, 0.2))
     (expected, place), (found, other) = ends(scene), ends(in_other_units(scene, length, time))
-    assert found == expected
+    assert found == expected and expected[0] is Outcome.COMPLETED
     assert np.allclose(other / length, place, rtol=0.0, atol=1e-6)
 
 
@@ -43,7 +44,8 @@ def rack_and_pinion() -> Scene:
 
 @pytest.mark.parametrize("mass", [1.0, 1e-9])
 @pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
-def test_torque_of_a_rack_and_pinion_is_exact_at_every_size(length, mass):
+def test_torque_of_a_rack_and_pinion_is_its_closed_form_at_every_size(length, mass):
+    """(J + I + r² (m + I')) φ'' with φ = 2 t + 3 t² at 0.5 s, and the rack at 0.01 - 0.2 φ m."""
     scene = in_other_units(scaled(rack_and_pinion(), mass), length, 1.0)
     run = simulate(scene, times=[0.5])
     angle, inertia = 2.0 * 0.5 + 3.0 * 0.5**2, 0.3 + 0.4 + 0.2**2 * (1.5 + 0.7)
@@ -53,6 +55,6 @@ def test_torque_of_a_rack_and_pinion_is_exact_at_every_size(length, mass):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(200))
-def test_random_mechanisms_end_alike_at_every_size(seed):
+def test_random_mechanisms_end_with_equal_outcome_and_message_at_every_size(seed):
     scene = random_mechanism(seed)
     assert ends(in_other_units(scene, (1e-6, 1e-3, 1e3, 1e6)[seed % 4], 1.0))[0] == ends(scene)[0]

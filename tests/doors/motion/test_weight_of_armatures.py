@@ -51,7 +51,7 @@ def off(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_slide_with_armature_falls_as_its_closed_form(method):
+def test_slide_with_armature_falls_as_its_closed_form_by_every_method(method):
     scene = slide()
     motion = simulate(scene, method, TIMES)
     assert motion.outcome.name == "COMPLETED", motion.message
@@ -62,19 +62,19 @@ def test_slide_with_armature_falls_as_its_closed_form(method):
 @pytest.mark.parametrize("ground", ["frame", "body"])
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("gravity", GRAVITIES)
-def test_direction_of_gravity_and_guide_do_not_matter(gravity, axis, ground):
+def test_slide_with_armature_falls_as_its_closed_form_in_every_direction(gravity, axis, ground):
     scene = slide(gravity, axis, ground=ground)
     assert off(simulate(scene, times=TIMES).joint("G").displacement, fallen(scene)) < 10 * ROUNDING
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="code is generated where kernels are compiled")
-def test_generated_code_gives_the_rotor_no_weight():
+def test_slide_with_armature_falls_as_its_closed_form_by_generated_code():
     scene = slide()
     motion = simulate(scene, "taylor", TIMES, Limits(code="generated"))
     assert off(motion.joint("G").displacement, fallen(scene)) < 10 * ROUNDING
 
 
-def test_every_scene_of_a_batch_has_its_own_gravity_and_no_weight_of_its_rotor():
+def test_slides_with_armature_of_a_batch_fall_by_their_own_gravity():
     scenes = [slide(gravity) for gravity in GRAVITIES for _ in range(2)]
     with ThreadPoolExecutor(1) as pool:
         found = dict(ensemble(scenes, TIMES, executor=pool))
@@ -83,7 +83,8 @@ def test_every_scene_of_a_batch_has_its_own_gravity_and_no_weight_of_its_rotor()
         assert off(moved @ scene.joint[0].axis, fallen(scene)) < 10 * ROUNDING
 
 
-def test_equilibrium_of_a_hanging_slide_bears_its_own_weight_alone():
+def test_equilibrium_of_a_slide_on_a_spring_has_the_weight_of_its_mass_alone():
+    """The slide rests at m (g·a) / k, and vibrates with √(k / (m + I)) rad/s."""
     stiffness = 50.0
     spring = {"type": "slide_spring", "joint": "G", "stiffness": stiffness}
     scene = slide(load=[spring])
@@ -94,7 +95,7 @@ def test_equilibrium_of_a_hanging_slide_bears_its_own_weight_alone():
 
 
 @pytest.mark.parametrize("kind", ["revolute", "cylindrical"])
-def test_rotor_of_a_hinge_turns_a_balanced_wheel_no_way(kind):
+def test_gravity_does_not_turn_a_balanced_wheel_with_armature(kind):
     """The centre of mass lies on the axis, so gravity moves nothing about it."""
     body = {"name": "wheel", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "position": [0.3, 0.1, -0.2]}
     hinge = {

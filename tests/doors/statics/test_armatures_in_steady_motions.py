@@ -32,8 +32,8 @@ def table(of_motor: float, of_slide: float) -> Scene:
 
 
 @pytest.mark.parametrize("armatures", [(0.0, 0.0), (0.7, 0.0), (0.0, 1.3), (0.7, 1.3)])
-def test_carriage_on_a_turntable_rests_and_vibrates_as_its_closed_form(armatures):
-    """m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s."""
+def test_armature_changes_the_frequency_of_a_carriage_on_a_turntable_and_not_its_place(armatures):
+    """Closed forms: m ω² (r + x) = k x, and vibrations of √((k - m ω²) / (m + I)) rad/s."""
     (found,) = equilibria(table(*armatures), starts=2)
     place = START * STIFFNESS / (STIFFNESS - MASS * RATE**2)
     assert np.linalg.norm(found.scene.body[1].position) == pytest.approx(place, rel=1e-9)

@@ -1,4 +1,4 @@
-"""Equilibria of mechanisms that are singular, marginal, stiff, or wound by many turns / closed forms."""
+"""Equilibria of mechanisms that are singular, marginal, stiff, or wound by many turns, by closed forms."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def spring(stiffness: float, **fields) -> dict:
 
 
 def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
-    """A pendulum near its upright pose beside a body of small mass on a stiff or damped slide."""
+    """A pendulum near its upright pose, and apart from it a small mass on a stiff or damped slide."""
     beside = pendulum((ARM * np.sin(0.2), ARM * np.cos(0.2), 0.0))
     load = {"type": "slide_spring", "joint": "T", "stiffness": stiffness, "damping": damping}
     return beside.with_(
@@ -32,10 +32,10 @@ def with_slide(stiffness: float, damping: float, mass: float) -> Scene:
     )
 
 
-def test_a_flat_parallelogram_rests_at_a_singular_position(tmp_path, capsys):
+def test_flat_parallelogram_is_an_equilibrium_at_a_singular_position_and_has_no_modes(tmp_path, capsys):
     flat = parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0))
     found = equilibria(flat, starts=2)
-    assert [each.stability for each in found][:1] == ["singular"] and len(found[0].eigenvalues) == 0
+    assert found[0].stability == "singular" and len(found[0].eigenvalues) == 0
     path = str(tmp_path / "flat.toml")
     flat.save(path)
     assert main(["equilibrium", path, "--starts", "1"]) == 0
@@ -44,16 +44,16 @@ def test_a_flat_parallelogram_rests_at_a_singular_position(tmp_path, capsys):
     assert "at a singular position" in capsys.readouterr().err
 
 
-def test_a_parallelogram_that_is_not_flat_keeps_its_eigenvalues():
-    """Three equal links: I = 2 J + 2 m l²/4 + m l², and a weight of 2 m g at the crank's end."""
+def test_hanging_parallelogram_vibrates_as_a_pendulum():
+    """Three equal links of l = 1 m: ω² = 2 m g l / I with I = 2 J + 2 m l²/4 + m l² about the pivots."""
     found = equilibria(parallelogram(-0.96, 0.28), starts=1)
     inertia = 2 * INERTIA + 2 * MASS / 4 + MASS
-    rate = np.sqrt(2 * MASS * np.hypot(G, 0.5) / inertia)
+    rate = np.sqrt(2 * MASS * np.hypot(G, 0.5) / inertia)  # gravity also has 0.5 m/s² along x
     assert [each.stability for each in found] == ["stable"]
     assert np.allclose(found[0].eigenvalues, [1j * rate, -1j * rate], rtol=1e-10, atol=0.0)
 
 
-def test_a_spring_that_just_holds_an_inverted_pendulum_is_indifferent():
+def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
     """k = m g l: the stiffness vanishes at the upright pose, the only equilibrium."""
     found = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE)]), starts=8)
     assert [each.stability for each in found] == ["indifferent"]
@@ -61,14 +61,15 @@ def test_a_spring_that_just_holds_an_inverted_pendulum_is_indifferent():
 
 
 @pytest.mark.parametrize("share", [-1e-6, 1e-6])
-def test_a_spring_beside_the_critical_one_is_judged_by_its_sign(share):
-    """s² = -(k - m g l) / I, also for a millionth of m g l."""
+def test_inverted_pendulum_is_stable_or_unstable_by_a_millionth_of_its_critical_stiffness(share):
+    """Eigenvalues s² = -(k - m g l) / I with k = m g l (1 + share)."""
     each = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE * (1 + share))]), starts=1)[0]
     assert each.stability == ("stable" if share > 0 else "unstable")
     assert np.allclose(each.eigenvalues**2, -share * TORQUE / ABOUT_HINGE, rtol=1e-4)
 
 
-def test_a_slow_fall_beside_a_fast_damper_is_unstable():
+def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_ten_million_times_faster():
+    """The pendulum falls with √(m g l / I) = 3.4 1/s, and the block of 0.1 g has c / m = 1e7 1/s."""
     fast = with_slide(100.0, 1000.0, 1e-4)
     rate = np.sqrt(TORQUE / ABOUT_HINGE)
     [upright] = equilibria(fast, starts=1)
@@ -78,7 +79,8 @@ def test_a_slow_fall_beside_a_fast_damper_is_unstable():
 
 
 @pytest.mark.parametrize("stiffness", [1e2, 1e5, 1e9])
-def test_stiff_springs_hide_no_equilibrium(stiffness):
+def test_both_equilibria_of_a_pendulum_are_found_beside_springs_of_any_stiffness(stiffness):
+    """At heights of ± l, with √(m g l / I) as the least eigenvalue of both."""
     found = equilibria(with_slide(stiffness, 0.0, 0.01))
     assert sorted(each.stability for each in found) == ["stable", "unstable"]
     heights = sorted(each.scene.body[0].position[1] for each in found)
@@ -87,16 +89,16 @@ def test_stiff_springs_hide_no_equilibrium(stiffness):
     assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=1e-9)
 
 
-def test_a_pose_that_is_reached_by_turns_both_ways_is_one():
-    """A free hinge that is turned by a full turn has its old pose; starts reach it from both sides."""
+def test_pendulum_without_spring_has_two_equilibria_whatever_turns_lead_to_them():
+    """A hinge without spring that has made a full turn has its old pose; starts reach it both ways."""
     for angle in (0.3, 2.0):
         place = (ARM * np.sin(angle), ARM * np.cos(angle), 0.0)
         found = equilibria(pendulum(place))
         assert sorted(each.stability for each in found) == ["stable", "unstable"]
 
 
-def test_a_tackle_in_balance_is_indifferent_at_every_height():
-    """Weights of 2 and 1 that move by 1 and 2: exactly zero, and one family of equilibria."""
+def test_tackle_in_balance_is_one_indifferent_equilibrium_with_eigenvalues_zero():
+    """Masses of 2 kg and 1 kg that move by 1 and -2: their weights balance at every height."""
     bodies = [rod("load", (0.0, -1.0, 0.0), 2.0), rod("weight", (0.5, -0.3, 0.0), 1.0)]
     joints = [
         slide("L", "load", (0.0, -1.0, 0.0), (0.0, 1.0, 0.0)),
@@ -109,8 +111,8 @@ def test_a_tackle_in_balance_is_indifferent_at_every_height():
 
 
 @pytest.mark.parametrize("turns", [-40, 3, 25])
-def test_a_spring_wound_by_many_turns_unwinds_to_its_own_angle(turns):
-    """k (φ - φ₀) = -m g l cos φ near φ₀; the scene at rest keeps the remaining twist."""
+def test_spring_wound_by_many_turns_unwinds_to_the_equilibrium_near_its_natural_angle(turns):
+    """k (φ - φ₀) = -m g l cos φ near φ₀; the scene of the equilibrium has the remaining twist φ₀ - φ."""
     stiffness, natural = 60.0, 2 * np.pi * turns + 0.4
     [each] = equilibria(pendulum(load=[spring(stiffness, damping=0.5, natural_angle=natural)]), starts=3)
     angle = brentq(
@@ -123,22 +125,29 @@ def test_a_spring_wound_by_many_turns_unwinds_to_its_own_angle(turns):
     assert np.allclose(np.abs(each.eigenvalues) ** 2, squares, rtol=1e-8) and each.stability == "stable"
 
 
-def test_two_equilibria_under_one_soft_spring_differ_by_a_turn():
-    """A weak spring leaves the hanging poses of several turns in balance: each is an equilibrium."""
-    found = equilibria(pendulum(load=[spring(0.2, natural_angle=2 * np.pi * 2.5)]), starts=12)
-    twists = {round(each.scene.load[0].natural_angle / (2 * np.pi)) for each in found}
-    assert len(found) >= 2 and len(twists) >= 2
+def test_hanging_poses_of_several_turns_are_equilibria_of_their_own_under_a_soft_spring():
+    """Each balances k (φ₀ - φ) = m g l cos φ with another remaining twist φ₀ - φ."""
+    stiffness = 0.2
+    found = equilibria(pendulum(load=[spring(stiffness, natural_angle=2 * np.pi * 2.5)]), starts=12)
+    twists = np.array([each.scene.load[0].natural_angle for each in found])
+    weights = [TORQUE * each.scene.body[0].position[0] / ARM for each in found]
+    assert stiffness * twists == pytest.approx(weights, abs=1e-9 * TORQUE)
+    hanging = [twist for each, twist in zip(found, twists, strict=True) if each.stability == "stable"]
+    assert np.ptp(hanging) > np.pi
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])
-def test_a_wheel_that_no_force_turns_is_one_equilibrium(angle):
-    bodies = [rod("rod", (0.0, -ARM, 0.0)), rod("wheel", (0.0, -2 * ARM, 0.0), 1.0)]
+def test_angle_of_a_wheel_that_no_force_turns_makes_one_indifferent_equilibrium(angle):
+    """A wheel at the end of a hanging rod, on a hinge through its centre of mass, starts at an angle."""
+    turned = {"orientation": [np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)]}
+    bodies = [rod("rod", (0.0, -ARM, 0.0)), rod("wheel", (0.0, -2 * ARM, 0.0), 1.0) | turned]
     joints = [hinge("A", ("ground", "rod")), hinge("W", ("rod", "wheel"), (0.0, -2 * ARM, 0.0))]
     found = equilibria(Scene(name="wheel", gravity=DOWN, body=bodies, joint=joints), starts=5)
     assert [each.stability for each in found if each.scene.body[0].position[1] < 0] == ["indifferent"]
 
 
-def test_bounds_hold_for_the_closed_form_and_are_printed_in_json(tmp_path, capsys):
+def test_bounds_of_eigenvalues_in_json_are_at_least_their_errors(tmp_path, capsys):
+    """Closed form of a hanging pendulum: ± i √(m g l / I)."""
     path = str(tmp_path / "pendulum.toml")
     pendulum((0.0, -ARM, 0.0)).save(path)
     assert main(["modes", path, "--starts", "1", "--json"]) == 0

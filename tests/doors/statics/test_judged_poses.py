@@ -1,4 +1,4 @@
-"""Equilibria of the judge: families without force, singular positions, slow motions / closed forms."""
+"""Equilibria that the judge finds: indifferent ones, singular positions and slow motions, by closed forms."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def balance_of_weights() -> Scene:
     )
 
 
-def test_weights_in_balance_at_every_height_are_one_table(tmp_path, capsys):
+def test_weights_in_balance_at_every_height_are_printed_as_one_indifferent_equilibrium(tmp_path, capsys):
     path = str(tmp_path / "weights.toml")
     balance_of_weights().save(path)
     assert main(["modes", path, "--engine", "mbref"]) == 0
@@ -35,17 +35,19 @@ def test_weights_in_balance_at_every_height_are_one_table(tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_a_spring_that_just_holds_a_pendulum_is_one_indifferent_pose():
+def test_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
+    """Critical stiffness m g l with 2 kg at 0.7 m."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 2.0 * G * 0.7}
     [each] = steady_poses(pendulum((0.0, 0.7, 0.0), load=[spring]))
     assert each.stability == "indifferent"
 
 
-def test_a_flat_parallelogram_has_no_small_motions():
+def test_flat_parallelogram_at_a_singular_position_is_left_out():
     assert not steady_poses(parallelogram(0.0, 1.0).with_(gravity=(G, 0.0, 0.0)), starts=1)
 
 
-def test_a_slow_fall_beside_a_fast_damper_is_unstable():
+def test_slow_fall_of_a_pendulum_is_found_beside_a_damper_millions_of_times_faster():
+    """√(m g l / (J + m l²)) = 3.4 1/s within the bound of the eigenvalue, beside c / m = 8e6 1/s."""
     beside = pendulum((0.0, 0.7, 0.0))
     damper = {"type": "slide_spring", "joint": "T", "stiffness": 50.0, "damping": 800.0}
     scene = beside.with_(

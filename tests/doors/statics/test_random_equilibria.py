@@ -1,4 +1,4 @@
-"""Equilibria of random mechanisms / accelerations and differences of the judge's own equations."""
+"""Equilibria of random mechanisms, against accelerations and eigenvalues of the judge's own equations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def at_rest(seed: int) -> Scene:
 
 
 def check(scene: Scene, starts: int) -> int:
-    """Check all equilibria of a scene; return their number."""
+    """Check accelerations and eigenvalues of all equilibria of a scene; return their number."""
     found = equilibria(scene, starts=starts)
     size = np.abs(gauss(scene)).max()
     for each in found:
@@ -45,15 +45,15 @@ def check(scene: Scene, starts: int) -> int:
     return len(found)
 
 
-@pytest.mark.parametrize("seed", [0, 3, 4])
-def test_eigenvalues_are_the_judges_within_their_bounds(seed):
-    check(at_rest(seed), starts=1)
+@pytest.mark.parametrize("seed", [0, 3])
+def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
+    assert check(at_rest(seed), starts=1) == 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(5, 215, 10))
-def test_eigenvalues_of_many_mechanisms_are_the_judges(first):
-    """Ten mechanisms each, of which several have an equilibrium."""
+def test_eigenvalues_of_many_mechanisms_agree_with_the_judges_within_their_bounds(first):
+    """Of ten mechanisms several have an equilibrium."""
     assert sum(check(at_rest(seed), starts=3) for seed in range(first, first + 10))
 
 
@@ -66,7 +66,9 @@ def test_eigenvalues_of_many_mechanisms_are_the_judges(first):
     ],
     ids=["linkage", "sprung"],
 )
-def test_units_of_length_mass_and_time_have_no_influence(scene, length, mass, time):
+def test_equilibria_in_other_units_have_equal_places_and_eigenvalues_by_the_unit_of_time(
+    scene, length, mass, time
+):
     changed = in_other_units(scaled(scene, mass), length, time)
     for each, other in zip(equilibria(scene, 3), equilibria(changed, 3), strict=True):
         assert each.stability == other.stability
