@@ -1,4 +1,4 @@
-"""Names that crosscheck exports / the objects behind them, and what a third party's engine imports."""
+"""Names that crosscheck exports, the cost of its import, and the module that a third party's engine needs."""
 
 from __future__ import annotations
 
@@ -16,18 +16,22 @@ TINY = Path(__file__).parents[2] / "examples" / "tiny_engine" / "tiny_engine.py"
 
 
 @pytest.mark.parametrize("name", crosscheck.__all__)
-def test_every_exported_name_is_there(name: str) -> None:
+def test_every_exported_name_exists_and_is_listed(name: str) -> None:
     assert getattr(crosscheck, name) is not None and name in dir(crosscheck)
 
 
-def test_names_of_functions_and_of_modules_do_not_collide() -> None:
+def test_crosscheck_exports_functions_beside_its_modules_engine_and_study() -> None:
+    """`find_engine` and `run_study` are exported under other names than their modules."""
     assert crosscheck.find_engine("mbref").name == "mbref"
     assert crosscheck.run_study is crosscheck.study.study
+
+
+def test_an_unknown_attribute_of_crosscheck_is_an_attribute_error() -> None:
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         crosscheck.nothing  # noqa: B018
 
 
-def test_importing_crosscheck_loads_nothing() -> None:
+def test_importing_crosscheck_imports_neither_numpy_nor_numba_nor_mbref() -> None:
     code = "import sys, crosscheck; print(sorted({m.partition('.')[0] for m in sys.modules}))"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert "'numpy'" not in loaded and "'numba'" not in loaded and "'mbref'" not in loaded, loaded
@@ -40,8 +44,8 @@ def test_an_engine_in_the_working_directory_is_found(tmp_path, monkeypatch) -> N
     assert engine.engine("beside_me:ENGINE").name == "mbref"
 
 
-def test_an_engine_needs_one_module() -> None:
-    """The example imports from crosscheck.engine alone, beside numpy and the standard library."""
+def test_the_example_engine_imports_from_crosscheck_engine_alone() -> None:
+    """Its other imports, by ``import``, are numpy and the standard library."""
     found = {
         node.module for node in ast.walk(ast.parse(TINY.read_text())) if isinstance(node, ast.ImportFrom)
     }

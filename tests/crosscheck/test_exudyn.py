@@ -1,4 +1,4 @@
-"""Exudyn: its runs / truths, closed forms and the joints' own equations; its known traps."""
+"""Exudyn's runs against truths and closed forms, and its failures at singular positions."""
 
 from __future__ import annotations
 
@@ -34,9 +34,15 @@ from tests.crosscheck.tree_scenes import driven, every_joint
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 TURNED = tuple(rotations.from_vector([0.3, -0.5, 0.8]).tolist())
-ACCELERATION = 2.7e-8  # measured errors: of the largest
-TURNING, TUMBLING, BEFORE = 8.2e-10, 6.1e-10, 7.2e-6  # rad; of the scene's length or rad
-DRIVEN, OPEN = (2.4e-11, 2.9e-10), (5.7e-14, 2.3e-12)  # m or rad, and their rates
+# measured errors
+ACCELERATION = 2.7e-8  # of accelerations / the largest acceleration
+TURNING = 8.2e-10  # rad, of a body on a hinge
+TUMBLING = 6.1e-10  # of a free body, relative to the scene's length or in rad
+BEFORE = 7.2e-6  # of a run before a singular position, relative to the scene's length or in rad
+DRIVEN, OPEN = (
+    (2.4e-11, 2.9e-10),
+    (5.7e-14, 2.3e-12),
+)  # of driven coordinates and of closures: m or rad, and rates
 
 
 def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory:
@@ -47,7 +53,7 @@ def run(scene: Scene, times: np.ndarray, family: str, step: float) -> Trajectory
 
 
 def one_body(**changes: object) -> Scene:
-    """A body with a full inertia matrix, 0.2 m from a joint at the origin whose axis is SIDEWAYS."""
+    """Return a body with a full inertia matrix, 0.2 m from a joint at the origin whose axis is SIDEWAYS."""
     body = Body(name="b", mass=2.0, inertia=INERTIA, position=(0.0, 0.2, 0.0), orientation=TURNED)
     return Scene(name="one", body=(body,), duration=1.0, **changes)
 
@@ -57,14 +63,14 @@ def hinge(kind: type = Revolute, bodies: tuple[str, str] = ("ground", "b")) -> d
 
 
 def moment_of_inertia(scene: Scene) -> float:
-    """About the axis SIDEWAYS through the origin, which is perpendicular to the body's arm."""
+    """Return the moment of inertia (kg m²) about SIDEWAYS through the origin, at a right angle to the arm."""
     turn = rotations.to_matrix(np.array(TURNED))
     axis = np.array(SIDEWAYS)
     return float(axis @ turn @ np.array(INERTIA) @ turn.T @ axis) + scene.body[0].mass * 0.2**2
 
 
 def angle(scene: Scene, trajectory: Trajectory) -> np.ndarray:
-    """Angle (k,) about SIDEWAYS since the start, modulo a turn."""
+    """Return the angle (k,) about SIDEWAYS since the start, modulo a turn."""
     relative = rotations.multiply(
         trajectory.orientation[:, 0], rotations.conjugate(scene.body[0].orientation)
     )
@@ -96,9 +102,10 @@ def assert_angle(scene: Scene, trajectory: Trajectory, expected: np.ndarray, tol
         ("planar_slider_crank_equal", 0.1, "alpha", 1e-4, (2.5e-4, 3.1e-4)),  # through a singular position
     ],
 )
-def test_run_and_truth_agree(
+def test_exudyns_families_move_mechanisms_within_their_measured_errors(
     name: str, duration: float, family: str, step: float, errors: tuple[float, float]
 ):
+    """Errors of poses and velocities against the judge's truth; MARGIN allows for other processors."""
     scene = SCENES[name]()
     trajectory = run(scene, np.linspace(0, duration, 11), family, step)
     measured = measure(scene, trajectory, truth_for(scene))
@@ -106,7 +113,8 @@ def test_run_and_truth_agree(
         assert measured[metric] < MARGIN * error, f"{metric} {measured[metric]:.2e}, measured {error:.1e}"
 
 
-def test_order_of_the_trapezoidal_rule_is_two_and_extrapolation_beats_it():
+def test_exudyns_trapezoidal_rule_has_order_two_and_extrapolation_more_than_five():
+    """The order is the logarithm of the errors' ratio at 2 and 1 ms."""
     scene = SCENES["spatial_slider_crank_gravity"]()
     times, truth = np.linspace(0, 0.1, 6), truth_for(scene)
     errors = {
@@ -120,7 +128,7 @@ def test_order_of_the_trapezoidal_rule_is_two_and_extrapolation_beats_it():
     assert order > 5, f"extrapolated {order:.3f} from {errors}"
 
 
-def test_given_accelerations_and_truth_agree():
+def test_exudyn_gives_the_true_accelerations():
     scene = SCENES["planar_slider_crank_gravity"]()
     trajectory = run(scene, np.linspace(0, 0.1, 6), "tuned", 1e-4)
     exact = truth_for(scene).poses(trajectory.times)
@@ -131,19 +139,20 @@ def test_given_accelerations_and_truth_agree():
 
 
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
-def test_moment_about_a_hinge_and_constant_acceleration_agree(bodies: tuple[str, str]):
+def test_exudyn_accelerates_a_body_on_a_hinge_uniformly_under_a_moment(bodies: tuple[str, str]):
+    """φ = M t² / (2 J) with 3 N m, beyond a full turn."""
     moment = tuple(3.0 * np.array(SIDEWAYS))
     scene = one_body(**hinge(Revolute, bodies), load=(Moment(body="b", moment=moment),))
     times = np.linspace(0, 1, 6)
     expected = 3.0 / moment_of_inertia(scene) * times**2 / 2
-    assert expected[-1] > 2 * math.pi, "the case is to turn more than once"
+    assert expected[-1] > 2 * math.pi
     assert_angle(scene, run(scene, times, "tuned", 5e-3), expected, MARGIN * TURNING)
 
 
 @pytest.mark.parametrize("kind", [Revolute, Cylindrical])
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
-def test_torsion_spring_beyond_a_turn_and_closed_form_agree(kind: type, bodies: tuple[str, str]):
-    """Released at 0 with natural angle ±8 rad: swings about it, past ±16 rad."""
+def test_exudyn_swings_a_body_on_a_torsion_spring_beyond_a_turn(kind: type, bodies: tuple[str, str]):
+    """A damped oscillation about the natural angle 8 rad, with the decay c / (2 J)."""
     natural = 8.0 if bodies[0] == "ground" else -8.0  # the coordinate of the second body about the first
     spring = TorsionSpring(joint="J", stiffness=2.0, damping=0.05, natural_angle=natural)
     scene = one_body(**hinge(kind, bodies), load=(spring,))
@@ -155,8 +164,8 @@ def test_torsion_spring_beyond_a_turn_and_closed_form_agree(kind: type, bodies: 
     assert_angle(scene, run(scene, times, "tuned", 5e-3), 8.0 * (1 - swing), MARGIN * TURNING)
 
 
-def test_force_and_spring_on_a_slider_and_closed_form_agree():
-    """A spring along the axis and a constant force, both through the centre of mass."""
+def test_exudyn_moves_a_slide_on_a_spring_under_a_force_as_a_damped_oscillator():
+    """Spring of 80 N/m along the axis, and 4 N: a damped oscillation about 4 N / 80 N/m - 0.05 m."""
     axis, start = np.array(SIDEWAYS), np.array([0.0, 0.2, 0.0])
     far = tuple((start - 0.5 * axis).tolist())
     at = tuple(start.tolist())
@@ -178,7 +187,11 @@ def test_force_and_spring_on_a_slider_and_closed_form_agree():
 @pytest.mark.parametrize("kind", [Revolute, Translational])
 @pytest.mark.parametrize("family", ["static", "tuned"])
 @pytest.mark.parametrize("bodies", [("ground", "b"), ("b", "ground")])
-def test_driven_joint_and_its_prescribed_motion_agree(kind: type, family: str, bodies: tuple[str, str]):
+def test_exudyn_moves_a_driven_joint_as_prescribed(kind: type, family: str, bodies: tuple[str, str]):
+    """q = 2 t + 9 t² + 0.4 sin 7 t; the body moves by -q if it is the joint's first body.
+
+    No accelerations are given, because Exudyn's initial ones leave out the driver's.
+    """
     driver = Driver(joint="J", polynomial=(0.0, 2.0, 9.0), sine=Sine(amplitude=0.4, frequency=7.0))
     scene = one_body(**hinge(kind, bodies), driver=(driver,))
     times = np.array([0.0, 0.1, 0.25, 0.6, 1.0])
@@ -195,17 +208,18 @@ def test_driven_joint_and_its_prescribed_motion_agree(kind: type, family: str, b
     seen = trajectory.velocity if kind is Translational else trajectory.angular_velocity
     off = np.abs(seen[:, 0] @ SIDEWAYS - rate).max()
     assert off < MARGIN * DRIVEN[1], f"rate off by {off:.2e}"
-    assert trajectory.acceleration is None, "initial accelerations leave out the driver's"
+    assert trajectory.acceleration is None
 
 
-def test_mechanism_of_every_joint_and_its_joint_equations_agree():
+def test_exudyn_keeps_joints_of_every_kind_closed():
+    """Residuals of the judge's joint equations, in a scene with and without drivers."""
     for scene in (every_joint(), driven()):
         measured = measure(scene, run(scene, np.linspace(0, 0.2, 6), "tuned", 2.5e-3))
         assert measured["violation_position"] < MARGIN * OPEN[0], (scene.name, measured)
         assert measured["violation_velocity"] < MARGIN * OPEN[1], (scene.name, measured)
 
 
-def test_torque_free_body_and_truth_agree():
+def test_exudyn_turns_a_torque_free_body_as_the_truth():
     body = Body(
         name="top",
         mass=2.0,
@@ -220,25 +234,27 @@ def test_torque_free_body_and_truth_agree():
     assert measured["error"] < MARGIN * TUMBLING, measured
 
 
-def test_irregular_samples_and_even_samples_agree():
+def test_exudyns_motion_does_not_depend_on_the_samples():
+    """Four of eleven even samples, which begin after t = 0, give the positions of the eleven."""
     scene = SCENES["planar_slider_crank_gravity"]()
     even = np.linspace(0, 0.1, 11)
-    some = even[[3, 4, 8, 10]]  # two spacings, and not from t = 0
+    some = even[[3, 4, 8, 10]]
     for family, tolerance in (("tuned", MARGIN * 2.7e-14), ("alpha", MARGIN * 1.4e-9)):
         dense, sparse = run(scene, even, family, 1e-4), run(scene, some, family, 1e-4)
         off = np.abs(dense.position[[3, 4, 8, 10]] - sparse.position).max()
         assert off < tolerance, f"{family} off by {off:.2e} m"
 
 
-def test_defaults_on_redundant_constraints_fail_and_say_so():
+def test_exudyns_defaults_end_at_redundant_constraints_with_the_cause():
+    """Its solver finds zero initial accelerations and a singular matrix; the start is the only sample."""
     scene = SCENES["planar_slider_crank"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("defaults", {"step": 1e-3}))
     assert trajectory.outcome is Outcome.SINGULAR_MATRIX, (trajectory.outcome, trajectory.message)
     assert "zero initial accelerations" in trajectory.message, trajectory.message
-    assert len(trajectory.times) == 1, f"the start is known, got {trajectory.times}"
+    assert len(trajectory.times) == 1, trajectory.times
 
 
-def test_stop_at_a_singular_position_keeps_the_states_before_it():
+def test_exudyn_ends_at_a_singular_position_with_right_samples_before_it():
     scene = SCENES["planar_slider_crank_equal"]()
     trajectory = ENGINE.run(scene, np.linspace(0, 0.1, 11), Setting("trapezoidal", {"step": 1e-4}))
     assert trajectory.outcome is Outcome.NOT_CONVERGED, (trajectory.outcome, trajectory.message)
@@ -249,8 +265,8 @@ def test_stop_at_a_singular_position_keeps_the_states_before_it():
     assert measured["error"] < MARGIN * BEFORE, measured
 
 
-def test_static_analysis_refuses_a_singular_pose():
-    """At θ = π, where a fully driven four-bar can take two branches."""
+def test_exudyns_static_analysis_ends_before_a_singular_pose():
+    """The crank reaches θ = π at 1 s, where the driven parallelogram can take two branches."""
     quarter = math.pi / 2
     scene = SCENES["four_bar"]()
     scene = scene.with_(driver=(Driver(joint="A", polynomial=(0.0, -quarter)),))
@@ -259,7 +275,8 @@ def test_static_analysis_refuses_a_singular_pose():
     assert 0.9 < trajectory.t_end < 1, (trajectory.t_end, trajectory.message)
 
 
-def test_scene_without_masses_is_driven_or_refused():
+def test_exudyn_moves_a_driven_scene_without_masses_and_refuses_a_free_one():
+    """Positions of kinematics are equal to the bit with and without masses."""
     scene = SCENES["four_bar"]()
     bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
     assert ENGINE.cannot(bare) is None
@@ -267,10 +284,10 @@ def test_scene_without_masses_is_driven_or_refused():
     assert "driven" in str(ENGINE.cannot(bare.with_(driver=())))
     times = np.linspace(0, 0.02, 5)
     with_mass, without = run(scene, times, "static", 1e-3), run(bare, times, "static", 1e-3)
-    assert np.array_equal(with_mass.position, without.position), "masses took part in kinematics"
+    assert np.array_equal(with_mass.position, without.position)
 
 
-def test_nothing_is_printed_or_written(
+def test_exudyn_prints_nothing_and_writes_no_files(
     capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)

@@ -1,4 +1,4 @@
-"""Exudyn's reactions / Newton and Euler's equations of the body they hold."""
+"""Exudyn's reactions satisfy the equations of Newton and Euler of the body that the joint holds."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from mbref.scene import (
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 
-MEASURED = 1.6e-10  # part of the largest force
+MEASURED = 1.6e-10  # measured difference / largest force or moment
 SIDEWAYS = (0.6, 0.0, 0.8)  # an axis along no coordinate axis
 INERTIA = ((0.02, 0.002, -0.001), (0.002, 0.03, 0.003), (-0.001, 0.003, 0.025))
 BODY = Body(
@@ -40,7 +40,7 @@ PLACES = {
 
 
 def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
-    """Force and moment (k, 6) about the anchor on the second body that Newton and Euler ask of the joint."""
+    """Return force and moment (k, 6) about the anchor on the second body by the run's accelerations."""
     body, joint = scene.body[0], scene.joint[0]
     turn = rotations.to_matrix(trajectory.orientation[:, 0])
     inertia = turn @ np.array(INERTIA) @ np.swapaxes(turn, 1, 2)
@@ -66,7 +66,10 @@ def needed_wrench(scene: Scene, trajectory: Trajectory) -> np.ndarray:
         for driven in (False, True)[: 1 + bool(kind.facts.driven)]
     ],
 )
-def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[str, str]):
+def test_exudyns_reaction_causes_the_acceleration_of_the_body(
+    kind: str, driven: bool, bodies: tuple[str, str]
+):
+    """F = m (a - g), and M = J α + ω × J ω less the applied moment, about the joint's anchor."""
     scene = Scene(
         name="held",
         body=(BODY,),
@@ -84,8 +87,8 @@ def test_reaction_and_newton_euler_agree(kind: str, driven: bool, bodies: tuple[
     )
 
 
-def test_reactions_without_reliable_accelerations_are_not_given():
-    """With an accelerating driver Exudyn's initial multipliers leave its acceleration out."""
+def test_exudyn_gives_no_reactions_with_an_accelerating_driver():
+    """Exudyn's initial multipliers leave the driver's acceleration out."""
     driver = Driver(joint="J", sine=Sine(amplitude=0.1, frequency=3.0))
     joint = Revolute.at("J", ("ground", "b"), **PLACES)
     scene = Scene(name="shaken", body=(BODY,), joint=(joint,), driver=(driver,))

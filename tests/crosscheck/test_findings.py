@@ -1,8 +1,8 @@
-"""The stored findings / their page, proofs of every kind, and installations without the engine."""
+"""Findings in other libraries: their page, their proofs, and their status at the installed version."""
 
 from __future__ import annotations
 
-from importlib.util import find_spec
+import re
 from pathlib import Path
 
 import numpy as np
@@ -18,13 +18,14 @@ from mbref.scene import Scene
 DOCUMENT = Path(__file__).parents[2] / "docs" / "findings.md"
 
 
-def test_document_and_generated_page() -> None:
+def test_committed_page_follows_from_the_stored_findings() -> None:
     assert DOCUMENT.read_text() == page(), (
         "docs/findings.md is stale: python -m crosscheck.findings.document docs/findings.md renews it"
     )
 
 
-def test_every_finding_has_words_and_one_proof_unless_it_ends_the_process() -> None:
+def test_every_finding_has_sentences_and_a_violation_measured_by_one_proof() -> None:
+    """A finding that ends the process of the engine has no proof."""
     names = [found.name for found in findings()]
     assert len(names) == len(set(names)), names
     for found in findings():
@@ -36,6 +37,7 @@ def test_every_finding_has_words_and_one_proof_unless_it_ends_the_process() -> N
 
 
 def scripted(script: str, **changes: object) -> Finding:
+    """Return a finding in numpy that is present if the script prints a last number above 0.5."""
     fields = {
         "name": "n",
         "engine": "e",
@@ -51,7 +53,7 @@ def scripted(script: str, **changes: object) -> Finding:
     return Finding(**{**fields, **changes})
 
 
-def test_answers_of_scripts() -> None:
+def test_status_of_a_finding_follows_from_the_number_that_its_script_prints() -> None:
     answers = {
         "print(0.75)": Status.PRESENT,
         "print('noise', 0.25)": Status.GONE,
@@ -62,13 +64,16 @@ def test_answers_of_scripts() -> None:
         answer = scripted(script).recheck()
         assert answer.status is status and answer.version == np.__version__, (script, answer)
     assert "no number here" in scripted("raise SystemExit('no number here')").recheck().words
+
+
+def test_a_finding_without_a_proof_is_unclear_and_one_without_its_package_absent() -> None:
     ending = scripted("", crashes=True).recheck()
     assert ending.status is Status.UNCLEAR and "no proof is stored" in ending.words, ending
     absent = scripted("print(1.0)", package="no-such-package").recheck()
     assert absent.status is Status.ABSENT and "pip install no-such-package" in absent.words, absent
 
 
-def test_an_unknown_finding_is_refused() -> None:
+def test_an_unknown_finding_is_refused_with_the_nearest_name() -> None:
     with pytest.raises(RequestError, match="dart-hinge-closure-turned"):
         chosen(["dart-hinge-closure-turnd"])
 
@@ -83,8 +88,8 @@ def proofs() -> list[object]:
 
 
 @pytest.mark.parametrize("name", proofs())
-def test_a_finding_and_the_installed_version(name: str) -> None:
-    """At the version of the record the proof gives the record's number; later ones may be right."""
+def test_the_proof_of_a_finding_gives_its_stored_number_at_the_stored_version(name: str) -> None:
+    """Within 5 %. Other versions of the library may be right."""
     (found,) = chosen([name])
     answer = found.recheck()
     if answer.status is Status.ABSENT:
@@ -95,9 +100,7 @@ def test_a_finding_and_the_installed_version(name: str) -> None:
             assert answer.measured == pytest.approx(found.measured, rel=0.05), answer
 
 
-def test_the_command_prints_status(capsys: pytest.CaptureFixture[str]) -> None:
-    assert (
-        main(["findings", "dart-hinge-closure-turned", *(["--recheck"] if find_spec("dartpy") else [])]) == 0
-    )
-    said = capsys.readouterr().out
-    assert "dart" in said and (not find_spec("dartpy") or "present" in said), said
+def test_the_command_rechecks_a_finding_and_prints_its_status(capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("dartpy")
+    assert main(["findings", "dart-hinge-closure-turned", "--recheck"]) == 0
+    assert re.search(r"dart.*present", capsys.readouterr().out, re.DOTALL)

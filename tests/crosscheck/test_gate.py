@@ -1,4 +1,4 @@
-"""The model-identity gate against models with one fault each."""
+"""The comparison of models: a short run passes if its model is the scene's, and fails with one fault."""
 
 from dataclasses import replace
 
@@ -29,6 +29,7 @@ MODELS = {
 
 
 def short_run(scene, times=None):
+    """Return the exact motion at the times of the comparison of models."""
     return truth_for(scene).poses(gate_times(scene) if times is None else times)
 
 
@@ -39,14 +40,14 @@ def with_body(scene, index, **changes):
 
 
 @pytest.mark.parametrize("name", CLOSED)
-def test_the_same_model_passes(name):
+def test_exact_motions_of_a_scene_pass_with_and_without_accelerations(name):
     run = short_run(SCENES[name]())
     found = gate(SCENES[name](), [run, replace(run, acceleration=None, angular_acceleration=None), run])
     assert found is None, f"{name}: {found}"
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_a_mass_off_by_five_percent_is_a_change_of_velocity(name):
+def test_a_mass_off_by_five_percent_is_reported_as_a_change_of_velocity(name):
     scene = MODELS[name]
     heavier = with_body(scene, -1, mass=scene.body[-1].mass * 1.05)
     found = gate(scene, [short_run(scene), short_run(heavier, gate_times(scene))])
@@ -54,20 +55,21 @@ def test_a_mass_off_by_five_percent_is_a_change_of_velocity(name):
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "pendulum_all"])
-def test_an_inertia_off_by_five_percent_is_a_change_of_velocity(name):
+def test_an_inertia_off_by_five_percent_is_reported_as_a_change_of_velocity(name):
     scene = ALL[name]
     other = with_body(scene, 0, inertia=np.array(scene.body[0].inertia) * 1.05)
     found = gate(scene, [short_run(scene), short_run(other, gate_times(scene))])
     assert found is not None and found.field.startswith("change of"), f"{name}: {found}"
 
 
-def test_gravity_left_out_is_a_change_of_velocity():
+def test_missing_gravity_is_reported_as_a_change_of_velocity():
     scene = MODELS["four_bar_gravity"]
     found = gate(scene, [short_run(scene), short_run(scene.with_(gravity=(0, 0, 0)), gate_times(scene))])
     assert found.field == "change of velocity" and "change of velocity: truth and truth" in str(found), found
 
 
-def test_a_run_that_did_not_arrive_is_named():
+def test_a_run_with_missing_samples_is_reported():
+    """One sample, or none."""
     scene = MODELS["four_bar_gravity"]
     run = short_run(scene)
     found = gate(scene, [run, short_run(scene, np.zeros(1))])
@@ -75,7 +77,8 @@ def test_a_run_that_did_not_arrive_is_named():
     assert gate(scene, [run, short_run(scene, np.zeros(0))]).field == "samples reached"
 
 
-def test_orientation_turned_is_named():
+def test_a_rotated_body_is_reported_with_its_angle():
+    """The quaternion (cos 1e-6, 0, 0, sin 1e-6) turns by 2e-6 rad."""
     scene = MODELS["four_bar_gravity"]
     run = short_run(scene)
     orientation = run.orientation.copy()
@@ -110,7 +113,8 @@ BALANCED = {
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio"])
 @pytest.mark.parametrize("balanced", BALANCED)
-def test_rounding_of_forces_in_balance_is_no_difference(balanced, name):
+def test_engines_pass_where_forces_balance_to_rounding(balanced, name):
+    """A difference relative to the largest change of velocity would be rounding over rounding."""
     scene = BALANCED[balanced]
     setting = engine(name).best_settings(scene)[-1]
     run = run_once(name, scene, gate_times(scene), setting)
@@ -119,7 +123,8 @@ def test_rounding_of_forces_in_balance_is_no_difference(balanced, name):
 
 
 @pytest.mark.parametrize(("part", "passes"), [(0.9, True), (1.1, False)])
-def test_differences_in_balance_count_against_what_gravity_can_cause(part, passes):
+def test_differences_of_a_body_in_balance_are_relative_to_free_fall(part, passes):
+    """Velocities may be off by the part SAME_CHANGE · LEAST_CHANGE of g t."""
     scene = BALANCED["a boom held by a spring"]
     exact = gauss_motion(scene, tuple(gate_times(scene)))
     shift = np.zeros_like(exact.velocity)
@@ -131,8 +136,8 @@ def test_differences_in_balance_count_against_what_gravity_can_cause(part, passe
 LATER = TorsionSpring(joint="A", stiffness=30.0, damping=0.0, natural_angle=0.0)  # no moment at the start
 
 
-def test_a_load_that_acts_later_is_seen_along_the_run():
-    """The gate passes a spring that is left out while it is slack; the run's own accelerations show it."""
+def test_a_missing_spring_that_is_slack_at_the_start_is_found_along_the_run():
+    """Short runs pass. Later, the run's accelerations do not solve the judge's equations at its states."""
     scene, without = arm(load=(LATER,)), arm()
     times = tuple(np.linspace(0.0, 0.3, 7))
     lost = replace(gauss_motion(without, times), engine="other")
@@ -145,7 +150,7 @@ def test_a_load_that_acts_later_is_seen_along_the_run():
 
 
 @pytest.mark.parametrize(("part", "passes"), [(0.009, True), (0.011, False)])
-def test_accelerations_along_a_run_may_be_off_by_a_hundredth(part, passes):
+def test_accelerations_along_a_run_may_be_off_by_one_percent(part, passes):
     scene = arm()
     run = gauss_motion(scene, (0.0, 0.1))
     off = replace(
@@ -154,38 +159,37 @@ def test_accelerations_along_a_run_may_be_off_by_a_hundredth(part, passes):
         angular_acceleration=(1 + part) * run.angular_acceleration,
     )
     assert (along(scene, off) is None) is passes, along(scene, off)
-    assert along(scene, replace(off, acceleration=None)) is None, "nothing is reported"
+    assert along(scene, replace(off, acceleration=None)) is None, "a run without accelerations passes"
 
 
-def test_samples_next_to_singular_positions_are_not_compared_along():
-    scene = SCENES["four_bar_gravity"]()
-    run = gauss_motion(scene, (0.0,))
-    off = replace(run, acceleration=2 * run.acceleration)
-    assert along(scene, off) is not None
+def test_accelerations_at_a_singular_position_are_not_compared_along_the_run():
+    """A flat four-bar at its start, and regular after 4 ms: an error is found in the second sample alone."""
     straight = SCENES["four_bar_straight"]()
     exact = truth_for(straight).poses(np.array([0.0, 0.004]))
-    wrong = np.where(np.arange(2)[:, None, None] == 0, 7.0, 0.0)  # at the flat start alone
+    wrong = np.where(np.arange(2)[:, None, None] == 0, 7.0, 0.0)  # m/s², at the flat start
     assert along(straight, replace(exact, acceleration=exact.acceleration + wrong)) is None
     both = along(straight, replace(exact, acceleration=exact.acceleration + 1e6))
     assert both is not None and both.field == "acceleration at t = 0.004 s", both
 
 
-def test_single_precision_is_no_other_model_and_hides_none():
+def test_a_model_in_single_precision_passes_and_a_fault_beyond_its_rounding_does_not():
+    """States rounded to 24 bits pass if the engine declares a rounding of 2⁻²³. Then changes of velocity may
+    be off by the part SINGLE_CHANGE; missing gravity is found."""
     scene = MODELS["four_bar_gravity"]
     exact = short_run(scene)
     names = ("position", "orientation", "velocity", "angular_velocity")
 
-    def first(run, rounding=2.0**-23):
+    def fault(run, rounding=2.0**-23):
         rounded = {name: getattr(run, name).astype(np.float32).astype(float) for name in names}
         one = replace(run, engine="one", acceleration=None, angular_acceleration=None, **rounded)
         found = differences(scene, [exact, one], {"one": rounding})
         return found["one"].field if found else ""
 
-    assert first(exact) == "" and first(exact, 2.0**-52) == "initial position"
+    assert fault(exact) == "" and fault(exact, 2.0**-52) == "initial position"
     changes = np.diff(exact.velocity, axis=0), scene_length(scene) * np.diff(exact.angular_velocity, axis=0)
     change = np.linalg.norm(changes, axis=-1).max()
     for share, field in ((0.9, ""), (1.1, "change of velocity")):
         moved = exact.velocity.copy()
         moved[1, 0, 0] += share * SINGLE_CHANGE * change
-        assert first(replace(exact, velocity=moved)) == field
-    assert first(short_run(scene.with_(gravity=(0.0, 0.0, 0.0)), gate_times(scene))).startswith("change of")
+        assert fault(replace(exact, velocity=moved)) == field
+    assert fault(short_run(scene.with_(gravity=(0.0, 0.0, 0.0)), gate_times(scene))).startswith("change of")

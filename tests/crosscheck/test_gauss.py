@@ -1,4 +1,4 @@
-"""Gauss's principle: bodies without moments of inertia, and singular values of straight linkages."""
+"""Gauss's principle for bodies without moments of inertia, and singular values of flat linkages."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from mbref.scenes import SCENES
 
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
-def test_bodies_without_moment_of_inertia(name):
-    """The report of these published problems ended with an error of the Cholesky factorisation."""
+def test_gausss_principle_accelerates_bodies_without_moments_of_inertia_as_the_reference(name):
+    """Their mass matrix is singular. Before, its Cholesky factorisation failed."""
     scene = SCENES[name]()
     motion = natural_motion(scene, [0.0], EXTENDED, seconds=100.0)
     angular = scene_length(scene) * motion.angular_acceleration[0]
@@ -22,9 +22,9 @@ def test_bodies_without_moment_of_inertia(name):
     assert np.abs(gauss(scene) - exact).max() < 1e-12 * np.abs(exact).max()
 
 
-def test_distance_from_singular_and_rank_of_the_rhombus():
-    """The straight rhombus lacks one more rank than the quarter-turned one, whose least value is far off."""
+def test_a_flat_rhombus_has_one_more_zero_singular_value_than_a_square_one():
+    """The least other singular value of the square one is above 1e-2."""
     straight, quarter = (singular_values(SCENES[n]()) for n in ("four_bar_straight", "four_bar_quarter"))
     zeros = [int(np.sum(values < 1e-12)) for values in (straight, quarter)]
-    assert zeros[0] == zeros[1] + 1, f"{zeros[0]} and {zeros[1]} zero singular values: {straight}, {quarter}"
-    assert quarter[-1 - zeros[1]] > 1e-2, f"least above rank {quarter[-1 - zeros[1]]:.1e}"
+    assert zeros[0] == zeros[1] + 1, (straight, quarter)
+    assert quarter[-1 - zeros[1]] > 1e-2, quarter

@@ -1,4 +1,4 @@
-"""Engines of generated code, CasADi and heyoka / truths, refusals, and files that are kept.
+"""Engines with generated code, CasADi and heyoka: true motions, refusals, and files in the cache.
 
 Runs are in child processes: CasADi and OpenSim do not share one.
 """
@@ -37,7 +37,7 @@ RUNS = [(name, setting) for name, settings in SETTINGS.items() for setting in se
 
 
 def needs(name: str) -> None:
-    """Skips where the engine's package, or CasADi's compiler, is missing."""
+    """Skip the test if the engine's package, or CasADi's compiler, is missing."""
     if find_spec(name) is None:
         pytest.skip(f"{name} is not installed (extra generators)")
     if name == "casadi" and (reason := library.why_not()):
@@ -50,7 +50,8 @@ def run_of(name: str, scene_name: str, times: np.ndarray, setting: Setting) -> T
 
 
 @pytest.mark.parametrize("name", ["planar_slider_crank_equal", "spatial_slider_crank", "four_bar_gravity"])
-def test_joint_coordinates_and_truth_agree(name: str):
+def test_symbolic_equations_of_a_tree_give_the_true_motion(name: str):
+    """Integrated by SciPy; the error of positions is below 1e-7 m at a tolerance of 1e-9."""
     scene = SCENES[name]()
     equations, end = TreeEquations(scene), 0.1 * scene.duration
 
@@ -65,7 +66,7 @@ def test_joint_coordinates_and_truth_agree(name: str):
 
 
 @pytest.mark.parametrize(("name", "setting"), RUNS, ids=str)
-def test_generated_code_and_truth_agree(name: str, setting: Setting) -> None:
+def test_generated_code_gives_the_true_motion_and_reactions(name: str, setting: Setting) -> None:
     scene = SCENES["spatial_slider_crank_gravity"]()
     run = run_of(name, scene.name, np.linspace(0, scene.duration, 5), setting)
     assert run.outcome is Outcome.COMPLETED, run.message
@@ -75,24 +76,29 @@ def test_generated_code_and_truth_agree(name: str, setting: Setting) -> None:
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_samples_need_not_begin_at_the_start(name: str) -> None:
+def test_generated_code_moves_alike_for_samples_that_begin_later_or_end_at_the_start(name: str) -> None:
+    """Samples at 0.1 and 0.25 s, at 0, 0.1 and 0.25 s, and at 0 alone."""
     times, setting = np.array([0.1, 0.25]), SETTINGS[name][0]
     run = run_of(name, "planar_slider_crank_gravity", times, setting)
     whole = run_of(name, "planar_slider_crank_gravity", np.array([0.0, *times]), setting)
     assert run.outcome is Outcome.COMPLETED and np.array_equal(run.times, times), run.message
     assert np.abs(run.position - whole.position[1:]).max() < ERROR
     start = run_of(name, "planar_slider_crank_gravity", np.array([0.0]), setting)
-    assert np.allclose(start.position[0], whole.position[0], atol=1e-15), "a run that ends where it starts"
+    assert np.array_equal(start.position[0], whole.position[0])
+
+
+def test_heyokas_settings_have_ever_smaller_tolerances() -> None:
+    needs("heyoka")
+    found = engine("heyoka").settings_of(SCENES["planar_slider_crank_gravity"](), "taylor")
+    rtols = [setting.options["rtol"] for setting in found]
+    assert rtols == sorted(rtols, reverse=True) and len(rtols) > 3, rtols
 
 
 @pytest.mark.parametrize("name", GENERATORS)
-def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
+def test_an_engine_with_generated_code_serves_all_its_families_and_refuses_others(name: str) -> None:
     needs(name)
     simulator, scene = engine(name), SCENES["planar_slider_crank_gravity"]()
     assert simulator.cannot(scene) is None
-    if name == "heyoka":  # CasADi's sweep runs its code, and that not beside OpenSim
-        rtols = [setting.options["rtol"] for setting in simulator.settings_of(scene, "taylor")]
-        assert rtols == sorted(rtols, reverse=True) and len(rtols) > 3, rtols
     assert all(simulator.serves(scene, family) for family in simulator.families)
     with pytest.raises(ValueError, match="no family of settings 'best'"):
         simulator.run(scene, np.array([0.0]), Setting("best", {"rtol": 1e-6}))
@@ -108,22 +114,26 @@ def test_sweeps_have_every_family_coarse_to_fine(name: str) -> None:
         ("five_bar_gravity", "depend on each other"),
     ],
 )
-def test_scenes_whose_equations_are_not_derived_are_refused(name: str, scene: str, reason: str) -> None:
+def test_scenes_without_symbolic_equations_are_refused_with_the_reason(
+    name: str, scene: str, reason: str
+) -> None:
     found = engine(name).cannot(SCENES[scene]())
     assert found is not None and found.owner is Owner.ADAPTER and reason in found.reason, found
 
 
-def test_nothing_runs_unasked() -> None:
+def test_engines_with_generated_code_are_not_among_the_default_engines() -> None:
     assert not set(GENERATORS) & set(default_engines())
 
 
-def test_scenes_are_refused_where_there_is_no_c_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_casadi_refuses_scenes_if_no_c_compiler_is_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler")
     found = engine("casadi").cannot(SCENES["planar_slider_crank_gravity"]())
     assert found is not None and found.reason == "no C compiler is installed (no-such-compiler)", found
 
 
-def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert kept.kept("folder", "origin", ".txt") is None
     path = kept.keep("folder", "origin", ".txt", lambda target: target.write_text("whole"))
@@ -132,9 +142,10 @@ def test_a_file_is_made_once_and_a_damaged_one_anew(tmp_path: Path, monkeypatch:
     assert kept.kept("folder", "origin", ".txt") is None
 
 
-def test_a_kept_library_serves_another_process_without_compiling(
+def test_a_compiled_library_in_the_cache_is_used_by_another_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Only the first process imports CasADi, which generates the code; the cache has one library."""
     needs("casadi")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.delenv("LD_LIBRARY_PATH", raising=False)  # where OpenSim, once imported, has another CasADi
@@ -143,11 +154,11 @@ def test_a_kept_library_serves_another_process_without_compiling(
         "library.library(SCENES['planar_slider_crank_gravity'](), 0.0); "
         "import sys; print('casadi' in sys.modules)"
     )
-    told = [
+    imported = [
         subprocess.run(
             [sys.executable, "-c", code], capture_output=True, text=True, check=True
         ).stdout.strip()
         for _ in range(2)
     ]
-    assert told == ["True", "False"], "whether CasADi was loaded"
+    assert imported == ["True", "False"]
     assert len(list((tmp_path / "mbref" / "casadi").iterdir())) == 1

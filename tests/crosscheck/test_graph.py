@@ -1,4 +1,4 @@
-"""Spanning trees / the scene's own counts, masses and velocities."""
+"""Spanning trees of random scenes keep mobility, inertia and velocities, and cut loops at fitting joints."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ CLOSURE_ROWS = {"point": 3, "weld": 6}
 
 @st.composite
 def graphs(draw: st.DrawFn) -> Scene:
-    """Scenes of 1 to 6 bodies and up to 9 joints of any kind between any two of them or the ground."""
+    """Draw scenes of 1 to 6 bodies and up to 9 joints of any kind, between any two of them or the ground."""
     rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1), label="seed"))
     n = draw(st.integers(1, 6), label="bodies")
     bodies = tuple(
@@ -56,11 +56,12 @@ def graphs(draw: st.DrawFn) -> Scene:
 
 
 def rods(tree: Tree) -> list:
+    """Return the links that stand for distance joints."""
     return [link for link in tree.links if link.ends]
 
 
 @given(graphs())
-def test_parents_of_links_lie_on_the_way_from_the_ground(scene: Scene) -> None:
+def test_links_are_in_depth_first_order_with_parents_first(scene: Scene) -> None:
     way: list[int] = []
     for k, link in enumerate(spanning_tree(scene).links):
         while way and way[-1] != link.parent:
@@ -70,7 +71,8 @@ def test_parents_of_links_lie_on_the_way_from_the_ground(scene: Scene) -> None:
 
 
 @given(graphs())
-def test_freedoms_less_closure_rows_are_coordinates_less_joint_rows(scene: Scene) -> None:
+def test_tree_with_its_closures_has_the_mobility_of_the_scene(scene: Scene) -> None:
+    """Joint velocities less rows of closures = 6 per body less rows of joints (a rod's own spin apart)."""
     tree = spanning_tree(scene)
     counted = 6 * len(scene.body) - sum(joint.facts.rows for joint in scene.joint)
     spins = len(rods(tree))
@@ -79,7 +81,8 @@ def test_freedoms_less_closure_rows_are_coordinates_less_joint_rows(scene: Scene
 
 
 @given(graphs())
-def test_links_together_have_the_inertia_of_the_bodies(scene: Scene) -> None:
+def test_links_have_the_spatial_inertia_of_the_bodies_in_sum(scene: Scene) -> None:
+    """Mass, first and second moments about the origin; some bodies are split, and rods take mass of them."""
     tree = spanning_tree(scene)
     links = sum(spatial_inertia(k.mass, k.position + k.offset, without_spin(k)) for k in tree.links)
     for rod in rods(tree):  # an end held by the ground is mass that never moves
@@ -95,7 +98,7 @@ def test_links_together_have_the_inertia_of_the_bodies(scene: Scene) -> None:
 
 
 def without_spin(link: Link) -> np.ndarray:
-    """A link's inertia; of a rod, which never spins, less its moment about its own axis."""
+    """Return a link's inertia; for a rod, without its moment about its axis, about which it never spins."""
     if not link.ends:
         return link.inertia
     along = link.ends[1][1] - link.ends[0][1]
@@ -104,13 +107,13 @@ def without_spin(link: Link) -> np.ndarray:
 
 
 def spatial_inertia(mass: float, centre: np.ndarray, inertia: np.ndarray) -> np.ndarray:
-    """(4, 4): mass, first and second moments about the world's origin."""
+    """Return mass, first and second moments about the world's origin (4, 4)."""
     second = np.trace(inertia) / 2 * np.eye(3) - inertia + mass * np.outer(centre, centre)
     return np.block([[second, mass * centre[:, None]], [mass * centre[None], np.array([[mass]])]])
 
 
 @given(graphs())
-def test_every_part_keeps_a_positive_mass_and_inertia(scene: Scene) -> None:
+def test_every_link_has_a_positive_mass_and_inertia(scene: Scene) -> None:
     for link in spanning_tree(scene).links:
         least = np.linalg.eigvalsh(link.inertia)[0]
         assert link.mass > 0 and least > 0, (
@@ -119,7 +122,7 @@ def test_every_part_keeps_a_positive_mass_and_inertia(scene: Scene) -> None:
 
 
 @given(graphs(), st.data())
-def test_a_driven_joint_stays_in_the_tree_and_moves_one_coordinate(scene: Scene, data: st.DataObject) -> None:
+def test_a_driven_joint_is_never_cut_and_has_one_coordinate(scene: Scene, data: st.DataObject) -> None:
     names = [joint.name for joint in scene.joint if joint.facts.driven]
     if not names:
         return
@@ -134,7 +137,8 @@ def test_a_driven_joint_stays_in_the_tree_and_moves_one_coordinate(scene: Scene,
 
 
 @pytest.mark.parametrize("kind", ["revolute", "cylindrical", "universal", "spherical", "planar"])
-def test_the_loosest_joint_of_a_loop_is_cut(kind: str) -> None:
+def test_a_loop_is_cut_at_its_joint_with_most_freedoms(kind: str) -> None:
+    """A spherical joint is closed by a point; another one by splitting a body, whose parts are welded."""
     (closure,) = spanning_tree(ring(kind)).closures
     expected = "point" if kind == "spherical" else "weld"
     cut = ring(kind).joint[closure.joint]
@@ -143,7 +147,8 @@ def test_the_loosest_joint_of_a_loop_is_cut(kind: str) -> None:
 
 
 @pytest.mark.parametrize("kind", [Fixed, Translational])
-def test_a_stiff_joint_is_split_when_the_loop_has_no_looser_one(kind: type) -> None:
+def test_a_body_is_split_in_halves_to_cut_a_loop_of_equal_joints(kind: type) -> None:
+    """Two bodies of 2 kg and three joints in a loop."""
     axis = {"axis": (1.0, 0.0, 0.0)} if kind is Translational else {}
     pairs = (("ground", "a"), ("a", "b"), ("b", "ground"))
     scene = Scene(
@@ -158,20 +163,21 @@ def test_a_stiff_joint_is_split_when_the_loop_has_no_looser_one(kind: type) -> N
     assert masses == [1.0, 1.0], f"body b is in parts of {masses} kg, expected two equal ones of 1 kg"
 
 
-def test_rods_take_a_share_of_what_their_anchors_can_spare() -> None:
+def test_a_rod_takes_less_than_half_of_the_effective_mass_at_its_ends() -> None:
+    """A distance joint becomes a rod with mass, which is taken from its bodies."""
     scene = every_joint()
     tree = spanning_tree(scene)
     (rod,) = rods(tree)
     whole = spanning_tree(scene.with_(joint=tuple(j for j in scene.joint if not isinstance(j, Distance))))
     spare = min(effective_mass(whole.links[whole.own[b]], point) for b, point in rod.ends)
-    assert rod.mass / 2 < 0.5 * spare, f"an end of {rod.mass / 2:.3g} kg where {spare:.3g} kg are to be had"
+    assert 0 < rod.mass / 2 < 0.5 * spare, (rod.mass, spare)
 
 
 SCENE_LIST = [*SCENES, "every_joint", "driven", "ring_universal"]
 
 
 @pytest.mark.parametrize("name", SCENE_LIST)
-def test_bodies_start_with_the_consistent_velocities(name: str) -> None:
+def test_start_rates_of_a_tree_give_the_judges_consistent_velocities(name: str) -> None:
     own = {"every_joint": every_joint, "driven": driven, "ring_universal": lambda: ring("universal")}
     scene = {**SCENES, **own}[name]()
     tree = spanning_tree(scene)
@@ -186,7 +192,7 @@ def test_bodies_start_with_the_consistent_velocities(name: str) -> None:
 @given(
     st.lists(st.floats(-3, 3), min_size=1, max_size=4), st.floats(-2, 2), st.floats(0.1, 5), st.floats(0, 1)
 )
-def test_driver_rates_are_the_slopes_of_its_values(c, amplitude, frequency, t) -> None:
+def test_rate_and_acceleration_of_a_driver_are_differences_of_its_values(c, amplitude, frequency, t) -> None:
     driver = Driver(
         joint="A", polynomial=(0.0, *c), sine=Sine(amplitude=amplitude, frequency=frequency, phase=0.0)
     )
@@ -209,14 +215,14 @@ def test_a_scene_without_masses_needs_its_whole_motion_driven() -> None:
 
 
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))
-def test_a_tree_cut_between_links_has_no_closure_at_the_ground(scene, closes):
+def test_a_tree_that_is_cut_between_links_has_no_closure_at_the_ground(scene, closes):
     tree = spanning_tree(scene, closes, between_links=True)
     assert all(GROUND_LINK not in closure.links for closure in tree.closures)
     assert len(tree.closures) == len(spanning_tree(scene, closes).closures)
 
 
 def hinged(*pairs: tuple[str, str]) -> Scene:
-    """Bodies on parallel hinges, the first letter of a body's name its place."""
+    """Return bodies at x = 0, 1, 2, … in the order of their names, with parallel hinges between pairs."""
     names = sorted({name for pair in pairs for name in pair} - {"ground"})
     bodies = [
         Body(name=n, mass=1.0, inertia=INERTIA, position=(float(k), 1.0, 0.0)) for k, n in enumerate(names)
@@ -228,13 +234,16 @@ def hinged(*pairs: tuple[str, str]) -> Scene:
     return Scene(name="hinged", body=bodies, joint=joints)
 
 
-def test_joints_at_the_ground_are_cut_last_and_split_a_body():
+def test_a_four_bar_is_cut_at_its_last_joint_or_at_its_last_joint_between_links():
     four_bar = hinged(("ground", "a"), ("a", "b"), ("b", "c"), ("c", "ground"))
     [at_ground] = spanning_tree(four_bar, ("revolute",)).closures
     assert at_ground.joint == 3 and GROUND_LINK in at_ground.links
     [between] = spanning_tree(four_bar, ("revolute",), between_links=True).closures
     assert between.joint == 2 and between.kind == "revolute"
-    # both hinges of a body are at the ground: one of the two loops is closed between links, one by halves
+
+
+def test_a_body_with_two_hinges_to_the_ground_is_split_if_the_ground_is_never_cut():
+    """Body a has 0.5 kg on either side of the weld; the other loops are cut at hinges between links."""
     two_loops = hinged(("ground", "a"), ("a", "ground"), ("a", "b"), ("b", "ground"), ("b", "a"))
     found = spanning_tree(two_loops, ("revolute",), between_links=True)
     assert [(c.kind, c.joint) for c in found.closures] == [
@@ -245,8 +254,8 @@ def test_joints_at_the_ground_are_cut_last_and_split_a_body():
     assert sorted(link.mass for link in found.links) == [0.5, 0.5, 1.0]
 
 
-def test_coordinates_of_drivers_couplings_and_armatures():
-    """The hinges of a chain have the velocities 0, 1 and 2, in the order from the ground."""
+def test_drivers_couplings_and_armatures_name_the_coordinates_of_their_joints():
+    """The hinges j0, j1 and j2 of a chain have the coordinates 0, 1 and 2."""
     chain = hinged(("ground", "a"), ("a", "b"), ("b", "c"))
     geared = [joint.model_copy(update={"armature": 0.5 * k}) for k, joint in enumerate(chain.joint)]
     scene = chain.with_(

@@ -1,4 +1,4 @@
-"""Hints for engines that fail / engines with one known defect; terms / accelerations of motions."""
+"""Hints for engines that fail name the defect in the equations of an engine with one known defect."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ NAMES = ("tumbling body", "pendulum", "spinning loop", "cylindrical driver", "to
 
 
 class Defective(example.Mechanism):
-    """The example engine's equations with one defect."""
+    """Equations of the example engine with one defect: no gravity, +ω × Jω, γ without velocities, or the
+    driver's acceleration of opposite sign."""
 
     defect = ""
 
@@ -76,29 +77,31 @@ def runner_with(defect, monkeypatch):
         ),
     ],
 )
-def test_the_term_that_an_engine_lacks_is_named(defect, names, says, monkeypatch):
+def test_hint_names_the_term_of_the_equations_that_is_wrong(defect, names, says, monkeypatch):
     runner = runner_with(defect, monkeypatch)
     found = hint(runner, [Failure(KNOWN[name], "truth") for name in names])
     assert says in found, found
 
 
-def test_an_engine_without_a_defect_is_told_to_look_at_its_integration(monkeypatch):
+def test_hint_for_an_engine_with_right_accelerations_points_at_its_integration(monkeypatch):
     found = hint(runner_with("", monkeypatch), [Failure(KNOWN["pendulum"], "truth")])
     assert "begin with the scene 'pendulum', check truth" in found
     assert "accelerations agree with the judge's, so look at the integration" in found
 
 
-def test_verify_ends_with_the_hint_and_conforming_engines_have_none(monkeypatch):
-    chosen = [KNOWN["free_fall"]]
-    failing = held_against(runner_with("gravity", monkeypatch), chosen)
-    assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
-    assert failing.to_record()["hint"] == failing.hint
-    conforming = held_against(runner_with("", monkeypatch), chosen)
+def test_a_conforming_engine_has_no_hint(monkeypatch):
+    conforming = held_against(runner_with("", monkeypatch), [KNOWN["free_fall"]])
     assert conforming.conforms and conforming.hint == ""
 
 
+def test_result_of_verify_on_a_failing_engine_has_the_hint(monkeypatch):
+    failing = held_against(runner_with("gravity", monkeypatch), [KNOWN["free_fall"]])
+    assert "gravity left out explains 1 of 1 scenes" in failing.hint and not failing.conforms
+    assert failing.to_record()["hint"] == failing.hint
+
+
 @pytest.mark.parametrize("name", [*NAMES, "force load", "turntable"])
-def test_terms_give_the_accelerations_of_the_judge_s_motion(name):
+def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
     scene = KNOWN[name].scene
     motion = gauss_motion(scene, tuple(np.linspace(0.0, 0.2 * scene.duration, 5).tolist()))
     own = np.concatenate([motion.acceleration[3], motion.angular_acceleration[3]], axis=-1)
@@ -107,8 +110,8 @@ def test_terms_give_the_accelerations_of_the_judge_s_motion(name):
     assert np.allclose(found, own, rtol=1e-6, atol=1e-6 * np.abs(own).max()), (found, own)
 
 
-def test_every_part_of_an_engine_has_variants_where_a_scene_needs_it():
+def test_every_part_of_the_equations_that_a_scene_needs_has_variants():
     scene = KNOWN["cylindrical driver"].scene
     motion = gauss_motion(scene, (0.0, 0.1 * scene.duration))
     found = {variant.part for variant in variants(scene, motion, 1)}
-    assert set(parts_of(scene)) <= found
+    assert set(parts_of(scene)) <= found and "drivers" in found

@@ -1,4 +1,4 @@
-"""Inline joints, a point on a line: closed form, judge, reference, engines, and the cure of two hinges."""
+"""Inline joints keep a point on a line: motions in mbref and engines against closed form and reference."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ WIRE = (0.6, 0.0, -0.8)
 
 
 def bead(bodies: tuple[str, str], **more) -> Scene:
-    """A body whose point slides down a wire; the wire on the ground, or the point on it."""
+    """Return a body with a point on a wire that the first of ``bodies`` carries."""
     joint = {"name": "J", "type": "inline", "bodies": bodies, "anchor": [0.3, 0.1, 0.0], "axis": WIRE}
     return Scene(name="bead", gravity=(0.0, 0.0, -9.81), body=[{**BEAD, **more}], joint=[joint])
 
 
 def two_hinges(second: str) -> Scene:
-    """A shaft in two bearings."""
+    """Return a shaft in two bearings: a hinge, and a joint of type ``second`` on the same axis."""
     shaft = {"name": "shaft", "mass": 2.0, "inertia": [0.1, 0.12, 0.02], "position": [0.05, 0.0, 0.4],
              "angular_velocity": [0.0, 0.0, 5.0]}  # fmt: skip
     bearings = [
@@ -50,8 +50,8 @@ SCENES = {
 each = pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
 
 
-def test_a_point_mass_slides_as_on_an_incline():
-    """The anchor at the centre of mass: the point falls with g sin of the slope."""
+def test_a_body_on_a_wire_through_its_centre_slides_as_on_an_incline():
+    """s = g sin α t² / 2 with sin α = 0.8."""
     scene = bead(("ground", "bead"), position=[0.3, 0.1, 0.0])
     motion = mbref.simulate(scene, times=TIMES)
     way = 9.81 * 0.8 * TIMES**2 / 2
@@ -60,7 +60,7 @@ def test_a_point_mass_slides_as_on_an_incline():
 
 
 @each
-def test_both_formulations_of_the_reference_agree(scene):
+def test_both_formulations_of_the_reference_agree_on_inline_joints(scene):
     a, b = (motion(scene, TIMES, EXTENDED, seconds=60.0) for motion in (natural_motion, tree_motion))
     assert not a.reason and not b.reason
     for field in ("position", "acceleration", "angular_acceleration"):
@@ -69,14 +69,14 @@ def test_both_formulations_of_the_reference_agree(scene):
 
 @each
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection/dop853"])
-def test_mbref_moves_as_the_reference(scene, method):
+def test_mbref_moves_an_inline_joint_as_the_reference(scene, method):
     motion = mbref.simulate(scene, method=method, times=TIMES, rtol=1e-12)
     found = measure(scene, motion, truth_for(scene))
     assert max(found[k] for k in ("error", "reaction_error", "violation_acceleration")) < 1e-10, found
 
 
 @each
-def test_mujoco_moves_as_the_reference(scene):
+def test_mujoco_moves_an_inline_joint_as_the_reference(scene):
     found = engine("mujoco")
     run = found.run(scene, TIMES, found.settings_of(scene, "projected")[-1])
     errors = measure(scene, run, truth_for(scene))
@@ -84,7 +84,7 @@ def test_mujoco_moves_as_the_reference(scene):
 
 
 @each
-def test_exudyn_moves_as_the_reference(scene):
+def test_exudyn_moves_an_inline_joint_as_the_reference(scene):
     found = engine("exudyn")
     assert found.cannot(scene) is None
     errors = measure(scene, found.run(scene, TIMES, found.best_settings(scene)[-1]), truth_for(scene))
@@ -92,12 +92,14 @@ def test_exudyn_moves_as_the_reference(scene):
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "simbody", "ondsel", "sundials"])
-def test_other_engines_refuse(name):
+def test_engines_without_inline_joints_refuse_them_by_their_type(name):
     refusal = engine(name).cannot(SCENES["wire on the ground"])
     assert refusal is not None and "inline" in refusal.reason
 
 
-def test_an_inline_joint_cures_two_hinges():
+def test_an_inline_joint_in_place_of_a_second_bearing_leaves_fewer_redundant_rows():
+    """Of two hinges five rows are redundant, of a hinge and an inline joint two, of a ball and an inline
+    joint none; the shaft keeps one freedom."""
     assert mbref.diagnose(two_hinges("revolute")).counts.redundant == 5
     cured = mbref.diagnose(two_hinges("inline")).counts
     assert (cured.redundant, cured.degrees_of_freedom) == (2, 1)
