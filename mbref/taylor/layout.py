@@ -43,6 +43,7 @@ class Solver(NamedTuple):
     work: Annotated[Matrix, "nr", "nz"]
     left: Annotated[Vector, "lanes"]  # 1 for a variable without a pivot, while pivots are chosen
     row_max: Annotated[Vector, "nr"]  # largest entry of each row, while pivots are chosen
+    unit: Annotated[Vector, "lanes"]  # unit of each variable in pivots: 1, or the growth of the mechanism
     # pivots of G and of the reduced mass matrix when the dependent variables were chosen
     first: Annotated[Vector, "nz"]
     last: Annotated[Vector, "nz"]  # pivots of the last factorisation
@@ -95,6 +96,7 @@ class Partition(NamedTuple):
     partition_id: int = 0  # number of selections of rows and variables so far
     parity: int = 0  # 1 if the order of pivots is an odd permutation
     replaced_pivot: float = 0.0  # least pivot before the last selection; minus infinity if a sign had changed
+    start_entry: float = 0.0  # largest entry of G at the first selection
 
 
 class Step(NamedTuple):

@@ -53,7 +53,7 @@ def save_replaced_pivot(memory):
     solver, least = memory.solver, inf
     for k in range(memory.partition.rank):
         same = solver.last[k] * solver.past[k] > 0.0
-        least = min(least, abs(solver.last[k]) if same else -inf)
+        least = min(least, unit_pivot(k, solver) if same else -inf)
     memory.partition.replaced_pivot = least
 
 
@@ -68,12 +68,21 @@ def replaced_pivot(memory):
     return partition.replaced_pivot if is_single else -inf
 
 
+@inlined
+def unit_pivot(k, solver):
+    """Return the size of pivot k of G in the unit of its variable."""
+    return solver.unit[solver.pivot_columns[k]] * abs(solver.last[k])
+
+
 @kernel
 def least_pivot(memory):
-    """Return the least pivot of G at the last factorisation; 1 without rows."""
+    """Return the least pivot of G at the last factorisation; 1 without rows, or without closed loops, where
+    no position is singular."""
     solver, least = memory.solver, 1.0
+    if memory.run.control.closed_loops == 0.0:
+        return least
     for k in range(memory.partition.rank):
-        least = min(least, abs(solver.last[k]))
+        least = min(least, unit_pivot(k, solver))
     return least
 
 

@@ -13,6 +13,8 @@ from mbref.taylor.partition import put_rows, save_start_pivots
 from mbref.taylor.simd import WIDTH, load, max_abs, store
 from mbref.taylor.solver import factorise_anew
 
+GROWN = 2.0  # largest entry of G / its value at the start: up to this growth, positions keep their unit
+
 
 @kernel
 def save_series(memory):
@@ -53,7 +55,9 @@ def choose_partition(memory):
 def choose(memory):
     """Choose independent rows and dependent variables by complete pivoting; return their number.
 
-    The tableau contains other numbers afterwards.
+    Lengths that grow along slides would enlarge some pivots and reduce others, far from singular positions.
+    So positions have the growth of the mechanism since its start as their unit. The tableau contains other
+    numbers afterwards.
     """
     solver, tolerance = memory.solver, memory.run.equations.system.settings.rank_tolerance
     pivot_rows, pivot_columns, rank = solver.pivot_rows, solver.pivot_columns, 0
@@ -61,9 +65,13 @@ def choose(memory):
     parity = False
     put_rows(memory)
     copy(memory.series.variable, solver.left)
+    put_largest_entries(memory)
+    if choose_units(memory):
+        copy(solver.unit, solver.left)
+        put_largest_entries(memory)
+    copy(memory.series.variable, solver.left)
     for k in range(pivot_rows.shape[0]):
         pivot_rows[k] = k
-        subtract_pivot_row(k, 0.0, k, memory)
     for k in range(pivot_columns.shape[0]):
         pivot_columns[k] = k
     for _ in range(min(pivot_rows.shape[0], pivot_columns.shape[0])):
@@ -87,6 +95,32 @@ def choose(memory):
     memory.partition.partition_id += 1
     memory.partition.parity = parity
     return rank
+
+
+@kernel
+def put_largest_entries(memory):
+    """Multiply the columns of the tableau by ``left``, and keep the largest entry of each row."""
+    for k in range(memory.solver.pivot_rows.shape[0]):
+        subtract_pivot_row(k, 0.0, k, memory)
+
+
+@kernel
+def choose_units(memory):
+    """Choose the units of the variables by the growth of the largest entry of G since the first selection.
+
+    Return whether positions have another unit than 1.
+    """
+    solver, partition, forms, largest = memory.solver, memory.partition, memory.pose_maps.along, 0.0
+    for k in range(solver.row_max.shape[0]):
+        largest = max(largest, solver.row_max[k])
+    if partition.start_entry == 0.0:
+        partition.start_entry = largest
+    has_grown = largest > GROWN * partition.start_entry
+    growth = largest / partition.start_entry if has_grown else 1.0
+    for i in range(solver.pivot_columns.shape[0]):
+        is_position = forms[i, 0] != 0.0 or forms[i, 1] != 0.0 or forms[i, 2] != 0.0
+        solver.unit[i] = growth if is_position else 1.0
+    return has_grown
 
 
 @inlined

@@ -153,7 +153,8 @@ def pivot_at_turning_point(h, memory):
             start = middle
     memory.kernels.gradient(memory.state, memory)
     for k in range(memory.partition.rank):
-        least = min(least, abs(solver.work[solver.pivot_rows[k], solver.pivot_columns[k]]))
+        pivot = abs(solver.work[solver.pivot_rows[k], solver.pivot_columns[k]])
+        least = min(least, solver.unit[solver.pivot_columns[k]] * pivot)
         eliminate_below(solver.work, solver.pivot_rows, solver.pivot_columns, k)
     evaluate_series(h, memory)
     return least

@@ -116,8 +116,9 @@ class Departure:
         if status != OK:
             return status
         distance.start_pivot, distance.clearance, distance.is_clear = 0.0, 0.0, 0
-        pivots = self._taylor.solver.last[: int(self._taylor.partition.rank)]
-        distance.entry_pivot = np.abs(pivots).min(initial=1.0)
+        solver, rank = self._taylor.solver, int(self._taylor.partition.rank)
+        pivots = solver.unit[solver.pivot_columns[:rank]] * np.abs(solver.last[:rank])
+        distance.entry_pivot = pivots.min(initial=1.0)
         self._keep_beginning()
         return PAUSED
 

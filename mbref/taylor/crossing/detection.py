@@ -99,6 +99,8 @@ def changes_signs(memory):
 @exchangeable(DETECT)
 def contains_singular_position(h, pivot, memory):
     """Return whether a step of h seconds, with a least pivot at its end, contains a singular position."""
+    if memory.run.control.closed_loops == 0.0:
+        return False
     start, moved, kept = memory.distance.start_pivot, distance_moved(h, memory), keeps_signs(memory)
     is_short = start + pivot > PIVOT_SLOPE * moved
     if (is_short and kept) or start + replaced_pivot(memory) > PIVOT_SLOPE * moved:

@@ -1,0 +1,70 @@
+"""Slides that become many times longer than the mechanism was are no singular positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import mbref
+from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, Spherical
+from tests.helpers.spinning import spinning_mechanism
+
+SPEED, START, END = 10.0, 0.1, 0.7  # rad/s of the arm, m from its axis, s
+TIMES = np.linspace(0.0, END, 8)
+
+
+def beads(joints: list[Spherical | Cylindrical], length: float) -> Scene:
+    """Return two beads on an arm that turns at a constant speed; nothing holds them along the arm.
+
+    They are at START · length from the axis at the start, and the joints connect them.
+    """
+    place, velocity = (START * length, 0.0, 0.0), (0.0, SPEED * START * length, 0.0)
+    inertia = (0.1 * length**2,) * 3
+    turning = {"mass": 1.0, "inertia": inertia, "angular_velocity": (0.0, 0.0, SPEED)}
+    return Scene(
+        name="beads",
+        gravity=(0.0, 0.0, 0.0),
+        duration=END,
+        body=[
+            Body(name="arm", position=(0.0, 0.0, 0.0), **turning),
+            Body(name="bead", position=place, velocity=velocity, **turning),
+            Body(name="follower", position=place, velocity=velocity, **turning),
+        ],
+        joint=[
+            Revolute(name="A", bodies=("ground", "arm"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0)),
+            Cylindrical(name="S", bodies=("arm", "bead"), anchor=(0.0, 0.0, 0.0), axis=(1.0, 0.0, 0.0)),
+            *joints,
+        ],
+        driver=[Driver(joint="A", polynomial=(0.0, SPEED))],
+    )
+
+
+def open_tree(length: float) -> Scene:
+    """Return beads without a closed loop: the follower slides on the other bead."""
+    bodies, anchor = ("bead", "follower"), (START * length, 0.0, 0.0)
+    return beads([Cylindrical(name="T", bodies=bodies, anchor=anchor, axis=(1.0, 0.0, 0.0))], length)
+
+
+def closed_loop(length: float) -> Scene:
+    """Return beads that two ball joints connect, which close a loop."""
+    bodies, distance = ("bead", "follower"), START * length
+    anchors = {"T": (distance, 0.0, 0.0), "U": (distance, 0.0, distance)}
+    return beads([Spherical(name=name, bodies=bodies, anchor=at) for name, at in anchors.items()], length)
+
+
+@pytest.mark.parametrize("length", [1e-6, 1.0, 1e6])
+@pytest.mark.parametrize("scene", [open_tree, closed_loop])
+def test_beads_leave_a_turning_arm(scene, length):
+    """The distance from the axis is r = r₀ cosh ωt: 548 r₀ at the end."""
+    motion = mbref.simulate(scene(length), times=TIMES)
+    assert motion.outcome == mbref.Outcome.COMPLETED, motion.message
+    distance = np.linalg.norm(motion.position[:, 1:], axis=2)
+    expected = START * length * np.cosh(SPEED * TIMES)[:, None]
+    assert distance == pytest.approx(np.broadcast_to(expected, distance.shape), rel=1e-10)
+
+
+@pytest.mark.parametrize("seed", [27, 51, 63, 99])
+def test_spinning_trees_with_long_slides_are_followed_to_the_end(seed):
+    motion = mbref.simulate(spinning_mechanism(seed), times=[0.0, 4.0])
+    assert motion.outcome == mbref.Outcome.COMPLETED, motion.message
+    assert motion.violation.position.max() < 1e-9
