@@ -21,6 +21,8 @@ from mbref.terminal import OUTPUT, discard_output, printable_streams
 CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")
 NUMBER_FAULT = re.compile(r"invalid (float|int) value: ")
 BAD_INPUT, INTERRUPTED = 2, 130  # exit statuses
+MOST_DURATION = 1e9  # s; a longer motion would end by the limit of time or steps in every engine
+MOST_PLACE = 1_000_000  # largest number of a singular position, an equilibrium or a vibration in a list
 KINDS = {"float": "must be a number, got ", "int": "must be a whole number, got "}
 
 
@@ -161,6 +163,22 @@ def whole(least: int, most: int) -> Callable[[str], int]:
         return int(text)
 
     return number
+
+
+def number(most: float, unit: str = "", zero: bool = False) -> Callable[[str], float]:
+    """Return a parser of positive numbers up to ``most``, also of 0 if ``zero``; ``unit`` is printed."""
+    ends = f"must be {'not negative' if zero else 'positive'} and at most {most:g}{unit and ' ' + unit}"
+
+    def parsed(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"must be a number, got {text[:40]!r}") from None
+        if not (0 < value <= most or (zero and value == 0)):
+            raise argparse.ArgumentTypeError(f"{ends}, got {text:.40}")
+        return value
+
+    return parsed
 
 
 def output_folder(text: str) -> str:

@@ -8,15 +8,15 @@ from typing import Any
 
 from crosscheck.cli.options import (
     DIGITS,
+    MOST_ERROR,
     add_duration,
     add_reference_time,
     add_samples,
     digits,
-    not_negative,
     numbers,
 )
 from crosscheck.judge.tolerances import FLOOR
-from mbref.command_line import add_output
+from mbref.command_line import add_output, number
 
 Commands = Any  # the object that argparse adds subcommands to; its type is private
 
@@ -70,7 +70,7 @@ def add_judge(commands: Commands) -> None:
     )
     parser.add_argument(
         "--tolerance",
-        type=not_negative,
+        type=number(MOST_ERROR, zero=True),
         default=FLOOR,
         metavar="E",
         help="largest error of a right column, relative to the mechanism's length, 1 rad, or the largest "

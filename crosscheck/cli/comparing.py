@@ -71,6 +71,7 @@ def tune(arguments: argparse.Namespace) -> int:
     path = shlex.join([arguments.scene, *reading.words()])
     name = request.find_engine(arguments.engine, notice)
     scene = request.lasting(scene, None, arguments.duration)
+    request.check_gap(arguments.closure, scene)
     times = request.sample_times(scene, None, selection.QUICK_SAMPLES)
     scouted([scene], [name])
     limit, ours = arguments.time_limit, engine(name).integrated_here

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +13,12 @@ from crosscheck.study.command import parsed_option
 from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
 from crosscheck.study.search.selection import QUICK_LIMIT
 from mbref import formats
-from mbref.command_line import add_force, add_output, output_folder, whole
+from mbref.command_line import MOST_DURATION, add_force, add_output, number, output_folder, whole
+from mbref.scene_fields import LARGEST
 from mbref.scene_units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
-MOST_DURATION = 1e9  # s; a longer motion would end by its time limit in every engine
+MOST_ERROR = 1.0  # of the mechanism's length, or rad: a larger error says nothing about a motion
 LOOSEST = 0.99  # relative tolerance; at 1 an error is as large as the motion
 MOST_SAMPLES = 1_000_000  # of one run; `request.MOST_STATES` limits samples times bodies
 MOST_REPEATS = 1000
@@ -129,37 +129,6 @@ def _option(text: str) -> tuple[str, Any]:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be a number, got {text!r}") from None
-
-
-def not_negative(text: str) -> float:
-    """Parse a finite number that is not negative."""
-    number = _number(text)
-    if not 0 <= number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be finite and not negative, got {text}")
-    return number
-
-
-def seconds(text: str) -> float:
-    """Parse a CPU time (s) from 0 to MOST_SECONDS."""
-    number = _number(text)
-    if not 0 <= number <= MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"must be from 0 to {MOST_SECONDS:g} s, got {text}")
-    return number
-
-
-def time_limit(text: str) -> float:
-    """Parse a positive CPU time (s) up to MOST_SECONDS."""
-    number = _number(text)
-    if not 0 < number <= MOST_SECONDS:
-        raise argparse.ArgumentTypeError(f"must be positive and at most {MOST_SECONDS:g} s, got {text}")
-    return number
-
-
 def numbers(text: str) -> list[float]:
     """Parse numbers separated by commas."""
     try:
@@ -174,7 +143,7 @@ def add_limits(parser: argparse.ArgumentParser, limit: float | None = TIME_LIMIT
     default = f"{limit:g}" if limit else f"{QUICK_LIMIT:g} at quick depth, {TIME_LIMIT:g} otherwise"
     parser.add_argument(
         "--time-limit",
-        type=time_limit,
+        type=number(MOST_SECONDS, "s"),
         default=limit,
         metavar="T",
         help="limit of a run: CPU seconds, and also seconds of waiting without computing; at most "
@@ -187,7 +156,13 @@ def add_limits(parser: argparse.ArgumentParser, limit: float | None = TIME_LIMIT
 def add_reference_time(parser: argparse.ArgumentParser) -> None:
     """Add the option for the CPU time that a reference may take."""
     about = "CPU seconds for the reference of a scene without a closed form (default: %(default)g); 0: none"
-    parser.add_argument("--reference-time", type=seconds, default=SECONDS, metavar="T", help=about)
+    parser.add_argument(
+        "--reference-time",
+        type=number(MOST_SECONDS, "s", zero=True),
+        default=SECONDS,
+        metavar="T",
+        help=about,
+    )
 
 
 def digits(text: str) -> int:
@@ -203,15 +178,7 @@ def length(text: str) -> float:
         value = in_si(text if text[-1:].isalpha() else f"{text} m", "length")
     except ValueError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
-    return positive(repr(value))
-
-
-def positive(text: str) -> float:
-    """Parse a positive finite number."""
-    number = _number(text)
-    if not 0 < number < math.inf:
-        raise argparse.ArgumentTypeError(f"must be positive and finite, got {text}")
-    return number
+    return number(LARGEST, "m")(repr(value))
 
 
 def add_stored_runs(parser: argparse.ArgumentParser, records: Path) -> None:

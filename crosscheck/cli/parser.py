@@ -8,6 +8,7 @@ from textwrap import fill
 from crosscheck.cli.commands_of_motions import Commands, add_certify, add_command, add_judge, add_reference
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
+    MOST_ERROR,
     MOST_MECHANISMS,
     MOST_REPEATS,
     MOST_SEED,
@@ -22,12 +23,11 @@ from crosscheck.cli.options import (
     add_selection,
     add_stored_runs,
     length,
-    positive,
 )
 from crosscheck.closed_loops.records import FILE
 from crosscheck.convergence.ladders import FILE as LADDERS
 from crosscheck.study.timings import REPEATS
-from mbref.command_line import Parser, add_output, commands, record_file, whole
+from mbref.command_line import Parser, add_output, commands, number, record_file, whole
 
 FIRST = """\
 first steps:
@@ -111,7 +111,8 @@ def _add_tune(commands: Commands) -> None:
     parser.add_argument("engine", metavar="ENGINE", help="a known engine (`crosscheck list engines`)")
     parser.add_argument("scene", metavar="SCENE", help="a built-in scene, a .toml, MJCF (.xml) or URDF file")
     goal = parser.add_mutually_exclusive_group()
-    goal.add_argument("--error", type=positive, default=1e-6, metavar="E", help="default: %(default)g")
+    about = f"largest error / mechanism's length, or rad; at most {MOST_ERROR:g}; default: %(default)g"
+    goal.add_argument("--error", type=number(MOST_ERROR), default=1e-6, metavar="E", help=about)
     goal.add_argument(
         "--closure",
         type=length,

@@ -11,14 +11,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.cli.options import LOOSEST, MOST_DURATION
+from crosscheck.cli.options import LOOSEST
 from crosscheck.cli.scene_request import Notice, RequestError
 from crosscheck.conformance.planar import left_out, planar_specimens
 from crosscheck.conformance.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, Setting, all_engines, default_engines, engine
+from crosscheck.judge.constraints import scene_length
 from crosscheck.study.grid import MOST_SECONDS, Case, shown_name
 from crosscheck.study.search.offers import default_cases, of_file, scout, settings
 from crosscheck.study.search.selection import of_few_families
+from mbref.command_line import MOST_DURATION
 from mbref.scene import Scene
 from mbref.scene_fields import meant
 
@@ -122,6 +124,13 @@ def sample_times(scene: Scene, times: Sequence[float] | None, samples: int) -> n
         bodies = f"the {len(scene.body)} bodies of {scene.name}"
         raise RequestError(f"--samples: at least 2 and at most {most} for {bodies}, got {samples}")
     return np.linspace(0.0, scene.duration, samples)
+
+
+def check_gap(gap: float | None, scene: Scene) -> None:
+    """Raise RequestError for a closure gap (m) that exceeds the length of the mechanism."""
+    most = scene_length(scene)
+    if gap is not None and gap > most:
+        raise RequestError(f"--closure: must be at most the mechanism's length, {most:.3g} m, got {gap:g} m")
 
 
 def _check_times(times: Sequence[float]) -> None:

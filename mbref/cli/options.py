@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.cli.output import progress_bar, warn
-from mbref.command_line import whole
+from mbref.command_line import MOST_DURATION, whole
 from mbref.formulations import FORMULATIONS
 from mbref.input_error import InputError
 from mbref.integrators import INTEGRATORS
@@ -71,7 +71,8 @@ def add_time_options(parser: argparse.ArgumentParser) -> None:
         type=whole(2, MOST_SAMPLES),
         help=f"this many equally spaced times from 0 to the duration (2 to {MOST_SAMPLES})",
     )
-    parser.add_argument("--duration", type=float, help="end time in s (default: the scene's)")
+    about = f"end time in s, at most {MOST_DURATION:g} (default: the scene's)"
+    parser.add_argument("--duration", type=float, help=about)
 
 
 class Request(NamedTuple):
@@ -114,8 +115,8 @@ def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None =
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
     """Return the sample times that the options request; raises InputError that names the faulty option."""
     duration = scene.duration if options.duration is None else options.duration
-    if not 0 < duration < np.inf:
-        raise InputError(f"--duration: must be positive and finite, got {duration:g}")
+    if not 0 < duration <= MOST_DURATION:
+        raise InputError(f"--duration: must be positive and at most {MOST_DURATION:g} s, got {duration:g}")
     if options.times is None:
         samples = 101 if options.samples is None else options.samples
         if samples * len(scene.body) > MOST_STATES:
@@ -128,6 +129,8 @@ def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:
         raise InputError(f"--times: must be numbers separated by commas, got {options.times!r}") from None
     if not np.isfinite(times).all() or times[0] < 0 or np.any(np.diff(times) <= 0):
         raise InputError(f"--times: must be finite, not negative and increasing, got {options.times}")
+    if times[-1] > MOST_DURATION:
+        raise InputError(f"--times: must be at most {MOST_DURATION:g} s, got {times[-1]:g}")
     times = times if options.duration is None else times[times <= duration]
     if not times.size:
         raise InputError(f"--times: none is within --duration {duration:g}")

@@ -9,7 +9,7 @@ from typing import Any
 
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
-from mbref.command_line import add_output
+from mbref.command_line import MOST_PLACE, add_output, whole
 from mbref.drawing.film import MOVING, png, write_film
 from mbref.drawing.picture import side_by_side, still
 from mbref.drawing.view import View
@@ -67,7 +67,7 @@ def add(commands: Any) -> None:
     )
     animate.add_argument(
         "--crossing",
-        type=int,
+        type=whole(1, MOST_PLACE),
         metavar="NUMBER",
         help="--branches at this singular position, counted from 1 (default: the first at which several\n"
         "branches meet)",

@@ -10,7 +10,7 @@ import numpy as np
 from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
-from mbref.command_line import add_output, whole
+from mbref.command_line import MOST_PLACE, add_output, whole
 from mbref.drawing.film import MOVING, write_film
 from mbref.input_error import InputError
 from mbref.records import strict_json
@@ -55,7 +55,12 @@ def add(commands: Any) -> None:
         "  mbref modes mechanism.toml --mode 2 --out second.svg",
     )
     _add_search(shake)
-    shake.add_argument("--mode", type=int, default=1, help="vibration of --out, from the slowest (default 1)")
+    shake.add_argument(
+        "--mode",
+        type=whole(1, MOST_PLACE),
+        default=1,
+        help="vibration of --out, from the slowest (default 1)",
+    )
     shake.add_argument("--view", metavar="VIEW", help=VIEW)
     add_output(shake, "--out", metavar="FILE", help=".svg, .gif or .mp4 of one vibration")
 
@@ -65,7 +70,9 @@ def _add_search(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--starts", type=whole(1, MOST_STARTS), default=24, help="number of poses to search from (default 24)"
     )
-    parser.add_argument("--number", type=int, metavar="K", help="number of the equilibrium, as listed")
+    parser.add_argument(
+        "--number", type=whole(1, MOST_PLACE), metavar="K", help="number of the equilibrium, as listed"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object and nothing else")
 
 

@@ -19,8 +19,8 @@ SCENE = Scene(name="s", duration=2.0, body=(BLOCK,))
 @pytest.mark.parametrize(
     ("parse", "good", "bad"),
     [
-        (options.positive, ["5e-324", "1", "1e308"], ["0", "-1", "inf", "nan", "x"]),
-        (options.not_negative, ["0", "5e-324", "1e308"], ["-5e-324", "inf", "nan", "x"]),
+        (options.number(1.0), ["5e-324", "1"], ["0", "-1", "1.0000000000000002", "inf", "nan", "x"]),
+        (options.number(1.0, zero=True), ["0", "5e-324", "1"], ["-5e-324", "1.1", "inf", "nan", "x"]),
         (options.whole(1, 10), ["1", "10"], ["0", "-1", "11", "1.5", "x", ""]),
         (
             options.digits,

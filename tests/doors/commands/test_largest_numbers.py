@@ -9,6 +9,7 @@ import pytest
 import crosscheck
 from crosscheck.cli import main
 from crosscheck.cli.request import RequestError
+from mbref.cli import main as mbref
 from tests.helpers.still_engines import resting
 
 HUGE = ("99999999999999999999", "9" * 5000, "-1", "0.5", "many")
@@ -85,6 +86,29 @@ def test_duration_that_is_not_positive_or_too_long_is_refused_before_any_run(com
 @pytest.mark.parametrize("command", ["run", "compare"])
 def test_sample_time_that_no_motion_reaches_is_refused_before_any_run(command: str, text: str, says, capsys):
     assert f"--times: {says}" in refusal(capsys, command, "four_bar", "--times", f"0,{text}")
+
+
+@pytest.mark.parametrize("option", ["--duration", "--times"])
+@pytest.mark.parametrize(
+    "command", [("run",), ("plot",), ("animate",), ("ensemble", "--vary", "duration=0.1:0.2")], ids=" ".join
+)
+def test_end_of_a_simulation_beyond_its_ends_is_refused(command, option: str, capsys):
+    assert mbref([*command, "four_bar", option, "1e20"]) == 2
+    assert f"{option}: must be" in (said := capsys.readouterr().err) and "at most 1e+09 s, got 1e+20" in said
+
+
+ERRORS = [("tune", "mbref", "four_bar", "--error"), ("judge", "four_bar", "run.csv", "--tolerance")]
+
+
+@pytest.mark.parametrize("text", ["1e20", "1.1", "inf", "nan", "-1e-3"])
+@pytest.mark.parametrize("command", ERRORS, ids=" ".join)
+def test_error_as_large_as_the_mechanism_is_refused(command, text: str, capsys):
+    assert "and at most 1, got " in refusal(capsys, *command[:-1], f"{command[-1]}={text}")
+
+
+def test_closure_gap_longer_than_the_mechanism_is_refused(capsys):
+    said = refusal(capsys, "tune", "tests.helpers.still_engines:LOGGED", "four_bar", "--closure", "1km")
+    assert "--closure: must be at most the mechanism's length, 0.707 m, got 1000 m" in said
 
 
 @pytest.mark.parametrize("text", ["99999999999999999999", "1", "nan", "0", "-1e-3"])
