@@ -1,4 +1,4 @@
-"""Isolation: what a misbehaving engine does / the outcome that comes back."""
+"""Engines in child processes: outcomes of failures, limits, processes that are shared or ended."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import sys
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +37,7 @@ from tests.helpers.fake_engines import FAKE, FAKES, CompilingModels, converse
 from tests.helpers.still_engines import resting as still
 
 TIMES = np.array([0.0, 0.1, 0.3])
-PLAIN = Setting("plain", {"seconds": 0.25})
+PLAIN = Setting("plain", {"seconds": 0.25})  # the fake says that its run took 0.25 s
 HERE = Path(__file__).parent
 
 
@@ -54,7 +53,7 @@ def run(fake: str, scene: Scene | None = None, time_limit: float = 60.0) -> Traj
 
 
 def gone(pid: int) -> bool:
-    """Whether the process has ended, waiting a little for the system to notice."""
+    """Return whether the process ends within 5 s."""
     for _ in range(100):
         status = Path(f"/proc/{pid}/stat")
         if not status.exists() or status.read_text().rsplit(")", 1)[1].split()[0] == "Z":
@@ -63,7 +62,7 @@ def gone(pid: int) -> bool:
     return False
 
 
-def test_isolated_run_and_run_in_this_process_agree():
+def test_a_run_in_a_child_process_equals_the_run_in_this_process():
     here, there = FAKE.run(still(), TIMES, PLAIN), run("FAKE")
     assert there.to_record() == here.to_record(), (there, here)
 
@@ -77,7 +76,8 @@ def test_isolated_run_and_run_in_this_process_agree():
         ("MISSING", "fake-package is not installed: No module named 'fake_package'", ""),
     ],
 )
-def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, version: str):
+def test_a_failed_engine_gives_a_crashed_trajectory_with_the_cause(fake: str, message: str, version: str):
+    """It has the setting and no samples, in a shared process and in one of its own (``observe``)."""
     ended = run(fake)
     assert (ended.outcome, ended.message, ended.version) == (Outcome.CRASHED, message, version)
     assert (ended.method, ended.settings) == (PLAIN.family, PLAIN.options)
@@ -86,7 +86,11 @@ def test_failure_of_an_engine_and_the_trajectory(fake: str, message: str, versio
     assert observed.value.to_record() == ended.to_record(), (observed.value, ended)
 
 
-def test_compilation_of_a_model_extends_the_time_limit():
+def test_the_time_that_an_engine_needs_to_compile_extends_the_limit_of_a_run():
+    """The engine computes for 0.4 s, with a limit of 0.1 s and up to 10 s of compilation.
+
+    Both a child process and this process extend the limit; without compilation the run times out.
+    """
     runner = InProcess(CompilingModels(), time_limit=0.1)
     for ended in (run("COMPILING_MODELS", time_limit=0.1), runner.observe(still(), TIMES, PLAIN).value):
         assert ended.outcome is Outcome.COMPLETED, ended.message
@@ -95,8 +99,8 @@ def test_compilation_of_a_model_extends_the_time_limit():
     assert ended.outcome is Outcome.TIMED_OUT and ended.message == "no result after 0.1 s"
 
 
-def test_observed_runs_and_a_process_for_each(tmp_path: Path):
-    """Each says what making the engine ready printed, and leaves no process behind."""
+def test_every_observed_run_has_a_process_of_its_own_that_ends(tmp_path: Path):
+    """The engine HERALD prints a banner when a process prepares it first."""
     log = tmp_path / "log"
     seen = [observe(f"{FAKES}:HERALD", still(str(log)), TIMES, PLAIN, 60.0) for _ in range(3)]
     assert [one.printed for one in seen] == ["a banner\n"] * 3, seen
@@ -105,24 +109,24 @@ def test_observed_runs_and_a_process_for_each(tmp_path: Path):
     assert all(gone(process) for process in processes), processes
 
 
-def test_observed_run_that_hangs_is_killed_with_all_it_started(tmp_path: Path):
+def test_an_observed_run_that_hangs_is_killed_with_the_processes_that_it_started(tmp_path: Path):
     pid = tmp_path / "pid"
     ended = observe(f"{FAKES}:HANG", still(str(pid)), TIMES, PLAIN, 2.0).value
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 2 s"), ended.message
     assert gone(int(pid.read_text())), f"grandchild {pid.read_text()} is still alive"
 
 
-def test_printing_and_files_of_an_engine_leave_no_trace(
+def test_output_and_files_of_an_engine_do_not_reach_the_parent_process(
     capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(tmp_path)
     ended = run("CHATTER")
     assert ended.outcome is Outcome.COMPLETED, ended.message
-    assert capfd.readouterr() == ("", ""), "the engine's printing reached this process"
-    assert list(tmp_path.iterdir()) == [], "files were left in the working directory"
+    assert capfd.readouterr() == ("", "")
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
+def test_a_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "2")
     monkeypatch.setenv("OMP_NUM_THREADS", "2")
     ended = run("THREADS")
@@ -130,63 +134,64 @@ def test_child_computes_with_one_thread(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_runs_of_an_engine_share_a_process_until_one_does_not_complete(tmp_path: Path):
-    """Process of every run, as the engine itself sees it."""
+    """The engine logs the process of every run; the last number says which process is expected."""
     log = tmp_path / "log"
-    ways = [{}, {}, {"outcome": "NOT_CONVERGED"}, {}, {"raise": "no such joint"}, {}, {"signal": 11}, {}, {}]
-    outcomes = [
-        run_isolated(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", way), 60.0).outcome.name
-        for way in ways
+    runs = [
+        ({}, "COMPLETED", 0),
+        ({}, "COMPLETED", 0),
+        ({"outcome": "NOT_CONVERGED"}, "NOT_CONVERGED", 0),
+        ({}, "COMPLETED", 1),
+        ({"raise": "no such joint"}, "CRASHED", 1),
+        ({}, "COMPLETED", 2),
+        ({"signal": 11}, "CRASHED", 2),
+        ({}, "COMPLETED", 3),
+        ({}, "COMPLETED", 3),
     ]
-    completed, crashed = "COMPLETED", "CRASHED"
-    assert outcomes == [
-        completed,
-        completed,
-        "NOT_CONVERGED",
-        completed,
-        crashed,
-        completed,
-        crashed,
-        completed,
-        completed,
-    ], outcomes
+    for options, outcome, _ in runs:
+        ended = run_isolated(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", options), 60.0)
+        assert ended.outcome.name == outcome, options
+    assert numbered(log) == [process for *_, process in runs]
+
+
+def numbered(log: Path) -> list[int]:
+    """Return the processes of the logged runs, numbered by their first run."""
     processes = [line.split()[1] for line in log.read_text().splitlines()]
-    alike = [first == second for first, second in pairwise(processes)]
-    assert alike == [True, True, False, True, False, True, False, True], processes
-    assert len(set(processes)) == 4, processes
+    return [list(dict.fromkeys(processes)).index(process) for process in processes]
 
 
-def test_runs_in_turn_share_a_process_until_one_is_ended(tmp_path: Path):
-    """An engine that ends early by itself serves on; one that hangs ends at its limit."""
+def test_runs_in_turn_share_a_process_until_one_passes_its_limit(tmp_path: Path):
+    """An engine that ends a run early by itself serves on; one that sleeps past its limit is ended."""
     log = tmp_path / "log"
-    ways = [({}, 60.0), ({"outcome": "NOT_CONVERGED"}, 60.0), ({}, 60.0), ({"sleep": 60.0}, 1.0), ({}, 60.0)]
-    outcomes = [
-        run_in_turn(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", way), limit).outcome.name
-        for way, limit in ways
+    runs = [
+        ({}, 60.0, "COMPLETED"),
+        ({"outcome": "NOT_CONVERGED"}, 60.0, "NOT_CONVERGED"),
+        ({}, 60.0, "COMPLETED"),
+        ({"sleep": 60.0}, 1.0, "TIMED_OUT"),
+        ({}, 60.0, "COMPLETED"),
     ]
-    completed = "COMPLETED"
-    assert outcomes == [completed, "NOT_CONVERGED", completed, "TIMED_OUT", completed], outcomes
-    processes = [line.split()[1] for line in log.read_text().splitlines()]
-    alike = [first == second for first, second in pairwise(processes)]
-    assert alike == [True, True, True, False], processes
+    for options, limit, outcome in runs:
+        ended = run_in_turn(f"{FAKES}:RECORDER", still(str(log)), TIMES, Setting("a", options), limit)
+        assert ended.outcome.name == outcome, options
+    assert numbered(log) == [0, 0, 0, 0, 1]
 
 
-def test_run_after_a_time_out_has_its_whole_time(tmp_path: Path):
-    """Getting ready takes this engine longer than its runs may."""
+def test_preparation_of_an_engine_after_a_time_out_does_not_count_against_the_next_limit(tmp_path: Path):
+    """The engine SLOW prepares for 2 s in every new process; its runs may take 1.5 s."""
     log, limit = tmp_path / "log", 1.5
-    ways = [{}, {"sleep": 60.0}, {}]
-    runs = [run_isolated(f"{FAKES}:SLOW", still(str(log)), TIMES, Setting("a", way), limit) for way in ways]
-    assert [r.outcome.name for r in runs] == ["COMPLETED", "TIMED_OUT", "COMPLETED"], runs
-    first, second, third = (line.split()[1] for line in log.read_text().splitlines())
-    assert first == second != third, (first, second, third)
+    for options, outcome in (({}, "COMPLETED"), ({"sleep": 60.0}, "TIMED_OUT"), ({}, "COMPLETED")):
+        ended = run_isolated(f"{FAKES}:SLOW", still(str(log)), TIMES, Setting("a", options), limit)
+        assert ended.outcome.name == outcome, options
+    assert numbered(log) == [0, 0, 1]
 
 
-def test_engine_that_hangs_while_it_gets_ready_times_out(monkeypatch: pytest.MonkeyPatch):
+def test_an_engine_that_hangs_in_its_preparation_times_out(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("crosscheck.processes.pool.READY_SECONDS", 1.0)
     ended = run("STUCK", time_limit=60.0)
     assert (ended.outcome, ended.message) == (Outcome.TIMED_OUT, "no result after 1 s"), ended.message
 
 
-def test_engine_that_compiles_and_what_it_prints_meanwhile():
+def test_the_last_line_that_an_engine_prints_in_its_preparation_is_known_meanwhile():
+    """`starting` gives it for each engine that is being prepared, and nothing afterwards."""
     with ThreadPoolExecutor(1) as thread:
         setting = Setting("plain", {"seconds": 0.25})
         made = thread.submit(run_in_turn, f"{FAKES}:COMPILING", still(), TIMES, setting, 60.0)
@@ -198,7 +203,8 @@ def test_engine_that_compiles_and_what_it_prints_meanwhile():
     assert not starting()
 
 
-def test_engine_is_asked_alone_until_it_has_answered_once(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+def test_first_questions_to_an_engine_wait_for_each_other(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """Two threads ask for its settings, for which it compiles; it logs the begin and end of each answer."""
     log = tmp_path / "log"
     monkeypatch.setenv("FAKE_LOG", str(log))
     with ThreadPoolExecutor(2) as threads:
@@ -213,13 +219,10 @@ def test_engines_do_not_share_a_process(tmp_path: Path):
     log, plain = tmp_path / "log", Setting("a")
     for fake in ("RECORDER", "SLOW", "RECORDER"):
         run_isolated(f"{FAKES}:{fake}", still(str(log)), TIMES, plain, 60.0)
-    first, other, again = (line.split()[1] for line in log.read_text().splitlines())
-    assert first != other, "two engines in one process"
-    assert first == again, "the child of the first engine did not wait for it"
+    assert numbered(log) == [0, 1, 0]
 
 
-def test_no_child_outlives_its_parent(tmp_path: Path):
-    """Neither one that waits after the parent's normal end, nor one whose parent is killed."""
+def test_no_child_outlives_a_parent_that_ends_or_is_killed(tmp_path: Path):
     log = tmp_path / "log"
     script = (
         "import os, sys; sys.path.insert(0, sys.argv[1])\n"
@@ -244,7 +247,8 @@ REAL = {  # settings of two families each
 
 
 @pytest.mark.parametrize("name", REAL)
-def test_runs_in_one_process_and_in_processes_of_their_own_agree(name: str):
+def test_an_engines_run_does_not_depend_on_earlier_runs_in_its_process(name: str):
+    """Two scenes at two settings in turn, in one process and in processes of their own: equal to the bit."""
     times = np.linspace(0.0, 0.01, 5)
     scenes = SCENES["five_bar"](), SCENES["spatial_slider_crank_driven"]()
     first, second = jobs = list(zip(scenes, REAL[name], strict=True))
@@ -260,13 +264,13 @@ def untimed(run: Trajectory) -> str:
     return repr({**record, "cost": {k: v for k, v in record["cost"].items() if "seconds" not in k}})
 
 
-def test_unknown_engine_is_refused_before_anything_starts():
+def test_an_unknown_engine_is_refused_with_the_known_ones():
     with pytest.raises(LookupError, match="unknown engine 'nosuch'; known: mbref"):
         run_isolated("nosuch", still(), TIMES, PLAIN, 1.0)
 
 
 @pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
-def test_the_end_of_the_parent_ends_the_child_within_a_call(sent: str, tmp_path: Path):
+def test_a_signal_to_the_parent_ends_a_child_that_hangs_and_its_children(sent: str, tmp_path: Path):
     if sent != "SIGINT" and not fork_server.AVAILABLE:
         pytest.skip("without a fork server the child ends itself after its limit")
     pid = tmp_path / "pid"
@@ -289,8 +293,6 @@ def test_the_end_of_the_parent_ends_the_child_within_a_call(sent: str, tmp_path:
 
 
 def test_stop_all_ends_running_children(tmp_path: Path):
-    from concurrent.futures import ThreadPoolExecutor
-
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         future = pool.submit(run, "HANG", still(str(pid)))
@@ -302,7 +304,9 @@ def test_stop_all_ends_running_children(tmp_path: Path):
     assert (ended.outcome, ended.message) == (Outcome.CRASHED, "the process was ended by SIGKILL")
 
 
-def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
+def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_path: Path):
+    """Job a takes 0.5 s; job b does not complete and has no time. The process that has imported the engine of
+    the first job serves this and the next timing."""
     log = tmp_path / "log"
     _, served = ask(f"{FAKES}:RECORDER", converse, (), 60.0)
     jobs = [
@@ -311,28 +315,22 @@ def test_interleaved_runs_take_turns_after_a_warm_up(tmp_path: Path):
     ]
     seconds = time_interleaved(still(str(log)), TIMES, jobs, repeats=2, time_limit=60.0)
     assert seconds[0] == [0.5, 0.5], seconds
-    assert len(seconds[1]) == 2, seconds
-    assert all(map(math.isnan, seconds[1])), f"an incomplete run has no time: {seconds}"
+    assert len(seconds[1]) == 2 and all(map(math.isnan, seconds[1])), seconds
     order, processes = zip(*(line.split() for line in log.read_text().splitlines()), strict=True)
     assert order == ("a", "b") * 3, order
-    assert len(set(processes)) == 1, f"one process for all, got {set(processes)}"
-    assert int(processes[0]) != os.getpid()
-    assert int(processes[0]) == served, "the child that has imported the first job's engine is used again"
+    assert {int(process) for process in processes} == {served} != {os.getpid()}
     time_interleaved(still(str(log)), TIMES, jobs, repeats=1, time_limit=60.0)
-    assert log.read_text().splitlines()[-1].split()[1] == processes[0], (
-        "the process times the next scene, too"
-    )
+    assert set(numbered(log)) == {0}
 
 
-def test_interleaved_crash_is_an_error():
+def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
     jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
         time_interleaved(still(), TIMES, jobs, repeats=1, time_limit=60.0)
     assert caught.value.outcome is Outcome.CRASHED
 
 
-def test_an_interrupt_ends_the_calls_of_threads(tmp_path: Path):
-    """The running call ends with its child, and the waiting call does not begin."""
+def test_an_interrupt_ends_the_running_call_of_a_thread_and_cancels_the_waiting_one(tmp_path: Path):
     pid = tmp_path / "pid"
     with ThreadPoolExecutor(1) as pool:
         calls = [pool.submit(run, "HANG", still(str(pid))) for _ in range(2)]
