@@ -149,9 +149,7 @@ def test_ondsel_moves_the_driven_slider_crank_with_a_plane() -> None:
     run = run_fine("ondsel", planar, times)
     truth = truth_for(base).poses(times)
     gaps = [np.abs(getattr(run, f) - getattr(truth, f)).max() for f in ("position", "acceleration")]
-    assert gaps[0] < MARGIN * DRIVEN[0] and gaps[1] < MARGIN * DRIVEN[1], (
-        f"off by {gaps} m, m/s² of {np.abs(truth.acceleration).max():.0f}"
-    )
+    assert gaps[0] < MARGIN * DRIVEN[0] and gaps[1] < MARGIN * DRIVEN[1]
 
 
 def at_rest(scene: Scene) -> tuple[Body, ...]:

@@ -14,15 +14,7 @@ import pytest
 
 from crosscheck.conformance import replays
 from crosscheck.conformance.trial import Outside
-from mbref.scene import (
-    Body,
-    Cylindrical,
-    Driver,
-    Moment,
-    Revolute,
-    Scene,
-    Translational,
-)
+from mbref.scene import Body, Cylindrical, Driver, Moment, Revolute, Scene, Translational
 from mbref.trajectory import Trajectory
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -12,10 +12,8 @@ from crosscheck.engines import driver_motion
 from crosscheck.engines.compiler import Compiler, NoLibrary
 from crosscheck.engines.fixed_steps import unended_piece
 from crosscheck.engines.geometry import in_body, point_in_body
-from crosscheck.engines.joint_coordinates import JointCoordinates
 from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through
 from crosscheck.refusals import Owner
-from mbref import rotations
 from mbref.scene import (
     Body,
     Driver,
@@ -148,37 +146,6 @@ def test_run_that_fails_keeps_its_samples_and_states_the_reason():
     )
     assert (lost.outcome, lost.t_end, len(lost.times)) == (Outcome.NOT_FINITE, 0.5, 2)
     assert lost.message == "the motion is not finite at 2 s"
-
-
-def one_ball(in_child: bool, places: tuple[Any, ...] = ()) -> JointCoordinates:
-    none = np.zeros(0, dtype=int)
-    return JointCoordinates(3, 4, none, none, ((0, 0),), places, in_child)
-
-
-@pytest.mark.parametrize("in_child", [True, False])
-def test_ball_s_quaternion_rate_is_half_its_product_with_the_spin(in_child):
-    """q' = q (0, ω) / 2 in the child's axes, (0, ω) q / 2 in the parent's. A turn by π / 2 about y composes
-    in the matching order; quaternions are normalised first."""
-    q, spin = np.array([HALF, HALF, 0.0, 0.0]), np.array([0.0, 2.0, 0.0])
-    other = rotations.multiply
-    wanted = other(q, np.array([0.0, *spin])) / 2 if in_child else other(np.array([0.0, *spin]), q) / 2
-    assert one_ball(in_child).rates(3 * q, spin) == pytest.approx(wanted)
-    moved = one_ball(in_child).moved(q, np.array([0.0, math.pi / 2, 0.0]))
-    turn = np.array([HALF, 0.0, HALF, 0.0])
-    assert moved == pytest.approx(other(q, turn) if in_child else other(turn, q))
-    assert one_ball(in_child).normalised(5 * q) == pytest.approx(q)
-
-
-def test_free_link_moves_along_and_turns_about_world_axes():
-    """q = (position, quaternion), v = (velocity, spin) in world axes: q' = (v, (0, ω) q / 2)."""
-    none = np.zeros(0, dtype=int)
-    free = JointCoordinates(6, 7, none, none, ((3, 3),), ((0, 0),), True)
-    q = np.array([1.0, 2.0, 3.0, HALF, HALF, 0.0, 0.0])
-    v = np.array([4.0, 5.0, 6.0, 0.0, 2.0, 0.0])
-    spin = np.array([0.0, 0.0, 2.0, 0.0])
-    assert free.rates(q, v)[:3].tolist() == [4.0, 5.0, 6.0]
-    assert free.rates(q, v)[3:] == pytest.approx(rotations.multiply(spin, q[3:]) / 2)
-    assert free.moved(q, v)[:3].tolist() == [5.0, 7.0, 9.0]
 
 
 # --- drivers ----------------------------------------------------------------------------------------------

@@ -27,13 +27,7 @@ def still(name: str = "still", **changes: object) -> Scene:
 
 
 def case(family: str, fake: str = "FAKE", scene: Scene | None = None, limit: float = 60.0) -> Case:
-    return Case(
-        scene or still(),
-        TIMES,
-        f"{FAKES}:{fake}",
-        Setting(family, {"seconds": 0.5}),
-        limit,
-    )
+    return Case(scene or still(), TIMES, f"{FAKES}:{fake}", Setting(family, {"seconds": 0.5}), limit)
 
 
 def test_record_of_a_study_holds_the_engine_s_trajectory():

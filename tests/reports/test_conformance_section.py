@@ -111,10 +111,6 @@ def test_the_page_on_engines_counts_the_violations_of_warp_by_cause():
     passed = sum(v["status"] == "pass" for v in warp["verdicts"])
     refused = sum(v["property"] == "refusal" and v["status"] == "cannot" for v in warp["verdicts"])
     words = " ".join(page.split())
-    assert f"passes {passed} checks, refuses {refused} mechanisms, and violates {len(failed)}. " in words, (
-        passed,
-        refused,
-        len(failed),
-    )
+    assert f"passes {passed} checks, refuses {refused} mechanisms, and violates {len(failed)}. " in words
     largest = max(v["measured"] for v in failed if v["property"] == "truth")
     assert max(float(row[2]) for row in cells) == float(f"{largest:.1e}")

@@ -22,13 +22,7 @@ from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 from reports.blocks import Figure, Heading, Table
 from reports.runs import Run
-from reports.sections import (
-    paper,
-    paper_cranks,
-    paper_methods,
-    paper_sweep,
-    paper_teaching,
-)
+from reports.sections import paper, paper_cranks, paper_methods, paper_sweep, paper_teaching
 
 LETTERS = {outcome.letter: outcome for outcome in Outcome if outcome.letter}
 ILLUSTRATION: dict[str, Any] = {}
