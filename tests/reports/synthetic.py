@@ -109,7 +109,7 @@ def nothing(engine: str, family: str, a_scene: Scene | None = None) -> dict[str,
 
 @functools.cache
 def records() -> tuple[dict[str, Any], ...]:
-    """Two scenes: a method of order 4, a faster one of order 1, a wrong one, and three kinds of failure."""
+    """Two scenes: a method of order 3, a faster one of order 1, a wrong one, and three kinds of failure."""
     spatial, planar = scene(), scene("planar_slider_crank")
     orders = [
         *(

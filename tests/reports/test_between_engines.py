@@ -37,7 +37,9 @@ def cells(blocks: list[Block], table: int = 0) -> list[list[str]]:
     return [list(row) for row in [b for b in blocks if isinstance(b, Table)][table].rows]
 
 
-def test_choices_shown_where_joints_are_redundant():
+def test_undetermined_components_are_listed_for_each_engine():
+    """The five-bar has redundant rows: the table has the components that they leave undetermined, N, at the
+    middle sample, of each engine."""
     group = runs_of("five_bar")
     blocks = reactions.render(group)
     tables = [block for block in blocks if isinstance(block, Table)]
@@ -46,10 +48,11 @@ def test_choices_shown_where_joints_are_redundant():
     times = group.runs[0].record["times"]
     assert f"at t = {times[len(times) // 2]:.3g} s" in tables[1].caption, tables[1].caption
     shares = [[float(cell) for cell in row[1:]] for row in tables[1].rows]
-    assert max(map(max, shares)) > 1, f"N, of reactions of about 100 N: {shares}"
+    assert max(map(max, shares)) > 1, shares
 
 
-def test_choices_that_are_rounding_are_told_as_zero():
+def test_undetermined_components_of_rounding_size_are_called_zero():
+    """The planar slider-crank has redundant rows whose components vanish by symmetry."""
     blocks = reactions.render(runs_of("planar_slider_crank_gravity"))
     assert len([block for block in blocks if isinstance(block, Table)]) == 1
     assert [b.text for b in blocks if isinstance(b, Text)] == [
@@ -57,7 +60,9 @@ def test_choices_that_are_rounding_are_told_as_zero():
     ]
 
 
-def test_acceleration_table_and_differences_put_in():
+def test_accelerations_table_shows_the_difference_put_in():
+    """MuJoCo's accelerations of centres are 1 % too large; the table is relative to the largest, by Gauss's
+    principle, angular accelerations included."""
     group = runs_of("planar_slider_crank_gravity")
     shown = {row[0]: row[2] for row in cells(accelerations.render(group))}
     exact = gauss(group.scene)
@@ -67,21 +72,23 @@ def test_acceleration_table_and_differences_put_in():
     assert abs(float(shown["mujoco"]) / expected - 1) < 0.05, f"put in {expected:.2e}, shown {shown}"
 
 
-def test_support_section_and_engines_of_the_records():
+def test_support_section_has_the_engines_of_the_records():
     (table,) = [b for b in support.render([runs_of("planar_slider_crank_gravity")]) if isinstance(b, Table)]
     assert list(table.header) == ["Feature", "pinocchio", "mujoco"], table.header
     assert ("revolute joint", "✓", "✓") in table.rows, table.rows[:3]
 
 
-def test_singular_positions_passed_with_branches_and_reactions_left_open():
+def test_singular_positions_are_listed_with_time_branch_and_undetermined_reactions():
+    """The rhombus, driven at 124.8 rad/s from π / 2, is flat at t = π / 2 / 124.8 s and three times that;
+    mbref takes branch 1 there. At the first one reactions of all four joints are undetermined."""
     scene = SCENES["four_bar"]().with_(duration=0.05)
-    flat = 0.01258650902880526  # s, of the driven rhombus
+    flat = np.pi / 2 / 124.8
     record = run_case(Case(scene, np.array([0.0, flat, 0.05]), "mbref", Setting("taylor", {})))
     (group,) = by_scene([record], {scene.name: scene})
     blocks = crossings.render(group)
     assert [row[:2] for row in cells(blocks)] == [["1", "0.012586509"], ["2", "0.037759527"]]
-    assert [row[3] for row in cells(blocks)] == ["1", "1"], "the smooth branch is taken"
-    assert not any(isinstance(block, Moving) for block in blocks), "no motion was recorded"
+    assert [row[3] for row in cells(blocks)] == ["1", "1"]
+    assert not any(isinstance(block, Moving) for block in blocks), "a motion that was not stored is shown"
     (text,) = [block.text for block in blocks if isinstance(block, Text)]
     assert "reactions of A, B, C, D at t = 0.0125865 s" in text
 
@@ -96,7 +103,9 @@ def parted() -> SceneRuns:
     return group
 
 
-def test_branches_move_side_by_side(parted):
+def test_both_branches_of_the_rhombus_move_side_by_side(parted):
+    """Both panels show the smooth branch in the background, and their own branch: the same at the start, with
+    the couplers apart at the end."""
     (block,) = [b for b in crossings.render(parted) if isinstance(b, Moving)]
     assert [title for title, _ in block.panels] == ["Branch 1, smooth", "Branch 2"]
     assert (
@@ -107,13 +116,14 @@ def test_branches_move_side_by_side(parted):
     (behind, ahead), (also_behind, apart) = ((bars(svg, 9.0), bars(svg)) for svg in (smooth, fold))
     assert len(behind) == len(apart) == 3
     for first, same, second, other in zip(behind, ahead, also_behind, apart, strict=True):
-        assert (first == same).all() and (first == second).all(), "the smooth branch is behind both"
-        assert (first[0] == other[0]).all(), "branches begin together"
-    assert (behind[1][-1] != apart[1][-1]).any(), "the couplers of both branches end apart"
+        assert (first == same).all() and (first == second).all()
+        assert (first[0] == other[0]).all()
+    assert (behind[1][-1] != apart[1][-1]).any()
     assert "<title>four_bar: Branch 2</title>" in fold and "<script" not in fold
 
 
-def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
+def test_branch_that_ended_early_says_so_and_stands_still(parted):
+    """Branch 2 has 40 samples and ended by STEP_FAILED; its picture has all frames, the last ones equal."""
     first, second = sorted(parted.branches, key=lambda r: r["asked"]["options"]["branches"])
     bodies = {n: {k: v[:40] for k, v in body.items()} for n, body in second["bodies"].items()}
     early = {
@@ -132,5 +142,5 @@ def test_a_branch_whose_run_ended_early_says_so_and_stays(parted):
     assert (coupler[39] == coupler[-1]).all() and (coupler[38] != coupler[39]).any()
 
 
-def test_no_table_of_singular_positions_where_none_is_passed():
+def test_scene_without_singular_positions_has_no_table_of_them():
     assert not crossings.render(runs_of("spatial_slider_crank_gravity"))

@@ -37,8 +37,8 @@ def refusal(engine: str, scene: str = FIRST.scene) -> dict:
 
 @pytest.fixture(scope="module")
 def section() -> list:
-    """mbref is right, MuJoCo wrong by default, Exudyn ends early, Pinocchio refuses and has one run
-    elsewhere."""
+    """On the first mechanism mbref is right, MuJoCo wrong by default, Exudyn ends early and Pinocchio
+    refuses; Pinocchio has a run of the second mechanism."""
     ended = {"outcome": "NOT_CONVERGED", "t_end": 0.25, "message": "no step", "metrics": {}}
     return closed_loops.render(
         [
@@ -57,7 +57,8 @@ def maps(section: list) -> tuple[HeatMap, HeatMap]:
     return best, defaults
 
 
-def test_cells_at_the_best_settings(section):
+def test_best_cells_show_error_refusal_and_early_end(section):
+    """✓ right, ≈ inaccurate, – refused, ! ended early, ○ not run."""
     best, _ = maps(section)
     first = {name: (row[0].text, row[0].kind) for name, row in best.rows.items()}
     assert first == {
@@ -71,7 +72,7 @@ def test_cells_at_the_best_settings(section):
     assert best.rows["pinocchio"][1].text == "≈ 3e-05"
 
 
-def test_rows_at_the_defaults_are_the_engines_that_have_a_run_of_them(section):
+def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
     """mbref has no defaults, and Pinocchio refuses one scene and has a tuned run of another."""
     _, defaults = maps(section)
     assert {name: row[0].text for name, row in defaults.rows.items()} == {
@@ -81,7 +82,7 @@ def test_rows_at_the_defaults_are_the_engines_that_have_a_run_of_them(section):
     assert defaults.rows["mujoco"][0].kind == "false"
 
 
-def test_each_engine_has_its_version_its_runs_and_their_commands(section):
+def test_each_engine_s_runs_are_listed_with_one_command_a_mechanism(section):
     place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "mujoco")
     table, text, commands = section[place + 1 : place + 4]
     assert isinstance(table, Table) and table.caption == "Version mujoco 1."
@@ -89,8 +90,8 @@ def test_each_engine_has_its_version_its_runs_and_their_commands(section):
     assert table.rows[0][2].startswith("tuned (step 0.001): largest error 1e-07, 0.5 s")
     assert text.text.startswith("Commands of the best runs")
     assert isinstance(commands, Listing) and "--engine mujoco" in commands.text
-    assert len(commands.text.splitlines()) == 1 and "tuned" in commands.text, "one command a mechanism"
+    assert len(commands.text.splitlines()) == 1 and "tuned" in commands.text
     place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "pinocchio")
     rows = section[place + 1].rows
     assert rows[0][2] == "refused: no hinge (missing in the engine)" and len(rows) == 2
-    assert len(section[place + 3].text.splitlines()) == 1, "a refusal has no command"
+    assert len(section[place + 3].text.splitlines()) == 1, "a refusal has a command"

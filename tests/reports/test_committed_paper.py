@@ -40,7 +40,7 @@ def test_every_cell_and_figure_has_its_record(records):
     assert has(records.records, "growth") and has(records.records, "gain")
 
 
-def test_records_are_of_one_clean_commit_and_small(records):
+def test_paper_s_records_are_of_one_clean_commit_that_the_readme_states(records):
     commits = {record["commit"] for record in records.records.values()}
     [commit] = commits
     assert "+" not in commit, f"made from a clean checkout: {commit}"
@@ -48,8 +48,8 @@ def test_records_are_of_one_clean_commit_and_small(records):
     assert sum(path.stat().st_size for path in FOLDER.rglob("*") if path.is_file()) < 9e6
 
 
-def test_no_run_ended_at_its_limit(records):
-    """A limit of time says nothing about a method."""
+def test_no_stored_run_of_the_paper_timed_out_or_crashed(records):
+    """Such an end says nothing about a method."""
     ended = [label for label, r in records.records.items() if r["outcome"] in ("TIMED_OUT", "CRASHED")]
     assert not ended, ended
 

@@ -26,16 +26,17 @@ def test_text_is_rendered_from_the_records(records):
     assert text == kept, "crosscheck report --section stability --render reports/stability renews it"
 
 
-def test_every_method_has_a_run_on_every_rung_of_one_commit(records):
+def test_every_method_has_a_stored_run_at_every_difficulty(records):
     found = {(record["scene"], record["family"]) for record in records if record["engine"] == stability.MBREF}
     missing = {(scene.name, method) for scene in stability.scenes() for method in stability.METHODS} - found
     assert not missing, missing
+    """All of one clean commit."""
     [commit] = {record["commit"] for record in records}
     assert "+" not in commit, f"made from a clean checkout: {commit}"
     assert (FOLDER / stability.FILE).stat().st_size < 3e6
 
 
-def test_records_are_kept_without_their_motions(tmp_path):
+def test_ladders_are_stored_without_motions(tmp_path):
     ladders.keep(FOLDER, tmp_path)
     assert (tmp_path / stability.FILE).read_text() == (FOLDER / stability.FILE).read_text()
     assert not any("bodies" in record for record in stored_ladders(tmp_path))

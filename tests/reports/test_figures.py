@@ -35,7 +35,7 @@ def pixels(png: bytes) -> int:
     return len({rows[i : i + stride] for i in range(0, len(rows), stride)})
 
 
-def test_every_picture_and_its_scene():
+def test_every_scene_has_its_four_figures():
     kinds = ("mechanism", "speed", "violation", "energy")
     wanted = {f"{name}-{kind}" for name in ("spatial_slider_crank", "planar_slider_crank") for kind in kinds}
     assert set(pictures()) == wanted, set(pictures()) ^ wanted
@@ -44,7 +44,7 @@ def test_every_picture_and_its_scene():
 @pytest.mark.parametrize(
     "name", [f"spatial_slider_crank-{k}" for k in ("mechanism", "speed", "violation", "energy")]
 )
-def test_picture_is_not_blank_and_is_the_same_each_time(name):
+def test_figure_is_not_blank_and_reproducible(name):
     picture = pictures()[name]
     once, again = figures.svg(picture.draw(), name), figures.svg(picture.draw(), name)
     assert once == again, f"{name} changes from one drawing to the next"
@@ -52,7 +52,7 @@ def test_picture_is_not_blank_and_is_the_same_each_time(name):
     assert pixels(figures.png(picture.draw())) > 60, f"{name} is nearly blank"
 
 
-def test_speed_plot_and_one_mark_a_run():
+def test_speed_plot_has_a_mark_for_each_run():
     group = groups()[0]
     failures = speed.failed(group.runs)
     main, strip = speed.plot(group, failures).axes
@@ -68,7 +68,7 @@ def test_speed_plot_and_one_mark_a_run():
     assert main.get_ylim() == strip.get_ylim(), "the strip has another time axis"
 
 
-def test_history_and_a_cross_where_a_run_ended_early():
+def test_time_series_has_a_cross_where_a_run_ended_early():
     group = groups()[0]
     values = time_series.series(group, lambda run: [np.ones_like(run.trajectory.times)])
     [axes] = time_series.plot(group, values, ["one"]).axes
@@ -77,7 +77,7 @@ def test_history_and_a_cross_where_a_run_ended_early():
     assert 0 < crosses[0] <= 0.6 * group.scene.duration, crosses
 
 
-def test_curves_of_an_engine_and_different_looks():
+def test_twelve_curves_of_an_engine_have_one_colour_and_different_lines():
     looks = figures.looks([("mbref", str(i)) for i in range(12)])
     kinds = {(str(look["linestyle"]), look["marker"]) for look in looks.values()}
     assert len(kinds) == 12, kinds
@@ -93,7 +93,7 @@ def test_powers_of_ten_are_plain_text():
     assert len(figures.png(picture)) > 1000
 
 
-def test_files_have_no_date_and_no_program():
+def test_figure_files_have_neither_date_nor_program():
     figure, _ = figures.canvas(2.0, 2.0)
     text = figures.svg(figure, "one")
     assert "<dc:date>" not in text and "Matplotlib" not in text

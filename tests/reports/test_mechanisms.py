@@ -19,7 +19,9 @@ from reports.figures import colour
 from reports.runs import Run
 
 
-def test_bodies_of_an_exact_run_lie_on_the_exact_motion():
+def test_exact_run_is_drawn_on_the_exact_motion():
+    """Run and truth have equal frames, one for each sample; the crank keeps its length up to a rounding of
+    px."""
     crank = scene("planar_slider_crank")
     true = exact(crank)
     picture = mechanisms.over_truth(crank, true, true, "mujoco")
@@ -28,17 +30,17 @@ def test_bodies_of_an_exact_run_lie_on_the_exact_motion():
     for a, b in zip(behind, before, strict=True):
         assert (a == b).all() and len(a) == len(true.times)
     lengths = np.hypot(*(before[0][:, 1] - before[0][:, 0]).T)
-    assert np.ptp(lengths) < 0.3, f"the crank changes its length, in pixels: {lengths}"
+    assert np.ptp(lengths) < 0.3, lengths
 
 
-def test_a_run_that_ended_early_stays_at_its_last_sample():
+def test_run_that_ended_early_is_drawn_at_its_last_sample():
     crank = scene("planar_slider_crank")
     true, part = exact(crank), exact(crank, share=0.5)
     early = bars(mechanisms.over_truth(crank, true, part, "mujoco"))[0]
     assert (early[len(part.times) - 1] == early[-1]).all() and (early[-1] != early[0]).any()
 
 
-def test_title_and_error_of_a_run_and_the_marks():
+def test_compared_runs_are_drawn_with_title_error_and_singular_positions():
     shown = Run(record("mujoco", "defaults", 0.5, 0.1, step=0.1, margin=3))
     picture = mechanisms.compared(scene(), exact(scene()), [shown, shown], [0.01])
     texts = [node.text for node in ET.fromstring(picture).iter(f"{SVG}text")]
@@ -46,7 +48,8 @@ def test_title_and_error_of_a_run_and_the_marks():
     assert "singular positions" in texts and "<script" not in picture
 
 
-def test_motion_stands_still_where_it_differs_most():
+def test_still_picture_shows_the_largest_difference_of_a_run():
+    """Without animation: the frame at which a body is farthest from the truth."""
     true, run = (mechanisms.motion_of(scene(), r) for r in (truths()[0]["motion"], motion()))
     picture = mechanisms.over_truth(scene(), true, run, "mujoco")
     stands = ET.fromstring(picture).findall(f"{SVG}g")[1]
@@ -58,7 +61,8 @@ def test_motion_stands_still_where_it_differs_most():
     assert len(middle) == 2 and set(middle) <= set(drawn), (middle, drawn)
 
 
-def test_planar_bodies_turn_without_a_jump_from_frame_to_frame():
+def test_frames_of_a_planar_crank_are_less_than_two_turn_steps_apart():
+    """Frames are chosen so that a body turns by about TURN rad between them."""
     planar = SCENES["planar_slider_crank"]().with_(duration=0.05)
     true = mechanisms.motion_of(planar, truth_record(planar, np.linspace(0, 0.05, 3), 20.0)["motion"])
     crank, *_ = bars(mechanisms.over_truth(planar, true, None, ""), 9.0)
@@ -67,7 +71,7 @@ def test_planar_bodies_turn_without_a_jump_from_frame_to_frame():
     assert len(angles) <= FRAMES + 1 and max(abs(np.diff(angles))) < 2 * TURN, angles
 
 
-def test_branches_share_one_part_of_space_and_have_a_mark():
+def test_branches_share_one_view_and_mark_the_crossing():
     crank = scene("planar_slider_crank")
     true = exact(crank)
     other = exact(crank, share=0.5)
@@ -75,11 +79,11 @@ def test_branches_share_one_part_of_space_and_have_a_mark():
     assert list(shown) == ["Branch 1", "Branch 2"]
     first, second = (bars(picture, 9.0) for picture in shown.values())
     assert all((a == b).all() for a, b in zip(first, second, strict=True))
-    assert all(picture.count("v14") == 2 for picture in shown.values()), "one mark, moving and still"
+    assert all(picture.count("v14") == 2 for picture in shown.values())  # the mark, moving and still
 
 
 @pytest.mark.parametrize("name", ["spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar"])
-def test_bodies_of_a_joint_and_one_point(name):
+def test_both_bodies_of_a_joint_are_drawn_through_a_common_point(name):
     """Both bodies of every joint that keeps its points together are drawn through a common point."""
     a_scene = SCENES[name]().with_(duration=0.02)
     trajectory = exact(a_scene)
@@ -93,7 +97,7 @@ def test_bodies_of_a_joint_and_one_point(name):
 
 
 @pytest.mark.parametrize(("name", "count"), [("planar_slider_crank_equal", 4), ("planar_slider_crank", 0)])
-def test_singular_positions_of_a_slider_crank(name, count):
+def test_slider_crank_is_singular_only_with_equal_lengths(name, count):
     """With equal lengths the crank passes θ = ±π/2; with unequal ones nothing is singular."""
     crank = SCENES[name]()
     found = singular_instants(crank)

@@ -69,7 +69,8 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
 
 @pytest.fixture(scope="module")
 def records() -> Records:
-    """Every cell as the paper has it but three: one late, one completed, one of Table III drifting sooner."""
+    """Every cell as printed except for three: one ends late, one completes, one of Table III drifts
+    sooner."""
     changed = {
         ("I", "MPI (SVD)", "θ₂ = π/4"): (Outcome.VIOLATION, 0.0566),
         ("II", "MPI (SVD) + CP", "five-bar"): (Outcome.COMPLETED, 20.0),
@@ -101,16 +102,18 @@ def tables(blocks: list, word: str) -> list[Table]:
     return [b for b in blocks if isinstance(b, Table) and word in b.header]
 
 
-def test_score_and_the_cells_that_were_changed(records):
+def test_score_counts_the_three_changed_cells(records):
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score
     assert "2 the outcome at another time, 1 another outcome" in score, score
     alone = sum(runs.draws(cell) == 1 for cell in CELLS)
     assert f"{alone} cells have the printed outcome and time in most draws" in score, score
-    assert f"{len(CELLS)} in at least one" in score, f"each of the changed cells has seed 1: {score}"
+    assert f"{len(CELLS)} in at least one" in score, score  # seed 1 of each changed cell ends as printed
 
 
-def test_differing_cells_and_their_reasons(blocks):
+def test_changed_cells_are_listed_with_their_causes(blocks):
+    """0.0566 s is the next singular position; 1 of 20 random starts ends as printed; the five-bar's run
+    crosses every singular position; the violation of LM2 grows."""
     [found] = tables(blocks, "Measured")
     reasons = {row[:3]: row[5] for row in found.rows}
     assert len(reasons) == 3, reasons
@@ -121,12 +124,12 @@ def test_differing_cells_and_their_reasons(blocks):
     assert reasons["III", "spatial slider-crank, driven", "LM2"].startswith("drift"), reasons
 
 
-def test_every_cell_and_a_row_of_its_table(blocks):
+def test_every_cell_of_the_paper_is_marked_in_a_table(blocks):
     marks = [cell for t in tables(blocks, "Method") for row in t.rows for cell in row if cell[:1] in "=≈≠"]
     assert len(marks) == len(CELLS), f"{len(marks)} marked cells of {len(CELLS)}"
 
 
-def test_tables_and_figures_without_the_studies(records, blocks):
+def test_paper_section_without_studies_lacks_only_their_headings(records, blocks):
     needed = runs.cases() | runs.timed()
     some = {label: record for label, record in records.items() if label in needed}
     found = paper.render(some, ILLUSTRATION)
@@ -140,7 +143,7 @@ def test_tables_and_figures_without_the_studies(records, blocks):
     assert len(reasons.rows) == 3, reasons.rows
 
 
-def test_records_of_a_folder_and_their_labels(records, tmp_path):
+def test_indexed_records_return_under_their_labels(records, tmp_path):
     chosen = dict(list(runs.cases().items())[:5])
     for label, case in chosen.items():
         append(tmp_path / store.FILE, {**records[label], "key": key(case)})
@@ -150,14 +153,15 @@ def test_records_of_a_folder_and_their_labels(records, tmp_path):
     assert all(found[label]["outcome"] == records[label]["outcome"] for label in chosen)
 
 
-def test_records_without_a_motion_that_no_figure_draws(records):
+def test_stored_record_has_a_motion_only_if_a_figure_draws_it(records):
     table, drawn = records[Label("I", "ALF", "θ₂ = π/4")], records[runs.PEAKS]
     assert Run(table).trajectory.times.size == 0 and not table["violation"]
     assert len(drawn["violation"]) == len(drawn["times"]) > 1 and max(drawn["violation"]) < 1e-9
 
 
 @pytest.mark.parametrize("power", [1.0, 2.0])
-def test_growth_of_a_violation_and_its_exponent(records, power):
+def test_exponent_of_a_growing_violation_is_the_power_put_in(records, power):
+    """A violation of 1e-8 t^p has the exponent p; one that stays at rounding has none (NaN)."""
     [label] = [label for label in records if label.part == runs.GROWTH and label.variant == "1e-06"]
     t = runs.TEACHING
     run = Run({**records[label], "times": t.tolist(), "violation": (1e-8 * t**power).tolist()})
@@ -165,14 +169,18 @@ def test_growth_of_a_violation_and_its_exponent(records, power):
     assert math.isnan(paper_teaching.exponent(Run({**run.record, "violation": [1e-16] * len(t)})))
 
 
-def test_ratios_of_steps_and_the_paper(blocks):
+def test_tables_show_the_paper_s_and_the_records_ratios_of_steps(blocks):
+    """Steps and end times of the paper's Tables III and IV; records have 1000 steps each: 50 steps/s to 20 s
+    over 400 steps/s to 2.5 s."""
     third, fourth = tables(blocks, "steps, ratio printed")
     assert third.rows[2][3] == f"{103 / 3303:.3f}", third.rows[2]
     assert fourth.rows[-1][3] == f"{1368 / 2428:.3f}", fourth.rows[-1]
-    assert third.rows[2][4] == f"{2.5 / 20:.3f}", f"50 steps/s to 20 s over 400 to 2.5 s: {third.rows[2]}"
+    assert third.rows[2][4] == f"{2.5 / 20:.3f}", third.rows[2]
 
 
-def test_a_sweep_and_what_is_missing_of_it(records):
+def test_incomplete_sweep_is_shown_as_far_as_it_got(records):
+    """Records with "data errors 1e-8" are missing: their score is 0 cells and a dash; all others of the sweep
+    end by violation (c) at 0.0315 s, and of random starts except seed 1 at 0.2 s."""
     [scores, sizes, times, drawn] = [b for b in paper_sweep.render(records) if isinstance(b, Table)]
     count = {row[0]: row[4] for row in scores.rows}
     assert count["data errors 1e-8 m"] == "0" and count["rtol 1e-5"] == "25", count
@@ -182,16 +190,19 @@ def test_a_sweep_and_what_is_missing_of_it(records):
     assert last == {"0.2000 c"}, f"ends of the last draw: {last}"
 
 
-def test_cranks_and_the_branch_of_an_exact_record(records):
+def test_exact_crank_record_follows_the_true_branch(records):
+    """It leaves the true motion never ("–"), crosses 61 singular positions (θ = 61.0 π at 20 s), and has the
+    true rate."""
     [found] = [b for b in paper_cranks.render(records) if isinstance(b, Table)]
-    assert {row[6] for row in found.rows} == {"–"}, "an exact motion is said to be off the true one"
-    assert {row[7] for row in found.rows if row[0] == "a = b"} == {"61"}, "θ(20 s) is 61.0 π"
-    assert all(row[9] == row[10] for row in found.rows), "an exact crank rate differs from the true one"
+    assert {row[6] for row in found.rows} == {"–"}
+    assert {row[7] for row in found.rows if row[0] == "a = b"} == {"61"}
+    assert all(row[9] == row[10] for row in found.rows)
 
 
-def test_digits_of_an_exact_record(records):
+def test_exact_accelerations_have_all_digits(records):
+    """Their errors are rounding; a run that failed at its start has none (NaN)."""
     for name, errors in paper_methods.digit_errors(records).items():
-        assert max(errors) < 1e-14, f"{name}: the exact accelerations have errors {errors}"
+        assert max(errors) < 1e-14, (name, errors)
     missing = Label("digits", "alf", "100")
     lost = Trajectory.failed(
         scene=records[missing]["scene"],
@@ -204,7 +215,7 @@ def test_digits_of_an_exact_record(records):
         message="",
     )
     other = {**records, missing: {**MADE_OF, **lost.to_record(), "scene": records[missing]["scene"]}}
-    assert np.isnan(paper_methods.digit_errors(other)["alf"][0]), "no accelerations, and yet an error"
+    assert np.isnan(paper_methods.digit_errors(other)["alf"][0])
 
 
 def test_every_figure_is_drawn(blocks):

@@ -21,7 +21,7 @@ def groups() -> list[SceneRuns]:
 
 
 def test_text_is_rendered_from_the_records(groups):
-    """All sections but the reactions, whose analysis takes longer than all the others."""
+    """All sections except for the reactions, whose analysis takes longer than all others."""
     text = (FOLDER / "report.md").read_text()
     names = [name for name in sections.NAMES if name != "reactions"]
     blocks = sections.blocks(groups, names, stored.verified(FOLDER))
@@ -32,7 +32,7 @@ def test_text_is_rendered_from_the_records(groups):
 
 
 @pytest.mark.slow
-def test_text_and_page_are_rendered_whole(groups):
+def test_committed_text_and_page_are_rendered_from_the_records(groups):
     blocks = sections.blocks(groups, verified=stored.verified(FOLDER))
     assert render.markdown(blocks) == (FOLDER / "report.md").read_text()
     drawn = [b.figure if isinstance(b, Plot) else b for b in blocks if isinstance(b, Figure | Plot)]
@@ -40,22 +40,23 @@ def test_text_and_page_are_rendered_whole(groups):
     assert page == DRAWING.sub(r"\1</div>", render.html(blocks, {figure.name: "" for figure in drawn}))
 
 
-def test_figures_and_numbers_of_the_text_are_in_the_page():
+def test_committed_page_has_the_numbers_and_figures_of_the_text():
     page, text = ((FOLDER / name).read_text() for name in ("index.html", "report.md"))
     assert len(re.findall(r'<div class="wide"[^>]*>\s*<svg', page)) > 10
     lost = [number for number in set(re.findall(r"\b\d\.\d+e-\d+\b", text)) if number not in page]
     assert not lost, lost
 
 
-def test_scenes_are_those_of_today(groups):
+def test_committed_records_are_of_the_current_scenes(groups):
     for group in groups:
         assert group.scene == SCENES[group.scene.name]().with_(duration=group.scene.duration)
 
 
-def test_the_report_is_of_one_commit_and_small(groups):
+def test_report_s_records_are_of_one_clean_commit_that_the_readme_states(groups):
     commits = {run.record["commit"] for group in groups for run in group.runs}
     [commit] = commits
-    assert "+" not in commit, "made from a clean checkout"
+    """Commits with "+" were not clean."""
+    assert "+" not in commit
     text = (FOLDER / "report.md").read_text()
     assert f"records of commit {commit}, " in text, "the report names the commit of its records"
     assert f"are of commit {commit[:7]}, later changes" in README, "README states the commit of the report"

@@ -34,7 +34,7 @@ def written(parts: list[Block], tmp_path_factory: pytest.TempPathFactory) -> Pat
     return out
 
 
-def test_page_and_every_block(written, parts):
+def test_page_has_every_heading_figure_table_and_failed_run(written, parts):
     page = (written / "index.html").read_text()
     for block in parts:
         if isinstance(block, Heading):
@@ -42,10 +42,11 @@ def test_page_and_every_block(written, parts):
     assert page.count('class="wide"') == len(list((written / "figures").glob("*.svg"))) - 2 == 6
     assert page.count('class="plot"') == 3 and page.count('mbref-moving">') == 1
     assert page.count('<table class="cards">') == sum(isinstance(b, Table) for b in parts)
-    assert "SIGSEGV" in page and "NOT_CONVERGED" in page, "a failed run is missing"
+    assert "SIGSEGV" in page and "NOT_CONVERGED" in page
 
 
 def test_page_opens_offline(written):
+    """No script, style, picture or frame is loaded from elsewhere."""
     page = (written / "index.html").read_text()
     loaded = re.findall(
         r'<(?:script|link|img|iframe)\b[^>]*(?:src|href)=(?!"data:,")[^>]*|(?:url|src|@import)\s*[(=]\s*["\']?http[^)"\']*',
@@ -54,7 +55,7 @@ def test_page_opens_offline(written):
     assert not loaded, loaded
 
 
-def test_page_and_its_places(written):
+def test_contents_of_the_page_lead_to_its_sections(written):
     page = (written / "index.html").read_text()
     targets, ids = (
         re.findall(r'href="#([\w-]+)"', page.split("</nav>")[0]),
@@ -63,12 +64,12 @@ def test_page_and_its_places(written):
     assert targets and set(targets) <= ids, set(targets) - ids
 
 
-def test_words_of_a_message_are_no_markup(tmp_path):
+def test_markup_in_a_message_is_escaped(tmp_path):
     render.write([Table("a < b", ("x",), [("<script>alert(1)</script>",)])], tmp_path)
     assert "<script>alert" not in (tmp_path / "index.html").read_text()
 
 
-def test_markdown_and_the_pictures_beside_it(written):
+def test_markdown_shows_eight_figures_as_png_and_svg(written):
     text = (written / "report.md").read_text()
     shown = re.findall(r"!\[[\w-]+\]\(([^)]+)\)", text)
     assert len(set(shown)) == 8, shown
@@ -77,7 +78,7 @@ def test_markdown_and_the_pictures_beside_it(written):
         assert (written / name).with_suffix(".svg").exists(), name
 
 
-def test_markdown_tables_and_one_line_a_row(written, parts):
+def test_markdown_table_has_one_line_for_each_row(written, parts):
     lines = (written / "report.md").read_text().split("\n")
     rows = [b.rows if isinstance(b, Table) else b.scenes for b in parts if isinstance(b, Table | Matrix)]
     assert sum(line.startswith("| ") for line in lines) == sum(len(of_table) + 2 for of_table in rows)
@@ -94,7 +95,9 @@ def few(scenes, engines) -> selection.Sweep:
     return default_cases(scenes[0], engines, None, np.linspace(0, 0.5, 4))
 
 
-def test_short_runs_and_interleaved_times(tmp_path):
+def test_short_runs_are_timed_five_times_and_long_runs_once(tmp_path):
+    """Runs of 0.1, 0.2 and 0.5 s by a fake engine, and one of twice LONG; the stored time stays the
+    fake's."""
     cases, _ = few([still("still")], [FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
     cases = [*cases, long]

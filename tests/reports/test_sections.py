@@ -49,7 +49,7 @@ def everything():
     return blocks(groups(), verified=VERIFIED)
 
 
-def test_every_section_and_a_heading():
+def test_every_section_has_its_heading():
     parts = blocks(groups())
     for part in parts:
         figure = part.figure if isinstance(part, Plot) else part
@@ -82,13 +82,14 @@ def test_sections_are_documented():
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_section_alone_and_its_blocks(name, everything):
+def test_section_can_be_rendered_alone(name, everything):
     alone = blocks(groups(), [name], VERIFIED)
     assert alone and len(alone) < len(everything), (len(alone), len(everything))
 
 
-def test_summary_and_costs_worked_out_by_hand():
-    """The order-3 curve has time ∝ error^(-1/3), the order-1 curve time ∝ error^(-1) but ends at 2e-3."""
+def test_summary_shows_costs_errors_and_failures_of_the_records():
+    """mbref's error is 1e-3 in 10 ms at its coarsest step: the cheapest at 1e-3, ratio 1.0. MuJoCo "tuned"
+    ends at 8e-3 / 2² and "defaults" is off by 0.5; Exudyn's runs did not converge."""
     found = table(summary.render(groups()[:1]), "Least error")
     at = column(found, "At 1e-3")
     assert at["mbref", "mpi-svd+projection"] == "1.0", at
@@ -101,17 +102,20 @@ def test_summary_and_costs_worked_out_by_hand():
     assert "at 1e-3 mbref mpi-svd+projection (10 ms), at 1e-6 none" in found.caption, found.caption
 
 
-def test_summary_and_the_ratio_of_two_curves():
+def test_summary_shows_the_ratio_of_two_work_precision_curves():
+    """Times at 1e-3, half-way between 1e-2 and 1e-4 in both logarithms: √(0.02 · 0.2) s / √(0.01 · 0.04)
+    s."""
     slow = [record("a", "x", e, s, rtol=e) for e, s in ((1e-2, 0.02), (1e-4, 0.2))]
     fast = [record("b", "y", e, s, rtol=e) for e, s in ((1e-2, 0.01), (1e-4, 0.04))]
     [group] = by_scene([*slow, *fast], {scene().name: scene()})
     at = column(table(summary.render([group]), "Least error"), "At 1e-3")
-    expected = math.sqrt(0.02 * 0.2) / math.sqrt(0.01 * 0.04)  # half-way in both logarithms
+    expected = math.sqrt(0.02 * 0.2) / math.sqrt(0.01 * 0.04)
     assert at["b", "y"] == "1.0" and at["a", "x"] == ratio(expected) == "3.2", (at, expected)
 
 
-def test_published_problems_and_their_own_measure():
-    """The block of the H-frame is off by 1e-4 m, more than is accepted, or by 1e-8 m."""
+def test_published_problem_accepts_a_run_by_its_own_measure():
+    """The block of the H-frame is off by 1e-4 m, more than is accepted, by 1e-8 m, or exact. A scene with
+    other masses is not the published problem."""
     frame = scene("h_frame")
     length = scene_length(frame)
     runs = [
@@ -127,7 +131,8 @@ def test_published_problems_and_their_own_measure():
     assert published.render(by_scene(runs, {frame.name: heavier})) == []
 
 
-def test_least_error_and_end_times_that_rounding_moves():
+def test_least_error_counts_a_run_that_ends_within_rounding():
+    """The better run ends 1e-10 s before the end of the motion, and counts as completed."""
     ends = [
         record("a", "x", 1e-3, 0.1, step=1.0),
         {**record("a", "x", 1e-5, 0.1, step=0.1), "t_end": 0.0199999999},
@@ -136,7 +141,8 @@ def test_least_error_and_end_times_that_rounding_moves():
     assert group.best()["a", "x"].error == pytest.approx(1e-5), group.best()
 
 
-def test_order_of_convergence_and_the_synthetic_slopes():
+def test_convergence_table_shows_the_orders_put_into_the_records():
+    """Errors at steps 0.1 / 2^k: 1e-3 / 8^k (order 3), 8e-3 / 2^k (order 1), and one run only (none)."""
     found = table(convergence.render(groups()[:1]), "Over")
     orders = column(found, "spatial_slider_crank")
     assert orders["mbref", "mpi-svd+projection"] == "3", orders
@@ -144,7 +150,9 @@ def test_order_of_convergence_and_the_synthetic_slopes():
     assert orders["mujoco", "defaults"] == "–", orders
 
 
-def test_limits_and_the_bias_put_in():
+def test_limit_table_shows_the_bias_and_discretisation_put_in():
+    """Engine a: error 1e-4 + 1e-2 h, of which 1e-5 is discretisation at h = 1e-3. Engine b: 1e-2 h², no
+    bias."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})
@@ -152,15 +160,17 @@ def test_limits_and_the_bias_put_in():
     cells = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows}
     assert cells["a"]["Bias"] == "1.0e-04" and cells["a"]["Larger"] == "bias", cells
     assert cells["a"]["Discretisation"] == "1.0e-05" and cells["a"]["Order"] == "1", cells
-    assert cells["a"]["Its error"] == "1.1e-04", "that of the finest step"
+    assert cells["a"]["Its error"] == "1.1e-04", cells
     assert float(cells["b"]["Bias"]) < 1e-12 and cells["b"]["Larger"] == "discretisation", cells
     assert "1 of them bias" in found.caption, found.caption
 
 
-def test_least_errors_of_the_records():
+def test_least_errors_table_shows_best_settings_and_failures():
+    """mbref: 1e-3 / 8² at the step 0.1 / 2²; no family within 1e-8. Exudyn's run that got farthest ended at
+    0.6 · 0.02 s."""
     found, others = (table(least_errors.render(groups()), name) for name in ("Families", "Within 1e-08"))
     rows = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows[:3]}
-    assert {row[0] for row in found.rows[:3]} == {"spatial_slider_crank"}, "each row names its scene"
+    assert {row[0] for row in found.rows[:3]} == {"spatial_slider_crank"}
     best = rows["mbref"]
     assert best["Least error"] == "1.56e-05" and best["Settings"] == "step=0.025", best
     assert best["Families"].startswith("0 of "), best
@@ -173,14 +183,15 @@ def test_least_errors_of_the_records():
 @pytest.mark.parametrize(
     ("shifts", "words"), [((0.0,), "The same mechanism in b"), ((0.0, 1e-4), "different mechanisms")]
 )
-def test_gate_and_what_the_summary_says(shifts, words):
+def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
+    """Short motions for the model check: equal to the truth, or one of them 1e-4 m off."""
     gate = [at_gate(shift) for shift in shifts]
     [group] = by_scene(records()[:3], {scene().name: scene()}, gate)
     [_, said] = [b.text for b in summary.render([group]) if isinstance(b, Text)]
     assert words in said, (words, said)
 
 
-def test_gate_run_that_timed_out_is_no_other_mechanism():
+def test_model_check_that_timed_out_is_no_difference():
     late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
     [group] = by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), late])
     assert group.difference() is None
@@ -193,17 +204,17 @@ def at_gate(shift: float) -> dict:
     return {**moved.to_record(), "scene": scene().name}
 
 
-def test_outcome_table_and_outcome_time_and_error_together():
+def test_outcome_table_shows_outcome_end_time_and_error_of_each_run():
     found = table(outcomes.render(groups()[0]), "Outcome")
     assert len(found.rows) == len(groups()[0].runs)
     for row, run in zip(found.rows, groups()[0].runs, strict=True):
         cells = dict(zip(found.header, row, strict=True))
         assert cells["Outcome"].startswith(run.record["outcome"]), cells
         assert cells["End time (s)"] == f"{run.t_end:.4g}" and cells["Error"], cells
-    assert "NOT_CONVERGED (b)" in {row[3] for row in found.rows}, "the letter of the paper's footnote"
+    assert "NOT_CONVERGED (b)" in {row[3] for row in found.rows}  # b: letter of the paper's footnote
 
 
-def test_key_of_failures_and_their_reasons():
+def test_failure_marks_are_explained_with_outcome_and_message():
     found = table(speed.render(groups()[0]), "Mark")
     assert [row[:5] for row in found.rows] == [
         ("1", "exudyn", "tuned", "2", "NOT_CONVERGED"),
@@ -212,7 +223,7 @@ def test_key_of_failures_and_their_reasons():
     assert "SIGSEGV" in found.rows[1][-1] and "did not converge" in found.rows[0][-1], found.rows
 
 
-def test_scene_without_any_state_and_words_instead_of_pictures():
+def test_scene_without_states_gets_sentences_instead_of_figures():
     [group] = by_scene([nothing("a", "x")], {scene().name: scene()})
     for render in (mechanism.render, energy.render):
         parts = render(group)
@@ -220,7 +231,8 @@ def test_scene_without_any_state_and_words_instead_of_pictures():
         assert not any(isinstance(b, Figure) for b in parts), parts
 
 
-def test_counts_and_the_scene_s():
+def test_mechanism_table_has_the_scene_s_rows_and_rank():
+    """The rows of its joints, one column each, add up to the scene's."""
     found = table(mechanism.render(groups()[0]), "Redundant rows")
     cells = dict(zip(found.header, found.rows[0], strict=True))
     counts = scene().counts()
@@ -230,7 +242,7 @@ def test_counts_and_the_scene_s():
     )
 
 
-def test_provenance_and_every_version_and_setting():
+def test_provenance_lists_versions_machine_settings_and_seed():
     parts = provenance.render(groups())
     words = " ".join(cell for b in parts if isinstance(b, Table) for row in b.rows for cell in row)
     for word in ("mujoco", "1.0", "numpy", "2.x", "not installed", "a processor", "step", "0.025"):
@@ -239,8 +251,9 @@ def test_provenance_and_every_version_and_setting():
     assert f"{len(records())} records; seed 0" in text and "the least of 1 runs" in text, text
 
 
-def test_errors_and_the_tolerances_asked_for():
-    """100 times the tolerance, just below and just above; none was asked of the last."""
+def test_runs_over_a_hundred_tolerances_are_counted():
+    """rtol 1e-6: errors of 0.9e-4 (within) and 1.1e-4 (over). A failed run and one without rtol do not
+    count."""
     asked = [record("a", "b", error, 1.0, rtol=1e-6) for error in (0.9e-4, 1.1e-4)]
     failed = record("a", "b", 1e-3, 1.0, rtol=1e-6, outcome=Outcome.NOT_CONVERGED)
     runs = [Run(r) for r in (*asked, failed, record("a", "c", 1e-3, 1.0, step=1e-6))]

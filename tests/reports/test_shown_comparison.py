@@ -24,13 +24,13 @@ def printed() -> str:
     return str(Comparison(judged(group), "planar_slider_crank", None))
 
 
-def test_headings_of_the_extract_are_printed_in_its_order(printed):
+def test_extract_in_the_docs_has_the_printed_headings_in_order(printed):
     _, extract, _ = re.split("<!-- /?compare -->", PAGE.read_text())
     shown = [line for line in extract.splitlines() if HEADINGS.match(line)]
     starts = [line[:12].strip() for line in printed.splitlines() if HEADINGS.match(line)]
     assert len(shown) == 7 and [line[:12].strip() for line in shown] == starts
 
 
-def test_columns_of_the_extract_are_columns_of_the_table(printed):
+def test_extract_in_the_docs_has_the_printed_columns(printed):
     [columns] = re.findall(r"^ +engine, family .* ratio$", PAGE.read_text(), re.M)
     assert columns.split() in [line.split() for line in printed.splitlines()]

@@ -27,7 +27,7 @@ def record(
     }
 
 
-def test_every_rung_has_an_exact_motion_and_a_place():
+def test_every_scene_of_a_ladder_has_a_closed_form():
     scenes = stability.scenes()
     assert len(scenes) == sum(len(ladder.rungs) for ladder in stability.ladders()) > 60
     for scene in scenes:
@@ -36,7 +36,9 @@ def test_every_rung_has_an_exact_motion_and_a_place():
         assert closed_form(scene) is not None, f"{scene.name} has no closed form"
 
 
-def test_counts_tell_right_ended_and_false(snapshot):
+def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
+    """Of mbref, 1e-9 is right, UNDECIDED ended early, and 2e-6 and NaN are wrong; of MuJoCo, 5e-3 is right
+    and 0.5 is wrong, by the limit for other engines."""
     records = [
         record("gap", 1e-1, 1e-9),
         record("gap", 3e-3, 2e-6),
@@ -53,7 +55,7 @@ def test_counts_tell_right_ended_and_false(snapshot):
     assert [b.text for b in section.render(records) if isinstance(b, Text)][:2] == snapshot
 
 
-def test_the_second_sentence_says_where_no_method_is_wrong():
+def test_sentence_says_if_no_other_method_completes_a_wrong_motion():
     records = [record("gap", 1e-1, 1e-9), record("gap", 1e-1, 1e-9, family="mpi-svd+none")]
     sentences = [b.text for b in section.render(records) if isinstance(b, Text)]
     assert sentences[1] == (
@@ -61,7 +63,7 @@ def test_the_second_sentence_says_where_no_method_is_wrong():
     )
 
 
-def test_stored_ladders_are_rendered_without_a_run(tmp_path, capsys):
+def test_stability_section_is_rendered_from_stored_records(tmp_path, capsys):
     assert program.main(["--section", "stability", "--render", str(tmp_path)]) == 2
     assert "stability.jsonl" in capsys.readouterr().err
     first, *_ = STORED.read_text().splitlines()
@@ -80,7 +82,8 @@ def test_stored_ladders_are_rendered_without_a_run(tmp_path, capsys):
         (1.0, "SINGULAR_MATRIX", "a", False),
     ],
 )
-def test_a_cell_shows_digits_or_why_the_run_ended(error, outcome, text, red):
+def test_stability_cell_shows_correct_digits_or_the_letter_of_the_end(error, outcome, text, red):
+    """Digits are -log10 of the error; a wrong motion is red on the page and bold in Markdown."""
     blocks = section.render([record("gap", 1e-1, error, outcome)])
     (heat,) = [b for b in blocks if isinstance(b, HeatMap)]
     cell, *others = heat.rows["taylor"]

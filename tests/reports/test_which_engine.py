@@ -12,13 +12,13 @@ from reports.which_engine import FOLDERS, KINDS, judged, keep, page
 DOCUMENT = Path(__file__).parents[2] / "docs" / "which-engine.md"
 
 
-def test_document_and_generated_page():
+def test_page_which_engine_is_rendered_from_the_records():
     assert DOCUMENT.read_text() == page(), (
         "docs/which-engine.md is stale: python -m reports.which_engine docs/which-engine.md renews it"
     )
 
 
-def test_every_kind_has_records():
+def test_every_scene_of_the_page_has_records():
     known = {group.scene.name for folder in FOLDERS for group in groups(folder)}
     assert known >= {name for kind in KINDS for name in kind.scenes}
 
@@ -30,16 +30,18 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_kept_records_give_the_answers_of_whole_ones(folder):
-    (kept,) = groups(folder)
-    whole = next(group for group in groups(FOLDERS[0]) if group.scene.name == kept.scene.name)
-    assert "bodies" not in kept.runs[0].record and len(kept.runs) == len(whole.runs)
-    found, expected = (group.cheapest(1e-6) for group in map(judged, (kept, whole)))
+def test_records_stored_without_motions_give_the_same_cheapest_runs(folder):
+    """The cheapest run of each engine within 1e-6 on the planar slider-crank: without the samples
+    (``bodies``) it is the one of the whole records."""
+    (stored,) = groups(folder)
+    whole = next(group for group in groups(FOLDERS[0]) if group.scene.name == stored.scene.name)
+    assert "bodies" not in stored.runs[0].record and len(stored.runs) == len(whole.runs)
+    found, expected = (group.cheapest(1e-6) for group in map(judged, (stored, whole)))
     assert {e: r["key"] for e, r in found.items()} == {e: r["key"] for e, r in expected.items()}
 
 
-def test_another_record_gives_another_answer(folder):
-    """An engine whose runs all fail has no run within the error, and the page says how they end."""
+def test_page_says_none_for_an_engine_whose_runs_all_failed(folder):
+    """All of MuJoCo's runs are changed to STEP_FAILED: its row has no setting, and says how they end."""
     text = (folder / "records.jsonl").read_text()
     lines = [
         line.replace('"COMPLETED"', '"STEP_FAILED"') if '"engine": "mujoco"' in line else line
@@ -50,7 +52,7 @@ def test_another_record_gives_another_answer(folder):
     assert row.startswith("| MuJoCo | none | – | – | ") and "step failed" in row
 
 
-def test_a_scene_without_its_truth_is_refused(folder):
+def test_records_without_a_truth_are_refused(folder):
     (folder / "truths.jsonl").write_text("")
     (group,) = groups(folder)
     with pytest.raises(ValueError, match="no record of its truth"):
