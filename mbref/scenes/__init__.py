@@ -118,7 +118,7 @@ def find_scene(name: Scene | str | Path) -> Scene:
     if Path(name).suffix in OTHER_FILES:
         makes = f"`mbref import {name}` makes one, and `crosscheck compare {name}` reads it as it is"
         raise SceneError([f"{name}: is no scene file; {makes}"])
-    if Path(name).exists():
+    if name and Path(name).exists():
         return Scene.from_file(name)
     if name.endswith(".toml"):
         raise SceneError([_missing(Path(name))])

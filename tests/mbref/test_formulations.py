@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from crosscheck.judge.truth import closed_form
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.formulations import FORMULATIONS
@@ -40,7 +41,10 @@ def tolerance(formulation):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
 @pytest.mark.parametrize("redundant", [0, 1, 4])
-def test_claim_of_redundancy_and_exact_solution(formulation, redundant):
+def test_formulation_solves_redundant_rows_exactly_if_it_claims_to_and_is_singular_otherwise(
+    formulation, redundant
+):
+    """The truth is the dense KKT system of the independent rows, and the balance M q̈ + Φ_qᵀ λ = g."""
     mass, jacobian, force, gamma, exact = system(12, 18, redundant)
     status, acceleration, multipliers = solve(formulation, mass, jacobian, force, gamma)
     if formulation.needs_independent_columns or (redundant and not formulation.handles_redundancy):
@@ -55,7 +59,7 @@ def test_claim_of_redundancy_and_exact_solution(formulation, redundant):
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
 @pytest.mark.parametrize("factor", [1e-6, 1e6])
-def test_rescaled_and_repeated_rows_change_nothing(formulation, factor):
+def test_rescaled_or_repeated_row_of_a_random_system_changes_nothing(formulation, factor):
     mass, jacobian, force, gamma, exact = system(8, 15, 0)
     jacobian, gamma = jacobian.copy(), gamma.copy()
     jacobian[2] *= factor
@@ -73,7 +77,8 @@ def test_rescaled_and_repeated_rows_change_nothing(formulation, factor):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
-def test_claim_of_singular_mass_and_exact_solution(formulation):
+def test_formulation_solves_a_singular_mass_matrix_if_it_claims_to_and_is_singular_otherwise(formulation):
+    """The truth is the dense KKT system."""
     mass, jacobian, force, gamma, _ = system(10, 15, 0)
     mass[4] = 0.0
     kkt = np.block([[np.diag(mass), jacobian.T], [jacobian, np.zeros((10, 10))]])
@@ -87,21 +92,24 @@ def test_claim_of_singular_mass_and_exact_solution(formulation):
     assert error < 1e-8, f"{formulation.name}: acceleration differs by {error:.2e}"
 
 
-def test_redundant_scene_by_lm1_is_singular_at_once():
+def test_redundant_scene_by_lm1_ends_at_the_start_with_a_singular_matrix():
     trajectory = simulate(SCENES["four_bar"](), "lm1+none", [0.0, 0.01])
-    assert (trajectory.outcome.letter, trajectory.t_end, trajectory.times.size) == ("a", 0.0, 0)
+    assert trajectory.outcome.label == "SINGULAR_MATRIX"
+    assert (trajectory.t_end, trajectory.times.size) == (0.0, 0)
 
 
-def test_literal_gram_schmidt_and_a_driven_mechanism():
+def test_literal_gram_schmidt_solves_a_system_of_independent_columns():
+    """16 rows of rank 12 and 12 columns, as of a mechanism that drivers prescribe."""
     formulation = FORMULATIONS["mpi-gs-literal"]
-    mass, jacobian, force, gamma, exact = system(16, 12, 4)  # more rows than columns, columns independent
+    mass, jacobian, force, gamma, exact = system(16, 12, 4)
     status, acceleration, multipliers = solve(formulation, mass, jacobian, force, gamma)
     assert status == OK
     assert np.max(np.abs(acceleration - exact)) < 1e-9
     assert np.max(np.abs(mass * acceleration + jacobian.T @ multipliers - force)) < 1e-9
 
 
-def test_augmented_lagrangian_that_may_not_iterate_enough_says_so():
+def test_augmented_lagrangian_reports_that_five_iterations_are_too_few():
+    """A penalty of 1e-3 converges slowly."""
     mass, jacobian, force, gamma, _ = system(12, 18, 1)
     for name in ("alf", "alf-dual"):
         status, _, _ = solve(FORMULATIONS[name], mass, jacobian, force, gamma, alpha=1e-3, iterations=5.0)
@@ -129,7 +137,7 @@ REAL = (
 
 @pytest.mark.parametrize("formulation", FORMULATIONS.values(), ids=FORMULATIONS)
 @pytest.mark.parametrize("name", REAL)
-def test_every_row_of_a_mechanism_repeated_or_rescaled_changes_nothing(formulation, name):
+def test_rescaled_or_repeated_row_of_a_mechanism_changes_nothing(formulation, name):
     mass, jacobian, force, gamma = real_system(name)
     status, before, multipliers = solve(formulation, mass, jacobian, force, gamma)
     if status == SINGULAR:
@@ -150,7 +158,7 @@ def test_every_row_of_a_mechanism_repeated_or_rescaled_changes_nothing(formulati
 
 
 def unchanged(formulation, system, acceleration, reaction, what):
-    """Accelerations and Φ_qᵀ λ of the system are as they were, to 1e-9 of their size."""
+    """Assert that accelerations and Φ_qᵀ λ of a system equal earlier ones, to 1e-9 of their size."""
     status, found, multipliers = solve(formulation, *system)
     assert status == OK, f"{formulation.name}, {what}: status {status}"
     now = system[1].T @ multipliers
@@ -159,10 +167,9 @@ def unchanged(formulation, system, acceleration, reaction, what):
         assert change < 1e-9, f"{formulation.name}, {what}: {name} changed by {change:.1e}"
 
 
-def test_long_chains_need_one_iteration_to_rounding():
-    """Rows of a chain are nearer to dependent the longer it is; a second iteration would change rounding."""
-    scene, times = find_scene("four_bar_chain[10]"), [0.0, 0.1]
-    sparse = simulate(scene, "alf-dual+none/rk4[step=0.05]", times)
-    dense = simulate(scene, "mpi-qr+none/rk4[step=0.05]", times)
-    size = np.abs(dense.acceleration).max()
-    assert np.abs(sparse.acceleration - dense.acceleration).max() < 1e-12 * size
+def test_accelerations_of_a_long_chain_by_alf_dual_are_exact_to_rounding():
+    """The start of a chain of ten loops against the judge's closed form; long chains are ill-conditioned."""
+    scene = find_scene("four_bar_chain[10]")
+    found = simulate(scene, "alf-dual+none", [0.0]).acceleration
+    exact = closed_form(scene).poses(np.zeros(1)).acceleration
+    assert np.abs(found - exact).max() < 1e-12 * np.abs(exact).max()

@@ -13,7 +13,7 @@ import mbref
 from mbref.kernels.compilation import PLAIN
 
 if PLAIN:
-    pytest.skip("test_written_code.py compares the code with interpreted kernels", allow_module_level=True)
+    pytest.skip("without compilation there is no generated code", allow_module_level=True)
 
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from mbref.kernels.layout import OK
@@ -36,7 +36,8 @@ MECHANISMS = (
 
 
 def terms(scene, code):
-    """Terms (orders, lanes) of the series about the start, each over t^order, t its own time (s)."""
+    """Return the terms (orders, variables) of the series about the start, scaled by tᵏ to similar sizes, and
+    the run."""
     run = start_run(scene, ORDER_16, np.array([0.1]), Limits(code=code))
     assert run.stepper.expand() == OK
     found = run.stepper.taylor.series.terms.copy()
@@ -47,7 +48,8 @@ def terms(scene, code):
 
 
 def agree(scene):
-    """Whether the terms of a scene's code are those of the kernels; by power it gives those of variables."""
+    """Return whether generated code and general kernels give equal terms, to 1e-11 of the largest; code that
+    uses the power equation gives terms of the variables only."""
     (expected, _), (found, run) = (terms(scene, code) for code in ("generic", "generated"))
     by_power = run.stepper.taylor.step.deceleration > 0.0
     lanes = slice(run.stepper.taylor.solver.pivot_columns.size if by_power else None)
@@ -55,7 +57,7 @@ def agree(scene):
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_terms_are_those_of_the_kernels(name):
+def test_generated_code_and_general_kernels_give_equal_series(name):
     assert agree(SCENES[name]())
 
 
@@ -63,8 +65,8 @@ def test_terms_are_those_of_the_kernels(name):
     ("name", "joint"),
     (("planar_slider_crank", "A"), ("planar_slider_crank", "B"), ("bennett", "R1"), ("bricard", "P0")),
 )
-def test_terms_of_driven_mechanisms_are_those_of_the_kernels(name, joint):
-    """Of 3, 5, 8 and 18 rows."""
+def test_generated_code_and_general_kernels_give_equal_series_of_driven_mechanisms(name, joint):
+    """A driver from rest, 3 t² rad."""
     scene = SCENES[name]()
     at_rest = (
         b.model_copy(update={"velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0)})
@@ -76,15 +78,17 @@ def test_terms_of_driven_mechanisms_are_those_of_the_kernels(name, joint):
 
 
 @pytest.mark.parametrize("seed", (3, 11, 17, 21))
-def test_terms_of_random_mechanisms_are_those_of_the_kernels(seed):
+def test_generated_code_and_general_kernels_give_equal_series_of_random_mechanisms(seed):
     scene = random_mechanism(seed)
+    """Springs are left out."""
     scene = scene.with_(load=tuple(load for load in scene.load if not hasattr(load, "stiffness")))
     assert agree(scene)
 
 
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
-def test_a_motion_that_turns_back_is_that_of_the_kernels(name):
-    """By power, but where it is slow."""
+def test_generated_code_follows_a_motion_that_turns_back(name):
+    """The general kernels are the second opinion. Generated code uses the power equation, except at low
+    speed."""
     times = np.linspace(0.0, 4.0, 41)
     generic, own = (
         simulate(SCENES[name](), "taylor", times, Limits(rtol=1e-11, code=code))
@@ -98,8 +102,8 @@ def test_a_motion_that_turns_back_is_that_of_the_kernels(name):
 @pytest.mark.parametrize(
     "name", (*MECHANISMS[:4], "four_bar", "planar_slider_crank_equal", "four_bar_gravity")
 )
-def test_runs_agree_with_the_kernels(name):
-    """In steps too, but for one a crossing: behind it they are as long as rounding lets them be."""
+def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and_steps(name):
+    """Steps may differ by one a crossing, behind which rounding decides on their length, or by 5 %."""
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
@@ -109,7 +113,7 @@ def test_runs_agree_with_the_kernels(name):
     assert np.abs(generic.position - own.position).max() < 1e-9
     for mine, theirs in ((own.acceleration, generic.acceleration), *_reactions(own, generic)):
         assert np.abs(mine - theirs).max() <= 1e-6 * max(1.0, np.abs(theirs).max())
-    apart = abs(generic.cost.steps - own.cost.steps)  # behind a singular position rounding tells how far
+    apart = abs(generic.cost.steps - own.cost.steps)
     assert apart <= max(0.05 * generic.cost.steps, len(generic.crossings or ()))
 
 
@@ -119,7 +123,7 @@ def _reactions(one, other):
 
 
 @pytest.mark.parametrize("order", (4, 5, 12, 13, 30))
-def test_every_order_is_that_of_the_kernels(order):
+def test_generated_code_and_general_kernels_give_equal_series_of_every_order(order):
     method = Method.parse(f"taylor[order={order}]")
     generic, own = (
         start_run(SCENES["spatial_slider_crank_gravity"](), method, np.array([0.1]), Limits(code=code))
@@ -152,7 +156,7 @@ else:
 """
 
 
-def test_mbref_runs_without_the_subpackage(tmp_path):
+def test_mbref_runs_without_the_optional_generator_of_code(tmp_path):
     package = Path(mbref.__file__).parent
     shutil.copytree(package, tmp_path / "mbref", ignore=shutil.ignore_patterns("generated", "__pycache__"))
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}

@@ -43,12 +43,13 @@ def model(*bodies: Body, joint: tuple[Any, ...], **parts: Any) -> Model:
 
 
 def poses(system: Model) -> np.ndarray:
-    """The coordinates (1, nb, 7) of the scene as it is given."""
+    """Return the coordinates (1, nb, 7) of the scene as it is given."""
     return np.array([[[*b.position, *b.orientation] for b in system.scene.body]])
 
 
 def found(system: Model, **loads: tuple[tuple[float, ...], tuple[float, ...]]) -> dict[str, list[float]]:
-    """Reactions that balance a force and a moment (world axes) at the centre of each named body."""
+    """Return the reactions that balance a force and a moment (world axes) at the centre of each named
+    body."""
     q = poses(system)
     forces = np.zeros((len(system.scene.body), 6))
     for name, (force, moment) in loads.items():
@@ -68,7 +69,7 @@ def near(*values: float) -> Any:
 
 @pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_a_weld_to_the_ground(sense, orientation):
+def test_weld_to_the_ground_balances_force_and_moment_of_its_body(sense, orientation):
     """F = (1, 2, 3) N and M = (4, 5, 6) N m at (2, 0, 1), moved to the weld at (1, 1, 1): the arm (1, -1, 0)
     turns F into (-3, -3, 3) N m. The weld exerts the opposite on the body."""
     bodies = ("ground", "b") if sense > 0 else ("b", "ground")
@@ -79,7 +80,7 @@ def test_a_weld_to_the_ground(sense, orientation):
 
 @pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
 @pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_a_chain_of_two_welds(sense, orientation):
+def test_welds_of_a_chain_carry_all_forces_beyond_them(sense, orientation):
     """Forces 3 N along y at (3, 0, 0) and 5 N along z at (1, 0, 0); joints at the origin and at (2, 0, 0)."""
     near_end = Fixed(name="A", bodies=("ground", "b"), anchor=ORIGIN)
     far_end = Fixed(name="B", bodies=("b", "c") if sense > 0 else ("c", "b"), anchor=(2.0, 0.0, 0.0))
@@ -89,8 +90,9 @@ def test_a_chain_of_two_welds(sense, orientation):
     assert wrenches["A"] == near(0, -3, -5, 0, 5, -9)
 
 
-def test_joints_give_only_what_they_forbid():
-    """A moment about the axis of the hinge is balanced by the weld behind it; a ball carries force alone."""
+def test_ball_joint_carries_force_alone_and_the_weld_behind_it_the_moment():
+    """7 N m about z on body b; (1, 2, 3) N on body c at (2, 0, 0), whose moment about the weld is
+    (2, 0, 0) × (1, 2, 3) = (0, -6, 4) N m."""
     ball = Spherical(name="ball", bodies=("b", "c"), anchor=(2.0, 0.0, 0.0))
     weld = Fixed(name="weld", bodies=("ground", "b"), anchor=ORIGIN)
     system = model(body("b", X), body("c", (2.0, 0.0, 0.0)), joint=(weld, ball))
@@ -101,7 +103,7 @@ def test_joints_give_only_what_they_forbid():
 
 @pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
 @pytest.mark.parametrize("frame", ["ground", "carrier"])
-def test_torques_of_coupled_shafts(frame, orientation):
+def test_reactions_of_coupled_shafts_include_the_tooth_torques(frame, orientation):
     """Shaft c turns 3 times as fast as shaft b: 6 N m on b balance -2 N m on c. The tooth forces are part of
     the reactions, as moments about the axes, which the carrier has in its own frame."""
     joints = (
@@ -119,7 +121,7 @@ def test_torques_of_coupled_shafts(frame, orientation):
 
 
 @pytest.mark.parametrize("frame", ["ground", "carrier"])
-def test_the_force_of_a_rack(frame):
+def test_reactions_of_rack_and_pinion_include_the_tooth_force(frame):
     """The rack moves by 0.5 m/rad: 2 N along it balance -1 N m about the pinion."""
     joints = (
         Fixed(name="base", bodies=("ground", "carrier"), anchor=ORIGIN),
@@ -134,7 +136,7 @@ def test_the_force_of_a_rack(frame):
     assert wrenches["pinion"] == near(0, 0, 0, 0, 0, 1) and wrenches["rack"] == near(-2, 0, 0, 0, 0, 0)
 
 
-def test_a_screw_couples_the_coordinates_of_one_joint():
+def test_screw_carries_an_axial_force_and_the_torque_that_balances_it():
     """5 N along the axis times 0.2 m/rad balance -1 N m about it."""
     screw = Cylindrical(name="screw", bodies=("ground", "b"), anchor=ORIGIN, axis=(0.0, 0.0, 4.0))
     coupling = (Coupling(name="thread", joints=("screw", "screw"), ratio=0.2),)
@@ -142,8 +144,8 @@ def test_a_screw_couples_the_coordinates_of_one_joint():
     assert found(system, b=((0, 0, 5), (0, 0, -1)))["screw"] == near(0, 0, -5, 0, 0, 1)
 
 
-# --- what equilibrium leaves open -------------------------------------------------------------------------
 def door(*heights: float) -> Model:
+    """Return body b on hinges about z at these heights, and body c on a ball joint."""
     hinges = [
         Revolute(name=f"J{k}", bodies=("ground", "b"), anchor=(0.0, 0.0, z), axis=Z)
         for k, z in enumerate(heights)
@@ -152,7 +154,9 @@ def door(*heights: float) -> Model:
     return model(body("b", X), body("c", Y), joint=(*hinges, free))
 
 
-def test_two_hinges_share_all_but_the_moment_about_their_axis():
+def test_two_hinges_on_one_axis_leave_five_components_open_each():
+    """Ten rows of rank five: only the moment about z is determined, as zero. The five combinations of unit
+    rows that vanish are orthonormal."""
     system = door(0.0, 2.0)
     q, blocks = poses(system), system.terms(np.zeros(1), poses(system)).blocks
     assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {
@@ -173,14 +177,14 @@ def test_two_hinges_share_all_but_the_moment_about_their_axis():
     assert vanishing[0].T @ vanishing[0] == pytest.approx(np.eye(5), abs=1e-14)
 
 
-def test_a_single_hinge_leaves_nothing_open():
+def test_single_hinge_has_determined_reactions():
     system = door(0.0)
     blocks = system.terms(np.zeros(1), poses(system)).blocks
     assert {n: k.tolist() for n, k in open_dimensions(system, blocks).items()} == {"J0": [0], "free": [0]}
     assert all(c.all() for c in determined_components(system, poses(system), blocks).values())
 
 
-def test_reactions_are_open_at_a_singular_position_only():
+def test_reactions_are_open_only_at_the_sample_of_the_singular_position():
     """A rod of 1 m along y stands across a slide along x at the second of three samples: the force along the
     rod, and its moment of 2 m at the slide, are open there."""
     slide = Translational(name="slide", bodies=("ground", "b"), anchor=ORIGIN, axis=X)
@@ -198,7 +202,7 @@ def test_reactions_are_open_at_a_singular_position_only():
     assert vanishing.shape == (3, 6, 1) and not vanishing[[0, 2]].any(), "zeros where no combination vanishes"
 
 
-def test_a_body_without_joints_has_no_reactions():
+def test_body_without_joints_has_no_reactions():
     free = model(body("b", X), joint=())
     blocks = free.terms(np.zeros(1), poses(free)).blocks
     assert reactions(free, poses(free), blocks, np.zeros((1, 0))) == {}

@@ -22,13 +22,13 @@ def unit_rows(seed: int, rows: int, columns: int, values: list[float]) -> np.nda
 
 
 def agree(matrix: np.ndarray, rhs: np.ndarray, within: float) -> None:
-    """The solution is that of the pseudo-inverse, and the basis spans the null space."""
+    """Assert that the solution is the pseudo-inverse's and the basis spans the null space."""
     x, basis = least_norm_and_null_space(matrix, rhs, TOLERANCE)
     inverse = np.linalg.pinv(matrix, rcond=TOLERANCE)
     off = np.abs(x - inverse @ rhs).max() / max(1.0, np.abs(x).max())
     assert off < within, f"the solutions differ by {off:.1e}"
     alone = least_norm(np.stack([matrix, 2 * matrix]), np.stack([rhs, rhs]), TOLERANCE)
-    assert np.abs(alone - [x, x / 2]).max() < within, "without the null space, or of two systems"
+    assert np.abs(alone - [x, x / 2]).max() < within, "two systems at once, A x = b and 2 A x = b"
     beside = np.eye(matrix.shape[1]) - inverse @ matrix
     gap = np.abs(basis @ basis.T - beside).max()
     assert gap < within, f"the null spaces differ by {gap:.1e}"
@@ -36,30 +36,31 @@ def agree(matrix: np.ndarray, rhs: np.ndarray, within: float) -> None:
 
 @pytest.mark.parametrize(("rows", "columns", "rank"), [(6, 6, 6), (8, 12, 5), (24, 18, 18), (3, 6, 1)])
 @pytest.mark.parametrize("seed", range(5))
-def test_ranks_of_any_number(seed, rows, columns, rank):
+def test_least_norm_solution_is_the_pseudo_inverse_s_for_every_rank(seed, rows, columns, rank):
     matrix = unit_rows(seed, rows, columns, [1.0] * rank)
     agree(matrix, matrix @ np.random.default_rng(seed).normal(size=columns), 1e-12)
 
 
 @pytest.mark.parametrize("least", [1e-4, 1.1e-5, 0.9e-5, 1e-7, 1e-12])
-def test_singular_values_near_the_tolerance(least):
+def test_singular_value_counts_only_above_the_tolerance(least):
+    """NumPy's pseudo-inverse with the tolerance 1e-5 decides on a fourth singular value on either side."""
     matrix = unit_rows(0, 7, 9, [1.0, 1.0, 1.0, least])
     agree(matrix, matrix @ np.random.default_rng(0).normal(size=9), 1e-9)
 
 
-def test_equations_that_contradict_each_other():
+def test_contradicting_equations_have_the_least_squares_solution():
     matrix = np.vstack([unit_rows(1, 4, 6, [1.0] * 4)] * 2)
     agree(matrix, np.random.default_rng(1).normal(size=8), 1e-12)
 
 
 @pytest.mark.parametrize("shape", [(0, 4), (3, 0), (3, 4)])
-def test_nothing_and_zero(shape):
+def test_zero_or_empty_matrix_has_the_solution_zero_and_a_full_null_space(shape):
     x, basis = least_norm_and_null_space(np.zeros(shape), np.zeros(shape[0]), TOLERANCE)
     assert not x.any() and basis.shape == (shape[1], shape[1])
 
 
-def test_singular_values_are_compared_with_the_largest():
-    """Both values are far below one; the smaller counts from a tenth on."""
+def test_tolerance_is_relative_to_the_largest_singular_value():
+    """Singular values 1e-8 and 1e-9: the smaller counts for tolerances below a tenth."""
     matrix, rhs = np.diag([1e-8, 1e-9]), np.array([2e-8, 3e-9])
     assert least_norm(matrix, rhs, 0.099) == pytest.approx([2.0, 3.0])
     assert least_norm(matrix, rhs, 0.101) == pytest.approx([2.0, 0.0])

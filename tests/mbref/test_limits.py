@@ -25,13 +25,13 @@ NUMBERS = (
 
 @pytest.mark.parametrize("value", [-1.0, math.nan, math.inf, 5e-324, 10**400, "1", True, [1.0]], ids=repr)
 @pytest.mark.parametrize("name", NUMBERS)
-def test_numbers_out_of_their_interval_are_refused(name, value):
+def test_limit_that_is_no_finite_number_in_its_interval_is_refused_by_name(name, value):
     with pytest.raises(ValueError, match=f"^{name}: must be "):
         Limits(**{name: value})
 
 
 @pytest.mark.parametrize(("name", "value"), [("rtol", 0.0), ("rtol", 1.0), ("atol", 0.0), ("violation", 0.0)])
-def test_limits_that_no_run_could_keep_are_refused(name, value):
+def test_limit_of_zero_or_one_that_no_run_could_keep_is_refused(name, value):
     with pytest.raises(ValueError, match=f"^{name}: must be "):
         Limits(**{name: value})
 
@@ -39,7 +39,7 @@ def test_limits_that_no_run_could_keep_are_refused(name, value):
 @pytest.mark.parametrize(
     "name", ["first_step", "smallest_step", "forced_step", "largest_step", "largest_turn"]
 )
-def test_zero_means_not_given(name):
+def test_step_limit_of_zero_means_no_limit(name):
     assert getattr(Limits(**{name: 0}), name) == 0.0
 
 
@@ -49,19 +49,19 @@ def test_steps_are_counted_in_whole_numbers(value):
         Limits(most_steps=value)
 
 
-def test_code_is_one_of_three():
+def test_unknown_kind_of_code_is_refused_with_the_three_known():
     with pytest.raises(ValueError, match=r"^code: must be one of auto, generic, generated, got 'fast'"):
         Limits(code="fast")
 
 
-def test_numpy_s_numbers_become_python_s():
+def test_numbers_of_numpy_are_stored_as_python_s():
     limits = Limits(rtol=np.float32(0.5), atol=np.int64(1), most_steps=np.int32(7))
     assert [type(x) for x in (limits.rtol, limits.atol, limits.most_steps)] == [float, float, int]
     assert limits == Limits(rtol=0.5, atol=1.0, most_steps=7)
 
 
 @pytest.mark.parametrize("times", [[10**400], ["x"], [[0.0], [1.0, 2.0]], [math.nan], [1.0, 1.0]], ids=repr)
-def test_times_are_refused_by_name(times):
+def test_times_that_are_no_rising_finite_numbers_are_refused(times):
     with pytest.raises(ValueError, match=r"^times: "):
         simulate(SCENES["four_bar"](), "alf-dual+projection", times)
 
@@ -69,6 +69,6 @@ def test_times_are_refused_by_name(times):
 @pytest.mark.parametrize(
     ("option", "value"), [("--rtol", "5e-324"), ("--rtol", "1"), ("--rtol", "nan"), ("--max-step", "-1")]
 )
-def test_options_are_refused_by_their_own_name(option, value, capsys):
+def test_command_refuses_a_limit_by_the_name_of_its_option(option, value, capsys):
     assert main(["run", "four_bar", option, value]) == 2
     assert capsys.readouterr().err.startswith(f"{option}: must be ")

@@ -57,20 +57,21 @@ def test_driver_by_a_table_of_a_cubic_turns_by_the_cubic(method):
     agree(motion.angular_acceleration[:, 0, 2], CUBIC.deriv(2)(TIMES))
 
 
-def test_acceleration_at_a_time_of_switching_is_that_after_it():
+def test_acceleration_at_the_time_of_switching_is_the_one_afterwards():
     for method in METHODS:
         motion = run(scenes.pushed(Factor(start=0.5, stop=1.5)), method, [0.0, 0.5, 1.0, 1.5])
         along = motion.acceleration[:, 0] @ AXIS
         assert np.allclose(along, [0.0, 1.0, 1.0, 0.0], atol=1e-12), method
 
 
-def test_steps_end_where_pieces_do():
+def test_step_by_series_crosses_each_polynomial_piece_of_a_table_at_once():
     """Between the times of a table the motion is a polynomial, which one step of the series crosses."""
     motion = run(scenes.pushed(Factor(table=WAVY)), "taylor", [0.0, 2.0])
     assert motion.cost.steps == 5  # pieces begin at 0, 0.3, 0.7, 1.1 and 1.6 s
 
 
-def test_a_load_that_acts_late_moves_what_rests_until_then():
+def test_load_that_begins_to_act_moves_a_body_from_rest():
+    """A force of 1 N from a time s on moves 1 kg by (2 - s)² / 2 m up to t = 2 s."""
     for start in (1.999, 1e-3):
         scene = scenes.pushed(Factor(start=start)).with_(duration=2.0)
         moved = run(scene, "taylor", [0.0, 2.0]).joint("J").displacement[-1]
@@ -78,15 +79,17 @@ def test_a_load_that_acts_late_moves_what_rests_until_then():
 
 
 def test_table_is_a_twice_differentiable_spline_through_its_rows():
-    factor, e = Factor(table=WAVY), 1e-4
+    """Cubics through four values on either side of an inner row have one second derivative at the row."""
+    factor = Factor(table=WAVY)
     times, values = np.array(WAVY).T
     assert np.allclose(factor.values(times), values, atol=1e-14)
     for t in times[1:-1]:
-        second = [np.diff(factor.values(t + side * e * np.arange(3)), 2)[0] / e**2 for side in (1.0, -1.0)]
-        assert second[0] == pytest.approx(second[1], abs=0.1)
+        beside = [side * 0.05 * np.arange(4) for side in (1.0, -1.0)]  # s, within the pieces
+        second = [2 * np.polyfit(x, factor.values(t + x), 3)[1] for x in beside]
+        assert second[0] == pytest.approx(second[1], abs=1e-9)
 
 
-def test_load_numbers_are_of_the_joint():
+def test_outputs_of_joint_loads_are_force_or_torque_and_joint_coordinates():
     motion = run(scenes.arm(), "taylor")
     names = list(motion.columns("load(0)"))
     assert names == [
@@ -99,9 +102,13 @@ def test_load_numbers_are_of_the_joint():
     assert np.allclose(spring.force, -30.0 * (joint.displacement - 0.05) - 0.7 * joint.displacement_rate)
 
 
-def test_equilibrium_refuses_what_varies_and_measures_slide_springs_from_its_pose():
+def test_equilibrium_of_a_load_over_time_is_refused():
     with pytest.raises(SceneError, match=r"load\[0\].factor: varies"):
         mbref.equilibria(scenes.wheel())
+
+
+def test_equilibrium_of_a_sprung_slide_has_its_frequency_and_a_relaxed_spring():
+    """ω = √(k / m) with k = 50 N/m and m = 2 kg; the spring's displacement counts from the new pose."""
     found = mbref.equilibria(scenes.sprung_slide())
     assert [load.natural_displacement for load in found[0].scene.load] == [pytest.approx(0.0, abs=1e-9)]
     assert found[0].frequencies[0] == pytest.approx(np.sqrt(50.0 / 2.0) / 2 / np.pi)
@@ -124,7 +131,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("message", FAULTS)
-def test_faulty_functions_are_refused_by_path_and_line(message, tmp_path):
+def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
     from mbref.scene_toml import scene_text
@@ -138,17 +145,17 @@ def test_faulty_functions_are_refused_by_path_and_line(message, tmp_path):
     assert fault.startswith("load[0].factor") and message in fault and fault.endswith(f"(line {line})")
 
 
-def test_driver_by_a_table_begins_at_zero():
+def test_table_of_a_driver_must_begin_at_zero():
     with pytest.raises(SceneError, match="value at t = 0 must be 0"):
         scenes.wheel().with_(driver=[{"joint": "J", "table": scenes.TABLE}])
 
 
-def test_loads_of_a_joint_need_its_coordinate():
+def test_force_along_a_joint_that_does_not_slide_is_refused():
     with pytest.raises(SceneError, match="only translational, cylindrical joints can carry a joint_force"):
         scenes.wheel().with_(load=[JointForce(joint="J", force=1.0)])
 
 
-def test_functions_are_kept_by_a_file(tmp_path):
+def test_saved_scene_keeps_functions_of_time(tmp_path):
     for scene in (scenes.arm(), scenes.driven_arm()):
         scene.save(tmp_path / "arm.toml")
         assert Scene.from_file(tmp_path / "arm.toml") == scene

@@ -47,7 +47,7 @@ def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
     assert joint.displacement is None and driven.joint("B").angle is None
 
 
-def test_angle_of_a_joint_is_the_same_where_a_quaternion_has_the_other_sign(driven):
+def test_angle_of_a_joint_does_not_depend_on_the_sign_of_quaternions(driven):
     """p and -p are one orientation, also at the first sample."""
     other = Motion.of(driven.mechanism, dataclasses.replace(driven, orientation=-driven.orientation))
     crank_alone = driven.orientation * np.array([-1.0, 1.0, 1.0])[:, None]
@@ -56,7 +56,7 @@ def test_angle_of_a_joint_is_the_same_where_a_quaternion_has_the_other_sign(driv
         assert np.abs(motion.joint("A").angle - driven.joint("A").angle).max() < 1e-9
 
 
-def test_displacement_of_a_guide_is_the_slider_s(crank):
+def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
     joint, slider = crank.joint("D"), crank["slider"]
     assert np.allclose(joint.displacement, slider.position[:, 0] - slider.position[0, 0], atol=1e-12)
     assert joint.angle is None and joint.displacement[-1] != 0
@@ -68,7 +68,7 @@ def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
     assert np.abs(vector[:, 2] - turned).max() < 1e-8 and np.abs(vector[:, :2]).max() < 1e-8
 
 
-def test_bodies_and_joints_that_are_not_there_are_told(crank):
+def test_unknown_body_or_joint_is_refused_with_the_known_ones(crank):
     with pytest.raises(KeyError, match="no body 'lid'; bodies: crank, rod, slider"):
         crank["lid"]
     with pytest.raises(KeyError, match="no joint 'Z'; joints: A, B"):
@@ -76,7 +76,7 @@ def test_bodies_and_joints_that_are_not_there_are_told(crank):
 
 
 @pytest.mark.parametrize("name", ["crank", "door"])
-def test_energies_are_the_judge_s(name, request):
+def test_kinetic_energy_and_energy_of_springs_are_the_judge_s(name, request):
     motion = request.getfixturevalue(name)
     scene = motion.mechanism
     scene = scene.with_(load=[load for load in scene.load if load.type == "spring"])
@@ -89,18 +89,18 @@ def test_energies_are_the_judge_s(name, request):
     assert np.allclose(of_springs, judged, rtol=1e-12)
 
 
-def test_energy_is_kept_by_springs_and_torsion_springs(door):
+def test_energy_of_a_motion_on_undamped_springs_is_constant(door):
     assert np.ptp(door.energy) < 1e-8, door.energy
     assert np.ptp(door.kinetic_energy) > 1.0
 
 
-def test_energy_is_kept_by_gravity_alone():
+def test_energy_of_a_motion_under_gravity_is_constant():
     motion = simulate("four_bar_gravity", times=TIMES, limits=Limits(rtol=1e-11))
     assert np.ptp(motion.energy) < 1e-8 < np.ptp(motion.kinetic_energy)
 
 
 def test_energy_of_a_tumbling_body_is_that_of_its_principal_axes():
-    """1/2 (A p² + B q² + C r²) with the rates about its own axes, which the spin leaves as it is."""
+    """½ (A p² + B q² + C r²) with the rates about its own axes, constant without moments."""
     moments, spin, turn = np.array([1.0, 2.0, 2.5]), np.array([3.0, 0.4, -1.0]), (0.5, -0.5, 0.5, 0.5)
     body = Body(
         name="top",
@@ -126,18 +126,21 @@ def test_energy_without_masses_names_the_body():
     assert "energy" not in motion.columns()
 
 
-def test_saved_and_loaded_is_equal(crank, tmp_path):
+def test_saved_motion_is_read_back_equal(crank, tmp_path):
     crank.save(tmp_path / "run.json")
     again = Motion.load(tmp_path / "run.json")
     assert again.mechanism == crank.mechanism and again.outcome is crank.outcome and again.cost == crank.cost
     assert again.to_record() == crank.to_record()
     assert list(again.columns()) == list(crank.columns())
+
+
+def test_file_that_is_no_saved_motion_is_refused(tmp_path):
     (tmp_path / "other.json").write_text('{"scene": 1}')
     with pytest.raises(ValueError, match=r"other\.json: is not a file that Motion\.save wrote"):
         Motion.load(tmp_path / "other.json")
 
 
-def test_csv_and_frame_have_the_columns(crank, tmp_path):
+def test_csv_file_and_data_frame_hold_the_arrays_of_the_motion(crank, tmp_path):
     crank.to_csv(tmp_path / "run.csv")
     with open(tmp_path / "run.csv", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -153,7 +156,7 @@ def test_csv_and_frame_have_the_columns(crank, tmp_path):
             assert (frame[f"rod.{field}.{axis}"] == getattr(crank["rod"], field)[:, k]).all(), field
 
 
-def test_without_pandas_the_frame_says_what_to_install(crank, monkeypatch):
+def test_data_frame_without_pandas_names_the_package_to_install(crank, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match="pip install pandas"):
         crank.to_dataframe()
@@ -165,6 +168,9 @@ def test_plot_has_a_panel_for_each_quantity(crank):
     names = [text.get_text() for text in axes[0].get_legend().get_texts()]
     assert names == ["slider.position.x", "rod.position.x", "rod.position.y", "rod.position.z"]
     assert (axes[1].lines[0].get_ydata() == crank.joint("A").angle).all()
+
+
+def test_plot_of_an_unknown_column_suggests_a_known_one(crank):
     with pytest.raises(ValueError, match=r"no column 'slider\.colour'"):
         crank.plot("slider.colour")
     for misspelt, suggested in (("slidr.position", "slider.position"), ("enrgy", "energy")):
@@ -172,7 +178,7 @@ def test_plot_has_a_panel_for_each_quantity(crank):
             crank.plot(misspelt)
 
 
-def test_panels_of_a_plot_have_the_units_of_their_quantities(crank):
+def test_panel_of_a_plot_is_labelled_with_its_quantity_and_unit(crank):
     quantities = ("position", "velocity", "angular_velocity", "acceleration", "angular_acceleration")
     names = [f"rod.{quantity}.x" for quantity in quantities]
     names += ["rod.orientation.w", "A.angle", "A.rate", "D.displacement", "A.force.x", "A.moment.z", "energy"]
@@ -192,13 +198,13 @@ def test_panels_of_a_plot_have_the_units_of_their_quantities(crank):
     ]
 
 
-def test_without_names_joints_and_energy_are_plotted(crank):
+def test_plot_without_columns_shows_joint_coordinates_and_energy(crank):
     groups = grouped(list(crank.columns())[1:], ())
     assert set(groups) == {"angle", "displacement", "energy"}
     assert groups["angle"] == ["A.angle", "B.angle"]
 
 
-def test_repr_is_one_short_line(crank):
+def test_repr_of_a_motion_is_one_line_and_its_html_an_animation(crank):
     assert repr(crank) == (
         "<Motion of 'planar_slider_crank' by mbref alf-dual+projection/taylor: COMPLETED, "
         "21 samples to t = 0.1 s>"
@@ -207,29 +213,34 @@ def test_repr_is_one_short_line(crank):
     assert "<animate" in crank._repr_html_() and "&#x27;planar_slider_crank&#x27;" in crank._repr_html_()
 
 
-def test_a_trajectory_of_another_engine_becomes_a_motion(crank):
+def test_trajectory_with_its_scene_has_the_energy_of_the_motion(crank):
     bare = Trajectory.from_record(crank.scene, crank.to_record())
     assert np.allclose(Motion.of(crank.mechanism, bare).energy, crank.energy, rtol=1e-14)
 
 
-def test_a_path_changes_one_value():
+def test_path_changes_one_value_of_a_scene():
     scene = find_scene("planar_slider_crank")
     heavy = scene.with_("body[slider].mass", 2.0)
     assert heavy.body[2].mass == 2.0 and heavy.body[:2] == scene.body[:2] and heavy.joint == scene.joint
     assert scene.with_("gravity", [0.0, -1.0, 0.0], duration=3.0).gravity == (0.0, -1.0, 0.0)
     assert scene.with_("joint[A].axis[2]", 2.0).joint[0].axis == (0.0, 0.0, 2.0)
-    for path, says in [
-        ("body[lid].mass", "no 'lid' there"),
-        ("mass", "not a path"),
-        ("name.x", "no 'x' there"),
-    ]:
-        with pytest.raises(SceneError, match=says):
-            scene.with_(path, 1.0)
-    with pytest.raises(SceneError, match="must not be negative"):
-        scene.with_("body[slider].mass", -1.0)
 
 
-def test_notebook_runs(capsys):
+@pytest.mark.parametrize(
+    ("path", "value", "says"),
+    [
+        ("body[lid].mass", 1.0, "no 'lid' there"),
+        ("mass", 1.0, "not a path"),
+        ("name.x", 1.0, "no 'x' there"),
+        ("body[slider].mass", -1.0, "must not be negative"),
+    ],
+)
+def test_unknown_path_or_faulty_value_is_refused(path, value, says):
+    with pytest.raises(SceneError, match=says):
+        find_scene("planar_slider_crank").with_(path, value)
+
+
+def test_every_cell_of_the_notebook_runs_and_shows_pictures_and_a_table(capsys):
     """Every code cell in turn; the value of a cell's last line is what a notebook shows."""
     cells = json.loads((ROOT / "examples" / "04_first_steps.ipynb").read_text())["cells"]
     names: dict[str, object] = {}

@@ -71,7 +71,9 @@ def whole(**given):
     return allocate(Whole, SIZES, **fields)
 
 
-def test_kernels_read_and_write_every_kind_of_field():
+def test_kernel_reads_and_writes_every_kind_of_field_by_name():
+    """``use`` returns twice phi[order[0]] = 2 (3 + 10) and writes steps, time, phi and x[1] of another
+    memory."""
     memory = whole()
     memory.order[0] = 2
     assert use(np.array([10.0]), packed(memory).argument) == 26.0
@@ -92,6 +94,6 @@ def test_kernels_read_and_write_every_kind_of_field():
         ("counts", Counts(), "Whole.counts: needs the record"),
     ],
 )
-def test_a_packing_mistake_names_the_field(field, value, fault):
+def test_value_of_another_type_or_shape_is_refused_by_its_field(field, value, fault):
     with pytest.raises(TypeError, match=fault):
         packed(whole(**{field: value}))

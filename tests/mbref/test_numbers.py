@@ -1,4 +1,5 @@
-"""Numbers of many scenes at once: the bits of each scene alone, and which scenes decide otherwise."""
+"""Batch numbers, one value a scene: results are bit-identical with those of each scene alone, and scenes that
+decide otherwise leave the batch."""
 
 import math
 
@@ -13,12 +14,12 @@ VALUES = st.lists(st.tuples(PLAIN, PLAIN), min_size=2, max_size=5)
 
 
 def mixed(x, y):
-    """A number by every operation, with constants on both sides."""
+    """Combine two numbers by every operation, with constants on both sides."""
     return root(abs(2.0 - x * y) + 1.0 / (x + 0.5)) - (x - y) / 3.0 + (-x) * 0.25 + 1.0
 
 
 @given(values=VALUES)
-def test_every_operation_has_the_bits_of_each_scene_alone(values):
+def test_operations_on_a_batch_are_bit_identical_with_each_scene_alone(values):
     batch = ManyScenes(len(values))
     x, y = batch.together(np.array(values))
     found = batch.spread(np.array([mixed(x, y)], dtype=object))[:, 0]
@@ -27,7 +28,7 @@ def test_every_operation_has_the_bits_of_each_scene_alone(values):
 
 
 @given(values=st.lists(st.lists(PLAIN, min_size=6, max_size=6), min_size=2, max_size=4))
-def test_vectors_have_the_bits_of_each_scene_alone(values):
+def test_products_norms_and_maxima_of_a_batch_are_bit_identical_with_each_scene_alone(values):
     rows, batch = np.array(values), ManyScenes(len(values))
     numbers = batch.together(rows)
     found = np.array([dot(numbers[:3], numbers[3:]), norm(numbers[:3]), largest(numbers)], dtype=object)
@@ -35,27 +36,27 @@ def test_vectors_have_the_bits_of_each_scene_alone(values):
     assert batch.spread(found).tolist() == np.array(alone, dtype=float).tolist()
 
 
-def test_numbers_on_which_scenes_agree_are_floats():
+def test_number_on_which_all_scenes_agree_is_a_float():
     together = ManyScenes(2).together(np.array([[1.0, 2.0, 0.0], [1.0, 3.0, -0.0]]))
     assert isinstance(together[0], float) and isinstance(together[1], BatchNumber)
     assert isinstance(together[2], BatchNumber), "the signs of zeros differ"
     assert ManyScenes(2).together(np.array([[1.0, 2.0], [1.0, 2.0]])).dtype == float
 
 
-def test_a_scene_that_decides_otherwise_leaves_the_batch():
+def test_scene_that_compares_otherwise_than_the_first_leaves_the_batch():
     batch = ManyScenes(3)
     number = BatchNumber(np.array([1.0, 2.0, -1.0]), batch)
     assert number > 0.0 and batch.agree.tolist() == [True, True, False]
     assert not number > 1.5 and batch.agree.tolist() == [True, False, False]
 
 
-def test_patterns_are_of_the_first_scene():
+def test_scene_with_another_pattern_of_zeros_than_the_first_leaves_the_batch():
     batch = ManyScenes(2)
     assert batch.pattern(np.array([[1.0, 0.0], [2.0, 1e-20]])).tolist() == [True, False]
     assert batch.agree.tolist() == [True, False]
 
 
-def test_rounded_numbers_are_those_of_python():
+def test_batch_numbers_round_as_python_s():
     values = [0.1234567885, 2.675, math.pi]
     assert round(BatchNumber(np.array(values), ManyScenes(3)), 9).values.tolist() == [
         round(v, 9) for v in values
