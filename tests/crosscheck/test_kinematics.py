@@ -64,6 +64,7 @@ def moved(motion, rates, h):
 @pytest.mark.parametrize("bodies", [PAIR, ("second", "first"), ("ground", "first"), ("second", "ground")])
 @pytest.mark.parametrize("kind", ROWS)
 def test_joint_has_its_number_of_rows_and_no_residual_at_the_start(kind, bodies):
+    """ROWS has 6 minus the joint's freedoms; the residual at the scene's own poses is rounding."""
     scene = jointed(kind, bodies)
     residual = constraints.closure(scene, 0.0, *constraints.initial_poses(scene))["j"]
     assert residual.shape == (ROWS[kind],), f"{kind}: {residual.shape} rows, expected {ROWS[kind]}"
@@ -112,6 +113,8 @@ def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, b
 
 @given(vector=st.tuples(*[st.floats(-1.7, 1.7)] * 3), shift=st.tuples(*[st.floats(-1, 1)] * 3))
 def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
+    """A body is turned and shifted: the norms of the residual's halves are the shift (m) and the angle
+    (rad)."""
     scene = jointed("fixed", ("ground", "second"))
     position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(np.array(vector))
@@ -127,6 +130,7 @@ def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.4, 3.0, np.pi])
 def test_revolute_residual_is_the_tilt_of_its_axis(angle):
+    """The body is turned about a line perpendicular to the axis, through the anchor."""
     scene = jointed("revolute", ("ground", "second"))
     position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(angle * np.array(SIDE) / np.linalg.norm(SIDE))
@@ -141,6 +145,7 @@ def test_revolute_residual_is_the_tilt_of_its_axis(angle):
 
 @pytest.mark.parametrize("name", [n for n in CLOSED if n != "four_bar_straight"])
 def test_initial_velocities_satisfy_the_joints_and_the_given_spins(name):
+    """Rates of joints and drivers are rounding; spins that the scene gives stay."""
     scene = SCENES[name]()
     velocity, spin = constraints.initial_twists(scene)
     rates = constraints.closure_rates(scene, 0.0, *constraints.initial_poses(scene), velocity, spin)

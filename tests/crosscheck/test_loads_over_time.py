@@ -68,6 +68,7 @@ def test_motion_under_constant_joint_loads_keeps_its_energy():
 @pytest.mark.parametrize("name", ("slide_spring load", "joint_torque load", "joint_force load"))
 @pytest.mark.parametrize(("of", "within"), [("mujoco", 1e-12), ("exudyn", 1e-10), ("pinocchio", 1e-10)])
 def test_engine_moves_joint_loads_as_the_reference(of, within, name):
+    """A spring, torque or force of a joint; ``within`` is the allowed difference (m)."""
     check(of, PROBES[name], within)
 
 

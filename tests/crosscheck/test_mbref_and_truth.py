@@ -62,6 +62,7 @@ def judged(name, end, method, rtol):
 
 @pytest.mark.parametrize(("name", "end", "method", "rtol", "measured"), RUNS)
 def test_method_stays_within_its_measured_error_of_the_truth(name, end, method, rtol, measured):
+    """RUNS has the measured errors (of the length, or rad); 10 times as much is allowed."""
     error = judged(name, end, method, rtol)["error"]
     assert error < MARGIN * measured, f"{name}, {method}: error {error:.2e}, measured {measured:.1e}"
 
@@ -69,6 +70,7 @@ def test_method_stays_within_its_measured_error_of_the_truth(name, end, method, 
 @pytest.mark.parametrize("name", CROSSINGS)
 @pytest.mark.parametrize("rtol", RTOLS)
 def test_taylor_crosses_singular_positions_within_its_measured_error(name, rtol):
+    """CROSSINGS has end times behind singular positions and measured errors; 10 times as much is allowed."""
     end, errors = CROSSINGS[name]
     measured = errors[RTOLS.index(rtol)]
     error = judged(name, end, "taylor", rtol)["error"]
@@ -89,6 +91,7 @@ def is_served(formulation, scene):
     ("name", "formulation"), [(n, f) for n in STARTS for f in ("lm1", "mpi-svd") if is_served(f, SCENES[n]())]
 )
 def test_first_acceleration_is_the_truth_s(name, formulation):
+    """Measured at t = 0: 1.1e-14 of the largest acceleration; 10 times as much is allowed."""
     scene = SCENES[name]()
     found = simulate(scene, f"{formulation}+none", [0.0])
     true = truth_for(scene).poses(np.zeros(1))

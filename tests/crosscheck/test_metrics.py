@@ -60,6 +60,7 @@ def test_violation_of_an_angle_is_the_angle_put_in():
 
 
 def test_energy_error_is_the_kinetic_energy_put_in():
+    """At one sample a body gets 2 m/s across its motion: m 2² / 2, over the largest kinetic energy."""
     push = np.array([0.0, 0.0, 2.0])
     faster = replace(EXACT, velocity=bumped(EXACT.velocity, 8, 0, push))
     added = SCENE.body[0].mass * 2.0**2 / 2
@@ -88,6 +89,7 @@ def test_work_of_a_moment_on_a_free_body_is_its_power_integrated():
 
 
 def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
+    """The work of the moment on the crank is then unknown."""
     scene = SCENES["planar_slider_crank"]()
     sparse = truth_for(scene).poses(np.linspace(0, 0.4, 9))
     assert measure(scene, sparse)["energy_error"] is None
@@ -95,11 +97,13 @@ def test_energy_error_is_none_if_bodies_turn_six_times_between_samples():
 
 @pytest.mark.parametrize("name", ["four_bar", "spatial_slider_crank_driven"])
 def test_energy_error_is_none_for_a_driven_scene(name):
+    """The work of the driver is unknown."""
     scene = SCENES[name]()
     assert measure(scene, truth_for(scene).poses(np.linspace(0, 0.1, 5)))["energy_error"] is None
 
 
 def test_energy_error_is_none_for_a_damped_scene():
+    """The work of the damper is unknown."""
     scene = SPRUNG["block_spring"]
     damped = scene.with_(load=(scene.load[0].model_copy(update={"damping": 1.0}),))
     assert measure(damped, truth_for(damped).poses(np.linspace(0, 1, 50)))["energy_error"] is None
@@ -122,6 +126,7 @@ def test_every_metric_of_a_run_without_samples_is_none():
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_states_that_are_not_finite_have_infinite_errors(value):
+    """One position of the last sample is NaN or infinite; no metric is NaN."""
     lost = replace(EXACT, position=bumped(EXACT.position, 20, 1, value), acceleration=None)
     found = measure(SCENE, lost, TRUTH)
     assert found["error"] == found["violation_position"] == found["energy_error"] == math.inf, found
@@ -161,6 +166,7 @@ def test_run_of_a_body_that_the_scene_lacks_is_refused():
 
 @pytest.mark.parametrize("order", [0.75, 1, 2, 4, 8])
 def test_order_of_convergence_is_the_power_put_in_above_a_floor(order):
+    """3 h^p with 10 % scatter, down to a floor of 1e-13; the first error is not asymptotic."""
     steps = 0.5 / 2.0 ** np.arange(12)
     scatter = 1 + 0.1 * np.sin(7 * np.arange(12))
     errors = np.maximum(3 * steps**order * scatter, 1e-13)

@@ -111,6 +111,7 @@ def test_run_at_rest_has_no_momentum_drift():
 
 
 def test_stored_violation_states_its_numbers_and_the_command_that_repeats_it(tmp_path):
+    """Comments of the scene file have check, measured and allowed value, and the command."""
     verdict = Verdict("truth", "free", FAIL, 0.25, 1e-5, "off")
     path = findings.keep(SCENE, verdict, "my engine", tmp_path / "new")
     lines = path.read_text().splitlines()

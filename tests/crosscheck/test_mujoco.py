@@ -46,6 +46,7 @@ def simulate(scene: Scene, duration: float, family: str, **options) -> Trajector
 
 @pytest.mark.parametrize("name", PAPER)
 def test_tuned_mujoco_stays_within_its_measured_error_of_the_truth(name: str) -> None:
+    """PAPER has durations, steps, gains and measured errors; 10 times as much is allowed."""
     duration, step, beta, measured = PAPER[name]
     scene = SCENES[name]()
     run = simulate(scene, duration, "tuned", step=step, beta=beta, hard=HARD)
@@ -82,6 +83,7 @@ def test_implicitfast_is_offered_with_damping_only_and_moves_as_euler_without() 
 
 @pytest.mark.parametrize("name", FORWARD)
 def test_integrated_accelerations_of_mujoco_stay_within_their_measured_error(name: str) -> None:
+    """DOP853 of crosscheck integrates MuJoCo's accelerations; FORWARD has the measured errors."""
     duration, _, beta, _ = PAPER[name]
     scene = SCENES[name]()
     run = simulate(scene, duration, "forward", rtol=1e-10, min_step=2e-5, beta=beta, hard=1e-7)
@@ -131,6 +133,7 @@ def test_samples_are_at_the_times_asked_for() -> None:
 
 
 def test_run_that_blows_up_ends_not_finite_with_its_finite_samples() -> None:
+    """A step of 4 ms is too long for gains of 2000 1/s."""
     scene = SCENES["planar_slider_crank"]()
     run = simulate(scene, 0.4, "tuned", step=4e-3, beta=2000.0, hard=HARD)
     assert run.outcome is Outcome.NOT_FINITE, f"{run.outcome.label} {run.message}"
@@ -154,6 +157,7 @@ def test_run_that_blows_up_writes_no_file_and_prints_nothing(tmp_path, monkeypat
 
 
 def test_compiled_model_has_the_masses_and_moments_of_the_links() -> None:
+    """Mass (kg) and principal moments (kg m²) of the links of the spanning tree."""
     built = compiled(every_joint())
     model, links = built.model, built.tree.links
     for link, body in zip(links, built.links, strict=True):
@@ -197,6 +201,7 @@ def test_projected_mujoco_follows_the_driven_crank() -> None:
 
 
 def test_a_duplicate_joint_changes_no_projected_motion() -> None:
+    """A ball joint given twice has dependent rows; the motions agree to 1e-9 of the length."""
     scene = moving_probes()["spherical joint"]
     twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))
     tight = {"rtol": 1e-8, "min_step": 6e-3, "beta": 25.0, "hard": ADAPTIVE["projected"]}

@@ -136,6 +136,7 @@ def is_right(simulator: Engine, way: str) -> bool:
     "way", [pytest.param(way, marks=pytest.mark.slow if way in SLOW else ()) for way in WAYS]
 )
 def test_adapter_without_defect_moves_as_the_reference(way):
+    """Errors of poses, velocities and reactions are within the limits in WAYS."""
     if not is_installed(way):
         pytest.skip(f"{WAYS[way][0]} is not installed")
     assert is_right(engine(package(way)), way)
@@ -168,11 +169,13 @@ def test_planted_defect_moves_an_adapter_off_the_reference(way, defect, monkeypa
 
 @pytest.mark.parametrize("name", sorted({package(way) for way in WAYS}))
 def test_each_adapter_is_tried_with_each_kind_of_defect(name):
+    """UNABLE has the kinds that an adapter cannot have, with the reason."""
     found = {one["kind"] for way, defects in DEFECTS.items() if package(way) == name for one in defects}
     assert set(KINDS) - found == set(UNABLE.get(name, {}))
 
 
 def test_example_of_the_documentation_is_the_code_of_bullet_s_adapter():
+    """The page shows four methods of the adapter word for word."""
     page = (FOLDER.parents[1] / "docs" / "verify-your-engine.md").read_text()
     (example,) = [block for block in page.split("```python\n")[1:] if "stepSimulation" in block]
     source = textwrap.dedent((FOLDER / "bullet" / "adapter.py").read_text().partition("class _World")[2])

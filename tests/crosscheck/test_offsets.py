@@ -94,6 +94,7 @@ def test_reference_and_mbref_agree_on_couplings_with_offsets(make, name, offset)
 
 @pytest.mark.parametrize("name", ["mujoco", "exudyn", "simbody", "drake", "dart"])
 def test_engine_moves_a_coupling_with_offset_as_the_reference(name):
+    """The offset holds in the assembled poses, from which both start."""
     modules = {"simbody": "opensim", "drake": "pydrake", "dart": "dartpy"}
     pytest.importorskip(modules.get(name, name))
     scene, simulator = shifted(coupled_loops, "gears", 0.1).with_(duration=0.2), engine(name)

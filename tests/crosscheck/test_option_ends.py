@@ -31,6 +31,7 @@ SCENE = Scene(name="s", duration=2.0, body=(BLOCK,))
     ids=["positive", "not negative", "whole", "digits"],
 )
 def test_option_takes_the_ends_of_its_range_and_refuses_values_beyond(parse, good, bad):
+    """Texts in ``good`` are parsed as their numbers; texts in ``bad`` are refused."""
     for text in good:
         assert parse(text) == float(text), text
     for text in bad:

@@ -63,6 +63,7 @@ def exact() -> Trajectory:
 
 
 def test_bricard_s_linkage_has_one_redundant_row_and_one_freedom():
+    """Six hinges have 30 rows, of rank 29, on five bodies with 30 coordinates."""
     counts = bricard().counts()
     assert (counts.rows, counts.rank, counts.degrees_of_freedom) == (30, 29, 1), counts
 
@@ -81,6 +82,7 @@ def test_bricard_s_linkage_has_one_redundant_row_and_one_freedom():
     ],
 )
 def test_engine_moves_bricard_s_linkage_as_the_reference(name: str, setting: Setting, measured: float):
+    """Ten times the measured difference is allowed."""
     scene = bricard()
     found = engine(name).run(scene, TIMES, setting)
     assert found.outcome is Outcome.COMPLETED, found.message

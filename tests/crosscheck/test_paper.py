@@ -68,6 +68,7 @@ def test_every_cell_of_the_paper_has_a_run_of_its_method():
 
 
 def test_every_variant_changes_one_setting():
+    """One option of the run, of ALF, or the size, seed or integrator differs from the base's."""
     default = {f.name for f in dataclasses.fields(Limits)}
     for variant in settings.SWEEP:
         assert set(variant.options()) <= default, f"{variant.name}: {set(variant.options()) - default}"
@@ -116,6 +117,7 @@ def test_small_rank_tolerance_brakes_a_crank_tilted_out_of_its_plane():
     ],
 )
 def test_run_ends_as_its_cell_of_the_paper(table, row, column):
+    """The run ends with the outcome of the printed letter, at the printed time."""
     [cell] = [c for c in CELLS if (c.table, c.row, c.column) == (table, row, column)]
     run = simulated(Label(table, row, column))
     mark = match(cell, run.outcome, run.t_end)
@@ -132,6 +134,7 @@ def test_forced_step_carries_a_run_on_to_its_violation():
 
 
 def test_forced_step_below_all_steps_changes_no_bit():
+    """Every step of the run is longer than 1e-9 s."""
     scene, times = SCENES["planar_slider_crank"](), [0.05, 0.1]
     plain = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6))
     forced = simulate(scene, "mpi-svd+none", times, Limits(rtol=1e-6, forced_step=1e-9))

@@ -70,6 +70,7 @@ def test_crossings_with_several_branches_are_shown_before_others():
 
 
 def test_run_takes_an_option_that_its_sweep_does_not_vary(capsys):
+    """Option branches of taylor, by which the run takes branch 2 at the second crossing."""
     asked = "run four_bar --engine mbref --setting taylor --option branches=[[2,2]] --times 0.05"
     assert main([*asked.split(), "--json"]) == 0
     assert '"branches": [[2, 2]]' in capsys.readouterr().out

@@ -43,6 +43,7 @@ def simulate(scene: Scene, duration: float, family: str, **options) -> Trajector
 
 @pytest.mark.parametrize("name", PAPER)
 def test_tuned_pinocchio_stays_within_its_measured_error_of_the_truth(name: str) -> None:
+    """PAPER has durations and measured errors; 10 times as much is allowed."""
     duration, measured = PAPER[name]
     scene = SCENES[name]().with_(duration=duration)
     finest = [s for s in engine("pinocchio").settings(scene) if s.family == "tuned"][-1]
@@ -107,6 +108,7 @@ def test_mass_matrix_by_composite_bodies_is_the_inverse_dynamics_one() -> None:
 
 
 def test_first_sample_of_pinocchio_has_the_scene_s_poses() -> None:
+    """Every joint type, by Pinocchio's kinematics at its initial coordinates."""
     scene = every_joint()
     run = engine("pinocchio").run(scene, np.array([0.0]), Setting("tuned", {"rtol": 1e-6, "min_step": 1e-4}))
     wanted = np.array([body.position for body in scene.body]), np.array([b.orientation for b in scene.body])
@@ -160,6 +162,7 @@ def test_moment_about_a_fixed_axis_is_a_constant_joint_torque() -> None:
 
 
 def test_a_kinematic_scene_needs_no_masses() -> None:
+    """The driven crank moves alike with and without masses; without them it has no reactions."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     runs = [simulate(s, 0.1, "tuned", rtol=1e-10, min_step=1e-4) for s in (base, bare)]

@@ -113,6 +113,7 @@ def test_block_on_an_incline_moves_as_its_closed_form(name: str, bodies: tuple[s
 
 @pytest.mark.parametrize("name", FREE)
 def test_a_second_planar_joint_in_the_same_plane_changes_nothing(name: str) -> None:
+    """Its three rows are redundant; the closed form stays."""
     scene = incline(ORDERS[0], joints=2)
     assert scene.counts().redundant == 3, scene.counts()
     run = run_fine(name, scene, TIMES)
@@ -143,6 +144,7 @@ def test_plane_replaces_the_guide_of_a_slider_crank(name: str) -> None:
 
 
 def test_ondsel_moves_the_driven_slider_crank_with_a_plane() -> None:
+    """The truth is the motion with a guide; DRIVEN has the measured errors (m, m/s²)."""
     driver = (Driver(joint="A", polynomial=(0.0, 30.0)),)
     base, planar = (scene.with_(body=at_rest(scene), driver=driver) for scene in guided())
     times = np.linspace(0, 0.1, 4)

@@ -122,6 +122,7 @@ PLANTED = {
 
 
 def test_exact_motion_is_right_in_every_column(table):
+    """The table is the reference's own."""
     found = judge_motion(SCENE, table)
     assert found.is_right and not found.explanations and len(found.columns) == len(table) - 1
 
@@ -196,6 +197,7 @@ PAIRS = {
     ],
 )
 def test_two_planted_differences_are_the_first_explanation(name, table):
+    """The first explanation names both, and leaves less than 1e-3 of the difference."""
     plant, says = PAIRS[name]
     (first, *_) = judge_motion(SCENE, plant(table)).explanations
     assert all(sentence in first.sentence for sentence in says), first.sentence

@@ -114,6 +114,7 @@ def test_robot_file_gives_its_freedoms_and_leaves_out_dampings_only(name):
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in LASTING else n for n in sorted(FREEDOMS)]
 )
 def test_scene_of_a_robot_file_moves_as_mujoco_s_model(name):
+    """MuJoCo's masses, forces and rows are integrated finely; loops missing in its model are added here."""
     found = read(name)
     assert apart(original(name, found), found, 0.05) < SAME
 

@@ -117,6 +117,7 @@ def comes_back(scene, random, tmp_path) -> None:
 
 @pytest.mark.parametrize("name", LOOPS)
 def test_loop_returns_from_sdf_in_random_frames(name, tmp_path):
+    """Random frames of models, links, joints and inertias; ``comes_back`` has the comparison."""
     comes_back(at_rest(SCENES[name]()), np.random.default_rng(len(name)), tmp_path)
 
 

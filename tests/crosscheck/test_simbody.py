@@ -45,6 +45,7 @@ def simulate(
 
 @pytest.mark.parametrize("name", PAPER)
 def test_simbody_stays_within_its_measured_error_of_the_truth(name: str) -> None:
+    """PAPER has durations and measured errors; 10 times as much is allowed."""
     scene = SCENES[name]()
     duration, measured = PAPER[name]
     run = simulate(scene, duration, 1e-9)

@@ -71,6 +71,7 @@ def test_second_study_runs_only_cases_that_are_not_stored(tmp_path: Path):
 
 
 def test_interrupted_study_stores_the_runs_that_have_ended(tmp_path: Path):
+    """After the first run its progress callback raises KeyboardInterrupt, while another run hangs."""
     path = tmp_path / "records.jsonl"
 
     def interrupt(done: int, total: int, record: dict) -> None:

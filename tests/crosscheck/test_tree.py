@@ -93,6 +93,7 @@ def test_bridged_rates_replace_wrong_ones_near_a_singular_time():
 
 @pytest.mark.parametrize("name", ["four_bar", "four_bar_quarter", "four_bar_gravity"])
 def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
+    """The truth is the closed form; at least three singular positions are crossed."""
     scene = SCENES[name]()
     times = np.linspace(0.0, scene.duration, 6)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)

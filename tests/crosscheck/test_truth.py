@@ -22,6 +22,7 @@ from tests.crosscheck.truth_scenes import ALL, DYNAMIC, Z, block, free, pendulum
 
 @pytest.mark.parametrize("name", ALL)
 def test_truth_satisfies_the_joints_at_three_levels(name):
+    """Violations over the length; rates relative to the spin, accelerations to its square."""
     scene = ALL[name]
     motion = truth_for(scene).poses(np.linspace(0.0, scene.duration, 41))
     spin = max(1.0, np.abs(motion.angular_velocity).max())
@@ -80,6 +81,7 @@ def test_velocities_and_accelerations_of_the_truth_are_difference_quotients(name
 
 @pytest.mark.parametrize("name", DYNAMIC)
 def test_truth_under_potential_loads_conserves_energy(name):
+    """Drift over the largest kinetic energy, at 301 samples."""
     scene = DYNAMIC[name]
     drift = energy_series(scene, truth_for(scene).poses(np.linspace(0.0, scene.duration, 301)))
     assert drift.max() < 1e-13, f"{name}: energy drifts by {drift.max()}, allowed 1e-13"
@@ -308,6 +310,7 @@ def test_symmetric_top_precesses_about_its_angular_momentum():
 
 
 def test_free_body_falls_and_keeps_energy_and_angular_momentum():
+    """The centre falls as r + v t + g t² / 2."""
     scene = free(gravity=(0.0, 0.0, -9.81), duration=5.0)
     t = np.linspace(0, 5.0, 40)
     motion = truth_for(scene).poses(t)

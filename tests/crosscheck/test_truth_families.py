@@ -65,6 +65,8 @@ def test_truth_does_not_depend_on_the_sign_of_an_axis(name):
     "name", ["four_bar", "spatial_slider_crank_driven", "pendulum_driven", "block_driven"]
 )
 def test_joint_seen_from_its_other_body_is_driven_backwards(name):
+    """With the bodies of each joint exchanged, the opposite driver gives the same motion."""
+
     def swapped(joint):
         axes = {"axes": joint.axes[::-1]} if isinstance(joint, Universal) else {}
         return joint.model_copy(update={"bodies": joint.bodies[::-1], **axes})

@@ -127,6 +127,7 @@ def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_famili
 
 
 def test_family_that_timed_out_is_abandoned():
+    """Its first run times out; no other is made."""
     engine = Modelled(slow=(4.0, 1.0, 1.0, 1.0))
     engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
@@ -153,6 +154,7 @@ def test_setting_between_two_is_their_geometric_mean():
 
 
 def test_coarser_setting_continues_the_ratio_up_to_the_longest_step_or_tolerance_0_5():
+    """Steps 0.025 and 0.1 s continue to 0.4 s, tolerances 0.01 and 0.1 to 0.5."""
     first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
     assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
     assert coarser(first, second, longest=0.2) == Setting("f", {"step": 0.2, "beta": 1.0, "hard": 1e-7})

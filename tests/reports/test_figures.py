@@ -53,6 +53,7 @@ def test_figure_is_not_blank_and_reproducible(name):
 
 
 def test_speed_plot_has_a_mark_for_each_run():
+    """Completed runs at their error and seconds; three failed ones in a strip, numbered by cause."""
     group = groups()[0]
     failures = speed.failed(group.runs)
     main, strip = speed.plot(group, failures).axes
@@ -69,6 +70,7 @@ def test_speed_plot_has_a_mark_for_each_run():
 
 
 def test_time_series_has_a_cross_where_a_run_ended_early():
+    """Only the best run of Exudyn, to 0.6 of the duration, ended early among those shown."""
     group = groups()[0]
     values = time_series.series(group, lambda run: [np.ones_like(run.trajectory.times)])
     [axes] = time_series.plot(group, values, ["one"]).axes

@@ -103,6 +103,7 @@ def tables(blocks: list, word: str) -> list[Table]:
 
 
 def test_score_counts_the_three_changed_cells(records):
+    """Two of them end at another time, one with another outcome."""
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score
     assert "2 the outcome at another time, 1 another outcome" in score, score

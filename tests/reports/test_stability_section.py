@@ -56,6 +56,7 @@ def test_stability_table_counts_right_ended_and_wrong_runs(snapshot):
 
 
 def test_sentence_says_if_no_other_method_completes_a_wrong_motion():
+    """Both runs, by taylor and by mpi-svd+none, have an error of 1e-9."""
     records = [record("gap", 1e-1, 1e-9), record("gap", 1e-1, 1e-9, family="mpi-svd+none")]
     sentences = [b.text for b in section.render(records) if isinstance(b, Text)]
     assert sentences[1] == (
