@@ -154,11 +154,7 @@ def test_printed_command_of_a_run_names_the_file_with_its_import_options(tmp_pat
 def sentence(scene, **changes) -> str:
     """Return the verdict on a run of the file: off by 20 mm and 0.03 rad, closures open by 1.2 mm."""
     settings = {"step": 0.004, "integrator": "Euler", "solref": "0.03 1", "file": "/robots/robot.xml"}
-    metrics = {
-        "error": 0.2,
-        "position_error": 0.02 / scene_length(scene),
-        "rotation_error": 0.03,
-    }
+    metrics = {"error": 0.2, "position_error": 0.02 / scene_length(scene), "rotation_error": 0.03}
     places, turns = initial_poses(scene)
     places[-1] += [0.0, 0.0012, 0.0]
     still = np.zeros_like(places)[None]

@@ -447,14 +447,7 @@ def test_compare_does_not_judge_an_adapter_that_loses_a_spring(capsys, tmp_path)
     Scene(
         name="later", body=(block,), joint=(hinge,), load=(later,), gravity=(0.0, -9.81, 0.0), duration=0.5
     ).save(tmp_path / "later.toml")
-    asked = (
-        "--engine",
-        "pinocchio",
-        "--engine",
-        f"{FAKES}:LOSES_LOADS",
-        "--setting",
-        "tuned",
-    )
+    asked = ("--engine", "pinocchio", "--engine", f"{FAKES}:LOSES_LOADS", "--setting", "tuned")
     status, out, err = run_main(capsys, "compare", str(tmp_path / "later.toml"), *asked)
     assert status == 1, (out, err)
     said = " ".join(out.split())

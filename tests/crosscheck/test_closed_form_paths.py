@@ -12,9 +12,7 @@ from crosscheck.judge.constraints import closure
 from crosscheck.judge.truth import closed_form
 from crosscheck.judge.truth.free_body import free_body
 from crosscheck.judge.truth.locked import locked
-from crosscheck.judge.truth.one_dof import (
-    one_dof,
-)
+from crosscheck.judge.truth.one_dof import one_dof
 from crosscheck.judge.truth.parallelogram import parallelogram
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
 from mbref import rotations

@@ -61,13 +61,6 @@ def test_column_turned_has_the_four_bar_rotated_about_the_origin() -> None:
     assert 0.3 < angle < 0.7
 
 
-def test_column_long_run_differs_from_the_four_bar_in_its_duration_alone() -> None:
-    by_heading = {column.heading: column.make() for column in DIFFICULTIES}
-    plain, long = by_heading["four-bar"], by_heading["long run"]
-    assert long.duration > plain.duration == 1.0
-    assert long.with_(name=plain.name, duration=1.0) == plain
-
-
 @pytest.mark.parametrize(
     ("record", "text"),
     [

@@ -10,15 +10,7 @@ import pytest
 from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document
 from crosscheck.convergence.document import cell, order
-from crosscheck.convergence.ladders import (
-    FILE,
-    MECHANISMS,
-    ROWS,
-    VAIN,
-    climb,
-    in_vain,
-    ladder,
-)
+from crosscheck.convergence.ladders import FILE, MECHANISMS, ROWS, VAIN, climb, in_vain, ladder
 from crosscheck.engine import engine
 from crosscheck.study.grid import Case
 

@@ -27,6 +27,7 @@ FINE = {
     "pinocchio": Setting("tuned", {"rtol": 1e-11, "min_step": 1e-4}),
     "simbody": Setting("merson", {"accuracy": 1e-10}),
 }
+FAMILIES = {"mujoco": "projected", "exudyn": "tuned"}  # whose finest settings are used
 MODULES = {"drake": "pydrake", "dart": "dartpy", "pinocchio": "pinocchio", "simbody": "opensim"}
 LACKS = {"pinocchio": ("coupling",), "simbody": ("armature",)}  # missing in the engines
 APART = 1e-13  # m; difference of both formulations of the reference
@@ -84,15 +85,16 @@ def refused_parts(name, scene):
 
 
 @every
-@pytest.mark.parametrize("name", FINE)
-def test_tree_engines_move_coupled_joints_as_the_reference_or_refuse_them(name, make):
-    pytest.importorskip(MODULES[name])
+@pytest.mark.parametrize("name", [*FINE, *FAMILIES])
+def test_engines_move_coupled_joints_as_the_reference_or_refuse_them(name, make):
+    pytest.importorskip(MODULES.get(name, name))
     scene, simulator = make().with_(duration=0.4), engine(name)
     if lacking := refused_parts(name, scene):
         refusal = simulator.cannot(scene)
         assert refusal is not None and refusal.owner is Owner.ENGINE and lacking[0] in refusal.reason
         return
-    run = simulator.run(scene, np.array([0.0, 0.2, 0.4]), FINE[name])
+    fine = FINE[name] if name in FINE else simulator.settings_of(scene, FAMILIES[name])[-1]
+    run = simulator.run(scene, np.array([0.0, 0.2, 0.4]), fine)
     found = measure(scene, run, truth_for(scene))
     assert found["error"] <= ENGINES and found["violation_position"] <= ENGINES, (found, run.message)
     assert found["reaction_error"] is None or found["reaction_error"] <= 1e-6, found
@@ -124,24 +126,6 @@ def test_bullet_moves_coupled_joints_to_first_order_or_refuses_armatures(make):
         errors.append(found["error"])
         assert found["violation_position"] < 1e-7, found
     assert errors[1] < 3e-3 and errors[0] / errors[1] == pytest.approx(2.0, abs=0.1), errors
-
-
-@every
-def test_mujoco_moves_coupled_joints_as_the_reference(make):
-    scene, mujoco = make().with_(duration=0.8), engine("mujoco")
-    found = measure(
-        scene, mujoco.run(scene, TIMES, mujoco.settings_of(scene, "projected")[-1]), truth_for(scene)
-    )
-    assert found["error"] <= ENGINES and found["violation_position"] <= ENGINES, found
-
-
-@every
-def test_exudyn_moves_coupled_joints_as_the_reference(make):
-    scene, exudyn = make(), engine("exudyn")
-    scene = scene.with_(duration=0.5)
-    run = exudyn.run(scene, np.array([0.0, 0.2, 0.5]), exudyn.settings_of(scene, "tuned")[-1])
-    found = measure(scene, run, truth_for(scene))
-    assert found["error"] <= ENGINES and found["reaction_error"] <= 1e-5, found
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -10,21 +10,10 @@ import pytest
 
 from crosscheck.engines.constraint_equations import frames as body_frames
 from crosscheck.engines.generalised_forces import Forces
-from crosscheck.engines.symbolic.equations import TreeEquations, solved
-from crosscheck.engines.symbolic.frames import Turned, turn
+from crosscheck.engines.symbolic.equations import TreeEquations
 from crosscheck.engines.symbolic.symbols import NUMBERS
 from mbref import rotations
-from mbref.scene import (
-    Body,
-    Driver,
-    Force,
-    Moment,
-    Revolute,
-    Scene,
-    Spherical,
-    TorsionSpring,
-    Translational,
-)
+from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, Spherical, TorsionSpring, Translational
 
 G = 9.0
 CART = Body(name="cart", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
@@ -111,36 +100,10 @@ def test_no_symbolic_equations_are_derived_for_free_bodies_drivers_and_forces(
         TreeEquations(crane(**parts))
 
 
-def test_symbolic_solution_of_a_symmetric_system_equals_numpys() -> None:
-    matrix = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, 0.25], [0.5, 0.25, 2.0]])
-    right = np.array([1.0, -2.0, 3.0])
-    assert solved(matrix, right).astype(float) == pytest.approx(np.linalg.solve(matrix, right))
-
-
-def test_rotations_about_one_axis_are_joined_by_adding_their_angles() -> None:
-    """0.25 and 0.5 rad about z give 0.75 rad, and 0.5 rad about -z gives -0.25 rad; others do not join."""
-    z = np.array([0.0, 0.0, 1.0])
-    first = Turned(np.eye(3), z, 0.25)
-    for axis, angle in ((z, 0.75), (-z, -0.25)):
-        again = first.further(axis, 0.5)
-        assert again is not None and again.angle == angle and again.axis is z
-    assert first.further(np.array([0.0, 0.6, 0.8]), 0.5) is None
-
-
-def test_symbolic_rotation_matrix_equals_that_of_the_rotation_vector() -> None:
-    axis = np.array([0.6, 0.0, 0.8])
-    wanted = rotations.to_matrix(rotations.from_vector(0.7 * axis))
-    assert turn(axis, 0.7, NUMBERS).astype(float) == pytest.approx(wanted)
-
-
 # --- Forces on bodies -------------------------------------------------------------------------------------
 HALF = math.sqrt(0.5)
 TURNED = Body(
-    name="b",
-    mass=2.0,
-    inertia=(1.0, 2.0, 3.0),
-    position=(1.0, 0.0, 0.0),
-    orientation=(HALF, 0.0, 0.0, HALF),
+    name="b", mass=2.0, inertia=(1.0, 2.0, 3.0), position=(1.0, 0.0, 0.0), orientation=(HALF, 0.0, 0.0, HALF)
 )
 HINGE = Revolute(name="H", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 2.0))
 

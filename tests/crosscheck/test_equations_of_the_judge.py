@@ -258,12 +258,6 @@ def test_turns_are_unknown_where_rates_near_a_step_differ_by_half_a_turn(rate, k
     assert np.isnan(found).tolist() == [False] * known + [True] * (6 - known)
 
 
-@pytest.mark.parametrize(("rate", "angle"), [(15.6, 0.5), (15.8, math.nan)])
-def test_turns_before_a_first_sample_after_zero_are_unknown_above_half_a_turn(rate, angle):
-    found = joint_coordinates.counted(np.array([0.2]), np.array([0.5]), np.array([rate]))
-    assert found == pytest.approx([angle], nan_ok=True)
-
-
 # --- loads ------------------------------------------------------------------------------------------------
 def at_state(
     scene: Scene, *, turn=UNIT, place=None, velocity=(0.0, 0.0, 0.0), spin=(0.0, 0.0, 0.0), angles=()

@@ -8,15 +8,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from mbref import rotations
-from mbref.scene import (
-    JOINT_TYPES,
-    Body,
-    Driver,
-    Moment,
-    Revolute,
-    Scene,
-    Sine,
-)
+from mbref.scene import JOINT_TYPES, Body, Driver, Moment, Revolute, Scene, Sine
 from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 

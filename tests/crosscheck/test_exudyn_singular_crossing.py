@@ -8,7 +8,6 @@ import pytest
 from crosscheck.conformance.random_scenes import mechanism
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
-from crosscheck.engines.exudyn.dynamic import stretches
 from crosscheck.engines.exudyn.singular_crossing import UPRIGHT, extrapolated_states, projected
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses
 from crosscheck.judge.metrics import error_series, measure
@@ -112,10 +111,3 @@ def test_projection_moves_a_light_rod_and_not_a_heavy_flywheel():
     rough[1, :2] += ROUGH
     crank = np.abs(projected(scene, 0.5, rough, rates)[0][0] - coordinates[0]).max()
     assert crank < 1e-3 * ROUGH, f"the flywheel moved by {crank:.1e} of {ROUGH:g}"
-
-
-def test_stretches_join_evenly_spaced_samples():
-    """From 0.9 s, three samples every 0.1 s, and one after 0.3 s."""
-    times = np.array([1.0, 1.1, 1.2, 1.5])
-    found = [(round(a, 12), round(b, 12), n) for a, b, n in stretches(times, 0.9)]
-    assert found == [(0.9, 1.2, 3), (1.2, 1.5, 1)], found

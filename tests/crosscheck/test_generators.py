@@ -87,13 +87,6 @@ def test_generated_code_moves_alike_for_samples_that_begin_later_or_end_at_the_s
     assert np.array_equal(start.position[0], whole.position[0])
 
 
-def test_heyokas_settings_have_ever_smaller_tolerances() -> None:
-    needs("heyoka")
-    found = engine("heyoka").settings_of(SCENES["planar_slider_crank_gravity"](), "taylor")
-    rtols = [setting.options["rtol"] for setting in found]
-    assert rtols == sorted(rtols, reverse=True) and len(rtols) > 3, rtols
-
-
 @pytest.mark.parametrize("name", GENERATORS)
 def test_an_engine_with_generated_code_serves_all_its_families_and_refuses_others(name: str) -> None:
     needs(name)

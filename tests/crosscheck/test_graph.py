@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.initial_velocities import initial_rates, lacks_mass, twist_maps
+from crosscheck.engines.initial_velocities import initial_rates, twist_maps
 from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
@@ -204,16 +204,6 @@ def test_rate_and_acceleration_of_a_driver_are_differences_of_its_values(c, ampl
     assert abs(acceleration - bend) < 1e-3, f"acceleration {acceleration} against their bend {bend}"
 
 
-def test_a_scene_without_masses_needs_its_whole_motion_driven() -> None:
-    bare = {"mass": None, "inertia": None}
-    prescribed, open_ = (
-        s.with_(body=tuple(b.model_copy(update=bare) for b in s.body))
-        for s in (SCENES["four_bar"](), SCENES["four_bar_gravity"]())
-    )
-    assert lacks_mass(prescribed) is None, f"a driven four-bar was refused: {lacks_mass(prescribed)}"
-    assert "crank" in str(lacks_mass(open_)), f"an undriven four-bar without masses: {lacks_mass(open_)}"
-
-
 @given(graphs(), st.sampled_from([(), ("spherical", "revolute")]))
 def test_a_tree_that_is_cut_between_links_has_no_closure_at_the_ground(scene, closes):
     tree = spanning_tree(scene, closes, between_links=True)
@@ -246,11 +236,7 @@ def test_a_body_with_two_hinges_to_the_ground_is_split_if_the_ground_is_never_cu
     """Body a has 0.5 kg on either side of the weld; the other loops are cut at hinges between links."""
     two_loops = hinged(("ground", "a"), ("a", "ground"), ("a", "b"), ("b", "ground"), ("b", "a"))
     found = spanning_tree(two_loops, ("revolute",), between_links=True)
-    assert [(c.kind, c.joint) for c in found.closures] == [
-        ("weld", 1),
-        ("revolute", 2),
-        ("revolute", 4),
-    ]
+    assert [(c.kind, c.joint) for c in found.closures] == [("weld", 1), ("revolute", 2), ("revolute", 4)]
     assert sorted(link.mass for link in found.links) == [0.5, 0.5, 1.0]
 
 

@@ -60,16 +60,8 @@ def runner_with(defect, monkeypatch):
     ("defect", "names", "says"),
     [
         ("gravity", ("pendulum",), "look at the gravity: gravity left out explains"),
-        (
-            "gyroscopic",
-            ("tumbling body",),
-            "velocity terms: the gyroscopic moments ω × Jω of opposite",
-        ),
-        (
-            "gamma",
-            ("spinning loop",),
-            "velocity terms: the velocity part of γ in J a = γ left out",
-        ),
+        ("gyroscopic", ("tumbling body",), "velocity terms: the gyroscopic moments ω × Jω of opposite"),
+        ("gamma", ("spinning loop",), "velocity terms: the velocity part of γ in J a = γ left out"),
         (
             "driver",
             ("driven", "cylindrical driver"),

@@ -101,30 +101,3 @@ ALL = (
         "block_driven": block(driver=(Driver(joint="line", sine=Sine(amplitude=0.3, frequency=4.0)),)),
     }
 )
-
-
-def turned_scene(scene, q):
-    """The same mechanism, rotated in space."""
-
-    def turn(v):
-        return None if v is None else tuple(rotations.rotate(q, np.array(v)))
-
-    def retyped(item):
-        keys = [k for k in ("anchor", "axis", "moment", "force", "point") if hasattr(item, k)]
-        pairs = [k for k in ("axes", "anchors", "points") if hasattr(item, k)]
-        both = {k: turn(getattr(item, k)) for k in keys}
-        return item.model_copy(update=both | {k: tuple(map(turn, getattr(item, k))) for k in pairs})
-
-    bodies = [
-        b.model_copy(
-            update={k: turn(getattr(b, k)) for k in ("position", "velocity", "angular_velocity")}
-            | {"orientation": tuple(rotations.multiply(q, b.orientation))}
-        )
-        for b in scene.body
-    ]
-    return scene.with_(
-        body=tuple(bodies),
-        joint=tuple(map(retyped, scene.joint)),
-        load=tuple(map(retyped, scene.load)),
-        gravity=turn(scene.gravity),
-    )
