@@ -113,8 +113,7 @@ def test_acceleration_residual_is_finite_difference_of_velocity_residual(kind, b
 
 @given(vector=st.tuples(*[st.floats(-1.7, 1.7)] * 3), shift=st.tuples(*[st.floats(-1, 1)] * 3))
 def test_fixed_joint_residual_is_the_displacement_put_in(vector, shift):
-    """A body is turned and shifted: the norms of the residual's halves are the shift (m) and the angle
-    (rad)."""
+    """A body is turned and shifted: the its residual's halves have the norms of shift (m) and angle (rad)."""
     scene = jointed("fixed", ("ground", "second"))
     position, orientation = constraints.initial_poses(scene)
     turn = rotations.from_vector(np.array(vector))

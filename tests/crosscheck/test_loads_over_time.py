@@ -78,6 +78,7 @@ SMOOTH = ("slide_spring load", "joint_torque load", "joint_force load", "polynom
 @pytest.mark.parametrize("name", SMOOTH)
 @pytest.mark.parametrize("on_terms", ["drake", "dart"])
 def test_integrated_accelerations_of_drake_and_dart_move_joint_loads_as_the_reference(on_terms, name):
+    """Crosscheck integrates the accelerations of their own mass matrices and forces."""
     pytest.importorskip({"drake": "pydrake", "dart": "dartpy"}[on_terms])
     check(on_terms, PROBES[name].with_(duration=0.2), 1e-10)
 

@@ -71,8 +71,7 @@ def test_ondsel_stays_within_its_measured_error_of_the_truth(name: str) -> None:
 
 
 def test_uneven_sample_times_leave_the_error_at_rounding() -> None:
-    """OndselSolver takes even spacings only: at each change the adapter starts a new analysis from the pose
-    reached."""
+    """OndselSolver takes even spacings only: the adapter starts a new analysis at each change of spacing."""
     scene = SCENES["four_bar"]()
     times = np.array([0.003, 0.004, 0.011, 0.02, 0.03, 0.057, 0.0999])
     run = simulate(scene, times, 5e-4)
@@ -198,8 +197,7 @@ def test_ondsel_refuses_a_distance_joint() -> None:
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "four_bar_straight"])
 def test_ondsel_refuses_motions_that_drivers_do_not_determine(name: str) -> None:
-    """The straight four-bar is driven, but its branch is open at the start, where OndselSolver takes the
-    wrong one."""
+    """The driven straight four-bar starts between two branches, of which OndselSolver takes the wrong one."""
     refusal = engine("ondsel").cannot(SCENES[name]())
     assert refusal is not None and refusal.owner is Owner.ENGINE, refusal
 

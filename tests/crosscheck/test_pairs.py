@@ -100,8 +100,7 @@ def check(name: str, mechanism: Scene) -> None:
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("pair", PAIRS)
 def test_both_loads_of_a_pair_act(name, pair):
-    """The truth is the motion by Gauss's principle with both loads; an engine that refuses the pair is
-    skipped."""
+    """The truth is the motion by Gauss's principle with both loads; engines that refuse it are skipped."""
     check(name, scene(load=PAIRS[pair]))
 
 

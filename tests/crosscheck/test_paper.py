@@ -54,8 +54,7 @@ def test_run_matches_a_cell_of_the_paper_by_outcome_and_end_time(cell, outcome, 
 
 
 def test_every_cell_of_the_paper_has_a_run_of_its_method():
-    """Its method, with partitioning for rows "CP", no masses (M = I), and one set of options for all
-    cells."""
+    """Its method, with partitioning for "CP", no masses (M = I), and one set of options for all cells."""
     tables = runs.tables()
     for cell in CELLS:
         case = tables[Label(cell.table, cell.row, cell.column)]

@@ -43,8 +43,7 @@ def test_runs_along_both_branches_part_at_the_crossing(run, tmp_path):
 
 
 def test_worst_run_is_shown_by_its_poses_alone(run):
-    """The run of largest error, at the times of the truth's motion; a run that crashed has no poses to
-    show."""
+    """The run of largest error, at the times of the truth's motion; a crashed run has no poses to show."""
     case, record = run
     worse = {**record, "metrics": {**record["metrics"], "error": 1.0}}
     coarse = case._replace(setting=Setting("taylor", {"rtol": 1e-3}))

@@ -121,8 +121,7 @@ def test_a_second_planar_joint_in_the_same_plane_changes_nothing(name: str) -> N
 
 
 def guided() -> tuple[Scene, Scene]:
-    """A slider-crank of revolutes, and the same with a plane in place of the slider's guide: one redundant
-    row instead of three."""
+    """A slider-crank of revolutes, and one with a plane as the slider's guide: 3 and 1 redundant rows."""
     base = SCENES["planar_slider_crank_gravity"]()
     a, b, c, d = base.joint
     end = Revolute(name="C", bodies=c.bodies, anchor=c.anchor, axis=(0.0, 0.0, 1.0))

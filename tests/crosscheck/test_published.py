@@ -50,6 +50,7 @@ BRIEF = {"andrews_squeezer": 0.01, "flyball_governor": 0.05, "heavy_top": 0.1}  
 
 @pytest.mark.parametrize("name", FREEDOMS)
 def test_freedoms_and_redundant_rows_are_as_published(name):
+    """FREEDOMS has both numbers from the publications."""
     counts = SCENES[name]().counts()
     assert (counts.degrees_of_freedom, counts.redundant) == FREEDOMS[name]
 

@@ -43,8 +43,7 @@ def check(seeds: Sequence[int]) -> None:
 
 
 def test_engines_accelerate_six_random_mechanisms_as_mbref():
-    """Initial accelerations of three engines and by Gauss's principle; every joint type, one to three
-    loops."""
+    """Initial accelerations, also by Gauss's principle; every joint type, one to three loops."""
     scenes = list(map(random_mechanism, SOME))
     assert {joint.type for scene in scenes for joint in scene.joint} == set(KINDS)
     assert {len(scene.joint) - len(scene.body) for scene in scenes} == {1, 2, 3}

@@ -118,8 +118,7 @@ def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
 
 
 def test_steady_pose_of_the_governor_stays_steady_when_integrated():
-    """Over 0.2 s of the judge's own integration, a ball's distance from the axis and the sleeve's height
-    stay."""
+    """Over 0.2 s of the judge's integration a ball's distance from the axis and the sleeve's height stay."""
     [each] = [e for e in steady_poses(governor(), starts=1) if e.stability == "stable"]
     scene = at_pose(each.balance, each.state)
     moved = gauss_motion(scene, (0.0, 0.2))
@@ -130,8 +129,7 @@ def test_steady_pose_of_the_governor_stays_steady_when_integrated():
 
 @pytest.mark.parametrize("name", ["mujoco", "pinocchio", "exudyn"])
 def test_engine_s_accelerations_give_the_judge_s_eigenvalues(name):
-    """Differences of its accelerations about the judge's pose, of a pendulum at rest and of one that
-    turns."""
+    """Differences of its accelerations about the judge's poses of a resting and of a turning pendulum."""
     pytest.importorskip(name)
     for scene in (pendulum(), turning_pendulum()):
         each = steady_poses(scene, starts=1)[0]
@@ -195,6 +193,7 @@ def test_poses_of_a_slider_crank_close_its_joints_and_hang_or_stand():
 
 
 def test_differences_of_mujoco_s_accelerations_include_dampers():
+    """The judge's eigenvalues of two damped slides are the truth."""
     [slides] = steady_poses(damped_slides(), starts=1)
     found = by_accelerations(engine("mujoco"), slides)
     assert found.eigenvalues is not None and error(found.eigenvalues, slides.eigenvalues) < 1e-9
@@ -208,8 +207,7 @@ def test_scene_at_an_equilibrium_starts_without_acceleration():
 
 
 def test_steady_rotation_has_the_second_body_s_sense():
-    """The joint's rate of 6 rad/s is that of its second body: with (spindle, ground) the spindle turns
-    back."""
+    """The rate of 6 rad/s is the second body's: with (spindle, ground) the spindle turns back."""
     scene = turning_pendulum()
     backwards = scene.joint[0].model_copy(update={"bodies": ("spindle", "ground")})
     assert np.allclose(turning(scene).spin, [0.0, 0.0, 6.0])
@@ -236,8 +234,7 @@ def test_horizontal_force_fixed_in_space_allows_no_steady_rotation():
 
 
 def test_page_on_small_motions_is_rendered_from_the_stored_records():
-    """The records have every mechanism; the judge is off the closed forms by less than 1e-13, mbref by
-    1e-11."""
+    """Every mechanism has a record; the judge is off the closed forms by at most 1e-13, mbref by 1e-11."""
     path = ROOT / "docs" / "small-motions.md"
     stored = records.read()
     assert path.read_text() == document.page(stored), (
@@ -252,8 +249,7 @@ def test_page_on_small_motions_is_rendered_from_the_stored_records():
 
 
 def test_modes_command_compares_a_scene_with_an_engine(tmp_path, capsys):
-    """Its table names pose, engine and judge; its JSON has mbref's error; without a scene it shows the stored
-    records."""
+    """A table of pose, engine and judge; JSON with mbref's error; without a scene the stored records."""
     path = str(tmp_path / "my.toml")
     pendulum().save(path)
     assert main(["modes", path, "--engine", "mujoco", "--starts", "3"]) == 0

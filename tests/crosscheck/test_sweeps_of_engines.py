@@ -20,8 +20,7 @@ def able(name: str, scene: str) -> bool:
 
 @pytest.mark.parametrize("name", [n for n in engine_names() if n != WITHOUT_RUNS])
 def test_families_are_swept_from_coarse_to_fine(name: str) -> None:
-    """Within a family one option (step, tolerance or accuracy) falls from setting to setting, at least
-    thrice."""
+    """Within a family one option (step, tolerance, accuracy) falls over three settings or more."""
     if not installed(name):
         pytest.skip(f"{name} is not installed")
     simulator, count = engine(name), 0

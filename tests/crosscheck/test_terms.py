@@ -150,8 +150,7 @@ def test_first_step_of_an_engine_has_gauss_s_accelerations(name: str, label: str
 @pytest.mark.parametrize("name", [of("drake"), of("dart"), of("bullet")])
 @pytest.mark.parametrize(("label", "measured"), [("ring revolute", 1.1e-2), ("every joint", 2.3e-2)])
 def test_engine_s_own_steps_converge_with_first_order(name: str, label: str, measured: float) -> None:
-    """Half of a step of 2 ms leaves half of the error, of which ``measured`` is the largest of the
-    engines."""
+    """Half of a step of 2 ms leaves half of the error; ``measured`` is the largest of the engines."""
     scene, errors = scenes()[label], []
     for step in (2e-3, 1e-3):
         run = simulate(name, scene, own_step(name, step), 0.0, 0.2, 0.4)
@@ -162,8 +161,7 @@ def test_engine_s_own_steps_converge_with_first_order(name: str, label: str, mea
 
 @pytest.mark.parametrize("name", [of("dart"), of("bullet")])
 def test_engine_s_own_steps_follow_drivers_with_first_order(name: str) -> None:
-    """Joints and drivers are violated by 1.3e-4, measured; half of the step leaves at most 1 / 1.8 of the
-    error."""
+    """Joints and drivers are violated by 1.3e-4, measured; half of the step leaves 1 / 1.8 of the error."""
     scene, errors = driven(), []
     for step in (2e-3, 1e-3):
         run = simulate(name, scene, own_step(name, step), 0.0, 0.2, 0.4)

@@ -36,8 +36,7 @@ class Oscillator:
 
 @pytest.mark.parametrize("numbers", [DOUBLE, EXTENDED], ids=lambda numbers: numbers.name)
 def test_panel_of_an_oscillator_is_the_cosine(numbers):
-    """x'' = -x from x = 1 at rest over 2 s: x = cos t, x' = -sin t, x'' = -cos t, to the panel's
-    tolerance."""
+    """Over 2 s from x = 1 at rest: x = cos t, x' = -sin t, x'' = -cos t, to the panel's tolerance."""
     panels = Panels(numbers, 34)
     guess = np.repeat(numbers.array([[1.0, 0.0]]), panels.count, axis=0)
     panel = panels.panel(Oscillator(), numbers.number(0.0), numbers.number(2.0), guess)
@@ -58,8 +57,7 @@ def test_panel_that_is_too_long_does_not_converge_and_asks_for_a_shorter_one():
 
 
 def test_continued_panel_is_within_its_stated_loss_of_digits():
-    """A panel to 2 s is continued by a factor of 1.3; the cosine at 2.6 s is within the digits stated as
-    lost."""
+    """A panel to 2 s is continued by a factor of 1.3; the cosine at 2.6 s is within the stated loss."""
     panels = Panels(EXTENDED, 34)
     guess = np.repeat(EXTENDED.array([[1.0, 0.0]]), panels.count, axis=0)
     panel = panels.panel(Oscillator(), EXTENDED.number(0.0), EXTENDED.number(2.0), guess)
@@ -82,8 +80,8 @@ def test_zero_of_a_signed_distance_is_a_singular_time():
 
 
 def test_bridged_rates_replace_wrong_ones_near_a_singular_time():
-    """Rates exp(x) are spoilt within 0.1 of a singular position at 0.1; the polynomial of the others has
-    them."""
+    """Rates exp(x), wrong within 0.1 of a singular position at 0.1, follow from the polynomial of the
+    others."""
     nodes = -np.cos(np.pi * np.arange(40) / 39)
     exact = np.exp(nodes)[:, None]
     distance = np.abs(nodes - 0.1)
@@ -104,8 +102,7 @@ def test_tree_formulation_crosses_singular_positions_on_the_smooth_branch(name):
 
 
 def test_tree_formulation_crosses_the_dead_positions_of_equal_crank_and_rod():
-    """Picard's iteration does not converge across these positions, on however short a panel; the truth is the
-    closed form."""
+    """Picard's iteration converges on no panel across these positions; the truth is the closed form."""
     scene, times = SCENES["planar_slider_crank_equal"](), np.linspace(0.0, 0.14, 8)
     motion, exact = tree_motion(scene, times, EXTENDED, seconds=SECONDS), closed_form(scene).poses(times)
     assert not motion.reason

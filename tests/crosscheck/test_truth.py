@@ -133,8 +133,7 @@ def multipliers_rhs(scene):
     ],
 )
 def test_truth_is_the_motion_of_the_multiplier_equations(name, end):
-    """M a - Jᵀ λ = F and J a = γ of all bodies, integrated by scipy; the truth integrates a reduced
-    equation."""
+    """M a - Jᵀ λ = F, J a = γ of all bodies, integrated by scipy; the truth has a reduced equation."""
     scene = ALL[name]
     start = np.concatenate(
         [a.ravel() for a in (*constraints.initial_poses(scene), *constraints.initial_twists(scene))]

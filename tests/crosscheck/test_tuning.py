@@ -63,7 +63,7 @@ def found(engine: Modelled, level: float, *steps: float, ours: tuple[str, ...] =
 
 @pytest.mark.parametrize("level", [1e-2, 3e-4, 1e-6])
 def test_cheapest_step_is_found_inside_and_beyond_the_grid_of_steps(level):
-    """An error of h⁴ reaches the level at h = level^¼, found to 15 %; the grid of steps is finer, or around
+    """An error of h⁴ reaches the level at h = level^¼, found to 15 %; grids of steps are finer or around
     it."""
     best = level**0.25
     for steps in ((0.01, 0.003, 0.001), (0.9, 0.3, 0.1, 0.03, 0.01)):
@@ -205,8 +205,7 @@ def test_work_is_evaluations_otherwise_steps_otherwise_seconds():
 
 
 def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
-    """The block is h² m off, and tilted by 0.5 rad, which does not count: a gap of 1 mm is reached at √1e-3
-    s."""
+    """The block is h² m off: 1 mm at √1e-3 s; it is also tilted by 0.5 rad, which does not count."""
     scene = SCENE.with_(
         joint=[{"name": "A", "type": "fixed", "bodies": ["ground", "b"], "anchor": [2.0, 0.0, 0.0]}]
     )

@@ -162,7 +162,7 @@ def test_engine_that_moves_another_mechanism_is_not_judged():
 
 
 def test_distance_of_two_runs_is_measured_only_at_equal_times():
-    """Motions a and b are off the truth by 1e-3 and 2e-3 of the scene's length; c has other times."""
+    """a and b are off the truth by 1e-3 and 2e-3 of the length, so 1e-3 apart; c has other times."""
     first, second = (synthetic.record(name, "x", error, 0.1) for name, error in (("a", 1e-3), ("b", 2e-3)))
     scene, other = synthetic.scene(), {**first, "engine": "c", "times": [0.5 * t for t in first["times"]]}
     found = Judged(scene, {}, [first, second, other]).agreement()

@@ -51,8 +51,7 @@ def test_built_in_engine_violates_no_check_on_couplings(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILT_IN)
 def test_built_in_engine_violates_only_known_relations(name):
-    """Motions of changed scenes (turned, scaled, reversed, …) follow from the motion; KNOWN has the
-    reasons."""
+    """Motions of turned, scaled or reversed scenes follow from the motion; KNOWN has the reasons."""
     scenes = RELATED
     found = violations(name, scenes, related=True)
     assert set(found) == known(name, scenes), found

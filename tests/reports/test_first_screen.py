@@ -38,8 +38,7 @@ def test_matrix_of_the_first_screen_shows_grades_errors_and_ends():
 
 
 def test_opening_names_the_worst_run_and_who_is_right():
-    """On the spatial slider-crank mbref is off by 1e-3 / 8² at best, more than 1e-8; MuJoCo's defaults by
-    0.5."""
+    """At best mbref is off by 1e-3 / 8², which is more than 1e-8; MuJoCo's defaults are off by 0.5."""
     opening = one(Opening)
     assert opening.headline.startswith("No engine is right on every scene"), opening.headline
     assert "MuJoCo, defaults, off by 5.0e-01" in opening.caption, opening.caption

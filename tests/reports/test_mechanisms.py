@@ -20,8 +20,7 @@ from reports.runs import Run
 
 
 def test_exact_run_is_drawn_on_the_exact_motion():
-    """Run and truth have equal frames, one for each sample; the crank keeps its length up to a rounding of
-    px."""
+    """Run and truth have equal frames, one for each sample; the crank keeps its length up to rounding."""
     crank = scene("planar_slider_crank")
     true = exact(crank)
     picture = mechanisms.over_truth(crank, true, true, "mujoco")

@@ -69,8 +69,7 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
 
 @pytest.fixture(scope="module")
 def records() -> Records:
-    """Every cell as printed except for three: one ends late, one completes, one of Table III drifts
-    sooner."""
+    """Every cell as printed except for three: one ends late, one completes, one drifts sooner."""
     changed = {
         ("I", "MPI (SVD)", "θ₂ = π/4"): (Outcome.VIOLATION, 0.0566),
         ("II", "MPI (SVD) + CP", "five-bar"): (Outcome.COMPLETED, 20.0),
@@ -192,8 +191,7 @@ def test_incomplete_sweep_is_shown_as_far_as_it_got(records):
 
 
 def test_exact_crank_record_follows_the_true_branch(records):
-    """It leaves the true motion never ("–"), crosses 61 singular positions (θ = 61.0 π at 20 s), and has the
-    true rate."""
+    """It never leaves the true motion ("–"), crosses 61 singular positions (θ = 61.0 π), at the true rate."""
     [found] = [b for b in paper_cranks.render(records) if isinstance(b, Table)]
     assert {row[6] for row in found.rows} == {"–"}
     assert {row[7] for row in found.rows if row[0] == "a = b"} == {"61"}

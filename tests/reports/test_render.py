@@ -35,6 +35,7 @@ def written(parts: list[Block], tmp_path_factory: pytest.TempPathFactory) -> Pat
 
 
 def test_page_has_every_heading_figure_table_and_failed_run(written, parts):
+    """Six wide figures, three plots and a moving mechanism; the failed runs by outcome and message."""
     page = (written / "index.html").read_text()
     for block in parts:
         if isinstance(block, Heading):
@@ -96,8 +97,7 @@ def few(scenes, engines) -> selection.Sweep:
 
 
 def test_short_runs_are_timed_five_times_and_long_runs_once(tmp_path):
-    """Runs of 0.1, 0.2 and 0.5 s by a fake engine, and one of twice LONG; the stored time stays the
-    fake's."""
+    """A fake engine runs 0.1, 0.2, 0.5 s and twice LONG; the stored times stay its own."""
     cases, _ = few([still("still")], [FAKE])
     long = cases[0]._replace(setting=Setting("plain", {"seconds": 2 * LONG}))
     cases = [*cases, long]

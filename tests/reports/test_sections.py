@@ -103,8 +103,7 @@ def test_summary_shows_costs_errors_and_failures_of_the_records():
 
 
 def test_summary_shows_the_ratio_of_two_work_precision_curves():
-    """Times at 1e-3, half-way between 1e-2 and 1e-4 in both logarithms: √(0.02 · 0.2) s / √(0.01 · 0.04)
-    s."""
+    """Half-way between 1e-2 and 1e-4 in both logarithms: √(0.02 · 0.2) s / √(0.01 · 0.04) s."""
     slow = [record("a", "x", e, s, rtol=e) for e, s in ((1e-2, 0.02), (1e-4, 0.2))]
     fast = [record("b", "y", e, s, rtol=e) for e, s in ((1e-2, 0.01), (1e-4, 0.04))]
     [group] = by_scene([*slow, *fast], {scene().name: scene()})
@@ -151,8 +150,7 @@ def test_convergence_table_shows_the_orders_put_into_the_records():
 
 
 def test_limit_table_shows_the_bias_and_discretisation_put_in():
-    """Engine a: error 1e-4 + 1e-2 h, of which 1e-5 is discretisation at h = 1e-3. Engine b: 1e-2 h², no
-    bias."""
+    """Engine a: 1e-4 + 1e-2 h, of which 1e-5 is discretisation at h = 1e-3. Engine b: 1e-2 h², no bias."""
     soft = [record("a", "soft", 1e-4 + 1e-2 * h, 0.1, step=h) for h in (0.04, 0.02, 0.001)]
     true = [record("b", "true", 1e-2 * h**2, 0.1, step=h) for h in (0.04, 0.02, 0.01)]
     [group] = by_scene([*soft, *true], {scene().name: scene()})
@@ -166,8 +164,7 @@ def test_limit_table_shows_the_bias_and_discretisation_put_in():
 
 
 def test_least_errors_table_shows_best_settings_and_failures():
-    """mbref: 1e-3 / 8² at the step 0.1 / 2²; no family within 1e-8. Exudyn's run that got farthest ended at
-    0.6 · 0.02 s."""
+    """mbref: 1e-3 / 8² at step 0.1 / 2², no family within 1e-8. Exudyn's last run ended at 0.6 · 0.02 s."""
     found, others = (table(least_errors.render(groups()), name) for name in ("Families", "Within 1e-08"))
     rows = {row[1]: dict(zip(found.header, row, strict=True)) for row in found.rows[:3]}
     assert {row[0] for row in found.rows[:3]} == {"spatial_slider_crank"}
@@ -192,6 +189,7 @@ def test_summary_says_if_engines_move_different_mechanisms(shifts, words):
 
 
 def test_model_check_that_timed_out_is_no_difference():
+    """One engine's short motion is the truth; another's run timed out."""
     late = {**nothing("c", "x"), "outcome": "TIMED_OUT"}
     [group] = by_scene(records()[:3], {scene().name: scene()}, [at_gate(0.0), late])
     assert group.difference() is None
@@ -252,8 +250,7 @@ def test_provenance_lists_versions_machine_settings_and_seed():
 
 
 def test_runs_over_a_hundred_tolerances_are_counted():
-    """rtol 1e-6: errors of 0.9e-4 (within) and 1.1e-4 (over). A failed run and one without rtol do not
-    count."""
+    """rtol 1e-6: 0.9e-4 is within, 1.1e-4 over. A failed run and one without rtol do not count."""
     asked = [record("a", "b", error, 1.0, rtol=1e-6) for error in (0.9e-4, 1.1e-4)]
     failed = record("a", "b", 1e-3, 1.0, rtol=1e-6, outcome=Outcome.NOT_CONVERGED)
     runs = [Run(r) for r in (*asked, failed, record("a", "c", 1e-3, 1.0, step=1e-6))]
