@@ -127,6 +127,7 @@ def thrown_off_a_hinge(off: float) -> Scene:
 
 
 def test_initial_velocity_four_percent_off_a_hinge_is_rounded_onto_it():
+    """0.12 m/s along the axis, of 3 m/s, are taken for rounding."""
     assert constraints.initial_twists(thrown_off_a_hinge(0.04))[0][0] == pytest.approx([0.0, 3.0, 0.0])
 
 

@@ -102,7 +102,7 @@ def test_four_bar_with_diagonal_spring_has_its_closed_form_eigenvalues():
 
 
 def test_ball_on_a_turning_spindle_has_the_roots_of_euler_s_equations():
-    """s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), seen from the spindle."""
+    """s = ± i Ω and s² = -Ω² (C - A) (C - B) / (A B), seen from the spindle, and a double zero of turning."""
     rate, (a, b, c) = 6.0, (0.02, 0.03, 0.045)
     bodies = [
         {"name": "spindle", "mass": 1.0, "inertia": [0.1] * 3, "position": [0.0, 0.0, 1.0]},

@@ -23,11 +23,11 @@ def grids(monkeypatch: pytest.MonkeyPatch):
 
 
 def test_speed_comparison_assigns_families_to_their_integrators(monkeypatch: pytest.MonkeyPatch):
+    """An engine's own, crosscheck's around compiled code, or crosscheck's in Python; mbref's families are the
+    Taylor series and other methods."""
     monkeypatch.syspath_prepend(str(BENCHMARKS))
     from speed import COMPILED_HERE, OPPONENTS, OURSELVES, OWN, _integrator
 
-    """An engine's own, crosscheck's around compiled code, or crosscheck's in Python; mbref's families are the
-    Taylor series and other methods."""
     assert _integrator("mujoco", "tuned") == _integrator("mbref", "taylor") == OWN
     assert (
         _integrator("pinocchio", "tuned, compiled")

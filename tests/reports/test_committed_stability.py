@@ -27,10 +27,10 @@ def test_text_is_rendered_from_the_records(records):
 
 
 def test_every_method_has_a_stored_run_at_every_difficulty(records):
+    """All of them were made from one commit without changes ("+")."""
     found = {(record["scene"], record["family"]) for record in records if record["engine"] == stability.MBREF}
     missing = {(scene.name, method) for scene in stability.scenes() for method in stability.METHODS} - found
     assert not missing, missing
-    """All of one clean commit."""
     [commit] = {record["commit"] for record in records}
     assert "+" not in commit, f"made from a clean checkout: {commit}"
     assert (FOLDER / stability.FILE).stat().st_size < 3e6

@@ -63,6 +63,7 @@ def test_marks_of_the_speed_figure_have_the_records_errors_and_times():
 
 
 def test_every_run_has_a_card_with_the_command_that_repeats_it():
+    """The command has scene, engine, setting, samples and duration of the record."""
     records = [block for block in blocks(groups(), ["records"]) if isinstance(block, Record)]
     assert sum(len(record.cards) for record in records) == sum(len(group.runs) for group in groups())
     [card, *_] = records[0].cards

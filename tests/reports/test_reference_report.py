@@ -53,9 +53,9 @@ def test_committed_records_are_of_the_current_scenes(groups):
 
 
 def test_report_s_records_are_of_one_clean_commit_that_the_readme_states(groups):
+    """A "+" marks a commit with changes. The folder has at most 15 MB."""
     commits = {run.record["commit"] for group in groups for run in group.runs}
     [commit] = commits
-    """Commits with "+" were not clean."""
     assert "+" not in commit
     text = (FOLDER / "report.md").read_text()
     assert f"records of commit {commit}, " in text, "the report names the commit of its records"
