@@ -167,7 +167,7 @@ def whole(least: int, most: int) -> Callable[[str], int]:
 
 def number(most: float, unit: str = "", zero: bool = False) -> Callable[[str], float]:
     """Return a parser of positive numbers up to ``most``, also of 0 if ``zero``; ``unit`` is printed."""
-    ends = f"must be {'not negative' if zero else 'positive'} and at most {most:g}{unit and ' ' + unit}"
+    ends = f"must be {'from 0 to' if zero else 'positive and at most'} {most:g}{unit and ' ' + unit}"
 
     def parsed(text: str) -> float:
         try:

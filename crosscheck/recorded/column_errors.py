@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from crosscheck.recorded.number_formats import WHOLE
 
@@ -108,7 +107,7 @@ class Compared:
         return ColumnError(name, largest, float(self.bound[name][k]), float(allowed[k]), at, rounded, coarse)
 
 
-def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, BSpline]) -> Compared:
+def aligned(compared: Compared, half: np.ndarray, later: Mapping[str, Callable[..., np.ndarray]]) -> Compared:
     """Return the comparison at times within the rounding ``half`` (k,) of the written times.
 
     Evenly spaced times count as exact. Other times are moved one by one. All columns of a sample are compared

@@ -10,6 +10,7 @@ from crosscheck.judge.constraints import joint_coordinates, joint_rates, scene_l
 from crosscheck.judge.joint_coordinates import COORDINATES
 from crosscheck.judge.start import start_coordinates, started
 from crosscheck.recorded.actions import action_names, actions
+from crosscheck.recorded.reactions import reaction_names, reactions
 from mbref.scene import JointLoad, Scene
 from mbref.scene_joints import ANGLE, DISPLACEMENT
 from mbref.trajectory import Trajectory
@@ -47,6 +48,7 @@ SI = {
     "length_rate": "m/s",
     "force": "N",
     "torque": "N m",
+    "moment": "N m",
     "power": "W",
     "kinetic_energy": "J",
     "potential_energy": "J",
@@ -77,11 +79,11 @@ def names(scene: Scene) -> list[str]:
     moving = [joint for joint in scene.joint if joint.facts.coordinates]
     found += [f"{joint.name}.{kind}" for joint in moving for kind in COORDINATES]
     found += [f"{joint.name}.{RATES[kind]}" for joint in moving for kind in joint.facts.coordinates]
-    return found + action_names(scene)
+    return found + action_names(scene) + reaction_names(scene)
 
 
 def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = None) -> dict[str, np.ndarray]:
-    """Return columns (k,) of a motion, in SI units: all columns, or at least the ``wanted`` ones."""
+    """Return columns (k,) of a motion, in SI units: all but reactions, or at least the ``wanted`` ones."""
     found: dict[str, np.ndarray] = {}
     for b, body in enumerate(scene.body):
         for kind, axes in VECTORS.items():
@@ -100,7 +102,7 @@ def values(scene: Scene, motion: Trajectory, wanted: Collection[str] | None = No
                     found[f"{joint.name}.{RATES[kind]}"] = rates[joint.name][:, i]
     if wanted is None or not set(wanted) <= set(found):
         found.update(actions(scene, motion, found))
-    return found
+    return {**found, **reactions(scene, motion, wanted or ())}
 
 
 def start_columns(scene: Scene) -> dict[str, float]:

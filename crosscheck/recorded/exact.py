@@ -57,7 +57,7 @@ def dense_exact(
     """Return the exact motion at the times (k,) and at further times from 0 on, and its columns.
 
     The further times are so dense that full turns of joints are counted, whatever the given times are.
-    ``wanted`` are the columns that are needed, by default all.
+    ``wanted`` are the columns that are needed, by default all but reactions of joints.
     """
     dense = DENSE
     while True:

@@ -122,17 +122,17 @@ class Difference:
         left = dict(self.squares)
         for name, column in self.signed(predicted).items():
             left[name] = self.left(name, column)
-            if left[name] > self._small(name):
+            if not self.is_small(name, left[name]):
                 return None
-        if any(left[n] > self._small(n) for n in left):
+        if not all(self.is_small(n, square) for n, square in left.items()):
             return None
         remains = float(np.sqrt(sum(left.values()) / total))
         return Explanation(sentence, remains, complexity) if remains <= ROUNDED else None
 
-    def _small(self, name: str) -> float:
-        """Return the mean square that an explanation may leave in a column, relative to its scale."""
+    def is_small(self, name: str, square: float) -> bool:
+        """Return whether an explanation may leave a mean square, relative to the scale, in a column."""
         mean = sum(self.squares.values()) / len(self.squares)
-        return max(LEFT**2 * max(self.squares[name], mean), self.noise[name])
+        return square <= max(LEFT**2 * max(self.squares[name], mean), self.noise[name])
 
     @property
     def bodies(self) -> list[str]:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import BSpline, make_interp_spline
 
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
@@ -21,9 +20,8 @@ from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.reading import Recording, read
 from crosscheck.recorded.search import SECONDS as SEARCHED
 from crosscheck.recorded.search import Search, search
+from crosscheck.recorded.splines import splines
 from mbref.scene import Scene, SceneError
-
-DEGREE = 5  # degree of the splines through the exact motion
 
 
 @dataclass(frozen=True)
@@ -144,7 +142,7 @@ def _judged(
     recorded = {n: recording.columns[n][known] for n in judged}
     rounding = {n: recording.rounding[n][known] if n in recording.rounding else 0 * times for n in judged}
     error = float(found.bound[places].max())
-    later = {n: _spline(found.motion.times, c) for n, c in whole.items()}
+    later = splines(scene, found.motion.times, whole)
     compared = Compared(
         times,
         recorded,
@@ -165,11 +163,3 @@ def _judged(
     left = tuple(n for n in recording.columns if n not in whole)
     until, searched = float(times[-1]), (causes.alike, causes.is_complete)
     return Judgement(errors, causes.explanations, until, found.reason, left, *searched)
-
-
-def _spline(times: np.ndarray, column: np.ndarray) -> BSpline:
-    """Return the spline of degree DEGREE, or less if there are few samples, through a column (k,)."""
-    if len(times) == 1:
-        return BSpline([0.0, 1.0], column, 0)
-    degree = min(DEGREE, len(times) - 1)
-    return make_interp_spline(times, column, degree - 1 + degree % 2)

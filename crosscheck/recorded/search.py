@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,7 +31,7 @@ class Search:
 
 
 def search(
-    scene: Scene, compared: Compared, later: dict[str, Callable[[np.ndarray], np.ndarray]], end: float
+    scene: Scene, compared: Compared, later: Mapping[str, Callable[[np.ndarray], np.ndarray]], end: float
 ) -> Search:
     """Return the simplest change that explains a table, within SECONDS of CPU time.
 
@@ -65,7 +65,7 @@ def _causes(scene: Scene, difference: Difference, found: list[tuple[Explanation,
 
 
 def _difference(
-    compared: Compared, later: dict[str, Callable[[np.ndarray], np.ndarray]], end: float
+    compared: Compared, later: Mapping[str, Callable[[np.ndarray], np.ndarray]], end: float
 ) -> Difference:
     """Return the difference at SAMPLES samples or fewer."""
     count = len(compared.times)

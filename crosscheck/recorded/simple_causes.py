@@ -3,7 +3,7 @@ interpolation, and the geometric ones."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -32,6 +32,7 @@ SHIFTS = np.linspace(-0.1, 0.1, 41)
 FASTER = 0.1  # largest relative error of a clock that is tried
 NEAR = 1e-3  # rad; rounding by which a wrapped angle may exceed its interval
 REFINED = 3  # intervals in which a fitted number is refined, each a thousandth of the former
+LISTED = 4  # exchanged columns that are named; of more, their bodies and joints are named
 INSIDE = 0.8  # least fraction of the samples at which a shifted motion is known
 
 
@@ -196,6 +197,39 @@ def _rotation_vectors(q: np.ndarray, first: float) -> np.ndarray:
     return np.hstack([first * angle, vectors])
 
 
+def _exchanges(d: Difference) -> Iterator[Stated]:
+    """Return columns that hold other columns of the exact motion, also of another quantity, body or joint."""
+    off = [n for n in d.recorded if not d.is_small(n, d.squares[n])]
+    names = [*off, *(n for n in d.recorded if n not in off)]
+    held: dict[str, str] = {}
+    for name in off:
+        ask()
+        held[name] = min(
+            (n for n in names if n != name), key=lambda n: d.left(name, d.exact[n]), default=name
+        )
+        if not d.is_small(name, d.left(name, d.exact[held[name]])):
+            return
+    if not held or all(_of_one_vector(*pair) for pair in held.items()):
+        return  # ``axes`` says which components are exchanged
+    title, other = ", ".join(held), ", ".join(held.values())
+    says = f"hold{'s' * (len(held) == 1)} {other} of the exact motion"
+    if len(held) == 2 and set(held) == set(held.values()):
+        title, says = " and ".join(held), "are exchanged"
+    elif len(held) > LISTED:
+        title, says = _parts(held), _parts(held.values())
+        title, says = f"columns of {title}", f"hold columns of {says} of the exact motion"
+    yield f"{title} {says}", 2, {n: d.exact[m] for n, m in held.items()}
+
+
+def _of_one_vector(first: str, second: str) -> bool:
+    return kind_of(first) in VECTORS and first.rpartition(".")[0] == second.rpartition(".")[0]
+
+
+def _parts(columns: Iterable[str]) -> str:
+    """Return the bodies, joints and loads of columns, in the order of the columns."""
+    return ", ".join(dict.fromkeys(n.partition(f".{kind_of(n)}")[0] for n in columns))
+
+
 def _interpolations(d: Difference) -> Iterator[Stated]:
     """Return all columns interpolated from every m-th row of the table, linearly or by the previous value."""
     times, exact = d.every or (d.times, d.exact)
@@ -225,4 +259,5 @@ FAMILIES_OF_CAUSES = (
     points,
     _interpolations,
     axes,
+    _exchanges,
 )

@@ -103,7 +103,8 @@ ERRORS = [("tune", "mbref", "four_bar", "--error"), ("judge", "four_bar", "run.c
 @pytest.mark.parametrize("text", ["1e20", "1.1", "inf", "nan", "-1e-3"])
 @pytest.mark.parametrize("command", ERRORS, ids=" ".join)
 def test_error_as_large_as_the_mechanism_is_refused(command, text: str, capsys):
-    assert "and at most 1, got " in refusal(capsys, *command[:-1], f"{command[-1]}={text}")
+    ends = "from 0 to 1" if command[-1] == "--tolerance" else "positive and at most 1"
+    assert f"must be {ends}, got {text}" in refusal(capsys, *command[:-1], f"{command[-1]}={text}")
 
 
 def test_closure_gap_longer_than_the_mechanism_is_refused(capsys):

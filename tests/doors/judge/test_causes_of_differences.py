@@ -221,3 +221,62 @@ def test_a_change_that_is_the_only_one_is_named() -> None:
             spinning_rod(), change(spinning_rod(), known("spinning_rod"))
         ).explanations
         assert says in found.sentence and found.remains < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (faster_clock, "all columns: the clock of the table is fast by 0.0001 of the time"),
+        (later, "all columns: later by 0.0225 s"),
+    ],
+)
+def test_a_clock_is_named_where_a_load_is_switched(
+    change: Callable[[Scene, Table], Table], says: str
+) -> None:
+    """Forces and accelerations leap where the motor is switched, also in the table of the other clock."""
+    (found,) = crosscheck.judge_motion(
+        switched_motor(), change(switched_motor(), known("switched_motor"))
+    ).explanations
+    assert found.sentence == says and found.remains < 1e-6
+
+
+def exchanged_columns(*pairs: tuple[str, str]) -> Table:
+    """Return columns of the double pendulum of which pairs are exchanged."""
+    table = known("double_pendulum")
+    found = {
+        n: c for n, c in table.items() if not n.endswith((".power", "energy")) and "acceleration" not in n
+    }
+    for first, second in pairs:
+        found[first], found[second] = table[second], table[first]
+    return found
+
+
+def upper_and_lower() -> list[tuple[str, str]]:
+    return [
+        (f"upper.{kind}.{axis}", f"lower.{kind}.{axis}")
+        for kind in ("position", "velocity")
+        for axis in "xyz"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("pairs", "says"),
+    [
+        ([("A.angle", "B.angle")], "A.angle and B.angle are exchanged"),
+        ([("A.rate", "lower.position.y")], "lower.position.y and A.rate are exchanged"),
+        (upper_and_lower(), "columns of upper, lower hold columns of lower, upper of the exact motion"),
+    ],
+)
+def test_exchanged_columns_are_named(pairs: list[tuple[str, str]], says: str) -> None:
+    """The columns may have different quantities, or belong to other bodies or joints."""
+    (found,) = crosscheck.judge_motion(double_pendulum(), exchanged_columns(*pairs)).explanations
+    assert found.sentence == says and found.remains < 1e-9
+
+
+@pytest.mark.slow
+def test_positions_of_a_late_clock_are_named_where_a_load_is_switched() -> None:
+    table = later(switched_motor(), known("switched_motor"))
+    few = {n: c for n, c in table.items() if n == "time" or n.endswith(("velocity.x", "velocity.y"))}
+    (found,) = crosscheck.judge_motion(switched_motor(), few).explanations
+    assert found.sentence == "all columns: later by 0.0225 s"

@@ -1,0 +1,55 @@
+"""Reactions of joints in a table are judged by the motion, as far as the constraints determine them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import crosscheck
+from crosscheck.cli import main
+from mbref.scene import Scene
+from tests.helpers.tables import FORMATS, Table, spinning_rod, write_table
+
+SPEED, PULL = 16.0, 128.0  # rad/s; m ω² r of the rod in N
+TIMES = np.linspace(0.0, 1.0, 41)
+
+
+def pulls(scale: float = 1.0) -> Table:
+    """Return the exact force of the hinge on the spinning rod, which points to the axis, and no moment."""
+    angle = SPEED * TIMES
+    table = {"time": TIMES, "A.force.x": -PULL * np.cos(angle), "A.force.y": -PULL * np.sin(angle)}
+    table |= {f"A.{name}": 0 * TIMES for name in ("force.z", "moment.x", "moment.y")}
+    return {n: c if n == "time" else scale * c for n, c in table.items()}
+
+
+def two_hinges() -> Scene:
+    """Return the spinning rod on two hinges of one axis, which share moments and axial forces anyhow."""
+    rod = spinning_rod()
+    return rod.with_(joint=[rod.joint[0], rod.joint[0].model_copy(update={"name": "B"})])
+
+
+def test_closed_forms_of_reactions_are_right():
+    found = crosscheck.judge_motion(spinning_rod(), pulls())
+    assert found.is_right and len(found.columns) == 5 and not found.left
+
+
+@pytest.mark.parametrize("scale", [-1.0, 1.01])
+def test_wrong_reactions_are_off(scale):
+    found = crosscheck.judge_motion(spinning_rod(), pulls(scale))
+    assert {c.name for c in found.columns if not c.is_right} == {"A.force.x", "A.force.y"}
+    assert "factor" in found.explanations[0].sentence
+
+
+def test_reactions_that_redundant_hinges_share_are_not_judged():
+    found = crosscheck.judge_motion(two_hinges(), {**pulls(), "A.angle": SPEED * TIMES})
+    assert found.is_right and [c.name for c in found.columns] == ["A.angle"]
+    assert set(found.left) == set(pulls()) - {"time"}
+
+
+def test_a_table_of_reactions_is_read_with_its_units(tmp_path, capsys):
+    spinning_rod().save(tmp_path / "rod.toml")
+    table = {n.replace("force.x", "force.x [kN]"): c for n, c in pulls().items()}
+    table["A.force.x [kN]"] = table["A.force.x [kN]"] / 1e3
+    path = write_table(table, tmp_path / "run.csv", FORMATS["repr"])
+    assert main(["judge", str(tmp_path / "rod.toml"), str(path)]) == 0
+    assert "A.force.x" in (shown := capsys.readouterr().out) and "not read" not in shown
