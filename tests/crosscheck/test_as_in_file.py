@@ -123,6 +123,7 @@ def test_stiff_closures_and_small_steps_together_reach_the_motion_of_exact_joint
 
 
 def test_families_of_the_files_model_are_offered_before_those_of_the_scene(tmp_path):
+    """MuJoCo runs the file's own model, and the scene in families such as `tuned`."""
     families = list(dict.fromkeys(s.family for s in offer("mujoco", found(tmp_path, FOUR_BAR, TILTED))))
     assert families[: len(FAMILIES)] == list(FAMILIES) and "tuned" in families[len(FAMILIES) :]
 
@@ -133,6 +134,7 @@ def test_no_family_of_a_file_is_offered_for_other_engines_or_scenes(tmp_path):
 
 
 def test_quick_depth_runs_the_files_own_settings_as_the_only_family_of_the_file(tmp_path):
+    """Smaller steps and stiffer closures of the file's model are left to the whole depth."""
     scene = found(tmp_path, FOUR_BAR, TILTED).with_(duration=0.3)
     cases = [Case(scene, np.array([0.0, 0.3]), "mujoco", s) for s in offer("mujoco", scene)]
     few = {case.setting.family for case in of_few_families(cases)}

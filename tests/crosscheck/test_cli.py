@@ -428,6 +428,7 @@ def test_compare_does_not_judge_an_engine_that_simulates_another_mechanism(capsy
 def test_compare_gives_no_ratios_of_times_if_engines_differ_and_no_truth_is_known(
     capsys, tmp_path, monkeypatch
 ):
+    """The engine ELSEWHERE puts every body 1 mm off; no reference is requested."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     asked = ("--engine", FAKE, "--engine", f"{FAKES}:ELSEWHERE", "--reference-time", "0")
     status, out, err = run_main(capsys, "compare", two_blocks(tmp_path), *asked)

@@ -135,6 +135,7 @@ def test_dop853_keeps_the_norm_of_a_quaternion() -> None:
 
 
 def test_an_integration_ends_when_its_largest_number_of_steps_is_reached() -> None:
+    """500 steps of an oscillator reach the sample at 1 s, and not the one at 1e6 s."""
     status, reached, _, memory = integrate(oscillator, [1.0, 0.0], [1.0, 1e6], 1e-8, most=500)
     assert (status, reached) == (dop853.TOO_MANY, 1)
     assert memory.counts[dop853.STEPS] == 500 and 1.0 < memory.clock[0] < 1e6
@@ -191,6 +192,7 @@ def apart(first: Trajectory, second: Trajectory) -> float:
 
 @pytest.mark.parametrize("name", _named(SMOOTH))
 def test_mujocos_compiled_family_gives_the_true_motion(name: str) -> None:
+    """The error exceeds its measured value (table SMOOTH) at most MARGIN times."""
     pytest.importorskip("mujoco")
     rtol, beta, measured = SMOOTH[name]
     scene = SCENES[name]()
@@ -249,6 +251,7 @@ def test_a_failed_run_of_mujocos_compiled_family_has_the_samples_before_its_end(
 def test_mujocos_projected_compiled_family_gives_the_true_motion_through_singular_positions(
     name: str,
 ) -> None:
+    """The error exceeds its measured value (table SINGULAR) at most MARGIN times; joints stay closed."""
     pytest.importorskip("mujoco")
     rtol, shortest, measured = SINGULAR[name]
     scene = SCENES[name]()
@@ -268,6 +271,7 @@ def test_mujocos_projected_compiled_family_moves_as_in_python_and_keeps_joints_c
 
 @pytest.mark.parametrize("name", DRIVEN)
 def test_newton_on_mujocos_closures_gives_the_true_driven_motion(name: str) -> None:
+    """The error exceeds its measured value (table DRIVEN) at most MARGIN times."""
     pytest.importorskip("mujoco")
     tolerance, measured = DRIVEN[name]
     scene = SCENES[name]()
@@ -338,6 +342,7 @@ def pinocchio() -> Engine:
 
 @pytest.mark.parametrize("name", _named(PINOCCHIO))
 def test_pinocchios_compiled_family_gives_the_true_motion(pinocchio: Engine, name: str) -> None:
+    """The error exceeds its measured value (table PINOCCHIO) at most MARGIN times; joints stay closed."""
     rtol, shortest, measured = PINOCCHIO[name]
     scene = SCENES[name]()
     run = simulate("pinocchio", scene, 11, "tuned, compiled", rtol=rtol, min_step=shortest)

@@ -107,7 +107,7 @@ def test_loop_closes_at_the_given_pose_of_a_joint(tmp_path):
 
 
 def test_loop_closes_near_the_pose_of_a_keyframe(tmp_path):
-    """The keyframe `low` has A at 0.5 rad; the reference pose has it at 0."""
+    """The keyframe `low` has A at 0.5 rad; from the reference pose the loop closes with A at -0.01 rad."""
     found = read(tmp_path, OPEN_LOOP.replace("EQUALITY", CONNECT), keyframe="low")
     assert abs(found.qpos[0] - 0.5) < 0.3
     assert_moves_as_compiled(found)
@@ -194,6 +194,7 @@ def middle(first: str, second: str, apart: str = "0 0 0", more: str = "") -> str
     ],
 )
 def test_two_hinges_of_a_massless_link_leave_two_freedoms(second, apart, joints, masses, tmp_path):
+    """The link is left out where a scene has joints that replace both hinges."""
     found = read(tmp_path, middle("0 1 0", second, apart), "hinges.urdf")
     scene = found.imported.scene
     assert [joint.type for joint in scene.joint] == joints and [body.mass for body in scene.body] == masses
