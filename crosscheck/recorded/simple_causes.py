@@ -73,10 +73,18 @@ def _units(d: Difference) -> Iterator[Stated]:
         for other, factor in KNOWN_UNITS[first].items():
             unit = WORDS.get(other, other)
             if factor != 1.0:
-                scaled = {n: d.exact[n] / factor for n in columns}
-                yield f"{title}: in {unit}, not {first} (factor {1 / factor:.6g})", 1, scaled
-                scaled = {n: d.exact[n] * factor for n in columns}
-                yield f"{title}: in {first}, read as {unit} (factor {factor:.6g})", 1, scaled
+                for by, says in (
+                    (1 / factor, f"in {unit}, not {first}"),
+                    (factor, f"in {first}, read as {unit}"),
+                ):
+                    scaled = {n: d.exact[n] * by for n in columns}
+                    if _is_visible(d, scaled):
+                        yield f"{title}: {says} (factor {by:.6g})", 1, scaled
+
+
+def _is_visible(d: Difference, scaled: Columns) -> bool:
+    """Return whether a number exceeds the rounding of its cell: zeros are no motion in another unit."""
+    return any((np.abs(column) > d.allowed.get(name, 0.0)).any() for name, column in scaled.items())
 
 
 def _factors(d: Difference) -> Iterator[Stated]:
@@ -85,7 +93,9 @@ def _factors(d: Difference) -> Iterator[Stated]:
         below = sum(float(d.exact[n] @ d.exact[n]) for n in columns)
         if below:
             factor = top / below
-            yield f"{title}: a factor of {factor:.9g}", 2, {n: factor * d.exact[n] for n in columns}
+            scaled = {n: factor * d.exact[n] for n in columns}
+            if _is_visible(d, scaled):
+                yield f"{title}: a factor of {factor:.9g}", 2, scaled
 
 
 def _offsets(d: Difference) -> Iterator[Stated]:

@@ -13,7 +13,7 @@ from mbref.scene import Scene
 from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, write_table
 
 SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
-GATE, DEEP = 15, 100  # number of random tables
+GATE, DEEP = 15, 100  # numbers of random tables for `make check` and for `make deep`
 SHARE = 1e-3  # fraction of a column's range, above which the bound beside "right" is stated as rounding
 TOLERANCE = 1e-8  # the judge's default tolerance, relative to the size of a quantity
 seeds = pytest.mark.parametrize(
@@ -64,7 +64,7 @@ def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize("form", ["%.6f", "%.7f", "%.8f", "%.7g", "spreadsheet with 8 decimals"])
-def test_numbers_within_the_tolerance_are_right_after_rounding(form: str, tmp_path: Path) -> None:
+def test_numbers_wrong_by_half_the_tolerance_are_right_after_rounding(form: str, tmp_path: Path) -> None:
     """Half the tolerance and half a unit of the last digit are together more than either of them."""
     rng = np.random.default_rng(6)
     table = {n: exact("double_pendulum")[n].copy() for n in ("time", "A.angle", "B.angle")}
@@ -75,8 +75,10 @@ def test_numbers_within_the_tolerance_are_right_after_rounding(form: str, tmp_pa
 
 
 @seeds
-def test_an_error_of_ten_units_is_off(seed: int, tmp_path: Path) -> None:
-    """The error is in one cell of one column, and larger than the tolerance."""
+def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
+    seed: int, tmp_path: Path
+) -> None:
+    """The error exceeds the tolerance, too."""
     rng, scene, table, form = drawn(seed)
     name = str(rng.choice([n for n in table if n != "time"]))
     size = 10 * unit(table[name], form) + 100 * TOLERANCE * max(1.0, np.abs(table[name]).max())
@@ -96,14 +98,14 @@ def test_an_error_of_ten_units_is_off(seed: int, tmp_path: Path) -> None:
     ],
 )
 def test_invented_numbers_are_off(rows: list[str], tmp_path: Path) -> None:
-    """A short cell is an exact number, not the resolution of its column."""
+    """Cells such as 0 and 0.5 are not rounded to their few digits: tools leave trailing zeros away."""
     path = tmp_path / "run.csv"
     path.write_text("\n".join(["time,A.angle", *rows]), encoding="utf-8")
     assert not crosscheck.judge_motion(double_pendulum(), path).is_right
 
 
-def test_a_column_of_one_digit_is_too_coarse(tmp_path: Path) -> None:
-    """Integers do not show a motion of less than a unit, whatever they are."""
+def test_column_of_zeros_is_too_coarse_to_be_right(tmp_path: Path) -> None:
+    """Zeros are the exact angles, of less than half a unit, rounded to integers, but show no motion."""
     path = tmp_path / "run.csv"
     path.write_text("time,A.angle\n0,0\n0.1,0\n0.2,0\n0.3,0\n", encoding="utf-8")
     (column,) = crosscheck.judge_motion(double_pendulum(), path).columns

@@ -1,4 +1,4 @@
-"""Relations of the suite on whole motions: the judge moves the changed mechanism as each relation expects."""
+"""Relations of the conformance suite hold for whole motions by the judge of the changed mechanisms."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def first_motion(name: str) -> tuple[Scene, Trajectory]:
 
 
 @pytest.mark.parametrize(("relation", "name"), CASES)
-def test_the_changed_mechanism_moves_as_expected(relation, name):
+def test_judge_moves_a_changed_mechanism_as_its_relation_expects(relation, name):
     scene, motion = first_motion(name)
     changed = RELATIONS[relation].change(scene, motion)
     if isinstance(changed, Outside):
