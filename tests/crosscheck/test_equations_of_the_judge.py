@@ -103,13 +103,8 @@ def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_sto
     )
     [_, factor] = time_functions.functions_of(scene)
     assert time_functions.ends(factor) == (0.4, 0.8)
-    assert [time_functions.next_end(scene, t) for t in (0.0, 0.3, 0.4, 0.5, 0.85)] == [
-        0.3,
-        0.4,
-        0.5,
-        0.8,
-        0.9,
-    ]
+    ends = [time_functions.next_end(scene, t) for t in (0.0, 0.3, 0.4, 0.5, 0.85)]
+    assert ends == [0.3, 0.4, 0.5, 0.8, 0.9]
     assert time_functions.next_end(scene, 0.9) == math.inf
     t = np.array([0.39, 0.4, 0.79, 0.8, 1.0])
     assert time_functions.value(factor, t) == pytest.approx([0.0, 1.8, 2.58, 0.0, 0.0])

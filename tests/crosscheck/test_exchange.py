@@ -135,6 +135,7 @@ def test_joints_of_a_file_become_joints_of_the_scene_by_name_and_kind():
 
 
 def test_a_body_without_a_joint_is_part_of_its_parent():
+    """In the file, the body `label` is a child of the body `top`, without a joint between them."""
     scissor = formats.read(MODELS / "scissor.xml")
     assert scissor.scene.joint_named("rail").type == "cylindrical"
     assert "label" not in {body.name for body in scissor.scene.body}
