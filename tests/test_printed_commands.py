@@ -57,7 +57,8 @@ OTHERS = [
 
 @pytest.mark.parametrize("page", ["README.md", *map(slow, OTHERS)])
 def test_printed_commands_of_mbref_run(page, tmp_path):
-    """Blocks with outputs are compared in test_transcripts.py."""
+    """In the order of the page, in one folder that has my.toml: exit status 0 (test_transcripts.py compares
+    outputs)."""
     if page in OWN:
         SCENES[OWN[page]]().save(tmp_path / "my.toml")
     elif page != "README.md":
@@ -68,7 +69,7 @@ def test_printed_commands_of_mbref_run(page, tmp_path):
 
 
 @pytest.mark.parametrize("page", ["README.md", slow("docs/api.md"), slow("docs/judge.md")])
-def test_printed_python_runs(page, tmp_path, monkeypatch):
+def test_printed_python_runs_without_error(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for block in re.findall(r"^```python\n(.*?)^```$", (ROOT / page).read_text(), re.S | re.M):
         exec(block, {})
@@ -77,6 +78,7 @@ def test_printed_python_runs(page, tmp_path, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.parametrize("words", OF_CROSSCHECK.values(), ids=OF_CROSSCHECK)
 def test_printed_commands_of_crosscheck_run(words, tmp_path):
+    """Each in a folder of its own that has my.toml and the scene files that the command names."""
     run(["mbref", "new", "my.toml"], tmp_path)
     for name in (word.removesuffix(".toml") for word in words if word.endswith(".toml")):
         if name in SCENES:

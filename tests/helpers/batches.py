@@ -1,4 +1,4 @@
-"""Scenes of one structure whose numbers decide which rows and columns take part, and results to compare."""
+"""Pairs of scenes of one structure whose numbers decide which constraint rows are independent; results."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ X, Z = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 
 
 def results(run: Motion) -> list:
-    """All numbers of a run, as bytes."""
+    """Return outcome, message, end time, counts and the bytes of all arrays of a run."""
     arrays = [getattr(run, key) for key in ("position", "orientation", "velocity", "angular_velocity")]
     arrays += [run.acceleration, run.angular_acceleration]
     for table in (run.reactions, run.open_reactions):

@@ -1,4 +1,4 @@
-"""Exact poses of the short motions, by the judge: python -m tests.helpers.exact_motions writes them anew."""
+"""Exact states of the short motions, by the judge: python -m tests.helpers.exact_motions stores them."""
 
 from __future__ import annotations
 

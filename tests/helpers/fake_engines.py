@@ -129,13 +129,13 @@ class Aging(Fake):
 class Keeping(Fake):
     """Moves its bodies by the mass and setting of the first run of a process."""
 
-    kept: float | None = None
+    first: float | None = None
 
     def run(self, scene: Scene, times: np.ndarray, setting: Setting) -> Trajectory:
-        if self.kept is None:
-            self.kept = sum(body.mass or 0.0 for body in scene.body) + setting.options["seconds"]
+        if self.first is None:
+            self.first = sum(body.mass or 0.0 for body in scene.body) + setting.options["seconds"]
         trajectory = super().run(scene, times, setting)
-        return replace(trajectory, position=trajectory.position + 1e-14 * self.kept)
+        return replace(trajectory, position=trajectory.position + 1e-14 * self.first)
 
 
 class Slow(Recorder):

@@ -44,7 +44,7 @@ def sprung_slide() -> Scene:
 
 
 def sprung_displacement(t: np.ndarray) -> np.ndarray:
-    """m, of the block of ``sprung_slide``, which starts at rest."""
+    """Return the displacement (m) of the block of ``sprung_slide``, a damped oscillator from rest."""
     root, ratio = np.sqrt(STIFFNESS / MASS), DAMPING / 2 / np.sqrt(STIFFNESS * MASS)
     damped = root * np.sqrt(1 - ratio**2)
     swing = np.cos(damped * t) + ratio * root / damped * np.sin(damped * t)
@@ -65,7 +65,7 @@ def wheel() -> Scene:
 
 
 def turned(t: np.ndarray) -> np.ndarray:
-    """rad, of the wheel."""
+    """Return the angle (rad) of the wheel at rest at the start: φ'' = M A sin(ωt + p) / I."""
     w, phase = WAVE.frequency, WAVE.phase
     rise = np.cos(phase) * t / w - (np.sin(w * t + phase) - np.sin(phase)) / w**2
     return np.asarray(TORQUE * WAVE.amplitude / MOMENT * rise)
@@ -80,7 +80,7 @@ def thrown() -> Scene:
 
 
 def switched(t: np.ndarray, start: float = 0.5, stop: float = 1.5, rate: Polynomial = CUBIC) -> np.ndarray:
-    """m, of a body at rest that accelerates by a polynomial (m/s²) from ``start`` until ``stop`` (s)."""
+    """Return the way (m) of a body that a polynomial (m/s²) accelerates from ``start`` to ``stop`` (s)."""
     speed = rate.integ(lbnd=start)
     place = speed.integ(lbnd=start)
     after = place(stop) + speed(stop) * (t - stop)

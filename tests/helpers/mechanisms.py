@@ -1,4 +1,4 @@
-"""Every maker of random mechanisms, and the mechanisms of a name, that verdicts are stored of."""
+"""Mechanisms of which verdicts are stored: makers of random ones by a seed, and others by a name."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def loaded(seed: int) -> Scene:
     return random_scenes.with_loads_of_joints(random_mechanism(seed), seed, switched=True)
 
 
-DRAWN: dict[str, Callable[[int], Scene]] = {
+RANDOM: dict[str, Callable[[int], Scene]] = {
     "random": random_mechanism,
     "mechanism": random_scenes.mechanism,
     "loaded": loaded,
@@ -40,7 +40,7 @@ DRAWN: dict[str, Callable[[int], Scene]] = {
 
 
 def named() -> dict[str, list[Scene]]:
-    """Return the mechanisms that are not drawn, by kind."""
+    """Return the mechanisms that are not random, by kind."""
     return {
         "hard": [make() for make in HARD.values()],
         "closed forms": [make()[0] for make in (*CLOSED_FORMS, *GEARED)],

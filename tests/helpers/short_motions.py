@@ -1,7 +1,7 @@
 """Catalogue of short motions: every joint, load, driver, coupling and armature, chains and loops.
 
-``MOTIONS`` maps a name to a maker of a scene. The exact poses at three times are stored
-beside the tests of motions; the judge computes them.
+``MOTIONS`` maps a name to a maker of a scene. The judge has computed the states at three times, which
+``tests/doors/motion/exact_motions.json`` stores.
 """
 
 from __future__ import annotations

@@ -43,7 +43,7 @@ def write_table(table: Table, path: Path, form: Format, separator: str = ",") ->
 
 
 def damped_pendulum() -> Scene:
-    """Return a pendulum with spring, damper and armature, which starts at rest beside its lowest pose."""
+    """Return a pendulum with spring, damper and armature, which starts at rest and horizontal."""
     return Scene(
         name="damped_pendulum",
         gravity=(0.0, -9.81, 0.0),

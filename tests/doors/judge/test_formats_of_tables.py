@@ -14,7 +14,7 @@ from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, 
 
 SCENES = {"double_pendulum": double_pendulum, "spinning_rod": spinning_rod}
 GATE, DEEP = 15, 100  # numbers of random tables for `make check` and for `make deep`
-SHARE = 1e-3  # fraction of a column's range, above which the bound beside "right" is stated as rounding
+SHARE = 1e-3  # fraction of a column's range, above which the verdict "right" must state the rounding
 TOLERANCE = 1e-8  # the judge's default tolerance, relative to the size of a quantity
 seeds = pytest.mark.parametrize(
     "seed", [pytest.param(k, marks=[pytest.mark.slow] * (k >= GATE)) for k in range(DEEP)]
@@ -29,8 +29,8 @@ def exact(name: str) -> Table:
     return {n: c for n, c in found.items() if n != "bound"}
 
 
-def drawn(seed: int) -> tuple[np.random.Generator, Scene, Table, str]:
-    """Return a scene, some columns of its exact motion at some samples, and a format."""
+def random_part(seed: int) -> tuple[np.random.Generator, Scene, Table, str]:
+    """Return the generator, a scene, random columns and samples of its exact motion, and a random format."""
     rng = np.random.default_rng(seed)
     name = str(rng.choice(list(SCENES)))
     table = exact(name)
@@ -55,7 +55,7 @@ def unit(values: np.ndarray, form: str) -> float:
 @seeds
 def test_an_exact_table_is_right_in_every_format(seed: int, tmp_path: Path) -> None:
     """The bound exceeds a thousandth of the column's range only where the verdict states the rounding."""
-    _, scene, table, form = drawn(seed)
+    _, scene, table, form = random_part(seed)
     found = crosscheck.judge_motion(scene, write_table(table, tmp_path / "run.csv", FORMATS[form]))
     assert found.is_right, (form, [c for c in found.columns if not c.is_right])
     for column in found.columns:
@@ -79,7 +79,7 @@ def test_column_with_one_cell_that_is_ten_units_of_its_last_digit_wrong_is_off(
     seed: int, tmp_path: Path
 ) -> None:
     """The error exceeds the tolerance, too."""
-    rng, scene, table, form = drawn(seed)
+    rng, scene, table, form = random_part(seed)
     name = str(rng.choice([n for n in table if n != "time"]))
     size = 10 * unit(table[name], form) + 100 * TOLERANCE * max(1.0, np.abs(table[name]).max())
     table[name] = table[name].copy()

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from mbref.scene import Scene
-from tests.helpers.mechanisms import DRAWN, named
+from tests.helpers.mechanisms import RANDOM, named
 from tests.machines import KERNELS, ROOT, environment, runs_here
 
 STORED = Path(__file__).with_name("mechanisms.json")
@@ -49,8 +49,8 @@ def signature(scene: Scene) -> list[float]:
 
 def table() -> dict[str, list[list[float]]]:
     """Return the signatures of all mechanisms, by maker and seed or by kind."""
-    drawn = {name: [signature(make(seed)) for seed in SEEDS] for name, make in DRAWN.items()}
-    return drawn | {name: [signature(scene) for scene in scenes] for name, scenes in named().items()}
+    random = {name: [signature(make(seed)) for seed in SEEDS] for name, make in RANDOM.items()}
+    return random | {name: [signature(scene) for scene in scenes] for name, scenes in named().items()}
 
 
 def test_mechanisms_of_all_seeds_and_names_equal_the_stored_ones():
