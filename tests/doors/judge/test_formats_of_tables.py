@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import crosscheck
+from crosscheck.cli import main
 from mbref.scene import Scene
 from tests.helpers.tables import FORMATS, Table, double_pendulum, spinning_rod, write_table
 
@@ -102,6 +103,17 @@ def test_invented_numbers_are_off(rows: list[str], tmp_path: Path) -> None:
     path = tmp_path / "run.csv"
     path.write_text("\n".join(["time,A.angle", *rows]), encoding="utf-8")
     assert not crosscheck.judge_motion(double_pendulum(), path).is_right
+
+
+@pytest.mark.parametrize(("form", "says"), [("%.3f", "right, rounded to"), ("%.12g", "right")])
+def test_command_says_that_few_digits_are_rounded(form: str, says: str, tmp_path: Path, capsys) -> None:
+    """Three decimals of an angle below 0.5 rad are bounded by more than a thousandth of its range."""
+    double_pendulum().save(tmp_path / "scene.toml")
+    part = {n: exact("double_pendulum")[n][:12] for n in ("time", "A.angle")}
+    path = write_table(part, tmp_path / "run.csv", FORMATS[form])
+    assert main(["judge", str(tmp_path / "scene.toml"), str(path)]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if "A.angle" in line]
+    assert says in row and ("rounded" in row) == ("rounded" in says), row
 
 
 def test_column_of_zeros_is_too_coarse_to_be_right(tmp_path: Path) -> None:
