@@ -74,6 +74,17 @@ def test_faulty_file_beside_right_records_is_named(name, tmp_path, capsys):
     assert name in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    "content", [b"{", b"[" * 100_000, b"\xff\xfe\x00"], ids=lambda content: ascii(content[:8])
+)
+def test_verdicts_of_a_suite_that_are_no_json_are_named(content, tmp_path, capsys):
+    place = folder(tmp_path / "r", record_with("seed", 0))
+    (place / "conformance").mkdir()
+    (place / "conformance" / "x.json").write_bytes(content)
+    assert report(["--render", str(place)]) == 2
+    assert "x.json: is not JSON" in capsys.readouterr().err
+
+
 def test_commands_that_print_records_name_their_missing_field(tmp_path, capsys):
     faulty = tmp_path / "records.jsonl"
     faulty.write_bytes(record_with("cost"))

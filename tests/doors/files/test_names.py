@@ -10,11 +10,15 @@ import pytest
 from markdown_it import MarkdownIt
 
 import mbref
+from crosscheck.study.command import command
 from mbref.cli import main
 from mbref.files import file_name
 from mbref.scene import Scene, SceneError
+from reports import sections
 from reports.blocks import Card, Figure, Heading, Listing, Record, Table, Text
 from reports.render import html, markdown
+from reports.runs import Run, SceneRuns
+from tests.reports import synthetic
 
 NAMES = [
     "../../other",
@@ -114,6 +118,20 @@ def test_page_and_markdown_of_a_report_show_a_name_without_acting_on_its_markup(
     heading = next(block for block in tokens if block.type == "inline").children
     assert "".join(token.content for token in heading) == name.replace("`", "")
     assert [token.content for token in tokens if token.type == "fence"] == [f"```\n{name}\n"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_printed_commands_of_a_report_name_the_scene_file_as_one_word(name):
+    scene = synthetic.scene().with_(name=name)
+    group = SceneRuns(scene, [Run(synthetic.record("mbref", "default", 1e-9, 0.1, a_scene=scene))])
+    blocks = [*sections.records.render([group]), *sections.provenance.render([group])]
+    printed = [card.command for block in blocks if isinstance(block, Record) for card in block.cards]
+    printed += [line for b in blocks if isinstance(b, Listing) for line in b.text.splitlines()[1:]]
+    assert len(printed) == 2
+    for line in printed:
+        assert f"scenes/{file_name(name)}.toml" in shlex.split(line), line
+    path = f"a folder/{name}.toml"
+    assert path in shlex.split(command(group.runs[0].record, shlex.quote(path)))
 
 
 @pytest.mark.parametrize("name", [*NAMES, "back\\slash", "\\u0041"])
