@@ -46,7 +46,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *command: str) -> str:
 
 @pytest.mark.parametrize("text", HUGE, ids=lambda text: f"{text[:6]} ({len(text)})")
 @pytest.mark.parametrize("command", COUNTS, ids=" ".join)
-def test_count_beyond_its_ends_is_refused(command: tuple[str, ...], text: str, capsys):
+def test_count_outside_its_range_is_refused_with_the_range(command: tuple[str, ...], text: str, capsys):
     said = refusal(capsys, *command, text)
     assert f"{command[-1]}: must be a whole number {COUNTS[command]}, got {text[:40]}" in said
     assert len(said.splitlines()[-1]) < 200

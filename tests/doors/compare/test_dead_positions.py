@@ -30,7 +30,7 @@ def test_time_of_a_dead_position_is_when_crank_and_rod_are_in_line(crank, rod, a
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 
 
-def test_driven_crank_longer_than_its_rod_is_dead_when_the_rod_is_perpendicular_to_the_slide():
+def test_crank_longer_than_its_rod_is_dead_when_the_rod_stands_upright():
     scene, time = turned(0.5, 0.4, 0.3, 4.0)
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 

@@ -66,9 +66,10 @@ def test_command_prints_that_an_engine_crashed(command: list[str], says: str, tm
     assert says in " ".join(printed(capsys, tmp_path, *command).split())
 
 
-def test_json_of_run_has_the_outcome_of_an_engine_that_crashed_and_that_of_tune_no_setting(
-    tmp_path: Path, capsys
-):
+def test_json_of_run_has_the_outcome_of_an_engine_that_crashed(tmp_path: Path, capsys):
     (run,) = json.loads(printed(capsys, tmp_path, "run", "--json"))["records"]
     assert (run["outcome"], run["times"]) == ("CRASHED", [])
+
+
+def test_json_of_tune_has_no_setting_of_an_engine_that_crashed(tmp_path: Path, capsys):
     assert json.loads(printed(capsys, tmp_path, "tune", "--json"))["records"] == []

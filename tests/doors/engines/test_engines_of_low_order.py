@@ -47,7 +47,7 @@ def test_engine_of_low_order_with_a_fault_does_not_conform(step: Step, fault: st
 
 
 @pytest.mark.parametrize("step", [euler, midpoint])
-def test_free_fall_of_low_order_conforms_with_its_weight_and_fails_with_twice_its_weight(step: Step):
+def test_free_fall_of_low_order_conforms_and_with_twice_its_weight_it_fails(step: Step):
     assert failures(step, ["free_fall"]) == []
     assert failures(step, ["free_fall"], "gravity acts twice")
 

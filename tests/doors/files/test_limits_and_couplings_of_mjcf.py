@@ -89,7 +89,7 @@ def test_an_open_loop_is_closed_alike_at_every_size(files):
 
 
 @pytest.mark.parametrize("tilt", [0.0, *(10.0**k for k in range(-16, -3))])
-def test_a_tilt_of_an_axis_is_rounding_or_locks_the_loop_and_never_stops_the_import(files, tilt):
+def test_tilted_axis_is_read_as_rounding_or_as_a_tilt_that_locks_the_loop(files, tilt):
     """Four parallel axes leave one freedom and one redundant row; a true tilt leaves none. The scene and the
     file must agree on it also between 1e-11 and 1e-7 rad, where either reading is possible."""
     scene, _ = files.scene(two_cranks(0.3, tilt, rod=1.0), "a.xml")

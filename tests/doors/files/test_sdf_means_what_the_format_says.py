@@ -67,7 +67,7 @@ def test_a_screw_moves_by_its_pitch_a_turn(files, more, metres_a_turn):
     assert moved == pytest.approx(metres_a_turn * turned / (2 * math.pi), rel=1e-9)
 
 
-def test_joints_of_a_mimic_with_an_offset_are_turned_at_the_start_so_that_both_obey(files):
+def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     """The format: follower = multiplier (leader - reference) + offset, here -1.5 (q + 0.4) + 0.2, in rad."""
     mimic = mimics("lead", -1.5, 0.2, -0.4)
     arm = "<inertial><pose>0.2 0 0 0 0 0</pose><mass>1</mass></inertial>"

@@ -141,7 +141,7 @@ def test_torque_that_lacks_the_armature_is_off_and_the_armature_is_named() -> No
     ]
 
 
-def test_judge_names_a_torque_that_the_mechanism_does_not_determine_and_does_not_call_it_right(
+def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Two drivers move one freedom, and the table has the torque of one of them alone."""
@@ -189,7 +189,7 @@ def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[flo
 @pytest.mark.parametrize(
     ("driven_joints", "length"), [("A", 1e6), ("AD", 1e-6)], ids=["determined", "shared"]
 )
-def test_torque_of_a_driver_of_a_closed_loop_is_proportional_to_the_square_of_its_size(driven_joints, length):
+def test_driver_torque_of_a_closed_loop_grows_with_the_square_of_its_size(driven_joints, length):
     """Two drivers of the loop's one freedom have no determined torque, NaN, at any size."""
     drivers = [Driver(joint=name, polynomial=(0.0, 1.0, 2.0)) for name in driven_joints]
     scene = parallelogram(0.6, 0.8).with_(driver=drivers)

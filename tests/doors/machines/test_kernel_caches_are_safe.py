@@ -64,11 +64,13 @@ def test_a_cache_that_others_can_write_is_not_loaded(place, tmp_path):
 
 @USERS
 @pytest.mark.slow
-def test_a_new_cache_and_its_folder_of_a_version_have_mode_0700_whatever_the_umask(tmp_path):
+def test_folders_of_a_new_cache_have_mode_0700_whatever_the_umask(tmp_path):
     cache, before = tmp_path / "cache", os.umask(0)
     try:
         run(tmp_path, cache)
-        assert [path.stat().st_mode & 0o777 for path in (cache, *cache.iterdir())] == [0o700, 0o700]
+        assert [path.stat().st_mode & 0o777 for path in (cache, *cache.iterdir())] == [0o700, 0o700], (
+            "with its version"
+        )
         assert run(tmp_path, cache)[1:] == ("1", ""), "the owner loads the kernel"
     finally:
         os.umask(before)

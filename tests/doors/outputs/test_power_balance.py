@@ -38,6 +38,7 @@ def off(motion: Motion) -> float:
 
 @pytest.mark.parametrize("seed", GATE)
 def test_work_of_drivers_and_loads_is_the_change_of_energy(seed):
+    """Gauss–Legendre quadrature of the power over three panels; differences over the largest power."""
     motion = run(powered_mechanism(seed))
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion) < BALANCED

@@ -169,7 +169,7 @@ def both_driven() -> Scene:
 
 
 @pytest.mark.parametrize("method", ["taylor", "alf-dual+projection"])
-def test_two_drivers_of_one_freedom_are_open_and_their_powers_sum_to_the_power_of_the_motion(method):
+def test_powers_of_two_open_drivers_of_one_freedom_sum_to_that_of_the_motion(method):
     """The power is J φ'' φ' with J = J₁ + I₁ + n² (J₂ + I₂), φ'' = 2 rad/s², φ' = 2 t rad/s. Equilibrium
     determines one component less than the two drivers have, and all if A is driven alone."""
     motion = simulate(both_driven(), method, TIMES)

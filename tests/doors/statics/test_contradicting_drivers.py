@@ -45,7 +45,7 @@ def test_two_drivers_of_one_slide_that_agree_move_it():
     assert np.allclose(run.position[:, 0, 0], [0.0, -0.5], atol=1e-12)
 
 
-def test_driver_by_a_table_agrees_with_a_linear_one_only_if_all_its_points_lie_on_the_line():
+def test_driver_by_a_table_agrees_with_a_line_only_if_its_points_lie_on_it():
     """The line is 0.4 t m; points of the other table are 10 mm off from 0.8 s on."""
     rows = [(t, 0.4 * t) for t in (0.0, 0.2, 0.4, 0.6, 0.8, 1.0)]
     line = {"joint": "left", "polynomial": [0.0, 0.4]}
@@ -70,7 +70,8 @@ def test_drivers_of_both_cranks_of_a_parallelogram_contradict_each_other_unless_
 
 
 @pytest.mark.parametrize("made", [lambda: turned(0.5, 0.4, 0.3, 4.0), lambda: pushed(0.2, 0.5, 1.0, 0.7)])
-def test_one_driver_that_comes_to_a_dead_position_is_reported_as_such_and_not_as_a_contradiction(made):
+def test_single_driver_at_a_dead_position_is_no_contradiction_of_drivers(made):
+    """The run ends at the time of the closed form, which its message names."""
     scene, dead = made()
     run = simulate(scene, times=[0.5 * dead, 2.0 * dead])
     assert run.t_end == pytest.approx(dead, rel=1e-9) and run.times.tolist() == [0.5 * dead]
