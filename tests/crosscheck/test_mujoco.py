@@ -200,7 +200,7 @@ def test_projected_mujoco_follows_the_driven_crank() -> None:
     assert completed_error(run, scene) < MARGIN * 3.9e-13, "measured, m or rad, on the closed form"
 
 
-def test_a_duplicate_joint_changes_no_projected_motion() -> None:
+def test_duplicate_joint_changes_no_projected_motion_of_mujoco() -> None:
     """A ball joint given twice has dependent rows; the motions agree to 1e-9 of the length."""
     scene = moving_probes()["spherical joint"]
     twice = scene.with_(joint=(*scene.joint, scene.joint[-1].model_copy(update={"name": "again"})))

@@ -127,18 +127,20 @@ SECOND_JOINTS = {
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_a_driver_and_a_torsion_spring_act_in_one_joint(name):
+def test_driver_and_torsion_spring_act_in_one_joint(name):
     check(name, scene(**DRIVEN_SPRUNG))
 
 
 @pytest.mark.parametrize("name", ENGINES)
 def test_two_drivers_move_joints_of_one_body(name):
+    """The truth is the motion by Gauss's principle."""
     check(name, scene(driver=TWO_DRIVERS))
 
 
 @pytest.mark.parametrize("name", ENGINES)
 @pytest.mark.parametrize("second", SECOND_JOINTS.values(), ids=SECOND_JOINTS)
 def test_two_joints_hold_the_same_two_bodies(name, second):
+    """A cylinder with a distance or a coaxial hinge; the truth is the motion by Gauss's principle."""
     check(name, scene(joint=(A, C, second)))
 
 

@@ -58,7 +58,7 @@ def test_default_solver_of_pinocchio_diverges_with_redundant_closures(name: str)
     assert "redundant" in run.message, f"message {run.message!r}"
 
 
-def test_default_and_proximal_solver_are_exact_without_redundancy() -> None:
+def test_default_and_proximal_solver_agree_with_the_truth_without_redundancy() -> None:
     """At a step of 4e-6 s both have the measured error of 7e-11 m or rad or less."""
     scene = SCENES["spatial_slider_crank"]()
     runs = [simulate(scene, 0.02, family, step=4e-6) for family in ("defaults", "proximal")]
@@ -161,7 +161,7 @@ def test_moment_about_a_fixed_axis_is_a_constant_joint_torque() -> None:
     assert not Loads(Mechanism(every_joint())).fixed, "loads in space were taken for constant ones"
 
 
-def test_a_kinematic_scene_needs_no_masses() -> None:
+def test_pinocchio_moves_a_driven_crank_alike_with_and_without_masses() -> None:
     """The driven crank moves alike with and without masses; without them it has no reactions."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))

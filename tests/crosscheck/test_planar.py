@@ -112,7 +112,7 @@ def test_block_on_an_incline_moves_as_its_closed_form(name: str, bodies: tuple[s
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_a_second_planar_joint_in_the_same_plane_changes_nothing(name: str) -> None:
+def test_second_planar_joint_in_one_plane_changes_no_motion(name: str) -> None:
     """Its three rows are redundant; the closed form stays."""
     scene = incline(ORDERS[0], joints=2)
     assert scene.counts().redundant == 3, scene.counts()
@@ -192,9 +192,9 @@ def test_swash_plate_lifts_a_pin_as_its_closed_form(name: str, bodies: tuple[str
 
 def referred(scene: Scene) -> Reference:
     """The reference at TIMES, of two formulations that agree."""
-    a, twin, b = runs(scene, TIMES, 60.0)
+    a, second, b = runs(scene, TIMES, 60.0)
     assert differences(scene, a, b).max() < 1e-15, f"A and B differ by {differences(scene, a, b).max():.1e}"
-    found, reason = judged(scene, TIMES, a, twin, b)
+    found, reason = judged(scene, TIMES, a, second, b)
     assert not reason and found.both.all() and found.bound.max() <= 1e-12
     return found
 
@@ -217,7 +217,7 @@ def test_reference_of_a_swash_plate_is_the_closed_form(bodies: tuple[str, str]) 
     assert np.abs(found.position[:, 1, 2] - heights).max() <= found.bound.max()
 
 
-def test_a_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
+def test_planar_joint_takes_neither_driver_nor_torsion_spring() -> None:
     scene = incline(ORDERS[0])
     with pytest.raises(
         SceneError, match=r"driver\[plane0\].joint: 'plane0' is planar; only .* can be driven"

@@ -146,7 +146,7 @@ def test_published_governor_is_off_by_the_error_of_its_step():
 
 
 @pytest.mark.parametrize("name", sorted(BY_SCENE))
-def test_the_best_family_of_mbref_runs_every_problem(name):
+def test_best_family_of_mbref_completes_every_published_problem(name):
     """Also bodies without moments of inertia, whose mass matrix is singular, have a family."""
     scene = SCENES[name]()
     setting = engine("mbref").best_settings(scene)[0]

@@ -130,7 +130,7 @@ def test_exact_motion_is_right_in_every_column(table):
 @pytest.mark.parametrize(
     ("tolerance", "right"), [(FLOOR, (True, False)), (2e-8, (True, True)), (0.0, (False, False))]
 )
-def test_a_column_is_right_within_the_tolerance_of_its_size(table, tolerance, right):
+def test_column_is_right_within_the_tolerance_of_its_scale(table, tolerance, right):
     """Errors: 0.9e-8 of the mechanism's length in a position, 1.9e-8 of the largest angular velocity in a
     rate. FLOOR is 1e-8. Of right columns no begin of an error is stated."""
     spin = max(abs(table[f"{b}.angular_velocity.{a}"]).max() for b in ("upper", "lower") for a in "xyz")
@@ -143,11 +143,11 @@ def test_a_column_is_right_within_the_tolerance_of_its_size(table, tolerance, ri
 
 
 # each finds its explanation among all others by references of changed scenes, which takes seconds
-SELDOM = ("mass", "missing body", "damping", "interpolation")
+SLOW = ("mass", "missing body", "damping", "interpolation")
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SELDOM)) for name in PLANTED]
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name in SLOW)) for name in PLANTED]
 )
 def test_planted_difference_is_the_first_explanation(name, table):
     """It leaves less than 1e-3 of the difference between recorded motion and reference."""

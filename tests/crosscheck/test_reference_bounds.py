@@ -33,8 +33,8 @@ def assert_bounded(name: str) -> None:
     of 1e-12 at most."""
     scene = HARD[name]()
     times = np.linspace(0.0, SHORTER.get(name, scene.duration), 5)
-    a, twin, b = runs(scene, times, SECONDS)
-    found, reason = judged(scene, times, a, twin, b)
+    a, second, b = runs(scene, times, SECONDS)
+    found, reason = judged(scene, times, a, second, b)
     assert not reason
     assert found.bound.max() <= 1e-12
     place = in_many_digits(scene, times)

@@ -137,7 +137,8 @@ def test_simbody_is_accurate_up_to_the_singular_position() -> None:
     assert completed_error(run, scene) < MARGIN * 1.8e-11
 
 
-def test_the_same_motion_with_and_without_masses() -> None:
+def test_simbody_moves_a_driven_crank_alike_with_and_without_masses() -> None:
+    """Without masses it has no reactions; without its driver it is refused."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     runs = [simulate(scene, 0.05, 1e-9) for scene in (base, bare)]

@@ -42,7 +42,7 @@ def judged(request):
     return mechanism, steady_poses(mechanism.make(), starts=8)
 
 
-def test_the_judge_finds_the_eigenvalues_of_closed_forms(judged):
+def test_judge_finds_the_eigenvalues_of_closed_forms(judged):
     """Relative errors of the best of the poses found are below 1e-13, and below fifty times the uncertainty
     that the judge states; a positive real part is called unstable."""
     mechanism, found = judged

@@ -124,7 +124,8 @@ def test_ida_turns_a_redundant_crank_by_more_than_a_turn() -> None:
     assert completed_error(run, scene) < MARGIN * 1.5e-3
 
 
-def test_the_same_motion_with_and_without_masses() -> None:
+def test_ida_moves_a_driven_crank_alike_with_and_without_masses() -> None:
+    """Without masses it has no reactions; without its driver it is refused. Measured difference: 8.8e-9 m."""
     base = SCENES["spatial_slider_crank_driven"]()
     bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
     runs = [simulate(scene, 0.02, 1e-7) for scene in (base, bare)]

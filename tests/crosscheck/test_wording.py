@@ -7,7 +7,7 @@ import pytest
 from crosscheck.study import wording
 
 
-def test_list_is_joined_by_commas_and_and():
+def test_list_is_joined_by_commas_and_the_word_and():
     assert [wording.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
 
 

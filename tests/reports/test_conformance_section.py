@@ -101,7 +101,7 @@ def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
         assert not unknown, (found["engine"], unknown)
 
 
-def test_the_page_on_engines_counts_the_violations_of_warp_by_cause():
+def test_page_on_engines_counts_the_violations_of_warp_by_cause():
     """The table's rows are the causes; the sentence before them has the numbers of verdicts."""
     [warp] = [found for found in committed() if found["engine"] == "warp"]
     failed = [v for v in warp["verdicts"] if v["status"] == "fail"]

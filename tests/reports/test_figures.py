@@ -31,8 +31,8 @@ def pixels(png: bytes) -> int:
         data += png[place + 8 : place + 8 + length] if kind == b"IDAT" else b""
         place += 12 + length
     rows = zlib.decompress(data)
-    stride = 4 * width + 1
-    return len({rows[i : i + stride] for i in range(0, len(rows), stride)})
+    row_size = 4 * width + 1
+    return len({rows[i : i + row_size] for i in range(0, len(rows), row_size)})
 
 
 def test_every_scene_has_its_four_figures():

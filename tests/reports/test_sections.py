@@ -77,8 +77,8 @@ def test_every_section_has_its_heading():
 
 def test_sections_are_documented():
     page = (Path(__file__).parents[2] / "docs" / "compare.md").read_text()
-    told = page.split("## Sections of a report")[1].split("The section `conformance`")[0]
-    assert re.findall(r"`(\w+)`", told) == [*NAMES, "stability", "closed_loops", "paper"]
+    listed = page.split("## Sections of a report")[1].split("The section `conformance`")[0]
+    assert re.findall(r"`(\w+)`", listed) == [*NAMES, "stability", "closed_loops", "paper"]
 
 
 @pytest.mark.parametrize("name", NAMES)
