@@ -319,10 +319,9 @@ def out_of_reach() -> Scene:
 def test_planar_scene_leaves_a_mechanism_that_can_leave_its_plane_unchanged() -> None:
     """A double pendulum on a hinge and a ball joint, at rest and with a spin out of the plane."""
     scene = SCENES["four_bar_gravity"]()
-    ball = [
-        Spherical(name=j.name, bodies=j.bodies, anchor=j.anchor) if j.name == "B" else j for j in scene.joint
-    ]
-    pendulum = scene.with_(body=scene.body[:2], joint=ball[:2])
+    hinge, second = scene.joint[:2]
+    ball = Spherical(name=second.name, bodies=second.bodies, anchor=second.anchor)
+    pendulum = scene.with_(body=scene.body[:2], joint=(hinge, ball))
     assert planar_scene(pendulum) is pendulum
     spun = scene.body[1].model_copy(update={"angular_velocity": (0.0, 1.0, 0.0)})
     pendulum = pendulum.with_(body=(scene.body[0], spun))
