@@ -56,6 +56,7 @@ def test_a_failed_run_may_answer_with_the_first_samples_alone():
 
 
 def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():
+    """The engine SCALARS answers with numpy's numbers, and with lists of velocities and bodies."""
     run = well_formed(SCALARS.run(SCENE, TIMES, Setting("a")), SCENE, TIMES)
     assert json.loads(json.dumps(run.to_record()))["cost"]["steps"] == 7
     kinds = [type(x) for x in (run.t_end, run.cost.seconds, run.cost.steps, run.settings["seconds"])]

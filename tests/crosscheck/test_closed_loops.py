@@ -122,7 +122,8 @@ def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
     assert len({cell.place for row in rows.values() for cell in row.values()}) == 2 * len(DIFFICULTIES)
 
 
-def test_a_record_supersedes_those_of_its_run_of_older_versions_and_refusals() -> None:
+def test_a_record_supersedes_its_run_older_versions_and_refusals_of_engine_and_mechanism() -> None:
+    """Records of another family of the version, and of another mechanism, remain."""
     new = run(1e-9)
     assert records.supersedes(new, run(1e-9)), "the same key"
     assert not records.supersedes(new, run(1e-3, "defaults"))

@@ -11,7 +11,6 @@ from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document
 from crosscheck.convergence.document import cell, order
 from crosscheck.convergence.ladders import FILE, MECHANISMS, ROWS, VAIN, climb, in_vain, ladder
-from crosscheck.engine import engine
 from crosscheck.study.grid import Case
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "convergence.md"
@@ -92,11 +91,6 @@ def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> Non
     assert in_vain(found) == VAIN and len(found) < len(cases)
     slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
     assert len(slow) == 1
-
-
-def test_every_row_names_a_family_that_its_engine_has() -> None:
-    assert all(row.family in engine(row.engine).families for row in ROWS)
-    assert len({row.name for row in ROWS}) == len(ROWS)
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:

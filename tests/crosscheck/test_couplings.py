@@ -85,6 +85,7 @@ def refused_parts(name, scene):
 @every
 @pytest.mark.parametrize("name", [*FINE, *FAMILIES])
 def test_engines_move_coupled_joints_as_the_reference_or_refuse_them(name, make):
+    """Simbody lacks armatures and Pinocchio couplings."""
     pytest.importorskip(MODULES.get(name, name))
     scene, simulator = make().with_(duration=0.4), engine(name)
     if lacking := refused_parts(name, scene):

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.conformance.hint import Failure, hint, parts_of
+from crosscheck.conformance.hint import Failure, hint
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.specimens import specimens
 from crosscheck.conformance.suite import held_against
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.terms import accelerations, terms_at, variants
+from crosscheck.judge.terms import accelerations, terms_at
 
 PATH = Path(__file__).parents[2] / "examples" / "spatial_engine" / "spatial_engine.py"
 SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PATH)
@@ -100,10 +100,3 @@ def test_terms_of_the_judge_give_the_accelerations_of_gausss_principle(name):
     found = accelerations(scene, terms_at(scene, motion, 3)).reshape(-1, 6)
     found[:, 3:] /= scene_length(scene)
     assert np.allclose(found, own, rtol=1e-6, atol=1e-6 * np.abs(own).max()), (found, own)
-
-
-def test_every_part_of_the_equations_that_a_scene_needs_has_variants():
-    scene = KNOWN["cylindrical driver"].scene
-    motion = gauss_motion(scene, (0.0, 0.1 * scene.duration))
-    found = {variant.part for variant in variants(scene, motion, 1)}
-    assert set(parts_of(scene)) <= found and "drivers" in found

@@ -271,6 +271,7 @@ def test_an_unknown_engine_is_refused_with_the_known_ones():
 
 @pytest.mark.parametrize("sent", ["SIGINT", "SIGTERM", "SIGKILL"])
 def test_a_signal_to_the_parent_ends_a_child_that_hangs_and_its_children(sent: str, tmp_path: Path):
+    """The engine HANG and a process that it starts sleep for 600 s."""
     if sent != "SIGINT" and not fork_server.AVAILABLE:
         pytest.skip("without a fork server the child ends itself after its limit")
     pid = tmp_path / "pid"
