@@ -2,9 +2,9 @@
 one after another.
 
 All scenes are prepared at once, in arrays whose first axis is the scene. A scene of a batch must have the
-rank and the active rows and columns of the lead scene, must not start at a singular position, and must
-complete in one call of the stepper. All other scenes are simulated by single runs. The results agree to the
-bit with runs of single scenes.
+rank and the active rows and columns of the lead scene, and complete in one call of the stepper. It must not
+start at a singular position or have contradicting drivers. All other scenes are simulated by single runs.
+The results agree to the bit with runs of single scenes.
 """
 
 from __future__ import annotations

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref.equations.active_coordinates import without_rounding
+from mbref.equations.driver_conflicts import conflict_of_drivers
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.initial_state import Alike, Start, consistent_starts
 from mbref.equations.model import Model, Terms
@@ -124,7 +125,7 @@ class Evaluations:
 
 def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     """Return the candidates for a batch of a lead run. A scene may join the batch if its structure equals the
-    structure of the run and its start is regular."""
+    structure of the run, its start is regular and its drivers do not contradict each other."""
     assert run.reduction is not None
     packs, decisions = Packs(scenes), run.reduction.decisions
     evaluations = Evaluations(run.model, packs)
@@ -136,7 +137,9 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     symbolic, tolerance = run.memory.factor.symbolic, run.limits.rank_tolerance
     ranks = all_ranks(run.model, terms.blocks[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
-    return Candidates(packs, q, v, starts, ranks, [k for k in starts if agree[k] and alike[k]])
+    end = float(run.times[-1])
+    fit = [k for k in starts if agree[k] and alike[k] and conflict_of_drivers(scenes[k], end) is None]
+    return Candidates(packs, q, v, starts, ranks, fit)
 
 
 def _starts(

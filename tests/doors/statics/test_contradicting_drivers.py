@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
-from mbref import Scene, SceneError, equilibria, simulate
+from mbref import Scene, SceneError, ensemble, equilibria, simulate
 from mbref.cli.commands import main
 from tests.helpers.dead_positions import pushed, turned
 from tests.helpers.statics import parallelogram, rod, slide
@@ -76,3 +78,22 @@ def test_single_driver_at_a_dead_position_is_no_contradiction_of_drivers(made):
     run = simulate(scene, times=[0.5 * dead, 2.0 * dead])
     assert run.t_end == pytest.approx(dead, rel=1e-9) and run.times.tolist() == [0.5 * dead]
     assert f"the drivers come to a dead position at t = {dead:.6g} s" in run.message
+
+
+@pytest.mark.parametrize("share", [1e-4, 1e-7])
+@pytest.mark.parametrize("frequency", [1.0, 16 * np.pi])
+def test_contradicting_drivers_of_any_scene_of_an_ensemble_are_named(share, frequency):
+    """The other scenes have drivers that agree; the differing one may be equal at many times."""
+
+    def scene(amplitude: float) -> Scene:
+        motions = [
+            {"joint": name, "polynomial": [0.0, 0.5], "sine": {"amplitude": a, "frequency": frequency}}
+            for name, a in (("left", 1e-12), ("right", amplitude))
+        ]
+        return twice_driven([0.0], [0.0]).with_(driver=motions)
+
+    with ThreadPoolExecutor(1) as pool:
+        motions = ensemble([scene(1e-12), scene(1e-12)], [0.5, 1.0], executor=pool)
+        assert all(np.allclose(run.position[:, 0, 0], [0.25, 0.5], atol=1e-9) for _, run in motions)
+        with pytest.raises(SceneError, match="the drivers of left and right contradict each other"):
+            list(ensemble([scene(1e-12), scene(1e-12), scene(share)], [0.5, 1.0], executor=pool))
