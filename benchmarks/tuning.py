@@ -26,8 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.cli import request
-from crosscheck.cli.request import Choice
+from crosscheck.cli.planning import Choice, plan
 from crosscheck.conformance.random_mechanisms import random_mechanism
 from crosscheck.engine import Setting, engine, installed
 from crosscheck.study.grid import Case, Record, run_here
@@ -103,7 +102,7 @@ def compared(scene: Scene, name: str, level: float, compiled: bool) -> list[Row]
     """A row for each family of an engine that is compiled first, or for each other family, in the order of
     its grid."""
     times = [np.linspace(0.0, scene.duration, SAMPLES)]
-    cases = request.plan([scene], [name], Choice(is_quick=False), times, LIMIT, lambda _: None)
+    cases = plan([scene], [name], Choice(is_quick=False), times, LIMIT, lambda _: None)
     cases = [case for case in cases if case.setting.family.endswith(COMPILED) == compiled]
     found = tuned(cases, level, lambda some: [run_here(c) for c in some], engine(name).integrated_here)
     reached = {record["family"]: record for record in found.reached}

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.comparison import WIDTH, comparisons
-from crosscheck.cli.request import Choice
+from crosscheck.cli.planning import Choice, plan
 from crosscheck.cli.running import COMPLETED, OTHERWISE, asked_of, console, missing_truths, notice, print_json
 from crosscheck.engine import engine
 from crosscheck.study.command import command
@@ -43,7 +43,7 @@ def compare(arguments: argparse.Namespace) -> int:
         asked.chosen.is_named,
         [f.dead for f in there],
     )
-    found = collected(asked.scenes, asked.engines, wanted, lambda: request.plan(*asked, notice), notice)
+    found = collected(asked.scenes, asked.engines, wanted, lambda: plan(*asked, notice), notice)
     words = import_options(arguments).words()
     paths = {
         s.name: shlex.join([path, *words]) for s, path in zip(asked.scenes, arguments.scene, strict=True)
@@ -75,7 +75,7 @@ def tune(arguments: argparse.Namespace) -> int:
     times = request.sample_times(scene, None, selection.QUICK_SAMPLES)
     scouted([scene], [name])
     limit, ours = arguments.time_limit, engine(name).integrated_here
-    planned = request.plan([scene], [name], Choice(is_quick=False), [times], limit, notice)
+    planned = plan([scene], [name], Choice(is_quick=False), [times], limit, notice)
     cases = [case._replace(reference_time=arguments.reference_time) for case in planned]
     wanted = by_closure(arguments.closure, scene) if arguments.closure else by_error(arguments.error)
     with counted("trying settings", len(families(cases))) as advance, ThreadPoolExecutor() as threads:

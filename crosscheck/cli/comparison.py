@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crosscheck.cli import request, scene_request, tables
-from crosscheck.cli.request import Choice
+from crosscheck.cli.planning import Choice, plan
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
@@ -215,7 +215,7 @@ def compare(
             is_named=chosen.is_named,
             dead=[dead],
         ),
-        lambda: request.plan([lasting], names, chosen, times, limit, tell),
+        lambda: plan([lasting], names, chosen, times, limit, tell),
         tell,
     )
     path = f"{given.name}.toml" if isinstance(scene, Scene) else str(scene)

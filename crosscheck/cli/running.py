@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.cli import request, scene_request
-from crosscheck.cli.request import Choice
+from crosscheck.cli.planning import Choice, choice, plan
 from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
 from crosscheck.study.progress import shown
@@ -50,7 +50,7 @@ def asked_of(arguments: argparse.Namespace, samples: int = SAMPLES) -> Asked:
     engines = request.find_engines(arguments.engine, notice)
     named = [*(arguments.method or ()), *(arguments.setting or ())]
     is_quick = arguments.depth == "quick"
-    chosen = request.choice(engines, named, arguments.option, arguments.rtol, is_quick)
+    chosen = choice(engines, named, arguments.option, arguments.rtol, is_quick)
     scenes = [request.lasting(s, arguments.times, arguments.duration) for s in scenes]
     count = samples if arguments.samples is None else arguments.samples
     times = [request.sample_times(s, arguments.times, count) for s in scenes]
@@ -65,7 +65,7 @@ def cases_of(arguments: argparse.Namespace) -> list[Case]:
     asked = asked_of(arguments)
     if asked.chosen.setting is None:
         scouted(asked.scenes, asked.engines)
-    cases = request.plan(*asked, notice)
+    cases = plan(*asked, notice)
     if asked.chosen.is_quick and asked.chosen.rtol is None:
         cases = thinned(cases)
     return [case._replace(reference_time=arguments.reference_time) for case in cases]

@@ -76,8 +76,8 @@ def couplings_of(scene: Scene) -> tuple[Coupled, ...]:
         return ()
     found, joints = [], {joint.name: joint for joint in scene.joint}
     for coupling in scene.coupling:
-        pair = tuple(joints[name] for name in coupling.joints)
-        (first, one), (second, other) = coupling.pairs(pair)
+        named = joints[coupling.joints[0]], joints[coupling.joints[1]]
+        (first, one), (second, other) = coupling.pairs(named)
         largest = max(1.0, abs(coupling.ratio))
         factors = -coupling.ratio / largest, 1.0 / largest
         found.append(Coupled(coupling.name, (first, second), (one, other), factors))

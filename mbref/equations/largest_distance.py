@@ -12,13 +12,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-FEW = 32  # points; up to here all pairs of a set cost less than its division
+FEW_POINTS = 32  # points; up to here all pairs of a set cost less than its division
 ROUNDING = 1e-14  # relative; larger than the rounding of a distance in three dimensions
 
 
 def largest_distances(points: np.ndarray) -> np.ndarray:
     """Return the largest distance (s,) between two points of each set (s, n, 3)."""
-    if points.shape[1] <= FEW:
+    if points.shape[1] <= FEW_POINTS:
         return _all_pairs(points, points)
     return np.array([_largest_distance(np.unique(each, axis=0)) for each in points])
 

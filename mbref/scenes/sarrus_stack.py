@@ -28,7 +28,7 @@ def sarrus_stack(count: int = 2, name: str = "sarrus_stack") -> Scene:
             changes = {"name": numbered(body.name), "position": (x, y, z + k * rise)}
             bodies.append(body.model_copy(update=changes))
         for joint in one.joint:
-            x, y, z = joint.anchor
+            x, y, z = joint.anchor_pair[0]
             pair = numbered(joint.bodies[0]), numbered(joint.bodies[1])
             changes = {"name": f"{joint.name}_{k}", "bodies": pair, "anchor": (x, y, z + k * rise)}
             joints.append(joint.model_copy(update=changes))
