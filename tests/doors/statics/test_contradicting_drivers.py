@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
-from mbref import Scene, SceneError, ensemble, equilibria, simulate
+from mbref import Limits, Scene, SceneError, equilibria, simulate
 from mbref.cli.commands import main
+from mbref.ensembles.simulate_all import simulate_all
 from tests.helpers.dead_positions import pushed, turned
 from tests.helpers.statics import parallelogram, rod, slide
 
+TIMES = np.array([0.5, 1.0])  # s, of scenes in a batch
 COMMANDS = {"run": 2, "diagnose": 0, "equilibrium": 2}  # and their exit status
 
 
@@ -92,8 +92,8 @@ def test_contradicting_drivers_of_any_scene_of_an_ensemble_are_named(share, freq
         ]
         return twice_driven([0.0], [0.0]).with_(driver=motions)
 
-    with ThreadPoolExecutor(1) as pool:
-        motions = ensemble([scene(1e-12), scene(1e-12)], [0.5, 1.0], executor=pool)
-        assert all(np.allclose(run.position[:, 0, 0], [0.25, 0.5], atol=1e-9) for _, run in motions)
-        with pytest.raises(SceneError, match="the drivers of left and right contradict each other"):
-            list(ensemble([scene(1e-12), scene(1e-12), scene(share)], [0.5, 1.0], executor=pool))
+    agreed = [scene(1e-12)] * 3
+    for run in simulate_all(agreed, "taylor", TIMES, Limits()):
+        assert np.allclose(run.position[:, 0, 0], [0.25, 0.5], atol=1e-9)
+    with pytest.raises(SceneError, match="the drivers of left and right contradict each other"):
+        simulate_all([*agreed, scene(share)], "taylor", TIMES, Limits())
