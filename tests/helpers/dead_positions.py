@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from mbref.scene import Scene
+from tests.helpers.parts import Entry, Point, hinge, slide
 
 
 def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1.0) -> tuple[Scene, float]:
@@ -26,16 +27,10 @@ def pushed(crank: float, rod: float, angle: float, speed: float, size: float = 1
             _link("slider", slider, slider, 0.0, size),
         ],
         joint=[
-            _hinge("O", "ground", "crank", (0.0, 0.0, 0.0)),
-            _hinge("P", "crank", "rod", pin),
-            _hinge("Q", "rod", "slider", slider),
-            {
-                "name": "S",
-                "type": "translational",
-                "bodies": ["ground", "slider"],
-                "anchor": list(slider),
-                "axis": [1.0, 0.0, 0.0],
-            },
+            hinge("O", "ground", "crank", (0.0, 0.0, 0.0)),
+            hinge("P", "crank", "rod", pin),
+            hinge("Q", "rod", "slider", slider),
+            slide("S", "ground", "slider", slider),
         ],
         driver=[{"joint": "S", "polynomial": [0.0, speed * size]}],
     )
@@ -52,14 +47,7 @@ def turned(crank: float, rod: float, angle: float, speed: float) -> tuple[Scene,
     return scene.with_(driver=[{"joint": "O", "polynomial": [0.0, speed]}], duration=3.0 * time), time
 
 
-def _hinge(name: str, first: str, second: str, anchor: tuple[float, ...]) -> dict[str, object]:
-    axis = [0.0, 0.0, 1.0]
-    return {"name": name, "type": "revolute", "bodies": [first, second], "anchor": list(anchor), "axis": axis}
-
-
-def _link(
-    name: str, begin: tuple[float, ...], end: tuple[float, ...], angle: float, size: float
-) -> dict[str, object]:
+def _link(name: str, begin: Point, end: Point, angle: float, size: float) -> Entry:
     return {
         "name": name,
         "mass": 1.0,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mbref.scene import Scene
+from tests.helpers.parts import hinge
 
 
 def arms(size: float, coupled: bool = False) -> Scene:
@@ -14,13 +15,7 @@ def arms(size: float, coupled: bool = False) -> Scene:
             for name, at in (("a", 0.0), ("b", size))
         ],
         joint=[
-            {
-                "name": f"hinge of {name}",
-                "type": "revolute",
-                "bodies": ["ground", name],
-                "anchor": [0.0, at, 0.0],
-                "axis": [0.0, 0.0, 1.0],
-            }
+            hinge(f"hinge of {name}", "ground", name, (0.0, at, 0.0))
             for name, at in (("a", 0.0), ("b", size))
         ],
         coupling=[{"name": "gears", "joints": ["hinge of a", "hinge of b"], "ratio": 2.0}] if coupled else [],

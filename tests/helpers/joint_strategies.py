@@ -5,15 +5,7 @@ from __future__ import annotations
 import numpy as np
 from hypothesis import strategies as st
 
-from mbref.scene import (
-    JOINT_TYPES,
-    Body,
-    Distance,
-    Driver,
-    Scene,
-    Sine,
-    Universal,
-)
+from mbref.scene import JOINT_TYPES, Body, Distance, Driver, Scene, Sine, Universal
 
 coordinate = st.floats(-1, 1, allow_subnormal=False)
 vectors = st.tuples(coordinate, coordinate, coordinate)

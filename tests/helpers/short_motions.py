@@ -98,73 +98,37 @@ def double_pendulum(name: str, load: list[Entry], gravity: list[float] = GRAVITY
     return made(name, bodies, joints, gravity=gravity, load=load, **fields)
 
 
+def load(kind: str, **fields: object) -> Entry:
+    """Return a load of a type."""
+    return {"type": kind, **fields}
+
+
+AB = {"bodies": ["a", "b"], "points": [[0.3, 0.5, 0.0], [0.9, 0.2, 0.5]]}
+BG = {"bodies": ["b", "ground"], "points": [[0.9, 0.4, 0.3], [0.2, 0.9, 0.0]]}
+WAVE = {"amplitude": 0.7, "frequency": 9.0, "phase": 0.4}
 LOADS: dict[str, list[Entry]] = {
     "gravity alone": [],
-    "moment": [{"type": "moment", "body": "b", "moment": [2.0, -3.0, 1.0]}],
-    "force": [{"type": "force", "body": "b", "point": [1.0, 0.5, 0.1], "force": [3.0, 6.0, -2.0]}],
-    "spring with damping": [
-        {
-            "type": "spring",
-            "bodies": ["a", "b"],
-            "points": [[0.3, 0.5, 0.0], [0.9, 0.2, 0.5]],
-            "stiffness": 60.0,
-            "damping": 3.0,
-            "natural_length": 0.4,
-        }
-    ],
-    "spring of natural length 0": [
-        {
-            "type": "spring",
-            "bodies": ["b", "ground"],
-            "points": [[0.9, 0.4, 0.3], [0.2, 0.9, 0.0]],
-            "stiffness": 30.0,
-            "natural_length": 0.0,
-        }
-    ],
-    "torsion spring": [
-        {"type": "torsion_spring", "joint": "B", "stiffness": 5.0, "damping": 0.2, "natural_angle": 1.5}
-    ],
-    "slide spring": [
-        {
-            "type": "slide_spring",
-            "joint": "B",
-            "stiffness": 80.0,
-            "damping": 2.0,
-            "natural_displacement": -0.1,
-        }
-    ],
-    "joint torque": [{"type": "joint_torque", "joint": "A", "torque": 4.0}],
-    "joint force": [{"type": "joint_force", "joint": "B", "force": -7.0}],
+    "moment": [load("moment", body="b", moment=[2.0, -3.0, 1.0])],
+    "force": [load("force", body="b", point=[1.0, 0.5, 0.1], force=[3.0, 6.0, -2.0])],
+    "spring with damping": [load("spring", **AB, stiffness=60.0, damping=3.0, natural_length=0.4)],
+    "spring of natural length 0": [load("spring", **BG, stiffness=30.0, natural_length=0.0)],
+    "torsion spring": [load("torsion_spring", joint="B", stiffness=5.0, damping=0.2, natural_angle=1.5)],
+    "slide spring": [load("slide_spring", joint="B", stiffness=80.0, damping=2.0, natural_displacement=-0.1)],
+    "joint torque": [load("joint_torque", joint="A", torque=4.0)],
+    "joint force": [load("joint_force", joint="B", force=-7.0)],
     "force over time": [
-        {
-            "type": "force",
-            "body": "a",
-            "point": [0.5, 0.3, 0.0],
-            "force": [8.0, 0.0, 4.0],
-            "factor": {
-                "polynomial": [0.5, 1.0, -2.0],
-                "sine": {"amplitude": 0.7, "frequency": 9.0, "phase": 0.4},
-            },
-        }
+        load("force", body="a", point=[0.5, 0.3, 0.0], force=[8.0, 0.0, 4.0])
+        | {"factor": {"polynomial": [0.5, 1.0, -2.0], "sine": WAVE}}
     ],
     "moment that is switched": [
-        {"type": "moment", "body": "b", "moment": [1.0, 5.0, -2.0], "factor": {"start": 0.05, "stop": 0.17}}
+        load("moment", body="b", moment=[1.0, 5.0, -2.0], factor={"start": 0.05, "stop": 0.17})
     ],
     "torque by a table": [
-        {
-            "type": "joint_torque",
-            "joint": "A",
-            "torque": 6.0,
-            "factor": {"table": [[0.0, 0.0], [0.1, 1.0], [0.2, 0.4], [0.3, -0.5], [0.4, 0.0]]},
-        }
+        load("joint_torque", joint="A", torque=6.0)
+        | {"factor": {"table": [[0.0, 0.0], [0.1, 1.0], [0.2, 0.4], [0.3, -0.5], [0.4, 0.0]]}}
     ],
     "force of a joint that begins": [
-        {
-            "type": "joint_force",
-            "joint": "B",
-            "force": 9.0,
-            "factor": {"polynomial": [0.0, 4.0], "start": 0.1},
-        }
+        load("joint_force", joint="B", force=9.0, factor={"polynomial": [0.0, 4.0], "start": 0.1})
     ],
 }
 for _name, _load in LOADS.items():
@@ -186,10 +150,7 @@ DRIVERS: dict[str, list[Entry]] = {
         {"joint": "A", "table": [[0.0, 0.0], [0.1, 0.2], [0.2, 0.5], [0.3, 0.4], [0.4, 0.0]]}
     ],
     "angle of the second joint": [{"joint": "B", "polynomial": [0.0, -5.0, 2.0]}],
-    "both angles": [
-        {"joint": "A", "polynomial": [0.0, 2.0]},
-        {"joint": "B", "polynomial": [0.0, 0.0, 6.0]},
-    ],
+    "both angles": [{"joint": "A", "polynomial": [0.0, 2.0]}, {"joint": "B", "polynomial": [0.0, 0.0, 6.0]}],
 }
 for _name, _driver in DRIVERS.items():
     MOTIONS[f"driven {_name}"] = partial(double_pendulum, f"driven {_name}", [], driver=_driver)
@@ -353,9 +314,7 @@ TOP = (0.75, 0.6, 0.0)
 MOTIONS |= {
     "four hinges": partial(closed_chain, "four hinges", [CRANK, KNEE, TOP, PIVOT]),
     "four hinges in the air": partial(
-        closed_chain,
-        "four hinges in the air",
-        [(0.0, 0.0, 0.5), (0.15, 0.25, 0.5), (0.75, 0.6, 0.5), (0.9, 0.0, 0.5)],
+        closed_chain, "four hinges in the air", [(*p[:2], 0.5) for p in (CRANK, KNEE, TOP, PIVOT)]
     ),
     "five hinges": partial(closed_chain, "five hinges", [CRANK, KNEE, TOP, (1.1, 0.4, 0.0), PIVOT]),
     "slider-crank of hinges": partial(closed_chain, "slider-crank", [CRANK, KNEE, (0.8, 0.0, 0.0)], "inline"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbref import Scene
+from tests.helpers import parts
 
 G = 9.81
 DOWN = (0.0, -G, 0.0)
@@ -18,24 +19,12 @@ def rod(name: str, place: Any, mass: float = 2.0, inertia: float = 0.3) -> dict[
 
 def hinge(name: str, bodies: Any, anchor: Any = ORIGIN, axis: Any = (0.0, 0.0, 1.0)) -> dict[str, Any]:
     """Return a hinge, by default about the z axis through the origin."""
-    return {
-        "name": name,
-        "type": "revolute",
-        "bodies": list(bodies),
-        "anchor": list(anchor),
-        "axis": list(axis),
-    }
+    return parts.hinge(name, *bodies, anchor, axis)
 
 
 def slide(name: str, body: str, anchor: Any, axis: Any) -> dict[str, Any]:
     """Return a slide of a body on the ground."""
-    return {
-        "name": name,
-        "type": "translational",
-        "bodies": ["ground", body],
-        "anchor": list(anchor),
-        "axis": list(axis),
-    }
+    return parts.slide(name, "ground", body, anchor, axis)
 
 
 def pendulum(place: Any = (0.7, 0.0, 0.0), **fields: Any) -> Scene:

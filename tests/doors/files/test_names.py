@@ -18,6 +18,7 @@ from reports import sections
 from reports.blocks import Card, Figure, Heading, Listing, Record, Table, Text
 from reports.render import html, markdown
 from reports.runs import Run, SceneRuns
+from tests.helpers.parts import hinge
 from tests.reports import synthetic
 
 NAMES = [
@@ -45,15 +46,7 @@ def named(name: str) -> Scene:
         gravity=(0.0, -9.81, 0.0),
         duration=0.01,
         body=[{"name": name, "mass": 1.0, "inertia": [0.1, 0.1, 0.1], "position": [1.0, 0.0, 0.0]}],
-        joint=[
-            {
-                "name": f"{name}'",
-                "type": "revolute",
-                "bodies": ["ground", name],
-                "anchor": [0.0, 0.0, 0.0],
-                "axis": [0.0, 0.0, 1.0],
-            }
-        ],
+        joint=[hinge(f"{name}'", "ground", name, (0.0, 0.0, 0.0))],
     )
 
 
@@ -79,12 +72,8 @@ def test_pictures_of_any_name_are_xml_in_the_folder_and_their_legends_show_it(
     assert main(["animate", "scene.toml", "--samples", "3"]) == 0
     for path in tmp_path.glob("*.svg"):
         ElementTree.fromstring(path.read_text())
-    assert {path.name for path in tmp_path.iterdir()} == {
-        "scene.toml",
-        "scene.svg",
-        "plot.svg",
-        "scene-moving.svg",
-    }
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"scene.toml", "scene.svg", "plot.svg", "scene-moving.svg"}
     figure = mbref.simulate(named(name), times=[0.0, 0.01]).plot(f"{name}.position")
     legend = figure.axes[0].get_legend().get_texts()
     assert [text.get_text() for text in legend] == [f"{name}.position.{axis}" for axis in "xyz"]

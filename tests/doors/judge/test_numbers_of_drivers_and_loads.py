@@ -11,18 +11,9 @@ from scipy.interpolate import CubicSpline
 import crosscheck
 from crosscheck.cli import main
 from crosscheck.conformance.relations import in_other_units
-from mbref.scene import (
-    Body,
-    Coupling,
-    Driver,
-    Revolute,
-    Scene,
-    SlideSpring,
-    Spring,
-    TorsionSpring,
-    Translational,
-)
-from tests.helpers.statics import parallelogram
+from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SlideSpring, Spring, TorsionSpring
+from tests.helpers.parts import hinge, slide
+from tests.helpers.statics import parallelogram, rod
 
 INERTIA, ARMATURE, RATE = 0.3, 1.1, 2.4  # kg m², kg m², rad/s²
 
@@ -62,12 +53,8 @@ def machine(seed: int) -> Scene:
             Body(name="block", mass=size[5], inertia=inertia, position=(1.0, 0.0, 0.0)),
         ],
         joint=[
-            Revolute(
-                name="A", bodies=("ground", "crank"), anchor=(0, 0, 0), axis=(0, 0, 1), armature=size[6]
-            ),
-            Translational(
-                name="B", bodies=("crank", "block"), anchor=(1, 0, 0), axis=(1, 0, 0), armature=size[7]
-            ),
+            hinge("A", "ground", "crank", (0, 0, 0), armature=size[6]),
+            slide("B", "crank", "block", (1, 0, 0), armature=size[7]),
         ],
         load=[
             SlideSpring(joint="B", stiffness=20 * size[8], damping=size[9], natural_displacement=0.2),
@@ -161,15 +148,7 @@ def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[flo
         name="wound_disc",
         gravity=(0.0, 0.0, 0.0),
         duration=10.0,
-        body=[
-            Body(
-                name="disc",
-                mass=1.0,
-                inertia=(1.0, 1.0, 1.0),
-                position=(0, 0, 0),
-                angular_velocity=(0, 0, 10.0),
-            )
-        ],
+        body=[rod("disc", (0, 0, 0), 1.0, 1.0) | {"angular_velocity": (0, 0, 10.0)}],
         joint=[Revolute(name="A", bodies=("ground", "disc"), anchor=(0, 0, 0), axis=(0, 0, 1))],
         load=[TorsionSpring(joint="A", stiffness=1.0)],
     )

@@ -9,9 +9,9 @@ import pytest
 
 import mbref
 from mbref.scene import Scene
+from tests.helpers.parts import hinge
 
 RATE, END = 7.0, 0.45  # rad/s of the crank at the start, and s
-Z = [0.0, 0.0, 1.0]
 ORDINARY = (0.2, 0.5, 0.45, 0.55)  # crank, coupler, rocker and ground, m
 CHANGE_POINT = (0.2, 0.4, 0.3, 0.5)  # flat at half a turn of the crank
 
@@ -62,10 +62,7 @@ def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
             }
         )
     hinges = (("A", "ground", "a", a), ("B", "a", "b", b), ("C", "b", "c", c), ("D", "ground", "c", d))
-    joints = [
-        {"name": name, "type": "revolute", "bodies": [one, other], "anchor": [*place, 0.0], "axis": Z}
-        for name, one, other, place in hinges
-    ]
+    joints = [hinge(*names, (*place, 0.0)) for *names, place in hinges]
     return Scene(name="crank_rocker", gravity=[0.0, 0.0, 0.0], duration=1.0, body=bodies, joint=joints)
 
 

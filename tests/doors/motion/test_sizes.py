@@ -33,10 +33,7 @@ def rack_and_pinion() -> Scene:
     return Scene(
         name="rack_and_pinion",
         body=[rod("pinion", ORIGIN), rod("rack", (0.0, 0.2, 0.0), mass=1.5)],
-        joint=[
-            hinge("A", ("ground", "pinion")) | {"armature": 0.4},
-            {"name": "B", "armature": 0.7} | slide,
-        ],
+        joint=[hinge("A", ("ground", "pinion")) | {"armature": 0.4}, {"name": "B", "armature": 0.7} | slide],
         coupling=[{"name": "teeth", "joints": ("A", "B"), "ratio": -0.2, "offset": 0.01}],
         driver=[{"joint": "A", "polynomial": (0.0, 2.0, 3.0)}],
     )

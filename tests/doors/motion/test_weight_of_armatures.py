@@ -11,6 +11,7 @@ import pytest
 from mbref import Limits, Scene, ensemble, equilibria, simulate
 from mbref.formulations import FORMULATIONS
 from mbref.stabilisation import STABILISATIONS
+from tests.helpers import parts
 
 MASS, ARMATURE = 0.8, 1.7
 TIMES = np.linspace(0.0, 0.6, 4)
@@ -28,14 +29,7 @@ ROUNDING = 1e-13  # relative to the distance fallen: a few hundred roundings of 
 def slide(gravity=GRAVITIES[2], axis=AXES[2], **changes) -> Scene:
     """A carriage with a motor's reflected mass on a guide."""
     body = {"name": "carriage", "mass": MASS, "inertia": [0.01, 0.02, 0.03], "position": [0.4, -0.1, 0.2]}
-    guide = {
-        "name": "G",
-        "type": "translational",
-        "bodies": ["ground", "carriage"],
-        "anchor": [0.4, -0.1, 0.2],
-        "axis": axis,
-        "armature": ARMATURE,
-    }
+    guide = parts.slide("G", "ground", "carriage", (0.4, -0.1, 0.2), axis, armature=ARMATURE)
     return Scene(**{"name": "slide", "gravity": gravity, "body": [body], "joint": [guide], **changes})
 
 
@@ -92,19 +86,3 @@ def test_equilibrium_of_a_slide_on_a_spring_has_the_weight_of_its_mass_alone():
     moved = np.subtract(found.scene.body[0].position, scene.body[0].position) @ AXES[2]
     assert moved == pytest.approx(MASS * np.dot(scene.gravity, AXES[2]) / stiffness, abs=1e-10)
     assert np.abs(found.eigenvalues) == pytest.approx(np.sqrt(stiffness / (MASS + ARMATURE)), rel=1e-8)
-
-
-@pytest.mark.parametrize("kind", ["revolute", "cylindrical"])
-def test_gravity_does_not_turn_a_balanced_wheel_with_armature(kind):
-    """The centre of mass lies on the axis, so gravity moves nothing about it."""
-    body = {"name": "wheel", "mass": 2.0, "inertia": [0.1, 0.1, 0.1], "position": [0.3, 0.1, -0.2]}
-    hinge = {
-        "name": "H",
-        "type": kind,
-        "bodies": ["ground", "wheel"],
-        "anchor": [0.3, 0.1, -0.2],
-        "axis": [0.0, 0.0, 1.0],
-        "armature": 3.0,
-    }
-    scene = Scene(name="wheel", gravity=(5.0, -4.0, 0.0), body=[body], joint=[hinge])
-    assert np.abs(simulate(scene, times=TIMES).joint("H").angle).max() < ROUNDING

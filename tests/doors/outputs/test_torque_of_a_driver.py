@@ -15,6 +15,7 @@ from crosscheck.engine import engine, installed
 from mbref import Motion, Scene, simulate
 from mbref.cli.commands import main
 from tests.helpers.parts import Entry, Point, X, Z, hinge, joint, slide
+from tests.helpers.statics import rod
 
 TIMES = np.linspace(0.0, 0.8, 9)
 G = 9.81
@@ -23,11 +24,6 @@ ANGLE = 0.4 * TIMES + 1.5 * TIMES**2 + 0.3 * np.sin(4 * TIMES)
 RATE = 0.4 + 3.0 * TIMES + 1.2 * np.cos(4 * TIMES)
 SECOND = 3.0 - 4.8 * np.sin(4 * TIMES)
 CLOSE = 1e-11  # relative to the largest torque or power
-
-
-def ball(name: str, position: Point, mass: float, inertia: float) -> Entry:
-    """Return a body of equal moments of inertia."""
-    return {"name": name, "mass": mass, "inertia": [inertia] * 3, "position": list(position)}
 
 
 def moved(bodies: list[Entry], joints: list[Entry], method: str | None = None, **parts) -> Motion:
@@ -45,7 +41,7 @@ def agree(found: np.ndarray | None, exact: np.ndarray) -> None:
 
 def wheels(*armatures: float, bodies=("ground", "w{}"), axis: Point = Z) -> tuple[list[Entry], list[Entry]]:
     """Return wheels of 0.1, 0.2, … kg m² on the ground, on joints A, B, … with armatures (kg m²)."""
-    made = [ball(f"w{k}", (0.5 * k, 0.0, 0.0), 1.0 + k, 0.1 * (k + 1)) for k in range(len(armatures))]
+    made = [rod(f"w{k}", (0.5 * k, 0.0, 0.0), 1.0 + k, 0.1 * (k + 1)) for k in range(len(armatures))]
     names = "ABC"[: len(armatures)]
     return made, [
         hinge(name, *(b.format(k) for b in bodies), (0.5 * k, 0.0, 0.0), axis, armature=armature)
@@ -96,7 +92,7 @@ def test_motor_lifts_a_nut_by_its_screw():
     mass, inertia, armature, pitch = 1.4, 0.05, 0.3, 0.2
     screw = joint("A", "cylindrical", "ground", "nut", axis=list(Z), armature=armature)
     thread = [{"name": "thread", "joints": ["A", "A"], "ratio": pitch}]
-    nut = [ball("nut", (0.0, 0.0, 0.1), mass, inertia)]
+    nut = [rod("nut", (0.0, 0.0, 0.1), mass, inertia)]
     found = moved(nut, [screw], coupling=thread, gravity=[0.0, 0.0, -G]).driver("A")
     agree(found.torque, (inertia + armature + pitch**2 * mass) * SECOND + mass * G * pitch)
     agree(found.power, found.torque * RATE)
@@ -105,7 +101,7 @@ def test_motor_lifts_a_nut_by_its_screw():
 def test_driven_rack_turns_its_pinion():
     """Force of the rack: (m + I + (J + I') / r²) x'' - m g along it; I' is the rotor of the pinion."""
     radius, mass, armature, inertia, rotor = 0.25, 2.0, 1.1, 0.06, 0.04
-    bodies = [ball("rack", (0.0, 0.4, 0.0), mass, 0.1), ball("pinion", (0.0, 0.0, 0.0), 1.0, inertia)]
+    bodies = [rod("rack", (0.0, 0.4, 0.0), mass, 0.1), rod("pinion", (0.0, 0.0, 0.0), 1.0, inertia)]
     joints = [
         slide("A", "ground", "rack", (0.0, 0.4, 0.0), X, armature=armature),
         hinge("B", "ground", "pinion", (0.0, 0.0, 0.0), armature=rotor),
@@ -120,7 +116,7 @@ def test_driven_rack_turns_its_pinion():
 def test_reflected_mass_of_a_slide_on_a_turning_arm_meets_no_centripetal_acceleration():
     """Force (m + I) r'' - m r φ'², and torque (J + m r²) φ'' + 2 m r r' φ', at r = 0.5 + 0.2 t - 0.3 t² m."""
     mass, inertia, armature, start = 0.9, 0.02, 1.6, 0.5
-    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, 0.3), ball("cart", (start, 0.0, 0.0), mass, inertia)]
+    bodies = [rod("arm", (0.0, 0.0, 0.0), 1.0, 0.3), rod("cart", (start, 0.0, 0.0), mass, inertia)]
     joints = [
         hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
         slide("B", "arm", "cart", (start, 0.0, 0.0), X, armature=armature),
@@ -137,7 +133,7 @@ def test_armature_of_a_hinge_between_turning_links_meets_their_relative_accelera
     """The hand turns by φ - t², about its centre of mass at r: torque J (φ'' - 2) - 2 I of B, and
     (J' + m r²) φ'' + J (φ'' - 2) of A, whose arm has J'."""
     arm, hand, armature, mass, reach = 0.3, 0.2, 0.7, 1.0, 0.4
-    bodies = [ball("arm", (0.0, 0.0, 0.0), 1.0, arm), ball("hand", (0.0, reach, 0.0), mass, hand)]
+    bodies = [rod("arm", (0.0, 0.0, 0.0), 1.0, arm), rod("hand", (0.0, reach, 0.0), mass, hand)]
     joints = [
         hinge("A", "ground", "arm", (0.0, 0.0, 0.0)),
         hinge("B", "arm", "hand", (0.0, reach, 0.0), armature=armature),

@@ -16,6 +16,7 @@ import mbref
 from crosscheck.judge.energy import energy_series
 from mbref.cli import main
 from mbref.scene import Scene
+from tests.helpers.parts import hinge
 from tests.helpers.spinning import spinning_mechanism
 
 END = 3.0  # s, in which the fastest joints make some 20 turns
@@ -33,15 +34,7 @@ def wound_wheel() -> Scene:
         name="wound",
         duration=END,
         body=[{"name": "wheel", "mass": 2.0, "inertia": [2.0, 2.0, INERTIA], "position": [0.0, 0.0, 0.0]}],
-        joint=[
-            {
-                "name": "H",
-                "type": "revolute",
-                "bodies": ["ground", "wheel"],
-                "anchor": [0, 0, 0],
-                "axis": [0, 0, 1],
-            }
-        ],
+        joint=[hinge("H", "ground", "wheel", (0.0, 0.0, 0.0))],
         load=[{"type": "torsion_spring", "joint": "H", "stiffness": STIFFNESS, "natural_angle": NATURAL}],
     )
 
