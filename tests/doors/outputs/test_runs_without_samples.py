@@ -72,15 +72,9 @@ def test_motion_of_another_engine_without_samples_has_empty_columns_of_all_parts
     """The scene has bodies, every type of joint and four loads, of which the last are springs."""
     scene = mbref.Scene(**EVERYTHING)
     failed = Trajectory.failed(
-        scene=scene.name,
-        engine="other",
-        version="1",
-        method="m",
-        settings={},
-        bodies=tuple(body.name for body in scene.body),
-        outcome=Outcome.CRASHED,
-        message="ended",
-    )
+        scene=scene.name, engine="other", version="1", method="m", settings={},
+        bodies=tuple(body.name for body in scene.body), outcome=Outcome.CRASHED, message="ended",
+    )  # fmt: skip
     columns = Motion.of(scene, failed).columns()
     assert all(values.shape == (0,) for values in columns.values())
     bodies = {f"{body.name}.position.x" for body in scene.body}
