@@ -137,6 +137,8 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     frame = _frame(scene)
     model = Model(frame.with_armature(scene, 0.0))
     first = Tangent(model, consistent_start(model).q, frame, np.zeros(slots(model)))
+    if first.freedoms == 0:
+        raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
     if reason := unsteady(first):
         raise SceneError([f"driver[{frame.joint}]: {reason}, so the motion is not steady"])
     freedoms = _freedoms(first)
@@ -241,10 +243,7 @@ def _frame(scene: Scene) -> Turning:
     for k, load in enumerate(scene.load):
         if load.over_time and not load.over_time.is_constant:
             raise SceneError([f"load[{k}].factor: varies; an equilibrium needs loads that stay the same"])
-    frame = turning(scene)
-    if scene.counts().degrees_of_freedom == 0:
-        raise SceneError(["the mechanism has no degree of freedom, so it rests at any load"])
-    return frame
+    return turning(scene)
 
 
 def _equilibrium(found: Newton, singular: bool, freedoms: int) -> Equilibrium:

@@ -12,7 +12,12 @@ from mbref.equations.model import Model
 
 
 def angles_at(model: Model, q: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return the angles (k,), rad, of turning joints at q (7 nb,), each nearest to its value ``before``."""
+    """Return the angles (k,), rad, of turning joints at q (7 nb,), each nearest to its value ``before``.
+
+    The values ``before`` are returned if no spring and no coupling needs an angle.
+    """
+    if not model.has_angles:
+        return before
     angles = angles_of_pose(model, q)
     return np.asarray(angles + 2 * np.pi * np.round((before - angles) / (2 * np.pi)))
 

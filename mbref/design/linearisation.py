@@ -15,16 +15,14 @@ from collections.abc import Callable
 
 import numpy as np
 
+from mbref.design.allowed_motions import TANGENT_RANK, Rows, by_gauss
 from mbref.design.joint_angles import angles_at, counted_from
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
-from mbref.equations.gaps import gaps, is_closed
-from mbref.equations.initial_state import solve_positions
+from mbref.equations.gaps import gaps
 from mbref.equations.model import Model, displaced, displacement
-from mbref.equations.units import row_lengths, unit_rows
-from mbref.linear_algebra.least_norm import least_norm_and_null_space
+from mbref.equations.units import row_lengths
 from mbref.scene import SceneError
 
-TANGENT_RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
 # increment of difference quotients / mechanism's length: truncation and rounding are both about 1e-13
 DIFFERENCE_STEP = 0.005
 SHORT = 0.04  # factor on DIFFERENCE_STEP for differences of second order
@@ -40,19 +38,23 @@ class OffConstraints(Exception):
 class Tangent:
     """Coordinates y (f,) of poses near a pose q0 (7 nb,) at rest in a frame; Zy is in lengths or rad.
 
-    ``conditioning`` is the smallest nonzero singular value of Φ_q S, rows of unit length, over the largest:
-    it falls to zero towards a singular position.  ``angles`` (k,) of torsion springs and couplings are at q0.
+    ``conditioning`` is the one of ``allowed_motions.Allowed``, which falls to zero towards a singular
+    position.  ``angles`` (k,) of torsion springs and couplings are at q0, ``at_rest`` (n,) the accelerations
+    of bodies at rest in the frame, m/s² and rad/s².
     """
 
-    def __init__(self, model: Model, q: np.ndarray, frame: Turning, angles: np.ndarray):
+    def __init__(
+        self, model: Model, q: np.ndarray, frame: Turning, angles: np.ndarray, before: Tangent | None = None
+    ):
+        """Store a pose; ``before`` is the tangent at a pose near it."""
         self.model, self.q, self.frame = model, q, frame
         self.angles = angles_at(model, q, angles)
         with counted_from(model, self.angles):
             terms = model.terms(0.0, q, frame.velocities(model, q))
-        _, values, right = np.linalg.svd(unit_rows(terms.jacobian * model.units))
-        rank = int(np.sum(values > TANGENT_RANK * values.max(initial=0.0)))
-        self.conditioning = float(values[rank - 1] / values[0]) if rank else 1.0
-        free, self.weight = right[rank:].T, terms.mass * model.units**2
+        self.rows = before.rows if before else Rows(model, q)
+        allowed = self.rows.allowed(terms, before.basis if before else None)
+        self.conditioning, free = allowed.conditioning, allowed.free
+        self.at_rest, self.weight = by_gauss(model, terms, allowed), terms.mass * model.units**2
         squares, axes = np.linalg.eigh(free.T @ (self.weight[:, None] * free))
         self.mass = float(squares.max(initial=0.0))
         if squares.size and not squares.min() > WEIGHTLESS * self.mass:
@@ -94,9 +96,9 @@ class Tangent:
         """Return q(y) (7 nb,). Raises OffConstraints if no pose on the constraints is found."""
         moved = displaced(self.q, self.model.units * (self.basis @ y))
         with counted_from(self.model, self.angles):
-            found, _ = solve_positions(self.model, 0.0, moved)
-            if not is_closed(self.model, self.model.terms(0.0, found)):
-                raise OffConstraints
+            found = self.rows.closed(moved)
+        if found is None:
+            raise OffConstraints
         return found
 
     def to(self, other: Tangent) -> np.ndarray:
@@ -106,7 +108,7 @@ class Tangent:
     def moved(self, y: np.ndarray) -> Tangent | None:
         """Return the tangent at q(y); None if no pose on the constraints is found."""
         try:
-            return Tangent(self.model, self.pose(y), self.frame, self.angles)
+            return Tangent(self.model, self.pose(y), self.frame, self.angles, self)
         except OffConstraints:
             return None
 
@@ -116,7 +118,8 @@ class Tangent:
         q = self.pose(y) if y.any() else self.q
         v = model.units * (self.basis @ rate)
         with counted_from(model, self.angles):
-            found = accelerations(model, 0.0, q, frame.velocities(model, q) + v)
+            terms = model.terms(0.0, q, frame.velocities(model, q) + v)
+            found = by_gauss(model, terms, self.rows.allowed(terms, self.basis))
         return frame.relative(model, q, v, found) / model.units
 
     def accelerations(self, y: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -125,7 +128,8 @@ class Tangent:
 
     def off_balance(self) -> np.ndarray:
         """Return x'' (n,) at the pose at rest: zero at an equilibrium."""
-        return self.relative_accelerations(*np.zeros((2, self.freedoms)))
+        still = np.zeros(self.model.n)
+        return self.frame.relative(self.model, self.q, still, self.at_rest) / self.model.units
 
     def slope(self, at: np.ndarray | None = None) -> np.ndarray:
         """Return A = ∂y''/∂y (f, f) at y, by default at the pose, by differences of second order."""
@@ -165,13 +169,7 @@ def _norms_by_body(x: np.ndarray) -> np.ndarray:
 def accelerations(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return q'' (n,) at time t (s): of all that the rows allow, the one of Gauss's principle."""
     terms = model.terms(t, q, v)
-    rows = terms.jacobian * model.units
-    lengths = row_lengths(rows)
-    bound, free = least_norm_and_null_space(rows / lengths[:, None], terms.gamma / lengths, TANGENT_RANK)
-    weight = terms.mass * model.units**2
-    mass = free.T @ (weight[:, None] * free)
-    push = free.T @ (terms.force * model.units - weight * bound)
-    return np.asarray(model.units * (bound + free @ np.linalg.solve(mass, push)))
+    return by_gauss(model, terms, Rows(model, q).allowed(terms, None))
 
 
 def multipliers(tangent: Tangent) -> np.ndarray:
@@ -180,7 +178,7 @@ def multipliers(tangent: Tangent) -> np.ndarray:
     v = tangent.frame.velocities(model, q)
     with counted_from(model, tangent.angles):
         terms = model.terms(0.0, q, v)
-        left = (terms.force - terms.mass * accelerations(model, 0.0, q, v)) * model.units
+    left = (terms.force - terms.mass * tangent.at_rest) * model.units
     rows = terms.jacobian * model.units
     lengths = row_lengths(rows)
     return np.asarray(np.linalg.lstsq((rows / lengths[:, None]).T, left, rcond=TANGENT_RANK)[0] / lengths)

@@ -31,8 +31,10 @@ class Turning(NamedTuple):
 
     def velocities(self, model: Model, q: np.ndarray) -> np.ndarray:
         """Return the velocities (n,) of bodies at rest in the frame: r' in the world, ω' along body axes."""
-        position, orientation = _poses(model, q)
         found = np.zeros((model.nb, 6))
+        if not self.rate:
+            return found.ravel()
+        position, orientation = _poses(model, q)
         count = len(position)
         found[:count, :3] = np.cross(self.spin, position - self.point)
         found[:count, 3:] = rotations.rotate(rotations.conjugate(orientation), self.spin)
@@ -44,6 +46,8 @@ class Turning(NamedTuple):
 
         r'' - 2 Ω × r' - Ω × (Ω × r) for positions, and ω̇' + ω' × Ω along body axes for orientations.
         """
+        if not self.rate:
+            return a
         position, orientation = _poses(model, q)
         found, moved = a.reshape(model.nb, 6).copy(), rate.reshape(model.nb, 6)[: len(position)]
         inwards = np.cross(self.spin, np.cross(self.spin, position - self.point))

@@ -100,6 +100,10 @@ def _alone(model: Model, t: float = 0.0, value: Any = 0.0) -> Alike:
 
 def consistent_start(model: Model) -> Start:
     """Return the nearest consistent state; raises SceneError for the joint that is grossly violated."""
+    return model.once(_consistent_start)
+
+
+def _consistent_start(model: Model) -> Start:
     (found,) = consistent_starts(_alone(model))
     if isinstance(found, SceneError):
         raise found
@@ -233,6 +237,12 @@ def _least_changes(scenes: Alike, places: np.ndarray, blocks: np.ndarray, rhs: n
     inverse_root = 1 / np.sqrt(mass)
     unit, rhs = unit_equations(model.structure.dense(blocks) * inverse_root[:, None], rhs)
     return inverse_root * least_norm(unit, rhs, START_RANK_TOLERANCE)
+
+
+def position_weights(model: Model) -> np.ndarray:
+    """Return the weights (n,) of changes of coordinates: M; a body without mass or inertia gets the largest
+    mass."""
+    return _weights(_alone(model), np.zeros(1, dtype=int))[0]
 
 
 def _weights(scenes: Alike, places: np.ndarray) -> np.ndarray:

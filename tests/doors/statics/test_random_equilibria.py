@@ -11,7 +11,7 @@ from crosscheck.conformance.relations import in_other_units, scaled
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.small_motions.equations import Balance
 from crosscheck.judge.small_motions.error_bounds import error_bounds
-from mbref import Scene, equilibria
+from mbref import Scene, equilibria, find_scene
 from tests.helpers.statics import parallelogram, pendulum
 
 STEP = 0.003  # of the judge's differences: their errors are about 1e-14
@@ -48,6 +48,11 @@ def check(scene: Scene, starts: int) -> int:
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
     assert check(at_rest(seed), starts=1) == 1
+
+
+def test_eigenvalues_of_a_leg_of_seven_links_are_the_judges():
+    """Its 50 constraint rows, 9 of them redundant, are solved by sparse factorisations."""
+    assert check(find_scene("strandbeest[1]"), starts=16) == 2
 
 
 @pytest.mark.slow
