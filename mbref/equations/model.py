@@ -7,15 +7,16 @@ converted to the bodies' own frames.
 from __future__ import annotations
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from mbref import rotations
 from mbref.equations.coordinates import displace_all
 from mbref.equations.evaluation import evaluate_along
+from mbref.equations.packed_scenes import packs_of
 from mbref.equations.packing import Packs, row_of
 from mbref.equations.structure import Structure
 from mbref.equations.units import displacement_units
@@ -25,6 +26,8 @@ from mbref.kernels.named_memory import allocate
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
 from mbref.scene import Scene
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -68,7 +71,8 @@ class Model:
 
     def __init__(self, scene: Scene, packs: Packs | None = None, place: int = 0):
         """Store a scene, or the scene with an index among several that are packed."""
-        packs = packs or Packs([scene])
+        packs = packs or packs_of(scene)
+        self._found = packs.found.setdefault(place, {})
         self.scene, self._packs, self._place = packs.scenes[place], packs, place
         self.bodies, self.joints = packs.listed[place], packs.joints[place]
         self.nb, self.n, self.kinematic = packs.nb, 6 * packs.nb, packs.kinematic
@@ -89,6 +93,16 @@ class Model:
             self._pooled = acquire((Equations, self.structure), self.equations)
             self.put_numbers(self._pooled.values, self.data)
         return self._pooled
+
+    def once(self, function: Callable[[Model], Found]) -> Found:
+        """Return the result of a function of this model, which is called once for a packed scene.
+
+        The result is never changed, because further runs of the scene read it.
+        """
+        if function not in self._found:
+            self._found[function] = function(self)
+        found: Found = self._found[function]
+        return found
 
     def release(self) -> None:
         """Release the memory of evaluations."""

@@ -59,6 +59,7 @@ class Packs:
 
     def __init__(self, scenes: Sequence[Scene]):
         self.scenes = scenes = [scene.assembled() for scene in scenes]
+        self.found: dict[int, dict[Any, Any]] = {}  # by scene: results of functions, see ``Model.once``
         self.kinematic = not scenes[0].has_mass()
         listed = [all_parts(scene) for scene in scenes]
         self.listed, self.joints = [found.bodies for found in listed], [found.joints for found in listed]

@@ -10,7 +10,7 @@ and columns.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -22,9 +22,10 @@ from mbref.equations.active_coordinates import (
     nonzero,
     primitives_with,
     reached,
+    without_rounding,
 )
 from mbref.equations.coordinates import displace_all
-from mbref.equations.initial_state import Start
+from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model, Terms
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import Active, SparseFactor, Symbolic
@@ -150,6 +151,19 @@ class Reduction:
 
 
 _known: dict[Structure, list[Reduction]] = {}
+
+
+def reduced_start(model: Model) -> tuple[Start, Reduction, np.ndarray]:
+    """Return the consistent start of a scene without roundings of zero, its reduction, and the blocks (m, 12)
+    of Φ_q there."""
+    return model.once(_reduced_start)
+
+
+def _reduced_start(model: Model) -> tuple[Start, Reduction, np.ndarray]:
+    start = consistent_start(model)
+    q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
+    start = replace(start, q=q[0], v=v[0])
+    return start, *reduction_of(model, start)
 
 
 def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
-from mbref.equations.active_coordinates import without_rounding
 from mbref.equations.branches import Passed
 from mbref.equations.diagnosis import freedoms_left
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
-from mbref.equations.reduction import Reduction, reduction_of
+from mbref.equations.reduction import Reduction, reduced_start
 from mbref.kernels.layout import (
     Active,
     Kernels,
@@ -97,9 +95,7 @@ class Run:
             raise SceneError(missing_masses(self.scene))
         if not (self.method.formulation.is_sparse or self.method.stabilisation.projects):
             return model, start, None
-        q, v = without_rounding(start.q[None], start.v[None], start.given[None], np.array([model.length]))
-        start = replace(start, q=q[0], v=v[0])
-        reduction, self._blocks = reduction_of(model, start)
+        start, reduction, self._blocks = reduced_start(model)
         return model, start, reduction
 
     def begin_again(self) -> None:

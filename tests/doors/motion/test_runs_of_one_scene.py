@@ -1,0 +1,59 @@
+"""Runs of one scene object give equal results, whatever ran before; a changed copy is another scene."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from mbref import diagnose, find_scene, simulate
+from mbref.ensembles.simulate_all import simulate_all
+from mbref.stepping.limits import Limits
+
+METHODS = ["taylor", "lm2+projection/dop853", "mpi-svd+partitioning/dop853"]
+TIMES = np.linspace(0.0, 0.05, 3)
+
+
+def numbers(motion):
+    return motion.position, motion.velocity, motion.acceleration, motion.reactions["A"]
+
+
+@pytest.mark.parametrize("name", ["spatial_slider_crank_gravity", "four_bar_gravity"])
+def test_second_run_of_a_scene_is_equal_to_the_bit(name):
+    scene = find_scene(name)
+    first, again = (numbers(simulate(scene, "taylor", TIMES)) for _ in range(2))
+    fresh = numbers(simulate(pickle.loads(pickle.dumps(scene)), "taylor", TIMES))
+    for one, other, new in zip(first, again, fresh, strict=True):
+        assert np.array_equal(one, other)
+        assert np.array_equal(one, new)
+
+
+def test_methods_in_turns_on_one_scene_do_not_change_each_other():
+    scene = find_scene("spatial_slider_crank_gravity")
+    alone = [simulate(find_scene(scene.name), method, TIMES).position for method in METHODS]
+    turns = [[simulate(scene, method, TIMES).position for method in METHODS] for _ in range(2)]
+    for found in turns:
+        for one, other in zip(alone, found, strict=True):
+            assert np.array_equal(one, other)
+
+
+@pytest.mark.parametrize("copy", ["with_", "model_copy"])
+def test_changed_copy_moves_by_its_own_numbers(copy):
+    scene = find_scene("planar_slider_crank_gravity")
+    before = simulate(scene, times=TIMES).position
+    heavier = [body.model_copy(update={"mass": 3.0 * body.mass}) for body in scene.body[:1]]
+    change = {"body": (*heavier, *scene.body[1:])}
+    changed = scene.with_(**change) if copy == "with_" else scene.model_copy(update=change)
+    found = simulate(changed, times=TIMES).position
+    assert np.abs(found - before)[-1].max() > 1e-6
+    assert np.array_equal(found, simulate(find_scene(scene.name).with_(**change), times=TIMES).position)
+
+
+def test_a_scene_that_ran_alone_is_equal_in_an_ensemble():
+    scene = find_scene("planar_slider_crank_gravity")
+    variants = [scene, *(scene.with_("body[rod].mass", mass) for mass in (0.5, 0.6, 0.7))]
+    alone = [simulate(each, "taylor", TIMES).position for each in variants]
+    diagnose(scene)
+    together = simulate_all(variants, "taylor", TIMES, Limits())
+    assert all(np.array_equal(one, motion.position) for one, motion in zip(alone, together, strict=True))
