@@ -30,73 +30,43 @@ def faults(tmp_path: Path, *changes: tuple[str, str]) -> list[str]:
     return caught.value.faults
 
 
-def line_of(text: str) -> int:
-    return next(n for n, line in enumerate(template().splitlines(), 1) if line.startswith(text))
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "path", "says", "line"),
-    [
-        ("mass = 2.0", "mass = -2.0", "body[rod].mass", "must not be negative", "mass = 2.0"),
-        ("gravity =", "gravty =", "gravty", "did you mean 'gravity'?", "gravity"),
-        ("anchor = [0.2", "ancor = [0.2", "joint[B].ancor", "did you mean 'anchor'?", "anchor = [0.2"),
-        (
-            '"rod", "slider"',
-            '"rood", "slider"',
-            "joint[C].bodies[0]",
-            "did you mean 'rod'?",
-            'bodies = ["rod", "s',
-        ),
-        (
-            'type = "translational"',
-            'type = "translatonal"',
-            "joint[D].type",
-            "did you mean 'translational'?",
-            'type = "translational"',
-        ),
-        ("duration = 2.0", "duration = 0.0", "duration", "must be positive", "duration"),
-        ('body = "crank"', 'body = "crnk"', "load[0].body", "did you mean 'crank'?", 'body = "crank"'),
-        ('"ground", "crank"', '"world", "crank"', "joint[A].bodies[0]", "did you mean 'ground'?", "bodies ="),
-        ('"ground", "crank"', '"ground", "Crank"', "joint[A].bodies[1]", "did you mean 'crank'?", "bodies ="),
-        ('type = "revolute"', 'type = "hinge"', "joint[A].type", "did you mean 'revolute'?", 'type = "rev'),
-        (
-            "position = [0.5, 0.0, 0.0]",
-            "position = [0.5, 0.0]",
-            "body[rod].position",
-            "must be three numbers, got [0.5, 0.0]",
-            "position = [0.5",
-        ),
-        ("gravity = [0.0, -9.81, 0.0]", "gravity = -9.81", "gravity", "must be three numbers", "gravity"),
-        ("moment = [", "speed = [", "load[0].speed", "known: type, body, moment", "moment = ["),
-        ("[[load]]", "[[loads]]", "loads", "did you mean 'load'?", "[[load]]"),
+SKEW = 'type = "universal"\nbodies = ["crank", "rod"]\naxes = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]'
+FAULTY = {
+    "sign": [("mass = 2.0", "mass = -2.0")],
+    "unknown key": [("gravity =", "gravty =")],
+    "unknown key of a joint": [("anchor = [0.2", "ancor = [0.2")],
+    "unknown body": [('"rod", "slider"', '"rood", "slider"')],
+    "unknown type": [('type = "translational"', 'type = "translatonal"')],
+    "zero": [("duration = 2.0", "duration = 0.0")],
+    "unknown body of a load": [('body = "crank"', 'body = "crnk"')],
+    "ground": [('"ground", "crank"', '"world", "crank"')],
+    "case": [('"ground", "crank"', '"ground", "Crank"')],
+    "hinge": [('type = "revolute"', 'type = "hinge"')],
+    "two numbers": [("position = [0.5, 0.0, 0.0]", "position = [0.5, 0.0]")],
+    "one number": [("gravity = [0.0, -9.81, 0.0]", "gravity = -9.81")],
+    "unknown key of a load": [("moment = [", "speed = [")],
+    "unknown part": [("[[load]]", "[[loads]]")],
+    "missing field": [("mass = 1.5\n", "")],
+    "one name twice": [('name = "rod"', 'name = "crank"')],
+    "table": [("[[load]]", "[load]")],
+    "driver of an unknown type": [
+        ('type = "revolute"', 'type = "hinge"'), ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]'),
     ],
-)
-def test_a_fault_has_its_line_and_a_suggestion(tmp_path, old, new, path, says, line):
-    told = [fault for fault in faults(tmp_path, (old, new)) if fault.startswith(f"{path}: ")]
-    assert len(told) == 1 and says in told[0] and told[0].endswith(f"(line {line_of(line)})"), told
+    "skew axes": [
+        ('type = "revolute"\nbodies = ["crank", "rod"]', SKEW),
+        ("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]", "anchor = [0.2, 0.0, 0.0]"),
+    ],
+}  # fmt: skip
 
 
-def test_a_driver_of_a_joint_without_a_known_type_is_no_second_fault(tmp_path):
-    found = faults(
-        tmp_path, ('type = "revolute"', 'type = "hinge"'), ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]')
-    )
-    assert len(found) == 1
-
-
-def test_axes_of_a_universal_joint_are_perpendicular(tmp_path):
-    skew = 'type = "universal"\nbodies = ["crank", "rod"]\naxes = [[1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]'
-    text = template().replace('type = "revolute"\nbodies = ["crank", "rod"]', skew)
-    (tmp_path / "my.toml").write_text(
-        text.replace("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]", "anchor = [0.2, 0.0, 0.0]")
-    )
-    with pytest.raises(SceneError, match=r"joint\[B\].axes: must be perpendicular, but enclose 45 degrees"):
-        Scene.from_file(tmp_path / "my.toml")
+@pytest.mark.parametrize("name", FAULTY)
+def test_each_fault_is_one_sentence_with_its_line_and_a_suggestion(name, tmp_path, snapshot):
+    assert faults(tmp_path, *FAULTY[name]) == snapshot
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("[[load]]", "[load]", "load: must be entries [[load]]"),
         ("[[joint]]", "[joint]", "[joint] must be [[joint]], one for each joint"),
         ("position = [0.5, 0.0, 0.0]", "position = 0.5, 0.0, 0.0", ": position = 0.5, 0.0, 0.0"),
     ],
@@ -139,35 +109,22 @@ def test_a_wrong_command_line_is_answered_in_words(capsys, words, says):
     assert ended.value.code == 2 and says in capsys.readouterr().err
 
 
-def test_a_missing_field_has_the_line_of_its_entry(tmp_path):
-    found = faults(tmp_path, ("mass = 1.5\n", ""))
-    entry = line_of('name = "slider"') - 1
-    assert found == [
-        f"body[slider].mass: is missing; give mass and inertia, or neither (kinematics) (line {entry})"
-    ]
-
-
-def test_two_bodies_of_a_name_are_told_by_place(tmp_path):
-    (found,) = [f for f in faults(tmp_path, ('name = "rod"', 'name = "crank"')) if "already" in f]
-    assert found.startswith("body[1].name: 'crank' is already the name of body[0] (line ")
-
-
 @pytest.mark.parametrize("name", SCENES)
 def test_no_built_in_scene_has_a_probable_slip(name):
     assert probable_slips(SCENES[name]()) == []
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "says"),
-    [
-        ("gravity", [0.0, -9810.0, 0.0], "gravity: 9810 m/s² is 1e+03 times the earth's"),
-        ("body[rod].inertia", [1e3, 1e4, 1e4], "body[rod].inertia: suits a body"),
-        ("joint[D].anchor", [700.0, 0.0, 0.0], "body[slider]: C–D is 699"),
-    ],
-)
-def test_probable_slips(path, value, says):
-    (slip,) = probable_slips(find_scene("planar_slider_crank").with_(path, value))
-    assert slip.startswith(says), slip
+SLIPS = {
+    "gravity": [0.0, -9810.0, 0.0],
+    "body[rod].inertia": [1e3, 1e4, 1e4],
+    "joint[D].anchor": [700.0, 0.0, 0.0],
+    "joint": [],
+}
+
+
+@pytest.mark.parametrize("path", SLIPS)
+def test_probable_slip_is_one_sentence(path, snapshot):
+    assert probable_slips(find_scene("planar_slider_crank").with_(path, SLIPS[path])) == snapshot
 
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").rglob("*.toml"))
@@ -199,13 +156,6 @@ def test_a_hinge_in_the_plane_of_a_plane_mechanism_is_probably_a_slip():
         assert probable_slips(spatial) == []
     first = with_axis((1.0, 0.0, 0.0)).with_("joint[A].axis", (1.0, 0.0, 0.0))
     assert probable_slips(first) == [], "one axis across the plane and two in it"
-
-
-def test_a_scene_without_joints_is_probably_a_slip():
-    scene = find_scene("planar_slider_crank")
-    assert probable_slips(scene.with_(joint=[])) == [
-        "joint: there is none, so nothing connects crank, rod, slider"
-    ]
 
 
 @pytest.mark.parametrize(("rate", "told"), [(100.1, 1), (99.9, 0), (-100.1, 1)])
@@ -275,19 +225,11 @@ def test_an_orientation_in_degrees_is_answered_with_the_quaternion():
         find_scene("four_bar").with_("body[crank].orientation", "60 deg")
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("wide", "must be a number, or one with a unit, such as \"300 mm\", got 'wide'"),
-        ("3 parsec", "'parsec' is no unit of length, known: m, mm"),
-        ("30 deg", "'deg' is no unit of length"),
-        ("1e999 mm", "must be a number|finite|at most"),
-        ("1 2 mm", "must be a number"),
-    ],
-)
-def test_texts_that_are_no_length_are_refused(text, says):
-    with pytest.raises(SceneError, match=says):
+@pytest.mark.parametrize("text", ["wide", "3 parsec", "30 deg", "1e999 mm", "1 2 mm"])
+def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
+    with pytest.raises(SceneError) as caught:
         find_scene("four_bar").with_("joint[A].anchor", [text, 0.0, 0.0])
+    assert caught.value.faults == snapshot
 
 
 def test_the_schema_allows_units_where_a_scene_does():
