@@ -19,6 +19,8 @@ from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
 DENSE = 400  # least number of further times at which the exact motion is computed
+UNEVEN = 0.3  # largest fraction of a step by which a further time is moved: it shows amplitudes over 0.4 rad
+GOLDEN = (np.sqrt(5.0) - 1) / 2  # its multiples are spread evenly over fractions of one
 FINEST = 16  # multiple of DENSE at which the search for full turns between samples ends
 
 
@@ -71,8 +73,13 @@ def dense_exact(
 
 def with_dense(times: np.ndarray, dense: int) -> np.ndarray:
     """Return times (k,) and further times from 0 to their end. A further time has at least a tenth of a step
-    to a given time."""
-    more = np.linspace(0.0, times[-1], dense + 1)
+    to a given time.
+
+    Steps are uneven, so that no oscillation has one rate at all times and looks like a steady turning.
+    """
+    part = np.arange(dense + 1.0)
+    part[1:-1] += UNEVEN * (2 * (GOLDEN * part[1:-1] % 1.0) - 1)
+    more = times[-1] * part / dense
     after = np.minimum(np.searchsorted(times, more), len(times) - 1)
     nearest = np.minimum(np.abs(times[after] - more), np.abs(times[np.maximum(after - 1, 0)] - more))
     return np.union1d(times, more[nearest > 0.1 * times[-1] / dense])

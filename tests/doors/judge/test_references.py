@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck import truth_for
+from crosscheck import reference_table, truth_for
 from crosscheck.judge import constraints
 from crosscheck.judge.joint_reactions import shared_wrenches
 from crosscheck.judge.reference.isostatic import isostatic, replaced
 from crosscheck.judge.reference.reference import Reference, reference
 from crosscheck.judge.truth import closed_form
 from mbref import rotations
-from mbref.scene import Scene
+from mbref.scene import Body, Driver, Revolute, Scene
 from mbref.trajectory import Trajectory
 from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
 from tests.helpers.errors import pose_error, rate_error, turned_between
@@ -219,3 +219,13 @@ def test_open_reactions_and_joints_without_redundant_rows_do_not_depend_on_the_s
     assert sum(basis.shape[1] for basis in wanted.values()) > 0
     weaker = replaced(plain, isostatic(plain))
     assert weaker and replaced(scene, isostatic(scene)) == weaker
+
+
+def test_an_oscillation_with_equal_rates_at_all_even_times_counts_no_turns():
+    """A wheel oscillates by 0.6 rad, 400 times up to the only later sample."""
+    wheel = Body(name="wheel", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0))
+    hinge = Revolute(name="A", bodies=("ground", "wheel"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    motion = Driver(joint="A", polynomial=(0.0,), sine={"amplitude": 0.6, "frequency": 2 * np.pi})
+    scene = Scene(name="wheel", duration=400.0, body=[wheel], joint=[hinge], driver=[motion])
+    table = reference_table(scene, [0.0, 400.0])
+    assert table["A.angle"] == pytest.approx([0.0, 0.0], abs=1e-9)
