@@ -29,6 +29,7 @@ class Result(NamedTuple):
     """Eigenvalues (1/s) of an engine by its own function or by differences; or the reason for none."""
 
     engine: str
+    version: str
     way: str
     eigenvalues: np.ndarray | None
     reason: str = ""
@@ -51,11 +52,11 @@ def of_engine(engine: Engine, scene: Scene, steady: Steady) -> Iterator[Result]:
     there = at_pose(steady.balance, steady.state)
     refusal = engine.cannot(there)
     if refusal is not None:
-        yield Result(engine.name, "", None, refusal.reason)
+        yield Result(engine.name, engine.version(), "", None, refusal.reason)
         return
     if isinstance(engine, Linearising) and not steady.balance.motion.rate:
         own = engine.own_eigenvalues(there).astype(complex)
-        yield Result(engine.name, engine.linearises_by, ordered(own))
+        yield Result(engine.name, engine.version(), engine.linearises_by, ordered(own))
     yield by_accelerations(engine, steady)
 
 
@@ -64,19 +65,20 @@ def by_accelerations(engine: Engine, steady: Steady) -> Result:
 
     With u = Nᵀ δq the motion is u'' = A u + B u' to first order.
     """
+    source = (engine.name, engine.version(), ACCELERATIONS)
     settings = engine.best_settings(steady.balance.scene)
     if not settings:
-        return Result(engine.name, ACCELERATIONS, None, "no setting serves the mechanism")
+        return Result(*source, None, "no setting serves the mechanism")
     run = _Accelerations(engine, settings[-1], steady)
     freedoms = steady.small.basis.shape[1]
     try:
         by_place = [run.derivative(direction, 0 * direction) for direction in np.eye(freedoms)]
         by_rate = [run.derivative(0 * direction, direction) for direction in np.eye(freedoms)]
     except ValueError as reason:
-        return Result(engine.name, ACCELERATIONS, None, str(reason))
+        return Result(*source, None, str(reason))
     lower = np.hstack([np.transpose(by_place), np.transpose(by_rate)])
     matrix = np.vstack([np.eye(freedoms, 2 * freedoms, freedoms), lower])
-    return Result(engine.name, ACCELERATIONS, ordered(np.linalg.eigvals(matrix).astype(complex)))
+    return Result(*source, ordered(np.linalg.eigvals(matrix).astype(complex)))
 
 
 class _Accelerations:

@@ -12,6 +12,8 @@ import numpy as np
 from crosscheck.engine import engine
 from crosscheck.engines.mbref import search
 from crosscheck.judge.small_motions.equilibria import STARTS, Steady, steady_poses
+from crosscheck.processes import pool
+from crosscheck.processes.child import ChildFailed
 from crosscheck.small_motions.compare import Result, distance, error, of_engine
 from crosscheck.small_motions.mechanisms import MECHANISMS
 from mbref import files
@@ -23,6 +25,7 @@ REGULAR = (
     1e-3  # part of the largest eigenvalue by which exact ones may differ from the judge's to be of a pose
 )
 DIGITS = 13  # of stored eigenvalues
+SECONDS = 300.0  # s of CPU time of an engine about a pose, imports and compilation included
 Record = dict[str, Any]
 
 
@@ -60,8 +63,16 @@ def _results(
     results: list[Result] = []
     for name in engines:
         progress(name)
-        results += of_engine(engine(name), scene, steady)
+        try:
+            results += pool.apart(_results_of, (name, scene, steady), SECONDS)
+        except ChildFailed as failure:
+            results.append(Result(name, "", "", None, str(failure)))
     return results
+
+
+def _results_of(name: str, scene: Scene, steady: Steady) -> list[Result]:
+    """Return an engine's results about a pose; called in a child, which captures what the engine prints."""
+    return list(of_engine(engine(name), scene, steady))
 
 
 def _record(
@@ -90,8 +101,7 @@ def _record(
 
 def _result(each: Result, reference: np.ndarray) -> Record:
     found = None if each.eigenvalues is None else error(each.eigenvalues, reference)
-    version = engine(each.engine).version()
-    known = {"engine": each.engine, "version": version, "way": each.way, "reason": each.reason}
+    known = {"engine": each.engine, "version": each.version, "way": each.way, "reason": each.reason}
     return known | {"error": found}
 
 

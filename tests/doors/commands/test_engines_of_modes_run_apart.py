@@ -1,0 +1,19 @@
+"""`crosscheck modes` runs each engine in a process of its own."""
+
+from __future__ import annotations
+
+import json
+
+from crosscheck.cli import main
+from tests.helpers.fake_engines import FAKES
+
+
+def test_modes_survives_engines_that_crash_or_print(capfd):
+    """SEGFAULT ends its process by a signal. CHATTER prints a banner past Python."""
+    engines = [word for name in ("SEGFAULT", "CHATTER") for word in ("--engine", f"{FAKES}:{name}")]
+    assert main(["modes", "point_pendulum", "--starts", "1", "--json", *engines]) == 0
+    out, said = capfd.readouterr()
+    crashed, silent = json.loads(out)["poses"][0]["results"]
+    assert "SIGSEGV" in crashed["reason"] and crashed["error"] is None
+    assert (silent["version"], silent["reason"]) == ("1.2.3", "reports no accelerations")
+    assert "banner" not in out + said
