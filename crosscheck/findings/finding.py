@@ -6,10 +6,10 @@ truth. An error that ends the engine's process has words alone: nothing here doe
 
 from __future__ import annotations
 
+import contextlib
 import enum
+import io
 import math
-import subprocess
-import sys
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -22,6 +22,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
+from crosscheck.processes.child import Child, ChildFailed
 from crosscheck.processes.pool import run_isolated
 from mbref.scene import Scene
 from mbref.trajectory import Outcome
@@ -29,6 +30,13 @@ from mbref.trajectory import Outcome
 FOLDER = Path(__file__).parent
 SAMPLES = 11
 TIME_LIMIT = 900.0  # s; some engines compile their code first
+
+
+def printed_by(script: str) -> str:
+    """Return the text that a script prints."""
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        exec(compile(script, "<script of a finding>", "exec"), {"__name__": "__main__"})
+    return text.getvalue()
 
 
 class Status(enum.Enum):
@@ -86,21 +94,15 @@ class Finding:
         return self._of_script(version) if self.script else self._of_scene(version)
 
     def _of_script(self, version: str) -> Answer:
-        try:
-            ended = subprocess.run(
-                [sys.executable, "-c", self.script],
-                capture_output=True,
-                text=True,
-                check=False,
-                timeout=TIME_LIMIT,
-            )
-        except subprocess.TimeoutExpired:
-            return Answer(Status.UNCLEAR, version, None, f"no answer within {TIME_LIMIT:g} s")
-        try:
-            return self._of_number(version, float(ended.stdout.split()[-1]))
-        except (IndexError, ValueError):
-            said = (ended.stderr.strip() or "nothing").splitlines()[-1]
-            return Answer(Status.UNCLEAR, version, None, f"the script gave no number: {said}")
+        with contextlib.closing(Child()) as child:
+            try:
+                printed = child.call(printed_by, (self.script,), TIME_LIMIT).value.split()
+                return self._of_number(version, float(printed[-1]))
+            except ChildFailed as failure:
+                said = str(failure)
+            except (IndexError, ValueError):
+                said = " ".join(printed) or "nothing"
+        return Answer(Status.UNCLEAR, version, None, f"the script gave no number: {said}")
 
     def _of_scene(self, version: str) -> Answer:
         scene = Scene.from_file(FOLDER / self.scene)
