@@ -14,7 +14,7 @@ from typing import Annotated, NamedTuple
 
 from numpy import inf, sqrt
 
-from mbref.equations.coordinates import contract, displace, expand
+from mbref.equations.coordinates import contract, displace, expand, normalise
 from mbref.equations.evaluation import assemble_system, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
 from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
@@ -174,6 +174,7 @@ def project_positions(t, memory):
 def accept(t, y, memory):
     state = memory.state
     expand(y, memory.active, state)
+    normalise(state.coordinates)
     status = project_positions(t, memory)
     if status != OK or not follow_last_correction(t, memory):
         return SINGULAR if status == OK else status
