@@ -25,36 +25,14 @@ TABLE = "time,crank.position.x,crank.position.y\n0,0,0.25\n0.0005,0.0{number},0.
 MOTION = '{{"scene": {{"name": "{name}"}}, "record": {number}}}'
 SAMPLES = {".xml": MJCF, ".urdf": URDF, ".sdf": SDF, ".csv": TABLE, ".json": MOTION}
 NUMBERS = (
-    "1",
-    "1",
-    "1",
-    "0",
-    "-1",
-    "1e300",
-    "1e308",
-    "inf",
-    "nan",
-    "",
-    "x",
-    "1 2",
-    "9" * 5000,
-    "0" * 200_000,
+    *("1", "1", "1", "0", "-1", "1e300", "1e308"),
+    *("inf", "nan", "", "x", "1 2", "9" * 5000, "0" * 200_000),
 )
 NAMES = ("model", "model", "../../up", "two words", "a\x1b[31mb", "&lt;b&gt;", "$x$", "$(touch pwned)", "")
 PIECES = (
     *(
-        b"",
-        b"\x00",
-        b"\xff\xfe",
-        b"<",
-        b">",
-        b"<!--",
-        b"]]>",
-        b'"',
-        b"&amp;",
-        b"&x;",
-        b"<a>" * 3000,
-        b"[" * 100_000,
+        *(b"", b"\x00", b"\xff\xfe", b"<", b">", b"<!--", b"]]>", b'"', b"&amp;", b"&x;", b"<a>" * 3000),
+        *(b"[" * 100_000,),
     ),
     *(b"nan", b"1e400", b"null", b"{}", b"\n", b",", b";", b"\t", b"\x1b[2J", b"0\n" * 50, b"<include/>"),
 )

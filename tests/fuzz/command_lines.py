@@ -36,35 +36,15 @@ BY_ITSELF = {
 }  # default outputs
 NUMBERS = (
     *(
-        "0",
-        "1",
-        "2",
-        "3",
-        "-1",
-        "0.01",
-        "1e-9",
-        "1e-300",
-        "1e30",
-        "1e308",
-        "inf",
-        "nan",
-        "9" * 20,
-        "9" * 5000,
+        *("0", "1", "2", "3", "-1", "0.01", "1e-9", "1e-300", "1e30", "1e308", "inf", "nan", "9" * 20),
+        *("9" * 5000,),
     ),
     *("-0", "1_0", "٣", "0x10", "", "x", "1e", "--"),
 )
 HOSTILE = (
     *(
-        "../../up",
-        "/no/such/folder",
-        "a/b",
-        "$(touch pwned)",
-        "`id`",
-        "two words",
-        "\x1b[31m",
-        "\x9b2J",
-        "<b>",
-        "%s",
+        *("../../up", "/no/such/folder", "a/b", "$(touch pwned)", "`id`", "two words", "\x1b[31m", "\x9b2J"),
+        *("<b>", "%s"),
     ),
     *("{0}", "$x_1$", "-", "--", "x" * 300, "ü", "\u202e", "[red]", "a\nb", "=", ":", ",", ".."),
 )
@@ -259,15 +239,8 @@ def _output(draw: random.Random, chosen: Command) -> str:
     Path("full").mkdir(exist_ok=True)
     Path("full/mine.txt").write_text("my own\n")
     strange = (
-        "kept.csv",
-        "full",
-        "no/such/x.svg",
-        "/dev/full",
-        "/dev/null",
-        "",
-        "x" * 300,
-        "..",
-        "$(id).svg",
+        *("kept.csv", "full", "no/such/x.svg", "/dev/full", "/dev/null"),
+        *("", "x" * 300, "..", "$(id).svg"),
     )
     return draw.choice(strange) if draw.random() < 0.4 else f"new.{suffix}".rstrip(".")
 

@@ -76,61 +76,13 @@ EVERYTHING = {
 }
 
 NUMBERS = (
-    0,
-    1,
-    -1,
-    2**63,
-    -(2**63) - 1,
-    10**400,
-    0.0,
-    -0.0,
-    1e-5,
-    1e5,
-    -1e5,
-    1e-12,
-    1e12,
-    1e-100,
-    1e100,
-    -1e100,
-    1e-200,
-    1e200,
-    -1e200,
-    5e-324,
-    2.2e-308,
-    1.7e308,
-    -1.7e308,
-    float("inf"),
-    float("-inf"),
-    float("nan"),
+    *(0, 1, -1, 2**63, -(2**63) - 1, 10**400, 0.0, -0.0, 1e-5, 1e5, -1e5, 1e-12, 1e12, 1e-100, 1e100, -1e100),
+    *(1e-200, 1e200, -1e200, 5e-324, 2.2e-308, 1.7e308, -1.7e308, float("inf"), float("-inf"), float("nan")),
 )
 WORDS = (
-    "",
-    " ",
-    "ground",
-    "the fixed frame",
-    "leaf",
-    "r",
-    "fixed",
-    "revolute",
-    "spherical",
-    "universal",
-    "a\nb",
-    "[red]x[/]",
-    "[/nothing]",
-    "$x_1$",
-    "../../up",
-    "a/b",
-    "<b>&amp;</b>",
-    "a|b",
-    "x" * 5000,
-    "ü",
-    "\u202e",
-    "\x00",
-    "1.0",
-    "nan",
-    "body",
-    "{0}",
-    "%s",
+    *("", " ", "ground", "the fixed frame", "leaf", "r", "fixed", "revolute", "spherical", "universal"),
+    *("a\nb", "[red]x[/]", "[/nothing]", "$x_1$", "../../up", "a/b", "<b>&amp;</b>", "a|b", "x" * 5000, "ü"),
+    *("\u202e", "\x00", "1.0", "nan", "body", "{0}", "%s"),
 )
 
 
@@ -264,27 +216,13 @@ def _smudged(draw: random.Random, text: bytes) -> bytes:
 
 
 METHODS = (
-    "alf-dual+projection",
-    "alf-dual+projection",
-    "alf+projection/adams",
-    "lm1+baumgarte",
-    "lm1+none/rk4",
-    "mpi-svd+partitioning",
-    "taylor",
+    *("alf-dual+projection", "alf-dual+projection", "alf+projection/adams", "lm1+baumgarte", "lm1+none/rk4"),
+    *("mpi-svd+partitioning", "taylor"),
 )
 OPTIONS = ("alpha", "beta", "step", "max_order", "omega", "mu", "kept", "iterations", "", "nothing")
 LIMITS = (
-    "rtol",
-    "atol",
-    "rank_tolerance",
-    "violation",
-    "first_step",
-    "smallest_step",
-    "forced_step",
-    "largest_step",
-    "largest_turn",
-    "most_steps",
-    "code",
+    *("rtol", "atol", "rank_tolerance", "violation", "first_step", "smallest_step", "forced_step"),
+    *("largest_step", "largest_turn", "most_steps", "code"),
 )
 CODES = ("auto", "generic", "generated")
 RATHER = (1e-3, 1e-6, 1e-9, 1e-12, 0.01, 0.1, 0.5, 1, 100)  # numbers that a user may well give

@@ -137,7 +137,7 @@ def test_record_file_keeps_the_crossings_of_a_run(tmp_path):
     assert np.array_equal(read.angular_velocity, crossing.angular_velocity)
 
 
-def test_crossings_are_none_if_the_method_does_not_look_for_them_and_empty_if_it_passes_none():
+def test_crossings_are_none_if_not_looked_for_and_empty_if_none_is_passed():
     assert simulate(four_bar_gravity(0.3), "mpi-svd+partitioning", [0.1]).crossings is None
     assert simulate(slider_crank(0.1, 0.3, 0.3, "crank"), "taylor", [0.1]).crossings == ()
 

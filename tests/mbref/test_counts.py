@@ -24,7 +24,7 @@ def test_built_in_scenes_have_the_counts_that_the_paper_states(name):
     assert found == PAPER[name], f"{name}: (coordinates, rows, redundant) {found}, the paper {PAPER[name]}"
 
 
-@pytest.mark.parametrize("loops", [1, 2, 5])
+@pytest.mark.parametrize("loops", [1, 2, 5, 200])
 def test_chains_have_the_counts_of_their_formulas(loops):
     """N four-bars: N + 1 hinges of 5 rows below and 2 N universal joints of 4 rows above, N rows redundant.
     N slider-cranks: 18 rows each and N - 1 welds of 6 rows; 1 row of each and 5 of each weld are

@@ -230,8 +230,7 @@ def test_only_a_link_with_three_joints_is_drawn_as_a_plate():
 
 
 @pytest.mark.parametrize(
-    ("name", "right", "up"),
-    [("xy", "x", "y"), ("xz", "x", "z"), ("yz", "y", "z"), ("-90,90", "x", "y")],
+    ("name", "right", "up"), [("xy", "x", "y"), ("xz", "x", "z"), ("yz", "y", "z"), ("-90,90", "x", "y")]
 )
 def test_named_view_has_its_two_world_axes_to_the_right_and_up(name, right, up):
     axes = View.parse(name).axes

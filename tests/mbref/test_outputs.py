@@ -24,7 +24,7 @@ POST = (0.5, 1.1, 0.0)  # the spring's end on the ground
 
 
 def pendulum(bodies=("ground", "rod"), axis=(0.0, 0.0, 2.0), load=()) -> Scene:
-    """A rod at rest along x, turned about the origin by 0.8 sin 3t + 0.5 t."""
+    """Return a rod along x that a driver turns about the origin by 0.8 sin 3t + 0.5 t."""
     rod = {"name": "rod", "mass": MASS, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
     hinge = {"name": "A", "type": "revolute", "bodies": bodies, "anchor": [0.0, 0.0, 0.0], "axis": axis}
     driver = {"joint": "A", "polynomial": [0.0, 0.5], "sine": SWING}
@@ -67,7 +67,7 @@ def sprung() -> Motion:
     ("bodies", "z", "sense"),
     [(("ground", "rod"), 2.0, 1), (("ground", "rod"), -1.0, -1), (("rod", "ground"), 1.0, -1)],
 )
-def test_torque_of_a_driver_is_that_of_the_driven_pendulum(bodies, z, sense):
+def test_torque_of_a_driver_is_the_moment_that_the_pendulum_needs(bodies, z, sense):
     """J θ'' + m g l cos θ acts on the rod about z; θ has the driver's sign or the opposite one."""
     motion = simulate(pendulum(bodies, (0.0, 0.0, z)), times=TIMES)
     theta, rate, acceleration = (sense * x for x in angle(TIMES))
@@ -78,7 +78,7 @@ def test_torque_of_a_driver_is_that_of_the_driven_pendulum(bodies, z, sense):
 
 
 def test_force_of_a_driver_pushes_a_slide_up_its_tilted_guide():
-    """m (s'' + g sin 30°) with s = 0.3 t + 0.1 t², and power force times s'."""
+    """F = m (s'' + g sin 30°) with s = 0.3 t + 0.1 t², and power F s'."""
     axis = (np.sqrt(3) / 2, 0.5, 0.0)
     slide = {"name": "slide", "mass": MASS, "inertia": [INERTIA] * 3, "position": [0.0, 0.0, 0.0]}
     guide = {
@@ -102,8 +102,8 @@ def test_force_of_a_driver_pushes_a_slide_up_its_tilted_guide():
     assert np.allclose(found.power, MASS * (0.2 + G / 2) * speed, atol=1e-9)
 
 
-def test_rate_of_a_displacement_counts_the_turn_of_the_guide():
-    """A slide on a turning arm: d/dt of the displacement along the arm, not along the world."""
+def test_rate_of_a_displacement_is_taken_along_the_turning_guide():
+    """A slide on a turning arm: the rate is the difference quotient of the displacement along the arm."""
     arm = {
         "name": "arm",
         "mass": 1.0,
@@ -151,28 +151,34 @@ def test_length_rate_and_force_of_a_spring_follow_from_geometry(sprung):
     assert np.allclose(found.power, -force * rate, atol=1e-8) and found.torque is None
 
 
-def test_torque_of_a_torsion_spring_turns_back(sprung):
+def test_torque_of_a_torsion_spring_and_damper_follows_from_the_angle(sprung):
     theta, turning, _ = angle(TIMES)
     torque = -STIFFNESS * (theta - TWIST) - DAMPING * turning
     found = sprung.load_at(1)
     assert np.allclose(found.angle, theta, atol=1e-9) and np.allclose(found.rate, turning, atol=1e-9)
     assert np.allclose(found.torque, torque, atol=1e-8) and found.length is None
     assert np.allclose(found.power, torque * turning, atol=1e-8)
+
+
+def test_force_on_a_body_has_power_and_no_numbers_of_springs(sprung):
     pushed = vars(sprung.load_at(2))
     assert [name for name in pushed if pushed[name] is not None] == ["place", "power"]
+
+
+def test_load_of_a_number_that_does_not_exist_is_refused(sprung):
     with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
         sprung.load_at(3)
 
 
-def test_powers_of_driver_and_springs_are_the_rate_of_energy(sprung):
-    """d/dt of kinetic energy and weight, by hand, is the power of driver, springs and the constant force."""
+def test_powers_of_driver_and_loads_sum_to_the_rate_of_energy(sprung):
+    """d/dt (½ J θ'² + m g l sin θ) is the power of driver, springs and the constant force."""
     theta, turning, acceleration = angle(TIMES)
     gained = (INERTIA + MASS * ARM**2) * turning * acceleration + MASS * G * ARM * np.cos(theta) * turning
     powers = sprung.driver("A").power + sum(sprung.load_at(k).power for k in range(3))
     assert np.allclose(powers, gained, atol=1e-8)
 
 
-def test_violations_of_a_motion_with_an_armature_are_of_its_own_rows():
+def test_armature_changes_neither_violations_nor_determined_reactions():
     scene = find_scene("four_bar_gravity")
     joints = [j.model_copy(update={"armature": 0.5}) if j.name == "A" else j for j in scene.joint]
     motion = simulate(scene.with_(joint=joints), times=TIMES[:3] / 10)
@@ -183,7 +189,8 @@ def test_violations_of_a_motion_with_an_armature_are_of_its_own_rows():
 
 
 @pytest.mark.parametrize("ground", ["frame", "body"])
-def test_violation_is_what_a_pose_and_its_rates_are_off_by(ground):
+def test_violation_is_the_distance_by_which_a_body_is_out_of_its_plane(ground):
+    """The rod is moved across the plane at one sample: by 1 mm, 1 cm/s and 0.1 m/s²."""
     motion = simulate(find_scene("planar_slider_crank").with_(ground=ground), times=TIMES[:3] / 10)
     assert all(level.max() < 1e-9 for level in motion.violation)
     off = {
@@ -193,7 +200,7 @@ def test_violation_is_what_a_pose_and_its_rates_are_off_by(ground):
     }
     for level, (size, field) in off.items():
         moved = getattr(motion, field).copy()
-        moved[1, 1, 2] += size  # the rod, out of the plane, at one sample
+        moved[1, 1, 2] += size
         found = getattr(dataclasses.replace(motion, **{field: moved}).violation, level)
         assert found[1] == pytest.approx(size, rel=1e-6) and found[[0, 2]].max() < 1e-9, level
     bare = dataclasses.replace(motion, acceleration=None)
@@ -203,7 +210,7 @@ def test_violation_is_what_a_pose_and_its_rates_are_off_by(ground):
 @pytest.mark.parametrize(
     "name", ["planar_slider_crank", "four_bar", "five_bar", "spatial_slider_crank", "bennett"]
 )
-def test_determined_components_are_those_that_the_judge_s_open_wrenches_leave(name):
+def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
     scene = find_scene(name)
     motion = simulate(scene, times=np.array([0.0, 0.003]))
     found = motion.determined_reactions
@@ -213,7 +220,9 @@ def test_determined_components_are_those_that_the_judge_s_open_wrenches_leave(na
             assert (found[joint][k] == (np.abs(basis).max(axis=1, initial=0.0) < 1e-6)).all(), (joint, t)
 
 
-def test_forces_in_the_plane_of_a_mechanism_of_revolutes_are_determined(capsys, tmp_path):
+def test_only_in_plane_reactions_of_a_planar_four_bar_are_determined(capsys, tmp_path):
+    """Four parallel hinges: force x, force y and moment z; three rows more than the motion needs act
+    across."""
     hinges = [
         j.model_dump() | {"type": "revolute", "axis": (0.0, 0.0, 1.0)} for j in find_scene("four_bar").joint
     ]
@@ -226,21 +235,19 @@ def test_forces_in_the_plane_of_a_mechanism_of_revolutes_are_determined(capsys, 
     assert "determined          force x, force y, moment z of A, B, C, D" in capsys.readouterr().out
 
 
-def test_the_largest_reaction_is_that_of_some_joint(sprung):
+def test_largest_reaction_is_the_largest_force_of_any_joint(sprung):
     assert np.allclose(sprung.largest_reaction, np.linalg.norm(sprung.joint("A").force, axis=1), rtol=1e-14)
     motion = simulate("planar_slider_crank", times=TIMES[:3] / 10)
     sizes = [np.linalg.norm(motion.joint(j.name).force, axis=1) for j in motion.mechanism.joint]
     assert (motion.largest_reaction == np.max(sizes, axis=0)).all()
 
 
-def test_unknown_columns_say_what_they_need_or_what_was_meant(sprung):
-    assert list(sprung.columns("driver(A)", "energy")) == [
-        "time",
-        "driver(A).torque",
-        "driver(A).power",
-        "driver(A).open",
-        "energy",
-    ]
+def test_columns_of_a_driver_are_its_torque_power_and_open_components(sprung):
+    expected = ["time", "driver(A).torque", "driver(A).power", "driver(A).open", "energy"]
+    assert list(sprung.columns("driver(A)", "energy")) == expected
+
+
+def test_unavailable_column_is_refused_with_its_need_or_a_suggestion(sprung):
     massless = sprung.mechanism.body[0].model_copy(update={"mass": None, "inertia": None})
     bare = simulate(sprung.mechanism.with_(body=[massless], load=[]), times=TIMES[:2])
     for motion, name, says in (
@@ -261,34 +268,39 @@ def test_unknown_columns_say_what_they_need_or_what_was_meant(sprung):
     assert bare.driver("A").power is None and bare.largest_reaction is None
 
 
-def test_the_page_lists_the_table_of_outputs():
+def test_page_of_outputs_has_a_row_for_every_output():
     rows = [f"| `{o.column}` | {o.unit} | {o.shape} | {o.meaning} |" for o in OUTPUTS]
     assert [line for line in PAGE.read_text().splitlines() if line.startswith("| `")] == rows
 
 
-def test_commands_print_write_and_plot_columns(tmp_path, capsys):
-    path, table, picture = (str(tmp_path / name) for name in ("my.toml", "run.csv", "run.png"))
+def test_command_run_prints_and_writes_the_requested_columns(tmp_path, capsys):
+    """At t = 0 the rod is level and does not accelerate: the torque is m g l = 13.734 N m."""
+    path, table = (str(tmp_path / name) for name in ("my.toml", "run.csv"))
     pendulum().save(path)
     asked = ["A.angle", "driver(A).torque"]
     assert main(["run", path, "--times", "0,0.5", "--out", table, "--columns", *asked]) == 0
     shown = capsys.readouterr().out
-    assert "driver(A).torque" in shown and "13.734" in shown and "largest reaction" in shown
+    assert "driver(A).torque" in shown and f"{MASS * G * ARM:.5g}" in shown and "largest reaction" in shown
     with open(table, newline="") as file:
-        rows = list(csv.DictReader(file))
-    assert list(rows[0]) == ["time", *asked] and float(rows[0]["driver(A).torque"]) == pytest.approx(
-        MASS * G * ARM
-    )
-    assert main(["plot", path, *asked, "--samples", "5", "--out", picture]) == 0
-    assert Path(picture).read_bytes().startswith(b"\x89PNG")
-    assert main(["plot", path, "--samples", "5", "--out", picture.replace("png", "svg")]) == 0
-    assert "<svg" in Path(picture.replace("png", "svg")).read_text()
+        first = next(csv.DictReader(file))
+    assert list(first) == ["time", *asked]
+    assert float(first["driver(A).torque"]) == pytest.approx(MASS * G * ARM)
+
+
+def test_command_plot_writes_png_and_svg_and_suggests_a_column(tmp_path, capsys):
+    path, picture = str(tmp_path / "my.toml"), tmp_path / "run.png"
+    pendulum().save(path)
+    assert main(["plot", path, "A.angle", "--samples", "5", "--out", str(picture)]) == 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert main(["plot", path, "--samples", "5", "--out", str(picture.with_suffix(".svg"))]) == 0
+    assert "<svg" in picture.with_suffix(".svg").read_text()
     capsys.readouterr()
     assert main(["plot", path, "A.angel", "--samples", "5"]) == 2
     assert "did you mean 'A.angle'?" in capsys.readouterr().err
-    assert main(["list", "outputs"]) == 0 and "driver(A).torque" in capsys.readouterr().out
 
 
-def test_a_gif_takes_the_time_of_the_round(tmp_path):
+def test_gif_of_a_short_motion_plays_four_seconds(tmp_path):
+    """A motion of 1 s, slowed to 4 s: the frames' durations (ms) in the file add up to it."""
     from PIL import Image
 
     path = tmp_path / "my.toml"
@@ -302,18 +314,20 @@ def test_a_gif_takes_the_time_of_the_round(tmp_path):
     assert len(lasts) == 7 and sum(lasts) == 4000
 
 
-def test_an_mp4_is_written_by_ffmpeg(tmp_path):
+def test_animation_is_written_as_mp4(tmp_path):
     pytest.importorskip("imageio_ffmpeg", reason="the extra video writes MP4")
     path = tmp_path / "my.toml"
     pendulum().save(path)
     assert main(["animate", str(path), "--samples", "7", "--out", str(tmp_path / "my.mp4")]) == 0
-    assert (tmp_path / "my.mp4").read_bytes()[4:8] == b"ftyp"
+    assert (tmp_path / "my.mp4").read_bytes()[4:8] == b"ftyp"  # the first box of ISO base media files
 
 
 @pytest.mark.parametrize(
     ("missing", "ending"), [("PIL", "gif"), ("imageio_ffmpeg", "mp4"), ("matplotlib.figure", "png")]
 )
-def test_a_missing_library_is_named(missing, ending, tmp_path, monkeypatch, capsys):
+def test_picture_that_needs_a_missing_library_is_refused_with_the_extra_to_install(
+    missing, ending, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setitem(sys.modules, missing, None)
     path = tmp_path / "my.toml"
     pendulum().save(path)

@@ -1,4 +1,4 @@
-"""Singular positions of different loops that follow each other within a step: each is told."""
+"""Singular positions of two loops that follow each other within one step: each is recorded."""
 
 import math
 
@@ -13,28 +13,27 @@ APART = (2e-2, -5e-3, 3e-4)  # rad, of the crank, between the flat positions of 
 
 
 def angles(run) -> np.ndarray:
-    """The crank's at each singular position, from its flat ones (rad)."""
+    """Return the crank's angle (rad) from the line of its frame at each singular position."""
     return np.array([math.asin(passed.position[0, 1] / (LENGTH / 2)) for passed in run.crossings])
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-9, 1e-12])
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("apart", APART)
-def test_both_are_told(apart, method, rtol):
-    """The crank swings from 0.3 rad to π - 0.3 rad below its frame and back: flat at 0 and at the turn of
-    the other frame, there and at π from there."""
+def test_flat_positions_of_two_loops_within_one_step_are_both_recorded(apart, method, rtol):
+    """The crank swings down from 0.3 rad to π - 0.3 rad and back. It passes 0, where the first loop is flat,
+    and ``apart``, the angle of the second loop's frame; half a turn later it passes both again."""
     run = simulate(two_rhombi(apart), method, [1.0], Limits(rtol=rtol, code="generic"))
     assert run.outcome.label == "COMPLETED", run.message
-    there, beyond = sorted((0.0, apart), reverse=True), sorted((0.0, -apart))
-    expected = (there + beyond)[: len(run.crossings)]
+    expected = sorted((0.0, apart), reverse=True) + sorted((0.0, -apart))
     assert len(run.crossings) >= 4
     assert np.abs(angles(run)[:4] - expected).max() < 1e-9
 
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("number", [1, 2])
-def test_another_branch_is_taken_at_the_one_asked_for(number, method):
-    """At the first or the second of two within a step: the loop goes over whose flat position it is."""
+def test_second_branch_is_taken_at_the_first_or_second_of_two_crossings_in_a_step(number, method):
+    """Up to the crossing of its loop a coupler is parallel to its frame, and behind it turns."""
     apart, times = -2e-2, np.linspace(0.0, 0.6, 61)
     run = simulate(two_rhombi(apart), method, times, Limits(branches={number: 2}, code="generic"))
     assert run.outcome.label == "COMPLETED", run.message

@@ -1,4 +1,4 @@
-"""A failed run names what bears its cause."""
+"""A failed run names a method or option that copes with the cause."""
 
 import re
 
@@ -32,29 +32,34 @@ SLENDER = Scene(
         (
             SCENES["planar_slider_crank"](),
             "mpi-qr+none/rk4[step=1e-2]",
-            "taylor completes|projection corrects",
+            r"\+projection corrects violations after every step",
         ),
     ],
 )
-def test_a_failure_names_what_bears_its_cause(scene, method, words):
+def test_message_of_a_failed_run_names_its_cause_and_a_remedy(scene, method, words):
     run = simulate(scene, method, np.linspace(0.0, 1.5, 7), Limits(rtol=1e-6, most_steps=5_000))
     assert run.outcome.label != "COMPLETED"
-    assert re.search("; .*(" + words + ")", run.message), run.message
+    assert re.search("; .*" + words, run.message), run.message
 
 
-def test_what_a_remedy_names_bears_the_cause():
-    for method in ("taylor", "alf+projection", "lm1+projection"):
-        assert simulate(SLENDER, method, [0.1]).outcome.label == "COMPLETED", method
+@pytest.mark.parametrize("method", ["taylor", "alf+projection", "lm1+projection"])
+def test_remedy_for_a_rod_without_thickness_follows_the_pendulum(method):
+    """The rod has no moment of inertia about its axis: J θ'' = -m g l cos θ with J = 0.1 + 0.5² kg m²; after
+    a short time t, θ = -m g l t² / 2 J."""
+    run = simulate(SLENDER, method, [1e-3])
+    assert run.outcome.label == "COMPLETED", run.message
+    fall = -9.81 * 0.5 / (0.1 + 0.5**2) * 1e-3**2 / 2
+    assert run.position[0, 0, 1] == pytest.approx(0.5 * fall, rel=1e-5)
 
 
-def test_a_singular_position_that_taylor_passes_is_no_dead_position():
-    """The rhombus comes to θ = -π at t = 37.76 ms, where branches meet and drift makes rates large."""
+def test_singular_position_that_taylor_passes_is_not_called_a_dead_position():
+    """The rhombus is flat at θ = -π, t = 37.76 ms, where branches meet and drift makes rates large."""
     run = simulate("four_bar", "mpi-svd+none/dop853", np.linspace(0.0, 0.05, 11), Limits(rtol=1e-6))
     assert run.outcome.label != "COMPLETED" and abs(run.t_end - 0.03776) < 1e-3
     assert "dead position" not in run.message and "taylor" in run.message, run.message
 
 
-def test_a_method_that_fails_as_well_is_not_advised():
+def test_method_that_fails_at_a_dead_position_as_well_is_not_advised():
     """A crank of 0.5 m is driven until the other bars are a straight line, at 0.55 s."""
     bars = linkage("dead", ((0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.8, 0.4, 0.0), (1.2, 0.0, 0.0)))
     scene = bars.with_(driver=(Driver(joint="P0", polynomial=(0.0, 2.0)),))

@@ -20,6 +20,7 @@ from mbref.scenes import SCENES, find_scene
 
 
 def faults(tmp_path: Path, *changes: tuple[str, str]) -> list[str]:
+    """Return the faults of the template after replacements of its text."""
     text = template()
     for old, new in changes:
         assert old in text, old
@@ -71,12 +72,12 @@ def test_each_fault_is_one_sentence_with_its_line_and_a_suggestion(name, tmp_pat
         ("position = [0.5, 0.0, 0.0]", "position = 0.5, 0.0, 0.0", ": position = 0.5, 0.0, 0.0"),
     ],
 )
-def test_what_is_not_toml_is_quoted_or_explained(tmp_path, old, new, says):
+def test_wrong_table_or_line_of_toml_is_quoted_or_explained(tmp_path, old, new, says):
     (fault,) = faults(tmp_path, (old, new))
     assert says in fault
 
 
-def test_a_missing_file_suggests_one_beside_it_or_a_built_in_scene(tmp_path, monkeypatch):
+def test_missing_file_suggests_a_file_of_the_folder_or_a_built_in_scene(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("pendulum.toml").touch()
     for name, says in (("pendulm.toml", "did you mean 'pendulum.toml'?"), ("bennett.toml", "'bennett' is")):
@@ -84,7 +85,7 @@ def test_a_missing_file_suggests_one_beside_it_or_a_built_in_scene(tmp_path, mon
             find_scene(name)
 
 
-def test_a_fault_that_moving_finds_has_its_line_too(tmp_path, capsys):
+def test_fault_found_by_a_run_states_the_line_of_its_entry(tmp_path, capsys):
     text = template().replace("mass = 2.0\ninertia = [1e-4, 0.06, 0.06]\n", "")
     (tmp_path / "my.toml").write_text(text)
     assert main(["run", str(tmp_path / "my.toml")]) == 2
@@ -103,7 +104,7 @@ def test_a_fault_that_moving_finds_has_its_line_too(tmp_path, capsys):
         ([], "mbref diagnose my.toml"),
     ],
 )
-def test_a_wrong_command_line_is_answered_in_words(capsys, words, says):
+def test_wrong_command_line_is_answered_with_a_suggestion(capsys, words, says):
     with pytest.raises(SystemExit) as ended:
         main(words)
     assert ended.value.code == 2 and says in capsys.readouterr().err
@@ -132,11 +133,11 @@ SCENE_FILES = [path for path in EXAMPLES if "[[body]]" in path.read_text()]
 
 
 @pytest.mark.parametrize("path", SCENE_FILES, ids=lambda path: path.name)
-def test_no_example_has_a_probable_slip(path):
+def test_no_scene_of_the_examples_has_a_probable_slip(path):
     assert probable_slips(Scene.from_file(path)) == []
 
 
-def test_a_hinge_in_the_plane_of_a_plane_mechanism_is_probably_a_slip():
+def test_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip():
     """Two hinges across the plane and one in it; as many in it as across are a spatial mechanism."""
     scene = find_scene("planar_slider_crank")
     hinge = {
@@ -159,7 +160,7 @@ def test_a_hinge_in_the_plane_of_a_plane_mechanism_is_probably_a_slip():
 
 
 @pytest.mark.parametrize(("rate", "told"), [(100.1, 1), (99.9, 0), (-100.1, 1)])
-def test_a_driver_of_more_than_a_hundred_radians_is_probably_a_slip(rate, told):
+def test_driver_that_turns_more_than_a_hundred_radians_is_a_probable_slip(rate, told):
     driven = find_scene("four_bar").with_(driver=({"joint": "A", "polynomial": [0.0, rate]},), duration=1.0)
     found = probable_slips(driven)
     assert len(found) == told and all(
@@ -167,8 +168,8 @@ def test_a_driver_of_more_than_a_hundred_radians_is_probably_a_slip(rate, told):
     )
 
 
-def test_units_are_read_as_si(tmp_path):
-    """Lengths and angles with a unit give the scene of the numbers in m and rad."""
+def test_lengths_and_angles_with_units_equal_the_numbers_in_si(tmp_path):
+    """The saved scene has numbers in m and rad only."""
     plain = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml").to_dict()
     with_units = json.loads(json.dumps(plain))
     for body in with_units["body"]:
@@ -194,7 +195,7 @@ def test_units_are_read_as_si(tmp_path):
     assert "mm" not in (tmp_path / "read.toml").read_text()
 
 
-def test_amplitudes_have_the_unit_of_the_driven_coordinate():
+def test_amplitude_of_a_driver_has_the_unit_of_its_coordinate():
     scene = find_scene("four_bar")
     swing = {"joint": "A", "sine": {"amplitude": "30 deg", "frequency": 2.0, "phase": "0 deg"}}
     assert scene.with_(driver=(swing,)).driver[0].sine.amplitude == pytest.approx(math.pi / 6, rel=1e-15)
@@ -203,9 +204,20 @@ def test_amplitudes_have_the_unit_of_the_driven_coordinate():
         match=r"driver\[A\]\.sine\.amplitude: prescribes the angle of a revolute joint.* got '30 mm'",
     ):
         scene.with_(driver=({**swing, "sine": {"amplitude": "30 mm"}},))
-    late = {"amplitude": "30 deg", "phase": "90 deg"}
-    with pytest.raises(SceneError, match="must be 0, motion is measured from t = 0; got 0"):
-        scene.with_(driver=({**swing, "sine": late},))
+
+
+@pytest.mark.parametrize(
+    ("motion", "value"),
+    [
+        ({"sine": {"amplitude": "30 deg", "phase": "90 deg"}}, math.pi / 6),
+        ({"polynomial": ["90 deg"]}, math.pi / 2),
+    ],
+    ids=["sine", "polynomial"],
+)
+def test_driver_that_does_not_begin_at_zero_is_refused_with_its_value_in_radians(motion, value):
+    with pytest.raises(SceneError, match="must be 0, motion is measured from t = 0; got ") as caught:
+        find_scene("four_bar").with_(driver=({"joint": "A", **motion},))
+    assert f"{value:.6g}" in str(caught.value)
 
 
 def test_coefficients_of_a_driver_have_the_unit_of_its_coordinate():
@@ -214,11 +226,9 @@ def test_coefficients_of_a_driver_have_the_unit_of_its_coordinate():
     assert driver.coefficients == (0.0, pytest.approx(2 * math.pi, rel=1e-15))
     with pytest.raises(SceneError, match=r"driver\[A\]\.polynomial\[1\]: prescribes the angle .* got '5 mm'"):
         scene.with_(driver=({"joint": "A", "polynomial": [0, "5 mm"]},))
-    with pytest.raises(SceneError, match=r"must be 0, motion is measured from t = 0; got 1\.5708"):
-        scene.with_(driver=({"joint": "A", "polynomial": ["90 deg"]},))
 
 
-def test_an_orientation_in_degrees_is_answered_with_the_quaternion():
+def test_orientation_in_degrees_is_refused_with_the_formula_of_the_quaternion():
     with pytest.raises(
         SceneError, match=r"for an angle φ about z cos\(φ/2\), 0, 0, sin\(φ/2\), got '60 deg'"
     ):
@@ -232,12 +242,12 @@ def test_text_that_is_no_length_is_refused_in_a_sentence(text, snapshot):
     assert caught.value.faults == snapshot
 
 
-def test_the_schema_allows_units_where_a_scene_does():
+def test_schema_allows_a_number_or_a_text_with_a_unit():
     text = json.dumps(Scene.model_json_schema())
     assert '"anyOf": [{"type": "number"}, {"type": "string"}]' in text
 
 
-def test_diagnose_echoes_units_in_si(tmp_path, capsys):
+def test_diagnose_prints_values_with_units_in_si(tmp_path, capsys):
     path = tmp_path / "my.toml"
     text = (Path(__file__).parents[2] / "mbref" / "templates" / "scene.toml").read_text()
     assert "position = [" in text
@@ -248,7 +258,7 @@ def test_diagnose_echoes_units_in_si(tmp_path, capsys):
     assert f"{1000 * float(number):g} mm = {float(number):g} m" in capsys.readouterr().out
 
 
-def test_angles_beyond_a_turn_are_probably_degrees():
+def test_angle_beyond_a_turn_is_a_probable_slip_of_degrees():
     scene = Scene.from_file(Path(__file__).parents[2] / "examples" / "door_closer.toml")
     assert probable_slips(scene) == []
     assert probable_slips(scene.with_("load[0].natural_angle", -69.0)) == [
@@ -263,12 +273,13 @@ def test_angles_beyond_a_turn_are_probably_degrees():
 
 
 @pytest.mark.parametrize(("rate", "told"), [(720.0, 1), (-90.0, 1), (124.8, 0), (6.0, 0), (0.0, 0)])
-def test_rates_of_whole_quarters_of_a_turn_are_probably_degrees(rate, told):
+def test_rate_of_whole_quarters_of_a_turn_is_a_probable_slip_of_degrees(rate, told):
+    """720 and -90 are whole multiples of 90; 124.8, 6 and 0 rad/s are not, or are too small."""
     driven = find_scene("four_bar").with_(driver=({"joint": "A", "polynomial": [0.0, rate]},))
     assert len(probable_slips(driven)) == told
 
 
-def test_the_shipped_schema_is_the_models_and_knows_every_field():
+def test_shipped_schema_is_generated_from_the_model_and_has_every_field():
     shipped = json.loads((files("mbref") / "templates" / "scene.schema.json").read_text())
     assert shipped == schema(), "mbref schema > mbref/templates/scene.schema.json renews it"
     assert set(shipped["properties"]) == set(Scene.model_fields)
@@ -281,15 +292,29 @@ def test_the_shipped_schema_is_the_models_and_knows_every_field():
     ]
 
 
-def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
+@pytest.fixture
+def my_toml(tmp_path, monkeypatch, capsys):
+    """The template, written by the command new into an empty working folder."""
     monkeypatch.chdir(tmp_path)
     assert main(["new", "my.toml"]) == 0
-    assert main(["new", "my.toml"]) == 2
-    assert "exists already" in capsys.readouterr().err
-    assert main(["draw", "my.toml"]) == 0 and (tmp_path / "my.svg").read_text().startswith("<svg")
-    assert main(["draw", "my.toml", "--view=-60,20", "--out", "my.png"]) == 0
-    assert (tmp_path / "my.png").read_bytes().startswith(b"\x89PNG")
-    assert main(["draw", "my.toml", "--out", "my.jpg"]) == 2
+    capsys.readouterr()
+    return "my.toml"
+
+
+def test_command_new_does_not_overwrite_a_file(my_toml, capsys):
+    Path(my_toml).write_text("mine")
+    assert main(["new", my_toml]) == 2
+    assert "exists already" in capsys.readouterr().err and Path(my_toml).read_text() == "mine"
+
+
+def test_command_draw_writes_svg_and_png_and_refuses_other_endings(my_toml, capsys):
+    assert main(["draw", my_toml]) == 0 and Path("my.svg").read_text().startswith("<svg")
+    assert main(["draw", my_toml, "--view=-60,20", "--out", "my.png"]) == 0
+    assert Path("my.png").read_bytes().startswith(b"\x89PNG")
+    assert main(["draw", my_toml, "--out", "my.jpg"]) == 2 and not Path("my.jpg").exists()
+
+
+def test_command_assemble_gives_a_link_its_length_and_diagnose_states_it(my_toml, capsys):
     assert main(["assemble", "my.toml", "--length", "A-B=0.25", "--out", "closed.toml"]) == 0
     out = capsys.readouterr().out
     assert "length A–B: 0.2 m, now 0.25 m" in out and "joint B: moved by 0.05 m" in out, out
@@ -301,38 +326,37 @@ def test_new_draw_assemble_and_diagnose(tmp_path, monkeypatch, capsys):
     assert {"B": "inline"} in found["exchanges"] and found["along_motion"] is None
 
 
-def test_diagnose_tells_a_locked_loop_and_drivers_too_many(tmp_path, capsys):
+def pinned_four_bar() -> Scene:
+    """Return a four-bar of four parallel hinges."""
     scene = find_scene("four_bar_gravity").with_(duration=0.1)
-    pins = [
-        {
-            "name": j.name,
-            "type": "revolute",
-            "bodies": j.bodies,
-            "anchor": j.anchor_pair[0],
-            "axis": (0.0, 0.0, 1.0),
-        }
-        for j in scene.joint
-    ]
-    scene = scene.with_(joint=pins)
-    scene.with_("joint[A].axis", [0.0, 0.1, 1.0]).save(tmp_path / "locked.toml")
+    fields = {"type": "revolute", "axis": (0.0, 0.0, 1.0)}
+    pins = [{"name": j.name, "bodies": j.bodies, "anchor": j.anchor_pair[0], **fields} for j in scene.joint]
+    return scene.with_(joint=pins)
+
+
+def test_diagnose_reports_that_a_loop_with_a_tilted_hinge_is_locked(tmp_path, capsys):
+    pinned_four_bar().with_("joint[A].axis", [0.0, 0.1, 1.0]).save(tmp_path / "locked.toml")
     assert main(["diagnose", str(tmp_path / "locked.toml")]) == 0
     out = capsys.readouterr().out
     assert "degrees of freedom  0" in out and "along the motion of 0.1 s: nothing moves" in out, out
     assert "nearest singular    at t = 0 s: smallest singular value" in out, out
+
+
+def test_diagnose_reports_more_drivers_than_degrees_of_freedom(tmp_path, capsys):
     drivers = [Driver(joint=name, polynomial=(0.0, 1.0)) for name in "AD"]
-    scene.with_(driver=drivers).save(tmp_path / "driven.toml")
+    pinned_four_bar().with_(driver=drivers).save(tmp_path / "driven.toml")
     assert main(["diagnose", str(tmp_path / "driven.toml")]) == 0
     last = capsys.readouterr().out.splitlines()[-1]
     assert last == "  more drivers than degrees of freedom (2 and 1): redundant rows remain"
 
 
-def test_diagnose_names_no_nearest_position_beside_those_that_are_passed(capsys):
+def test_diagnose_lists_passed_singular_positions_instead_of_the_nearest(capsys):
     assert main(["diagnose", "four_bar"]) == 0
     out = capsys.readouterr().out
     assert "singular position   at t = 0.0125865 s: one branch" in out and "nearest singular" not in out, out
 
 
-def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, monkeypatch):
+def test_command_run_writes_json_and_csv_and_animate_an_svg(tmp_path, capsys, monkeypatch):
     run = ["run", "planar_slider_crank", "--duration", "0.01", "--samples", "3"]
     assert main([*run, "--out", str(tmp_path / "run.json")]) == 0
     assert Motion.load(tmp_path / "run.json").times[-1] == 0.01
@@ -345,7 +369,7 @@ def test_run_writes_csv_and_json_and_animate_a_moving_picture(tmp_path, capsys, 
     assert "<animate " in (tmp_path / "planar_slider_crank-moving.svg").read_text()
 
 
-def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
+def test_command_animate_draws_the_branches_of_a_crossing_side_by_side(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["animate", "four_bar", "--duration", "0.05"]) == 0
     assert "position 2 at t = 0.0377595 s: 2 branches; --branches shows" in capsys.readouterr().out
@@ -372,26 +396,26 @@ def test_animate_shows_branches_side_by_side(tmp_path, capsys, monkeypatch):
         ("planar_slider_crank --duration 0.1 --method mpi-svd+none", "does not detect singular positions"),
     ],
 )
-def test_animate_says_why_there_are_no_branches(words, told, tmp_path, capsys, monkeypatch):
+def test_command_animate_states_why_there_are_no_branches(words, told, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(["animate", *words.split(), "--branches"]) == 2
     assert told in capsys.readouterr().err and not list(tmp_path.iterdir())
 
 
-def test_lists_fit_eighty_columns_and_have_every_name(capsys):
+def test_command_list_prints_every_name_within_eighty_columns(capsys):
     assert main(["list"]) == 0
     out = capsys.readouterr().out
     assert max(map(len, out.splitlines())) <= 80 and all(name in out for name in SCENES)
     assert all(f"{name} " in out for name in ("mpi-gs-literal", "baumgarte", "dop853"))
 
 
-def test_progress_that_creeps_tells_no_thousands_of_years(capsys):
+def test_slow_progress_prints_more_than_an_hour_left(capsys):
     times = iter([0.0, 20.0])
     Lines("simulating", 1.0, lambda: next(times))(1e-12)
     assert capsys.readouterr().err == "simulating: 0 %, more than an hour left\n"
 
 
-def test_progress_in_a_pipe_is_a_line_every_ten_seconds(capsys):
+def test_progress_in_a_pipe_prints_at_most_a_line_in_ten_seconds(capsys):
     now = iter([0.0, 1.0, 12.0, 13.0, 30.0])
     lines = Lines("simulating", 2.0, lambda: next(now))
     for done in (0.1, 0.5, 0.6, 1.5):

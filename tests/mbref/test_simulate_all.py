@@ -1,4 +1,5 @@
-"""Many runs in one memory / runs of their own: the same bits, messages and outcomes, whatever happens."""
+"""Ensembles that are simulated together: results are bit-identical with single runs, also of runs that
+fail."""
 
 from __future__ import annotations
 
@@ -28,7 +29,7 @@ MASS = Variation("body[crank].mass", 0.5, 2.0)
 
 
 def agree(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> list:
-    """The results of runs together, which are those of runs alone."""
+    """Assert that runs together are bit-identical with single runs; return them."""
     together = simulate_all(scenes, method, times, limits)
     alone = [simulate(scene, method, times, limits) for scene in scenes]
     assert [results(run) for run in together] == [results(run) for run in alone]
@@ -37,13 +38,13 @@ def agree(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> lis
 
 
 def in_batches(scenes: list[Scene], times=TIMES, limits=LIMITS, method=METHOD) -> int:
-    """The number of runs that were completed in a batch."""
+    """Return the number of runs that were computed together with the first one, in a batch."""
     ended = run_all(scenes, method, times, limits)
     return sum(len(followed.places) for _, followed in ended.batches)
 
 
 def number_at(scene: Scene, path: str) -> float:
-    """The number of a scene at a path."""
+    """Return the number of a scene at a path."""
     found: list[float] = []
     fields = {name: getattr(scene, name) for name in Scene.model_fields}
     replaced_at(fields, path, lambda value: found.append(value) or value)
@@ -51,7 +52,7 @@ def number_at(scene: Scene, path: str) -> float:
 
 
 def bytes_of(crossing: Crossing) -> list:
-    """All of a crossing, its numbers as bytes."""
+    """Return all fields of a crossing, its numbers as bytes."""
     return [
         np.asarray(value).tobytes() if key != "sentence" else value for key, value in vars(crossing).items()
     ]
@@ -60,7 +61,7 @@ def bytes_of(crossing: Crossing) -> list:
 @pytest.mark.parametrize(
     "name", ["planar_slider_crank", "spatial_slider_crank", "heavy_top", "flyball_governor"]
 )
-def test_variants_together_and_alone_agree(name):
+def test_variants_of_masses_and_gravity_together_equal_single_runs(name):
     body = SCENES[name]().body[0].name
     varied = [Variation(f"body[{body}].mass", 0.5, 2.0), Variation("gravity[1]", -10.0, 10.0)]
     scenes = list(variants(SCENES[name](), varied, 12))
@@ -69,7 +70,7 @@ def test_variants_together_and_alone_agree(name):
     assert len({run.position.tobytes() for run in runs}) == 12, "the variants are to differ"
 
 
-def test_varied_lengths_and_a_driver_together_and_alone_agree():
+def test_variants_of_a_driven_scene_s_lengths_together_equal_single_runs():
     scenes = list(variants(DRIVEN, [Variation("joint[B].anchor[0]", 0.1, 1e-3, normal=True)], 12))
     agree(scenes)
     assert in_batches(scenes) == 11, "roundings of zero in Φ and γ decide nothing"
@@ -84,7 +85,7 @@ def test_varied_lengths_and_a_driver_together_and_alone_agree():
         ("planar_slider_crank_gravity", "joint[C].anchor[0]"),
     ],
 )
-def test_varied_places_by_series_together_and_alone_agree(name, path):
+def test_variants_of_places_together_equal_single_runs(name, path):
     """Natural coordinates of all scenes are found at once."""
     scene = SCENES[name]()
     mean = number_at(scene, path)
@@ -93,7 +94,7 @@ def test_varied_places_by_series_together_and_alone_agree(name, path):
     assert in_batches(scenes, np.linspace(0.0, 0.01, 3), method="taylor") == 7
 
 
-def test_a_force_on_a_varied_place_by_series_together_and_alone_agree():
+def test_variants_of_a_force_s_point_together_equal_single_runs():
     force = Force(body="rod", point=(0.4, 0.1, 0.0), force=(1.0, 2.0, 0.0))
     scene = SCENES["planar_slider_crank_gravity"]().with_(load=(force,))
     scenes = list(variants(scene, [Variation("load[0].point[0]", 0.3, 0.5)], 8))
@@ -101,14 +102,14 @@ def test_a_force_on_a_varied_place_by_series_together_and_alone_agree():
     assert in_batches(scenes, method="taylor") == 7
 
 
-def test_varied_couplings_by_series_together_and_alone_agree():
+def test_variants_of_a_coupling_s_ratio_together_equal_single_runs():
     varied = [Variation("coupling[0].ratio", -0.6, -0.4), Variation("joint[B].anchor[0]", 0.39, 0.41)]
     scenes = list(variants(gear_pair(), varied, 8))
     agree(scenes, method="taylor")
     assert in_batches(scenes, method="taylor") == 7
 
 
-def test_runs_that_pass_singular_positions_and_others_agree():
+def test_variants_with_and_without_crossings_together_equal_single_runs():
     """Some of the cranks are stopped before they reach the position in which rod and crank are in line."""
     scenes = list(
         variants(SCENES["planar_slider_crank_equal"](), [Variation("gravity[0]", -400.0, 400.0)], 10)
@@ -118,8 +119,8 @@ def test_runs_that_pass_singular_positions_and_others_agree():
     assert 0 in passed and max(passed) > 0, passed
 
 
-def test_runs_across_singular_positions_are_in_one_batch():
-    """Masses vary, then places of centres, with which natural coordinates do."""
+def test_variants_that_all_cross_singular_positions_are_computed_in_one_batch():
+    """Of six variants five follow the first; masses vary, then also places of centres."""
     times = np.linspace(0.0, 0.1, 5)
     mass, centre = Variation("body[coupler].mass", 0.45, 0.55), Variation("body[bar].position[0]", 0.2, 0.3)
     for varied in ([mass], [mass, centre]):
@@ -131,14 +132,15 @@ def test_runs_across_singular_positions_are_in_one_batch():
             assert alone and list(map(bytes_of, run.crossings)) == list(map(bytes_of, alone))
 
 
-def test_runs_that_fail_and_others_agree():
+def test_variants_that_fail_or_complete_together_equal_single_runs():
+    """The median of the steps of single runs is the largest number of steps allowed."""
     scenes = list(variants(CRANK, [MASS, LENGTH], 12))
     steps = [simulate(scene, METHOD, TIMES, LIMITS).cost.steps for scene in scenes]
     runs = agree(scenes, limits=Limits(rtol=1e-6, most_steps=int(np.median(steps))))
     assert {run.outcome.name for run in runs} == {"COMPLETED", "STEP_FAILED"}
 
 
-def test_random_mechanisms_and_their_variants_agree():
+def test_random_mechanisms_in_random_order_together_equal_single_runs():
     scenes = []
     for seed in range(8):
         scene = random_mechanism(seed)
@@ -150,13 +152,13 @@ def test_random_mechanisms_and_their_variants_agree():
 
 
 @pytest.mark.parametrize("scenes", NUMBERS_DECIDE.values(), ids=NUMBERS_DECIDE.keys())
-def test_numbers_that_decide_what_takes_part_are_asked_in_a_batch(scenes):
+def test_scenes_whose_numbers_decide_on_equations_together_equal_single_runs(scenes):
     for order in permutations(range(len(scenes))):
         agree([scenes[k] for k in order * 2])
 
 
 @pytest.mark.parametrize("method", [METHOD, "taylor"])
-def test_springs_and_products_of_inertia_together_and_alone_agree(method):
+def test_variants_of_springs_and_full_inertias_together_equal_single_runs(method):
     points = ((0.3, 0.2, 0.0), CRANK.body[1].position)
     spring = Spring(bodies=("ground", "rod"), points=points, stiffness=50.0, natural_length=0.1)
     sprung = CRANK.with_(load=(*CRANK.load, spring))
@@ -170,17 +172,17 @@ def test_springs_and_products_of_inertia_together_and_alone_agree(method):
 @pytest.mark.parametrize(
     "method", ["mpi-svd+baumgarte", "taylor", "mpi-qr+projection", "lm2+projection/rk4[step=1e-4]"]
 )
-def test_other_methods_together_and_alone_agree(method):
+def test_variants_by_other_methods_together_equal_single_runs(method):
     agree(list(variants(CRANK, [MASS, LENGTH], 3)), np.linspace(0.0, 0.01, 3), method=method)
 
 
-def test_runs_and_their_reactions_pass_between_processes():
+def test_run_of_an_ensemble_is_equal_after_pickling():
     run, *_ = simulate_all(list(variants(CRANK, [MASS], 4)), METHOD, TIMES, LIMITS)[1:]
     sent = pickle.loads(pickle.dumps(run))
     assert results(sent) == results(run)
 
 
-def test_scenes_of_one_shape_differ_in_numbers_alone():
+def test_scenes_have_one_shape_if_they_differ_in_numbers_alone():
     assert len({shape_of(scene) for scene in variants(CRANK, [MASS, LENGTH], 5)}) == 1
     others = [
         CRANK,
@@ -193,7 +195,7 @@ def test_scenes_of_one_shape_differ_in_numbers_alone():
     assert len({shape_of(scene) for scene in others}) == len(others)
 
 
-def test_the_first_scene_that_cannot_be_simulated_is_told():
+def test_ensemble_raises_the_faults_of_its_first_faulty_scene():
     scenes = list(variants(CRANK, [MASS], 4))
     scenes[2] = (
         scenes[2]

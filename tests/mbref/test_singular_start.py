@@ -1,4 +1,4 @@
-"""Starts in motion on a singular position: the motion goes on along the branch of its velocities."""
+"""Starts in motion on a singular position: the motion continues on the branch of its velocities."""
 
 import math
 
@@ -18,7 +18,8 @@ UPRIGHT = math.pi / 2  # rad: crank and rod of equal lengths lie on each other
 
 
 def upright_slider_crank(rod: float | None) -> Scene:
-    """The equal slider-crank on its singular position: 30 rad/s of the crank, or of the rod too."""
+    """Return the slider-crank of equal crank and rod, both upright: the crank turns at 30 rad/s, the rod at a
+    given rate (rad/s)."""
     scene = slider_crank(0.308, 0.308, UPRIGHT, "upright", rate=30.0)
     crank, coupler, slider = scene.body
     if rod is not None:
@@ -29,7 +30,7 @@ def upright_slider_crank(rod: float | None) -> Scene:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("angle", [0.0, math.pi, -math.pi])
-def test_a_driven_loop_that_starts_flat(linkage, angle, method):
+def test_driven_loop_starts_flat_and_moves_as_its_closed_form(linkage, angle, method):
     scene = linkage(angle)
     run = simulate(scene, method, np.linspace(0.0, 0.1, 21), Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED", run.message
@@ -37,7 +38,8 @@ def test_a_driven_loop_that_starts_flat(linkage, angle, method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_crank_that_starts_upright_pushes_its_slider(method):
+def test_crank_that_starts_upright_moves_its_slider_as_the_closed_form(method):
+    """The rod turns against the crank, so that the slider moves."""
     scene = upright_slider_crank(-30.0)
     run = simulate(scene, method, np.linspace(0.0, 0.5, 21), Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED", run.message
@@ -45,8 +47,9 @@ def test_a_crank_that_starts_upright_pushes_its_slider(method):
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_velocities_left_open_are_those_of_the_branch_with_the_least_energy(method):
-    """Crank and rod turn as one body about the fixed hinge, and the slider rests."""
+def test_missing_velocities_choose_the_branch_of_the_least_kinetic_energy(method):
+    """Crank and rod turn as one body about the fixed hinge, their middles on a circle of 0.154 m, and the
+    slider rests."""
     times = np.linspace(0.0, 0.5, 21)
     run = simulate(upright_slider_crank(None), method, times, Limits(rtol=1e-9))
     assert run.outcome.name == "COMPLETED" and "branch with the least kinetic energy" in run.message
@@ -56,14 +59,14 @@ def test_velocities_left_open_are_those_of_the_branch_with_the_least_energy(meth
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_velocities_on_no_branch_are_refused(method):
-    """They agree with the constraint Jacobian, but no motion has them."""
+def test_velocities_that_belong_to_no_branch_are_undecided(method):
+    """A rate of the rod of 9 rad/s satisfies Φ_q v = 0; the branches have -30 and 30 rad/s."""
     run = simulate(upright_slider_crank(9.0), method, [0.0, 0.1])
     assert run.outcome.name == "UNDECIDED" and "agree with none of the branches" in run.message
 
 
 def falling_parallelogram(rate: float, length: float = 0.3) -> Scene:
-    """Two cranks and a coupler of 1 kg in one line, with a small rate (rad/s) of the first crank."""
+    """Return two cranks and a coupler of 1 kg in one line, with a small rate (rad/s) of the first crank."""
     z = (0.0, 0.0, 1.0)
     inertia = (0.01, 0.02, 0.02)
     given = {"angular_velocity": (0.0, 0.0, rate), "velocity": (0.0, rate * length / 2, 0.0)}
@@ -84,7 +87,7 @@ def falling_parallelogram(rate: float, length: float = 0.3) -> Scene:
 
 
 @pytest.mark.parametrize("rate", [-1e-6, -1e-3, -1e-2, -0.03, -0.3])
-def test_a_slow_start_along_the_forces(rate):
+def test_slow_start_along_the_weight_falls_with_its_energy(rate):
     """The cranks keep ½ I ω² + m g l sin φ, I = 2 (0.02 + m l² / 4) + m l², and the coupler does not turn."""
     run = simulate(falling_parallelogram(rate), "taylor", np.linspace(0.0, 0.4, 9))
     assert run.outcome.name == "COMPLETED", run.message
@@ -95,8 +98,8 @@ def test_a_slow_start_along_the_forces(rate):
     assert np.abs(run["coupler"].angular_velocity).max() < 1e-9 and rates[-1] < -5.0
 
 
-def test_a_slow_start_against_the_forces_ends_at_its_singular_position():
-    """The motion turns back after 1e-6 rad. A run had ended "at t = 0.25 s" without a step or a sample."""
+def test_slow_start_against_the_weight_is_undecided_at_its_singular_position():
+    """The motion turns back after about 1e-6 rad."""
     run = simulate(falling_parallelogram(0.01), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end == 0.0 and not run.times.size
     assert run.message.endswith(
@@ -104,8 +107,9 @@ def test_a_slow_start_against_the_forces_ends_at_its_singular_position():
     )
 
 
-def test_a_motion_that_ends_early_reports_the_branch_at_its_start():
-    """The swing ends at rest in the other flat position, where neither a tolerance nor a branch helps."""
+def test_message_of_an_undecided_run_also_states_the_branch_at_its_start():
+    """The swing from rest comes to rest in the other flat position, where neither a tighter tolerance nor
+    another branch helps."""
     run = simulate(falling_parallelogram(0.0), "taylor", np.linspace(0.0, 1.0, 9))
     assert run.outcome.name == "UNDECIDED" and run.t_end > 0.1
     cause, advice, start = run.message.split("; ")
@@ -115,12 +119,14 @@ def test_a_motion_that_ends_early_reports_the_branch_at_its_start():
         "the motion begins at rest on a singular position and takes, of the 2 branches that meet there, the "
         "branch of Gauss's principle of least constraint"
     )
-    held = simulate(falling_parallelogram(0.0), "mpi-svd+projection", [0.0, 0.1])
-    [met] = held.crossings
+
+
+def test_branches_of_a_start_at_rest_are_listed_without_velocities():
+    [met] = simulate(falling_parallelogram(0.0), "mpi-svd+projection", [0.0, 0.1]).crossings
     assert met.sentence == "2 branches" and not np.any(met.angular_velocity)
 
 
-def test_a_run_that_ends_where_the_series_begins():
+def test_run_of_a_microsecond_from_a_singular_position_is_exact():
     scene = upright_slider_crank(-30.0)
     for end in (1e-6, 1e-4):
         times = np.linspace(0.0, end, 3)
@@ -132,8 +138,8 @@ def test_a_run_that_ends_where_the_series_begins():
 @pytest.mark.parametrize("method", ["taylor"])
 @pytest.mark.parametrize("linkage", [four_bar, five_bar])
 @pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_driven_loops_that_start_beside_the_flat_position(linkage, side, method):
-    """Nearly half of them had been undecided, and others off by their distance, taken for rounding."""
+def test_driven_loop_starts_up_to_1e_7_rad_from_flat_and_moves_as_its_closed_form(linkage, side, method):
+    """Distances of 1e-11 to 1.6e-7 rad on both sides. Before, nearly half of the runs were undecided."""
     for distance in (1.6e-7, 1e-7, 4e-8, 1.6e-8, 6.3e-9, 1.6e-9, 1e-9, 4e-10, 1e-11):
         scene = linkage(math.pi + side * distance)
         run = simulate(scene, method, np.linspace(0.0, 0.05, 6), Limits(rtol=1e-9))
@@ -142,8 +148,8 @@ def test_driven_loops_that_start_beside_the_flat_position(linkage, side, method)
 
 
 def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[float, float]) -> Scene:
-    """A spherical four-bar whose opposite arcs (rad) are equal, on the branch of the greater ratio of the
-    half tangents of rocker and crank, at an angle of the crank and with rates of both."""
+    """Return a spherical four-bar whose opposite arcs (rad) are equal, at an angle of the crank and with
+    rates of crank and rocker; the half tangents of their angles have the greater of two constant ratios."""
     turned = lambda axis, turn, v: rotations.rotate(rotations.from_vector(turn * axis), v)  # noqa: E731
     first, last = arc(0.0), arc(coupler)
     a = turned(first, angle, arc(crank))
@@ -176,21 +182,20 @@ def spherical_loop(crank: float, coupler: float, angle: float, rates: tuple[floa
 
 
 def arc(angle: float) -> np.ndarray:
-    """A point of the great circle on which the loop is flat."""
+    """Return the point at an angle (rad) of the great circle on which the loop is flat."""
     turn = rotations.from_vector(np.array([0.3, -0.5, 0.8]))
     return rotations.rotate(turn, np.array([math.sin(angle), 0.0, math.cos(angle)]))
 
 
 def ratio(crank: float, coupler: float) -> float:
-    """Of the half tangents of rocker and crank, on one of the two branches."""
+    """Return tan(rocker / 2) / tan(crank / 2) on one of the two branches."""
     return math.sin((crank + coupler) / 2) / math.sin((crank - coupler) / 2)
 
 
 @pytest.mark.parametrize("method", ["taylor"])
 @pytest.mark.parametrize("rate", [2.0, -5.0])
-def test_a_spherical_loop_leaves_the_flat_position(rate, method):
-    """Its rows depend on others only where the constraints hold: a state near the start, which violated them,
-    seemed to leave no freedom, and all runs were UNDECIDED."""
+def test_spherical_loop_leaves_the_flat_position_on_the_branch_of_its_velocities(rate, method):
+    """The ratio k of the half tangents of rocker and crank is constant (closed form), and the energy too."""
     for crank, coupler in ((0.7, 1.1), (1.2, 0.5), (0.9, 1.3)):
         k = ratio(crank, coupler)
         scene = spherical_loop(crank, coupler, 0.0, (rate, k * rate))
@@ -203,9 +208,8 @@ def test_a_spherical_loop_leaves_the_flat_position(rate, method):
         assert np.ptp(run.energy) < 1e-6 * np.abs(run.energy).max()
 
 
-def test_rows_are_nearly_dependent_beside_the_flat_position_alone():
-    """A run that began near it took rows for nearly dependent to its end, and 200000 steps; two of its hinges
-    are given at the centre."""
+def test_start_near_the_flat_position_of_a_spherical_loop_does_not_shorten_later_steps():
+    """Fewer than 100 steps. Before, rows counted as nearly dependent to the end of a run: 200 000 steps."""
     scene = spherical_loop(0.3, 0.6, 1e-4, (2.0, 2.0 * ratio(0.3, 0.6)))
     joints = (
         joint if joint.name in "AC" else joint.model_copy(update={"anchor": (0.0, 0.0, 0.0)})

@@ -32,7 +32,7 @@ from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
-def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
+def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, seed):
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
     second = np.where(rng.random(rows) < 0.3, bodies, (columns[:, 0] // 6 + 1) % (bodies + 1))
@@ -74,7 +74,7 @@ def test_factor_and_dense_algebra_on_random_blocks(bodies, rows, seed):
 
 
 @given(bodies=st.integers(1, 8), rows=st.integers(1, 20), seed=st.integers(0, 999))
-def test_factors_of_a_product_of_gradients_and_dense_determinants(bodies, rows, seed):
+def test_pivots_of_a_product_of_gradients_give_dense_determinants(bodies, rows, seed):
     """The product of the first k pivots is the determinant of the first k rows of both gradients."""
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
@@ -110,7 +110,7 @@ def test_factors_of_a_product_of_gradients_and_dense_determinants(bodies, rows, 
         ("spatial_slider_crank", (0.0, 0.0, 0.0), 14),  # the slider and the line never turn: three rows rest
     ],
 )
-def test_rows_that_move_and_the_plane(name, gravity, rows):
+def test_number_of_moving_rows_follows_from_the_plane_of_the_motion(name, gravity, rows):
     model = Model(find_scene(name).with_(gravity=gravity))
     start = initial_state.consistent_start(model)
     moving = active_entries(model, start.q, start.v)[1].any(axis=1)
@@ -122,7 +122,7 @@ SIMILAR = dict.fromkeys(ACCELERATIONS, ACCELERATIONS)
 
 
 def both(scene, stabilisation, times, formulation="alf-dual"):
-    """The run by the sparse factor, and by the dense singular values of MPI-SVD."""
+    """Return the run by the sparse factor, and by the dense singular values of MPI-SVD."""
     methods = (f"{name}+{stabilisation}" for name in (formulation, "mpi-svd"))
     return [simulate(scene, method, times, Limits(rtol=1e-10)) for method in methods]
 
@@ -142,7 +142,9 @@ def both(scene, stabilisation, times, formulation="alf-dual"):
         ("spatial_slider_crank", (0.0, 0.0, 0.0)),
     ],
 )
-def test_sparse_and_dense_runs(name, gravity, formulation, stabilisation):
+def test_sparse_and_dense_runs_have_equal_poses_rates_and_accelerations(
+    name, gravity, formulation, stabilisation
+):
     scene = find_scene(name).with_(gravity=gravity)
     times = np.linspace(0, 0.01, 4)
     sparse, dense = both(scene, stabilisation, times, formulation)
@@ -153,7 +155,7 @@ def test_sparse_and_dense_runs(name, gravity, formulation, stabilisation):
         assert gap < 1e-10, f"{key}: sparse and dense differ by {gap:.1e}"
 
 
-def test_reactions_of_sparse_and_dense_runs_without_redundancy():
+def test_sparse_and_dense_runs_have_equal_reactions_without_redundancy():
     scene = find_scene("spatial_slider_crank")
     sparse, dense = both(scene, "projection", [0.005, 0.01])
     for joint, theirs in dense.reactions.items():
@@ -161,17 +163,11 @@ def test_reactions_of_sparse_and_dense_runs_without_redundancy():
         assert gap < 1e-9, f"reactions of {joint} differ by {gap:.1e}"
 
 
-@pytest.mark.parametrize("loops", [20, 200])
-def test_counts_of_long_chains_and_their_formulas(loops):
-    counts = find_scene(f"four_bar_chain[{loops}]").counts()
-    assert (counts.rows, counts.redundant, counts.degrees_of_freedom) == (13 * loops + 5, loops, 1)
-
-
 @pytest.mark.parametrize(
     ("name", "end", "method"),
     [("four_bar_chain[8]", 2.0, "taylor"), ("slider_crank_chain[6]", 0.2, "taylor")],
 )
-def test_large_scene_and_truth_past_singular_positions(name, end, method):
+def test_large_chain_moves_as_its_closed_form_past_singular_positions(name, end, method):
     scene, times = find_scene(name), np.linspace(0.0, end, 11)
     run = simulate(scene, method, times, Limits(rtol=1e-11))
     error = np.abs(run.position - truth_for(scene).poses(times).position).max()
@@ -180,7 +176,8 @@ def test_large_scene_and_truth_past_singular_positions(name, end, method):
     assert error < 1e-8, f"error {error:.1e}"
 
 
-def test_two_hundred_loops_and_their_pendulum():
+def test_chain_of_two_hundred_loops_swings_as_its_pendulum():
+    """One loop under gravity larger by the ratio of W (scene's docstring) has the angle of 200 loops."""
     loops, times = 200, np.array([0.25, 0.5])
     run = simulate(find_scene(f"four_bar_chain[{loops}]"), "alf-dual+projection", times)
     one = truth_for(find_scene("four_bar_chain[1]").with_(gravity=(0.0, -9.81 * 1.0 * ratio(loops), 0.0)))
@@ -190,7 +187,7 @@ def test_two_hundred_loops_and_their_pendulum():
 
 
 def ratio(loops):
-    """How much faster than one loop that many swing: W of the docstring of the scene."""
+    """Return W of that many loops over W of one loop."""
 
     def pull(n):
         return ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
@@ -199,7 +196,7 @@ def ratio(loops):
 
 
 @pytest.mark.parametrize("formulation", ["alf-dual", "mpi-svd"])
-def test_what_decays_out_of_the_plane_is_zero_at_the_end(formulation):
+def test_velocities_across_the_plane_decay_to_zero_instead_of_denormals(formulation):
     scene, method = find_scene("four_bar_chain[1]"), f"{formulation}+projection/rk4[step=0.01]"
     run = simulate(scene, method, [0.5])
     values = np.abs(np.concatenate([run.velocity, run.angular_velocity], axis=None))
@@ -207,7 +204,7 @@ def test_what_decays_out_of_the_plane_is_zero_at_the_end(formulation):
     assert not left.size, f"{left.size} velocities have decayed to {left.max():.0e}"
 
 
-def test_shares_of_redundant_rows_are_those_of_left_null_vectors():
+def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
     matrix = np.random.default_rng(7).normal(size=(6, 9))
     matrix[2], matrix[4] = 2.0 * matrix[0], matrix[1] - matrix[3]
     matrix /= np.linalg.norm(matrix, axis=1)[:, None]
@@ -219,7 +216,7 @@ def test_shares_of_redundant_rows_are_those_of_left_null_vectors():
 
 
 @pytest.mark.parametrize("stabilisation", ["projection", "none"])
-def test_pivots_tell_that_many_rows_are_independent(stabilisation):
+def test_many_independent_rows_are_recognised_by_their_pivots(stabilisation):
     run = start_run(
         find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
     )
@@ -228,7 +225,7 @@ def test_pivots_tell_that_many_rows_are_independent(stabilisation):
     assert run.memory.equations.system.settings.independent
 
 
-def test_pivots_tell_that_rows_are_redundant():
+def test_redundant_rows_are_recognised_by_their_pivots():
     run = start_run(find_scene("bennett"), Method.parse("alf-dual+projection"), np.array([0.1]), Limits())
     blocks = run.model.terms(0.0, run.start.q).blocks
     assert not are_clear(run.model, blocks, run.memory.factor)

@@ -17,7 +17,7 @@ FINE = Limits(rtol=1e-12)
 
 
 @pytest.mark.parametrize("form", CLOSED_FORMS, ids=lambda form: form.__name__)
-def test_a_closed_form(form):
+def test_motion_by_series_is_the_closed_form(form):
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 9)
     run = simulate(scene, "taylor", times, FINE)
@@ -30,19 +30,19 @@ def test_a_closed_form(form):
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8])
 @pytest.mark.parametrize("form", [pendulum, torsion], ids=lambda form: form.__name__)
-def test_the_error_follows_the_tolerance(form, rtol):
-    """The last terms of places and rates are as large as the tolerance: errors are 0.0003 to 0.02 of it."""
+def test_error_by_series_is_a_fiftieth_to_a_ten_thousandth_of_the_tolerance(form, rtol):
+    """Neither is the tolerance exceeded, nor are steps much shorter than it asks for."""
     scene, exact = form()
     times = np.linspace(0.0, scene.duration, 3)
     turned = simulate(scene, "taylor", times, Limits(rtol=rtol)).orientation
     error = rotations.angle_between(turned, exact(times)[1]).max()
-    assert 1e-4 * rtol < error < 0.05 * rtol, f"{scene.name}: {error:.1e} rad for {rtol:g}"
+    assert 1e-4 * rtol < error < 0.02 * rtol, f"{scene.name}: {error:.1e} rad for {rtol:g}"
 
 
-def test_a_sample_beside_a_singular_position():
-    """A microsecond before and after it the formulation alone would find no acceleration."""
+def test_accelerations_a_microsecond_beside_a_singular_position_are_exact():
+    """The judge's closed form has the crank upright there."""
     scene = SCENES["planar_slider_crank_equal"]()
-    truth, upright = truth_for(scene), 0.06119206833987707  # s, when the crank stands upright
+    truth, upright = truth_for(scene), simulate(scene, "taylor", [0.1]).crossings[0].time
     times = upright + np.array([-1e-6, 1e-6])
     exact, run = truth.poses(times), simulate(scene, "taylor", times, Limits(rtol=1e-10))
     assert run.outcome.name == "COMPLETED", run.message
@@ -52,7 +52,7 @@ def test_a_sample_beside_a_singular_position():
 
 
 @pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)])
-def test_quaternions_go_on_over_a_full_turn(axis):
+def test_quaternion_of_a_spinning_body_is_continuous_over_full_turns(axis):
     """A body that spins about a principal axis by 4 π: its quaternion is that of the angle, sign and all."""
     spin, times = 10.0, np.linspace(0.0, 0.4 * np.pi, 41)
     body = Body(
@@ -69,7 +69,7 @@ def test_quaternions_go_on_over_a_full_turn(axis):
     assert off < 1e-10, f"off by {off:.1e}"
 
 
-def test_drivers_of_a_chain_and_their_phases():
+def test_two_driven_arms_move_as_the_sum_of_their_drivers_angles():
     """The second arm's driver is relative to the first's; both begin in the middle of their sines."""
     z, rod = (0.0, 0.0, 1.0), {"mass": 1.0, "inertia": (0.1, 0.2, 0.2)}
     sines = [Sine(amplitude=a, frequency=f, phase=p) for a, f, p in ((0.4, 3.0, 0.7), (0.5, 2.0, -0.9))]
@@ -101,8 +101,8 @@ def test_drivers_of_a_chain_and_their_phases():
 
 
 @pytest.mark.slow
-def test_a_body_that_spins_fast():
-    """Pivots that had fallen to a twentieth magnified rounding: 3000 rad of phase were off by 6e-7."""
+def test_phase_of_a_fast_top_is_exact_after_3000_radians():
+    """The judge's reference. Before, rounding was magnified, and the phase was off by 6e-7 rad."""
     scene = SCENES["heavy_top"]().with_(duration=4.0)
     times = np.linspace(0.0, scene.duration, 5)
     run = simulate(scene, "taylor", times, Limits(rtol=1e-11))
@@ -111,7 +111,7 @@ def test_a_body_that_spins_fast():
 
 
 def angle_of_bar(beside: float, duration: float) -> float:
-    """The angle (rad) of the bar of the test below, by the equation of its one degree of freedom."""
+    """Return the angle (rad) of the bar of the next test, by the equation of its one degree of freedom."""
 
     def rates(t, y):
         tip, turned = (
@@ -133,7 +133,7 @@ def angle_of_bar(beside: float, duration: float) -> float:
 
 
 def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
-    """A bar that turns on a hinge at a speed (rad/s), with a spring between the ground and it."""
+    """Return a bar that turns on a hinge at a speed (rad/s), with a spring between the ground and it."""
     bar = Body(
         name="bar",
         mass=1.0,
@@ -154,8 +154,9 @@ def sprung_bar(speed: float, ends: tuple, **spring: float) -> Scene:
 
 @pytest.mark.parametrize("rtol", [1e-6, 1e-9])
 @pytest.mark.parametrize("beside", [0.0, 1e-9, 1e-4])
-def test_a_spring_whose_ends_meet(beside, rtol):
-    """Where a spring has no length its force turns around; a series would go on with a negative length."""
+def test_spring_whose_ends_meet_pulls_back_as_the_bar_s_own_equation(beside, rtol):
+    """Where the ends meet, or miss each other by ``beside`` (m), the force changes its direction. The truth
+    is the bar's equation of one degree of freedom, solved by SciPy with a stop where they meet."""
     scene = sprung_bar(5.0, ((beside - 0.4, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.3)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=rtol))
     assert run.outcome.name == "COMPLETED", run.message
@@ -165,10 +166,16 @@ def test_a_spring_whose_ends_meet(beside, rtol):
 @pytest.mark.parametrize(
     ("place", "damping"), [(0.4, 0.0), (-0.4, 0.5)], ids=["coincide at the start", "meet, with a damper"]
 )
-def test_a_spring_without_a_natural_length(place, damping):
-    """Its force is linear in the coordinates; that of a damper has the direction of the spring."""
+def test_spring_without_natural_length_turns_a_bar_as_its_equation(place, damping):
+    """From the ground at p to the bar's tip at a, p = ±a: J θ'' = -k a p sin θ - ½ c (a² + a p cos θ) θ'."""
     scene = sprung_bar(12.0, ((place, 0.0, 0.0), (0.4, 0.0, 0.0)), natural_length=0.0, damping=damping)
     run = simulate(scene, "taylor", [0.0, 0.7], Limits(rtol=1e-9))
-    other = simulate(scene, "alf-dual", [0.0, 0.7], Limits(rtol=1e-10))
+    inertia, tip, stiffness = 0.0133 + 0.2**2, 0.4, 20.0
+
+    def rates(t, y):
+        damped = 0.5 * damping * (tip**2 + tip * place * np.cos(y[0])) * y[1]
+        return y[1], -(stiffness * tip * place * np.sin(y[0]) + damped) / inertia
+
+    exact = solve_ivp(rates, (0.0, 0.7), (0.0, 12.0), method="DOP853", rtol=1e-12, atol=1e-13).y[0, -1]
     assert run.outcome.name == "COMPLETED", run.message
-    assert np.abs(run.joint("A").angle - other.joint("A").angle).max() < 1e-8
+    assert abs(run.joint("A").angle[-1] - exact) < 1e-8

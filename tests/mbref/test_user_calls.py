@@ -17,33 +17,33 @@ def saved(tmp_path) -> str:
     return str(tmp_path / "pendulum.toml")
 
 
-def test_a_file_is_diagnosed_by_its_name(saved):
+def test_diagnosis_takes_a_file_s_name_a_built_in_name_or_a_scene(saved):
     assert mbref.diagnose(saved) == mbref.diagnose(PENDULUM) == mbref.diagnose(PENDULUM.with_())
     assert mbref.diagnose("four_bar").counts == mbref.diagnose(SCENES["four_bar"]()).counts
-    with pytest.raises(mbref.SceneError):
+    with pytest.raises(mbref.SceneError, match="unknown scene 'no_such_scene'"):
         mbref.diagnose("no_such_scene")
 
 
-def test_a_duration_ends_the_run(saved):
+def test_duration_gives_a_run_101_samples_up_to_its_end(saved):
     run = mbref.simulate(saved, "lm1+none", duration=0.1)
     assert run.times[-1] == 0.1 and len(run.times) == 101, run.times
     given = mbref.simulate(saved, "lm1+none", np.linspace(0.0, 0.1, 101))
     assert np.array_equal(run.position, given.position)
 
 
-def test_a_tolerance_is_that_of_the_limits(saved):
+def test_rtol_is_the_tolerance_of_the_limits(saved):
     loose, fine = (mbref.simulate(saved, "lm1+none", [2.0], rtol=rtol) for rtol in (1e-3, 1e-10))
     assert fine.cost.steps > loose.cost.steps, "the tolerance was not taken"
     same = mbref.simulate(saved, "lm1+none", [2.0], mbref.Limits(rtol=1e-10))
     assert np.array_equal(same.position, fine.position)
 
 
-def test_a_duration_beside_sample_times_is_an_error(saved):
+def test_duration_together_with_sample_times_is_refused(saved):
     with pytest.raises(ValueError, match="give sample times or a duration, not both"):
         mbref.simulate(saved, "lm1+none", [0.1], duration=0.2)
 
 
-def test_a_motion_is_saved_as_json_alone(saved, tmp_path):
+def test_motion_is_saved_as_json_only(saved, tmp_path):
     run = mbref.simulate(saved, "lm1+none", duration=0.05)
     with pytest.raises(ValueError, match=r"run.mp4: a motion is saved as .json"):
         run.save(tmp_path / "run.mp4")

@@ -113,7 +113,7 @@ def faults(name: str, thing: Any) -> list[str]:
     return list(of_class(name, thing) if inspect.isclass(thing) else of_function(name, thing))
 
 
-def test_public_names_describe_parameters_results_and_errors():
+def test_docstrings_of_public_names_describe_parameters_results_and_errors():
     found = public()
     assert len(found) > 45
     wrong = [fault for name, thing in found.items() for fault in faults(name, thing)]
@@ -173,13 +173,13 @@ def scaled(values, factor: float) -> "np.ndarray":
         ("values : ndarray, shape (k,)", "values : ndarray", "no shape in"),
     ],
 )
-def test_an_incomplete_docstring_is_found(tmp_path, old, new, fault):
+def test_incomplete_docstring_is_found(tmp_path, old, new, fault):
     module = imported(tmp_path, COMPLETE.replace(old, new, 1))
     found = faults("scaled", module.scaled)
     assert any(fault in text for text in found) if fault else not found, found
 
 
-def test_a_section_that_repeats_the_signature_is_found(tmp_path):
+def test_section_that_repeats_the_signature_is_found(tmp_path):
     described = REPEATED.replace("    str\n", "    str\n        In lower case.\n")
     without = REPEATED.replace("    Returns\n    -------\n    str\n", "")
     texts = REPEATED, described, without
@@ -188,7 +188,7 @@ def test_a_section_that_repeats_the_signature_is_found(tmp_path):
 
 
 def imported(folder, text):
-    """The module of a text, in a file of its own."""
+    """Return the module of a text, imported from a new file."""
     path = folder / f"module_{sum(1 for _ in folder.glob('*.py'))}.py"
     path.write_text(text)
     spec = importlib.util.spec_from_file_location(path.stem, path)

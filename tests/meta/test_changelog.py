@@ -17,13 +17,13 @@ def entries(section: str) -> list[str]:
     return [line for line in section.splitlines()[1:] if line and not line.startswith("### ")]
 
 
-def test_the_newest_version_is_of_the_packages():
+def test_newest_released_section_is_the_version_of_the_packages():
     """A section Unreleased may stand before it."""
     released = SECTIONS[1:] if SECTIONS[0].startswith("Unreleased\n") else SECTIONS
     assert released[0].startswith(f"{__version__}\n"), released[0][:20]
 
 
-def test_entries_are_few_single_lines_without_timings():
+def test_section_has_at_most_60_entries_of_one_line_without_timings():
     for section in SECTIONS:
         lines = entries(section)
         assert 0 < len(lines) <= MOST, f"{section[:6]} has {len(lines)} entries, at most {MOST} are allowed"
@@ -34,6 +34,6 @@ def test_entries_are_few_single_lines_without_timings():
         )
 
 
-def test_headings_are_those_of_keep_a_changelog():
+def test_headings_are_the_six_of_keep_a_changelog():
     found = re.findall(r"^### (.*)$", TEXT, flags=re.M)
     assert found and set(found) <= {"Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"}

@@ -16,14 +16,14 @@ PARSERS = {
 }
 
 
-def test_commands_are_found():
+def test_pages_print_more_than_50_commands_of_both_programs():
     assert len(FOUND) > 50 and {words[0] for _, words in FOUND} >= set(PARSERS)
 
 
 @pytest.mark.parametrize(
     ("page", "words"), FOUND, ids=[f"{page}: {' '.join(words)}" for page, words in FOUND]
 )
-def test_a_printed_command_is_accepted(page, words):
+def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
     program, *arguments = words
     if program in PARSERS:
         plain = arguments[: arguments.index(">")] if ">" in arguments else arguments

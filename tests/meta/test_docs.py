@@ -35,20 +35,20 @@ def paths(entry: object) -> list[str]:
     return [path for part in inside for path in paths(part)]
 
 
-def test_the_contents_name_every_page_once():
+def test_contents_of_the_site_name_every_page_once():
     contents = method_pages.with_formulations(yaml.safe_load((ROOT / "mkdocs.yml").read_text())["nav"])
     assert sorted(paths(contents)) == sorted([*(str(page.relative_to(DOCS)) for page in PAGES), *MADE])
 
 
 @pytest.mark.parametrize("name", METHODS)
-def test_a_method_s_page_has_equations_use_limits_and_measurements(name):
+def test_page_of_a_method_has_equations_use_limits_and_measurements(name):
     text = MADE.get(f"methods/{name}.md") or (DOCS / "methods" / f"{name}.md").read_text()
     assert text.startswith(f"# `{name}`: ") and "$$" in text
     assert "**Use it for**: " in text and "**It fails on**: " in text and "## Measured" in text
 
 
-def test_a_new_formulation_is_one_file_and_one_line(monkeypatch, capsys):
-    """Listing, table, page and contents follow from the formulation's own file and its line."""
+def test_new_formulation_appears_in_list_table_page_and_contents(monkeypatch, capsys):
+    """One entry in FORMULATIONS is enough."""
     about = FORMULATIONS["lm1"].about._replace(
         title="Thrown away", meaning="made by a test", formula="x", text="y", use="nothing", fails="all"
     )
@@ -63,7 +63,7 @@ def test_a_new_formulation_is_one_file_and_one_line(monkeypatch, capsys):
     assert {"thrown-away": "methods/thrown-away.md"} in contents and contents[-1] == {"End": "end.md"}
 
 
-def test_the_guide_has_the_present_table_of_formulations():
+def test_page_of_methods_has_the_generated_table_of_formulations():
     text = (DOCS / "methods.md").read_text()
     assert method_pages.with_table(text) == text, "python docs/method_pages.py renews the table"
     for name in FORMULATIONS:
@@ -71,20 +71,20 @@ def test_the_guide_has_the_present_table_of_formulations():
         assert f"\n| [`{name}`](methods/{name}.md) |" in method_pages.with_links(text)
 
 
-def test_measured_methods_are_methods():
+def test_every_method_in_a_measured_table_exists():
     texts = [*(page.read_text() for page in PAGES), *MADE.values()]
     found = [m for text in texts for m in re.findall(r"<!-- measured: (.+?) -->", text)]
     names = [name for row in found for name in row.split()]
     assert len(names) > len(METHODS) and all(str(Method.parse(name)) for name in names)
 
 
-def test_every_joint_and_load_has_its_figure():
+def test_page_of_the_scene_format_has_a_figure_of_every_joint_and_load():
     text = (DOCS / "scene-format.md").read_text()
     shown = set(re.findall(r"\]\(figures/((?:joint|load)_\w+)\.svg\)", text))
     assert shown == {f"joint_{name}" for name in JOINT_TYPES} | {f"load_{name}" for name in LOAD_TYPES}
 
 
-def test_tests_that_the_page_on_robustness_names_are_tests():
+def test_page_of_robustness_names_only_existing_tests():
     sources = "".join(path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     named = set(re.findall(r"`(test_\w+)`", (DOCS / "robustness.md").read_text()))
     assert len(named) > 30

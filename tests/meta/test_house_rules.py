@@ -1,4 +1,4 @@
-"""The house rules as tests: import arrows, file sizes, docstrings, tables told in the README."""
+"""The house rules as tests: imports, sizes of files, docstrings, names, links of pages, slow tests."""
 
 import ast
 import functools
@@ -24,7 +24,7 @@ MOST_SKIPS = 60  # marks in the repository that keep a layout from the formatter
 
 @functools.cache
 def imports(path, inside_functions=True):
-    """Top-level names that a file imports; without those inside functions if asked."""
+    """Return the top-level names that a file imports; without imports inside functions if requested."""
     names = set()
     for node in statements(path) if inside_functions else parsed(path).body:
         if isinstance(node, ast.Import):
@@ -42,18 +42,14 @@ def name(path):
     return str(path.relative_to(ROOT))
 
 
-def test_there_are_files_to_judge():
-    assert len(FILES) > 50
-
-
 @pytest.mark.parametrize("package", PACKAGES)
-def test_import_direction(package):
+def test_package_imports_only_packages_below_it(package):
     theirs = {*PACKAGES, "tests"} - MAY_IMPORT[package]
     upward = {name(path): found for path in files(package) if (found := imports(path) & theirs)}
     assert not upward, f"{upward}, against reports → crosscheck → mbref"
 
 
-def test_engines_only_in_their_adapters_and_inside_functions():
+def test_engine_is_imported_only_in_adapters_and_inside_functions():
     adapters = ROOT / "crosscheck" / "engines"
     elsewhere = [path for path in FILES if not path.is_relative_to(adapters)]
     outside = {name(path): found for path in elsewhere if (found := imports(path) & ENGINE_PACKAGES)}
@@ -62,32 +58,32 @@ def test_engines_only_in_their_adapters_and_inside_functions():
     assert not at_import, f"loaded when the file is imported: {at_import}"
 
 
-def test_plotting_only_in_reports_and_in_the_plot_of_a_motion():
+def test_matplotlib_is_imported_only_by_reports_and_the_plot_of_a_motion():
     others = [path for path in FILES if "reports" not in path.parts]
     plotting = [path for path in others if "matplotlib" in imports(path)]
     assert plotting == [ROOT / "mbref" / "drawing" / "plot.py"], plotting
     assert not [name(path) for path in plotting if "matplotlib" in imports(path, False)]
 
 
-def test_files_are_short():
+def test_file_has_at_most_330_lines():
     lengths = {name(path): len(path.read_text().splitlines()) for path in FILES}
-    assert not {path: length for path, length in lengths.items() if length > LONGEST}
+    assert len(lengths) > 50 and not {path: length for path, length in lengths.items() if length > LONGEST}
 
 
-def test_the_formatter_lays_out_nearly_all_lines():
+def test_at_most_60_lines_are_kept_from_the_formatter():
     folders = (*PACKAGES, "tests", "benchmarks", "examples", "docs")
     sources = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     marked = {name(path): count for path in sources if (count := path.read_text().count("# fmt: " + "skip"))}
     assert sum(marked.values()) <= MOST_SKIPS, f"{sum(marked.values())} marks, at most {MOST_SKIPS}: {marked}"
 
 
-def test_first_lines_say_what_files_are():
+def test_file_has_a_docstring_of_more_than_ten_characters():
     first = {name(path): (ast.get_docstring(parsed(path)) or "").partition("\n")[0] for path in FILES}
     assert not [path for path, line in first.items() if len(line) <= 10]
 
 
 @pytest.mark.parametrize("package", PACKAGES)
-def test_public_functions_say_what_they_do(package):
+def test_public_function_and_class_has_a_docstring(package):
     kernels = {"accelerate", "enter", "rates", "accept", "step", "propose"}  # contract on the base class
     silent = [
         f"{name(path)}: {node.name}"
@@ -102,7 +98,8 @@ def test_public_functions_say_what_they_do(package):
 
 
 def test_a_name_of_a_function_has_one_meaning_in_mbref():
-    """Or it is the name that each method, integrator, kind of array or file gives to one thing."""
+    """No two files define different functions of one name, except the interfaces of methods and integrators,
+    and functions that serve several kinds of arrays or files."""
     interface = {"accelerate", "accept", "add", "enter", "first_step", "propose", "rates", "step"}
     alike = {"cross", "dot", "iterate", "largest", "norm", "prepare", "read", "unit", "write"}
     bodies: dict[str, set[str]] = {}
@@ -114,7 +111,7 @@ def test_a_name_of_a_function_has_one_meaning_in_mbref():
 
 
 def definitions(path):
-    """Public classes and constants of a file with what they are."""
+    """Yield the names of public classes and constants of a file with their definitions."""
     for node in parsed(path).body:
         if isinstance(node, ast.ClassDef):
             yield node.name, ast.dump(node)
@@ -127,7 +124,8 @@ def definitions(path):
 
 
 def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
-    """Or it is the name that each method or each kind of generated code gives to one thing."""
+    """No two files define different classes or constants of one name, except the names that each method and
+    each kind of generated code must define. Scenes are left out."""
     interface = {"ABOUT", "Options", "Scratch", "Stages", "POINTERS"}
     meanings: dict[str, set[str]] = {}
     for path in files("mbref"):
@@ -138,13 +136,13 @@ def test_a_name_of_a_class_or_constant_has_one_meaning_in_mbref():
     assert double == interface, double ^ interface
 
 
-def test_the_guide_lists_every_method():
+def test_page_of_methods_lists_every_stabilisation():
     text = (ROOT / "docs" / "methods.md").read_text()
     listed = set(re.findall(r"^\| `([\w-]+)`", text, flags=re.M))
     assert set(STABILISATIONS) <= listed, f"docs/methods.md does not list {set(STABILISATIONS) - listed}"
 
 
-def test_readme_is_short_and_its_links_lead_somewhere():
+def test_readme_has_at_most_120_lines_and_links_of_pages_lead_to_files():
     text = (ROOT / "README.md").read_text()
     assert len(text.splitlines()) <= 120, len(text.splitlines())
     for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md")):
@@ -154,12 +152,12 @@ def test_readme_is_short_and_its_links_lead_somewhere():
         assert not missing, f"{path.name} links to {missing}"
 
 
-def test_every_integrator_and_scene_has_its_own_name():
+def test_key_of_every_integrator_and_scene_is_its_name():
     assert all(key == integrator.name for key, integrator in INTEGRATORS.items())
     assert all(key == make().name for key, make in SCENES.items())
 
 
-def test_readme_commands_are_what_the_gate_runs():
+def test_gate_runs_the_commands_of_the_readme_and_the_linters():
     gate = (ROOT / ".ci" / "run").read_text()
     assert "README.md" in gate
     commands = re.findall(r"^python3 -m venv .*$", (ROOT / "README.md").read_text(), flags=re.M)
@@ -169,13 +167,13 @@ def test_readme_commands_are_what_the_gate_runs():
         assert f".venv/bin/{check}" in gate, f"the gate does not run {check}"
 
 
-def test_slow_tests_are_left_out_unless_asked_for():
+def test_slow_tests_run_only_in_make_deep():
     options = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["pytest"]["ini_options"]
     assert "not slow" in options["addopts"], options["addopts"]
     assert '-m "slow or not slow"' in (ROOT / "Makefile").read_text(), "make deep leaves slow tests out"
 
 
-def test_slow_cases_are_of_tests_that_exist():
+def test_list_of_slow_cases_names_existing_tests():
     """The cases themselves are checked by conftest.py when all tests are collected."""
     listed = tomllib.loads((ROOT / "tests" / "slow.toml").read_text())
     assert len(listed) > 50
@@ -185,7 +183,7 @@ def test_slow_cases_are_of_tests_that_exist():
         assert set(tests) <= defined, f"tests/slow.toml lists {set(tests) - defined}, not in {file}"
 
 
-def test_versions_are_pinned_without_addresses():
+def test_constraints_pin_exact_versions_without_addresses():
     lines = [
         line for line in (ROOT / "constraints.txt").read_text().splitlines() if line[:1] not in ("#", "")
     ]

@@ -21,13 +21,13 @@ def every_message():
     return list(collected())
 
 
-def test_messages_are_in_plain_words():
+def test_messages_contain_no_private_word():
     assert len(every_message()) > 800, len(every_message())
     wrong = [f"{place}:{line}: {text}" for place, line, text in every_message() if WORDS.search(text)]
     assert not wrong, "\n".join(wrong)
 
 
-def test_messages_are_no_riddles():
+def test_messages_contain_no_phrase_without_a_noun():
     wrong = [f"{place}:{line}: {text}" for place, line, text in every_message() if RIDDLES.search(text)]
     assert not wrong, "\n".join(wrong)
 
@@ -41,5 +41,5 @@ def test_messages_are_no_riddles():
         ('x = "short text"', []),
     ],
 )
-def test_a_new_message_is_collected(source, found):
+def test_collector_finds_messages_and_leaves_out_docstrings_and_short_texts(source, found):
     assert [text for _, text in messages(source)] == found

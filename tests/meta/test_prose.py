@@ -11,13 +11,13 @@ PAGES = prose.pages()
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
-def test_pages_have_no_fault(path):
+def test_page_has_no_fault_by_the_rules_of_prose(path):
     found = [f"{path.name}:{line}: {message}" for line, message in prose.faults(path.read_text())]
     assert not found, "\n".join(found)
 
 
 @pytest.mark.parametrize("path", PAGES, ids=[str(path.relative_to(prose.ROOT)) for path in PAGES])
-def test_pages_begin_with_their_purpose_and_an_example(path):
+def test_page_begins_with_a_sentence_and_soon_shows_code_or_a_picture(path):
     lines = path.read_text().splitlines()
     first = next(line for line in lines[1:] if line)
     assert lines[0].startswith("# ") and first[:1] not in "#|-", first
@@ -36,5 +36,5 @@ def test_pages_begin_with_their_purpose_and_an_example(path):
         ("It is very unique.\n", [1, 1]),
     ],
 )
-def test_faults_are_found_with_their_lines(text, lines):
+def test_faults_of_prose_are_found_with_their_lines(text, lines):
     assert [line for line, _ in prose.faults(text)] == lines

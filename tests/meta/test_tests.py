@@ -82,7 +82,7 @@ def private_uses(path: Path) -> Iterator[str]:
             yield node.attr
 
 
-def test_no_private_name_of_the_product():
+def test_tests_use_no_private_name_of_the_product():
     found = {name_of(path): names for path in TESTS if (names := sorted(set(private_uses(path))))}
     assert not found, found
 
@@ -109,15 +109,15 @@ def patches(path: Path) -> Iterator[str]:
                 yield f"{product[root.id]}.{ast.unparse(target).partition('.')[2]}.{last}".replace("..", ".")
 
 
-def test_patches_of_the_product_only_at_seams():
+def test_tests_patch_the_product_only_at_listed_seams():
     found = {name_of(path): list(patches(path)) for path in TESTS}
     beside = {path: names for path, each in found.items() if (names := [n for n in each if n not in SEAMS])}
     assert not beside, beside
     assert sum(map(len, found.values())) <= MOST_PATCHES
 
 
-def test_no_stand_ins_of_objects():
-    """A stand-in of a product's object repeats its fields, and stays as it was when they change."""
+def test_tests_use_no_mocks():
+    """A stand-in repeats the fields of a product's object, and does not change with them."""
     found: Counter[str] = Counter()
     for path in TESTS:
         for node in ast.walk(parsed(path)):
@@ -127,7 +127,7 @@ def test_no_stand_ins_of_objects():
     assert not found, found
 
 
-def test_file_names_say_behaviours():
+def test_names_of_test_files_contain_no_vague_word():
     vague = [name_of(path) for path in TESTS if any(word in path.stem.split("test_")[-1] for word in VAGUE)]
     assert not vague, vague
 
@@ -137,6 +137,6 @@ def lines(folders: tuple[str, ...]) -> int:
     return sum(path.read_text().count("\n") for folder in folders for path in (ROOT / folder).rglob("*.py"))
 
 
-def test_tests_are_shorter_than_the_product():
+def test_tests_have_at_most_55_lines_for_100_of_the_product():
     ratio = lines(("tests",)) / lines(PRODUCT)
     assert ratio <= MOST_RATIO, f"{ratio:.2f} lines of tests for a line of the product"

@@ -48,7 +48,7 @@ def faults(path: Path) -> list[str]:
     return [f"{path.name}:{line}: {text[:80]}" for line, text in found]
 
 
-def test_docstrings_and_comments_are_in_plain_words():
+def test_docstrings_and_comments_contain_no_private_word():
     found = [fault for path in FILES for fault in faults(path)]
     assert len(FILES) > 200 and not found, "\n".join(found)
 
@@ -64,7 +64,7 @@ def test_docstrings_and_comments_are_in_plain_words():
         ('told = "or why"\n', 0),
     ],
 )
-def test_faults_are_found(tmp_path, text, count):
+def test_private_words_and_verbless_beginnings_are_found(tmp_path, text, count):
     path = tmp_path / "module.py"
     path.write_text(text)
     assert len(faults(path)) == count

@@ -24,13 +24,8 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 LIBRARIES = ("numpy", "scipy.linalg", "scipy.integrate", "scipy.optimize", "scipy.interpolate", "hypothesis")
 LIBRARIES += (
-    "scipy.sparse.linalg",
-    "pydantic",
-    "numba",
-    "rich.progress",
-    "jinja2",
-    "matplotlib.figure",
-    "mujoco",
+    *("scipy.sparse.linalg", "pydantic", "numba", "rich.progress"),
+    *("jinja2", "matplotlib.figure", "mujoco"),
 )
 BUDGET = 60.0  # CPU s of the tests of a mutant
 

@@ -61,12 +61,12 @@ def test_{0}():
 
 
 @pytest.mark.parametrize("name", BY_KIND)
-def test_each_operator_and_the_sources_it_makes(name):
+def test_operator_makes_the_stated_changes_of_a_source(name):
     source, expected = BY_KIND[name]
     assert {m.planted(source) for m in mutants("a.py", source)} == expected
 
 
-def test_every_mutant_of_a_source_is_another_source_that_compiles():
+def test_every_mutant_differs_from_its_source_and_compiles():
     path = "mbref/energy.py"
     source = (ROOT / path).read_text()
     made = mutants(path, source)
@@ -76,13 +76,13 @@ def test_every_mutant_of_a_source_is_another_source_that_compiles():
         compile(mutant.planted(source), path, "exec")
 
 
-def test_a_seed_draws_the_same_mutants_and_another_seed_others():
+def test_random_mutants_depend_on_the_seed_alone():
     first, again, other = (drawn(ROOT, seed, 20, ["mbref/drawing"]) for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
     assert all(mutant.file.startswith("mbref/drawing/") for mutant in first)
 
 
-def test_a_statement_ends_before_the_statements_it_contains():
+def test_lines_of_a_statement_end_before_the_statements_inside_it():
     source = "x = f(\n    1,\n)\nif (\n    x\n):\n    y = 2\n"
     assert [*statement(source, 2)] == [1, 2, 3]
     assert [*statement(source, 5)] == [4, 5, 6] and [*statement(source, 7)] == [7]
@@ -98,8 +98,9 @@ def test_killed_mutants_are_counted_by_folder():
 
 
 @pytest.mark.slow
-def test_mutants_of_a_tiny_package_are_killed_by_the_tests_that_run_their_lines(tmp_path):
-    """Sums are tested, a product is not; a loop that does not end is ended."""
+def test_mutant_of_a_small_package_is_killed_by_the_test_that_runs_its_line(tmp_path):
+    """A sum is tested, a product is not (3 · 1 = 3 / 1), and a mutant that loops for ever counts as
+    killed."""
     for name in ("mutants", "__init__.py"):
         (tmp_path / "tests").mkdir(exist_ok=True)
         (tmp_path / "tests" / name).symlink_to(ROOT / "tests" / name)

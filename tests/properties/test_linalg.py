@@ -32,7 +32,7 @@ RATIO = 30.0  # LAPACK's customary bound for ‖residual‖ / (ε n ‖…‖) o
 
 
 def pinv_svd(d, tolerance):
-    """D⁺ and the rank, column by column from the kernels of MPI-SVD, without its refinement."""
+    """Return D⁺ and the rank, column by column from the kernels of MPI-SVD, without its refinement."""
     m, n = d.shape
     inverse, rank = np.zeros((n, m)), 0
     factors = np.linalg.svd(d, full_matrices=False)
@@ -45,7 +45,7 @@ def pinv_svd(d, tolerance):
 
 
 def pinv_gram_schmidt(d, tolerance):
-    """D⁺ and the rank, column by column from the kernel of MPI-GS."""
+    """Return D⁺ and the rank, column by column from the kernel of MPI-GS."""
     m, n = d.shape
     inverse, rank = np.zeros((n, m)), 0
     for i, unit in enumerate(np.eye(m)):
@@ -101,14 +101,14 @@ def check_penrose(name, d, rank, tolerance):
 
 @pytest.mark.parametrize("name", PSEUDO_INVERSES)
 @given(case=matrices(condition=1e12))
-def test_penrose_identities(name, case):
+def test_pseudo_inverse_has_the_four_penrose_properties(name, case):
     d, rank, _ = case
     check_penrose(name, d, rank, 1e-14)
 
 
 @pytest.mark.parametrize("name", PSEUDO_INVERSES)
 @given(case=matrices(condition=1e12), noise=st.floats(0, 1e-15), seed=st.integers(0, 2**32 - 1))
-def test_penrose_identities_of_nearly_deficient_matrices(name, case, noise, seed):
+def test_pseudo_inverse_of_a_nearly_deficient_matrix_has_the_penrose_properties(name, case, noise, seed):
     d, rank, _ = case
     check_penrose(name, d + noise * np.random.default_rng(seed).normal(size=d.shape), rank, 1e-13)
 
@@ -128,7 +128,9 @@ def exact_inverse(d):
     return np.array([[float(x) for x in row[n:]] for row in a])
 
 
-def test_penrose_ratios_of_the_exact_inverse_rounded_and_the_condition():
+def test_residual_of_the_rounded_exact_inverse_grows_with_the_condition():
+    """The bound of ``penrose_ratios`` needs the factor κ: even the inverse in rational arithmetic, rounded
+    once, has a million times larger residuals without it."""
     rng = np.random.default_rng(4)
     u, v = (np.linalg.qr(rng.normal(size=(10, 10)))[0] for _ in range(2))
     d = (u * 10 ** -np.linspace(0, 12, 10)) @ v.T
@@ -140,7 +142,7 @@ def test_penrose_ratios_of_the_exact_inverse_rounded_and_the_condition():
 
 
 @given(case=matrices(condition=1e4), noise=st.floats(0, 1e-13))
-def test_nearly_deficient_rank_and_full_pivoting(case, noise):
+def test_full_pivoting_finds_the_rank_and_independent_rows_in_spite_of_noise(case, noise):
     d, rank, _ = case
     rng = np.random.default_rng(7)
     a = np.ascontiguousarray(d + noise * rng.normal(size=d.shape))
@@ -154,7 +156,7 @@ def test_nearly_deficient_rank_and_full_pivoting(case, noise):
 
 
 @given(case=matrices(condition=1e12))
-def test_rank_and_the_independent_rows_and_columns_of_full_pivoting(case):
+def test_full_pivoting_finds_the_rank_and_independent_rows_at_any_condition(case):
     d, rank, values = case
     m, n = d.shape
     rows, columns = np.zeros(m, dtype=np.int64), np.zeros(n, dtype=np.int64)
@@ -167,7 +169,7 @@ def test_rank_and_the_independent_rows_and_columns_of_full_pivoting(case):
 
 
 @given(case=matrices(condition=1e6))
-def test_least_norm_by_qr_and_by_svd(case):
+def test_least_norm_by_qr_is_numpy_s_by_svd(case):
     d, rank, _ = case
     m, n = d.shape
     rhs = d @ np.random.default_rng(3).normal(size=n)
@@ -202,7 +204,7 @@ def norm_of(v):
 
 
 @given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1))
-def test_lu_and_cholesky_solve(n, seed):
+def test_lu_and_cholesky_solve_to_rounding_times_the_condition(n, seed):
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(n, n)) + n * np.eye(n)
     x = rng.normal(size=n)
@@ -218,7 +220,7 @@ def test_lu_and_cholesky_solve(n, seed):
 
 
 @given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1), scale=st.integers(-140, 140))
-def test_sign_and_logarithm_of_a_determinant(n, seed, scale):
+def test_sign_and_logarithm_of_a_determinant_are_numpy_s(n, seed, scale):
     """Pivots above 1e-150 may have a product that no double can hold."""
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(n, n))
@@ -234,7 +236,7 @@ def test_sign_and_logarithm_of_a_determinant(n, seed, scale):
 
 
 @given(seed=st.integers(0, 2**32 - 1), m=st.integers(1, 20), freedoms=st.integers(0, 20))
-def test_formulations_agree_where_all_apply(seed, m, freedoms):
+def test_formulations_agree_on_systems_of_independent_rows(seed, m, freedoms):
     rng = np.random.default_rng(seed)
     n = m + freedoms
     jacobian = rng.normal(size=(m, n)) + np.eye(m, n) * 3

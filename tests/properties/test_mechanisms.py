@@ -1,4 +1,4 @@
-"""Drawn mechanisms: mbref's motion and reactions / the judge's own equations, work, energy, its way back."""
+"""Random mechanisms: mbref's motion and reactions against the judge's equations, work and energy."""
 
 from __future__ import annotations
 
@@ -26,27 +26,26 @@ from mbref.trajectory import Outcome, Trajectory
 
 METHOD = "taylor"
 NEAR = 1e-4  # least singular value below which a scene counts as at a singular position
-EXACT, MOVED = (
-    1e-7,
-    1e-6,
-)  # of equations at a state; of motions, which leave the neighbourhood of singular ones
+EXACT = 1e-7  # relative error of equations at a state
+MOVED = 1e-6  # of motions, relative to the length of the scene
 
 
 def is_regular(scene: Scene) -> bool:
-    """Whether a scene is neither at a singular position nor in a mobility of the instant."""
+    """Return whether a scene is not singular, and its velocities do not vanish at second order."""
     values = singular_values(scene)
     return bool(np.all((values < RANK * values[0]) | (values > NEAR * values[0]))) and goes_on(scene)
 
 
 def run(scene: Scene, samples: int = 3) -> Trajectory:
-    """mbref's motion, and that it completed."""
+    """Return mbref's motion; assert that it completed."""
     found = simulate(scene, METHOD, np.linspace(0.0, scene.duration, samples), Limits(rtol=1e-10))
     assert found.outcome is Outcome.COMPLETED, f"{found.outcome} {found.message}: {scene}"
     return found
 
 
 def state(motion: Trajectory, k: int) -> tuple[np.ndarray, ...]:
-    """Positions, orientations, velocities and spins at a sample, without torsion springs."""
+    """Return positions, orientations, velocities and angular velocities at a sample, without torsion
+    springs."""
     return (
         motion.position[k],
         motion.orientation[k],
@@ -57,7 +56,7 @@ def state(motion: Trajectory, k: int) -> tuple[np.ndarray, ...]:
 
 
 @given(mechanisms())
-def test_state_and_equations(scene):
+def test_samples_satisfy_constraints_gauss_s_principle_and_the_balance_of_reactions(scene):
     """Constraints at three levels; Gauss's principle; Newton and Euler with reactions; virtual work."""
     assume(is_regular(scene))
     motion = run(scene)
@@ -77,8 +76,8 @@ def test_state_and_equations(scene):
 
 
 @given(mechanisms())
-def test_power_and_what_changes_the_energy(scene):
-    """Kinetic energy grows by the power of the loads: the reactions of joints at rest do none."""
+def test_kinetic_energy_grows_by_the_power_of_loads_and_reactions_do_no_work(scene):
+    """Σ (m a · v + J α · ω) = Σ (F · v + M · ω) of loads, and Σ over reactions is zero without drivers."""
     assume(is_regular(scene))
     motion = run(scene)
     mass = np.array([body.mass for body in scene.body])[:, None]
@@ -99,8 +98,8 @@ def test_power_and_what_changes_the_energy(scene):
 
 @settings(max_examples=8)
 @given(mechanisms(most_bodies=3, most_loops=1))
-def test_motion_and_reference_and_way_back(scene):
-    """The motion is Gauss's; energy less work is kept; with velocities reversed it comes back."""
+def test_motion_is_gauss_s_keeps_its_energy_and_returns_with_reversed_velocities(scene):
+    """The judge integrates Gauss's principle of least constraint with equations of its own."""
     assume(is_regular(scene))
     motion = run(scene, 9)
     exact = gauss_motion(scene, tuple(motion.times.tolist()))
@@ -116,8 +115,8 @@ def test_motion_and_reference_and_way_back(scene):
 
 
 @given(mechanisms(redundant=True))
-def test_redundancy_by_construction_and_diagnosis(scene):
-    """A joint is there twice: its rows count as redundant, and the rank is the judge's."""
+def test_joint_that_is_there_twice_counts_as_redundant(scene):
+    """The second joint is named R; the rank is the judge's."""
     values = singular_values(scene)
     assume(np.all((values < RANK * values[0]) | (values > NEAR * values[0])))
     found = diagnose(scene)
@@ -128,8 +127,7 @@ def test_redundancy_by_construction_and_diagnosis(scene):
 
 
 @given(mechanisms())
-def test_drawn_scenes_and_what_is_promised_of_them(scene):
-    """Joints hold and velocities obey them; the scene file is the scene."""
+def test_random_scene_has_velocities_that_its_joints_allow_and_survives_its_dictionary(scene):
     pose = initial_poses(scene)
     rows, _ = jacobian(scene, 0.0, *pose)
     twists = np.array([[*body.velocity, *body.angular_velocity] for body in scene.body]).ravel()
@@ -139,14 +137,14 @@ def test_drawn_scenes_and_what_is_promised_of_them(scene):
 
 @settings(max_examples=6)
 @given(paper_mechanisms(("planar_slider_crank", "spatial_slider_crank")))
-def test_paper_mechanisms_of_any_mass_and_equations(scene):
+def test_paper_s_mechanisms_with_random_masses_balance_their_reactions(scene):
     motion = run(scene.with_(duration=0.005))
     assert balance(scene, motion, motion) < 1e-6, scene
     assert float(violation_series(scene, motion).max()) < 1e-8, scene
 
 
 @given(st.integers(0, 5), st.data())
-def test_drawn_matrices_and_their_rank_and_spectrum(rank, data):
+def test_random_matrices_have_the_requested_rank_and_spectrum(rank, data):
     matrix = data.draw(matrices(rank=rank))
     assert np.linalg.matrix_rank(matrix, rtol=1e-9) == rank, matrix.shape
     spectrum = (3.0, 1e-3)

@@ -1,4 +1,4 @@
-"""Φ_q, ν and γ of every joint against differences of Φ and of Φ_q v along exact motions."""
+"""Φ_q, ν and γ of every joint and driver against differences of Φ and of Φ_q v along exact motions."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ TOLERANCE = 2e-11  # rounding of 1e-16 over STEP, times the size of the terms, w
 
 
 def derivative(function):
-    """d/ds at s = 0 by the central difference of order 8."""
+    """Return d/ds at s = 0 by the central difference of order 8."""
     pairs = [(function(k * STEP) - function(-k * STEP)) for k in (1, 2, 3, 4)]
     return np.tensordot(STENCIL, np.array(pairs), axes=1)
 
@@ -30,7 +30,7 @@ def agree(measured, expected, what):
 
 @pytest.mark.parametrize(("kind", "driven"), CASES)
 @given(data=st.data())
-def test_jacobian_and_difference_of_phi(kind, driven, data):
+def test_jacobian_is_the_derivative_of_phi(kind, driven, data):
     model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
     t, q, v = data.draw(states(model.nb), label="state")
     difference = derivative(lambda s: model.terms(t, displaced(q, s * v), v).phi)
@@ -39,7 +39,7 @@ def test_jacobian_and_difference_of_phi(kind, driven, data):
 
 @pytest.mark.parametrize(("kind", "driven"), CASES)
 @given(data=st.data())
-def test_nu_and_rate_of_phi(kind, driven, data):
+def test_jacobian_times_velocity_less_nu_is_the_rate_of_phi(kind, driven, data):
     model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
     t, q, v = data.draw(states(model.nb), label="state")
     terms = model.terms(t, q, v)
@@ -49,7 +49,7 @@ def test_nu_and_rate_of_phi(kind, driven, data):
 
 @pytest.mark.parametrize(("kind", "driven"), CASES)
 @given(data=st.data())
-def test_gamma_and_rate_of_velocity_equations(kind, driven, data):
+def test_gamma_is_the_negative_rate_of_the_velocity_equations(kind, driven, data):
     model = Model(data.draw(one_joint_scenes(kind, driven), label="scene"))
     t, q, v = data.draw(states(model.nb), label="state")
 

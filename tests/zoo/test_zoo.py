@@ -26,8 +26,8 @@ def sound_bench(scene: str) -> trial.Bench:
 
 
 @pytest.mark.parametrize("about", DEFECTS)
-def test_defect_and_the_check_that_tells(about):
-    """The named check fails with the defect, and passes without it."""
+def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
+    """The table tests/zoo/defects.toml names a check and a scene for each change of one line."""
     defect = DEFECTS[about]
     runner, sound = InProcess(engine(defect)), suite.verdict_on(defect.check, sound_bench(defect.scene))
     bench = suite.asked(runner, SPECIMENS[defect.scene])
@@ -43,25 +43,25 @@ def test_defect_and_the_check_that_tells(about):
     assert sound.status == suite.PASS, f"the sound engine: {sound}"
 
 
-def test_every_check_and_a_defect_that_trips_it():
+def test_every_check_has_a_defect_that_it_detects():
     idle = {*suite.FIRST, *PROPERTIES} - {defect.check for defect in DEFECTS.values()}
     assert not idle, f"no defect of the zoo trips {sorted(idle)}"
 
 
-def test_every_scene_of_a_defect_and_the_suite():
+def test_scene_of_every_defect_belongs_to_the_suite():
     unknown = {defect.scene for defect in DEFECTS.values()} - set(SPECIMENS)
     assert not unknown, unknown
 
 
 @pytest.mark.slow
-def test_sound_engine_and_the_whole_suite():
+def test_sound_engine_passes_the_whole_suite():
     found = suite.held_against(InProcess(engine()), specimens(deep=True))
     failed = [v for v in found.verdicts if v.status == suite.FAIL]
     assert found.conforms, failed
 
 
-def test_page_of_checks_and_the_table():
-    """docs/conformance.md is what its command writes."""
+def test_page_and_data_of_checks_are_what_their_command_writes():
+    """docs/conformance.md and the data for reports, by python -m tests.zoo.table."""
     path = Path(__file__).parents[2] / "docs" / "conformance.md"
     assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
     assert FOR_REPORTS.read_text() == data(), "the same command renews it"
