@@ -34,11 +34,11 @@ MECHANISMS = (
 )
 
 
-def agree(scene, method=ORDER_16):
+def agree(scene, method=ORDER_16, rtol=1e-11):
     """Return whether runs by generated code and general kernels agree to 1e-11 of the mechanism's length."""
     times = [0.0, 0.01, 0.02]
     generic, own = (
-        simulate(scene, method, times, Limits(rtol=1e-11, code=code)) for code in ("generic", "generated")
+        simulate(scene, method, times, Limits(rtol=rtol, code=code)) for code in ("generic", "generated")
     )
     assert generic.outcome == own.outcome == Outcome.COMPLETED, own.message
     return np.abs(generic.position - own.position).max() <= 1e-11 * scene_length(scene)
@@ -112,7 +112,7 @@ def _reactions(one, other):
 
 @pytest.mark.parametrize("order", (4, 5, 12, 13, 30))
 def test_generated_code_and_general_kernels_agree_at_every_order(order):
-    assert agree(SCENES["spatial_slider_crank_gravity"](), Method.parse(f"taylor[order={order}]"))
+    assert agree(SCENES["spatial_slider_crank_gravity"](), Method.parse(f"taylor[order={order}]"), rtol=1e-5)
 
 
 WITHOUT = """
