@@ -63,7 +63,9 @@ def test_every_array_of_a_motion_without_samples_is_empty(stuck, tmp_path):
     columns = stuck.columns()
     assert columns and all(values.shape == (0,) for values in columns.values())
     assert stuck.violation.position.shape == stuck.energy.shape == stuck.largest_reaction.shape == (0,)
-    assert all(found.shape == (0, 6) for found in stuck.determined_reactions.values())
+    assert [found.shape for found in stuck.determined_reactions.values()] == [(0, 6)] * len(
+        stuck.mechanism.joint
+    )
     assert stuck.joint("A").angle.shape == (0,) and len(stuck.to_dataframe()) == 0
     assert "SINGULAR_MATRIX" in stuck._repr_html_()
 
