@@ -27,6 +27,7 @@ from mbref.equations.active_coordinates import (
 from mbref.equations.coordinates import displace_all
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model, Terms
+from mbref.equations.planes import MotionEquations, motion_equations
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import Active, SparseFactor, Symbolic
 from mbref.kernels.scene_layout import Primitives, SceneData
@@ -130,12 +131,35 @@ def _of_rounds(found: np.ndarray, rounds: int) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Numbers of the primitives with a nonzero entry, the active columns, and the factor of their rows."""
+    """Numbers of the primitives with a nonzero entry, the active columns, and the factor of their rows.
+
+    ``parts`` caches the reductions of steps that need a part of the rows and columns.
+    """
 
     primitives: np.ndarray
     active: Active
     symbolic: Symbolic
     decisions: StructuralDecisions
+    motion: MotionEquations
+    parts: dict[tuple[bytes, ...], Reduction]
+
+    def of_steps(self, model: Model, start: Start) -> Reduction:
+        """Return the reduction of a scene with these decisions that determines its motion."""
+        return self._part(model, start, motion_equations(model, start, *self.motion))
+
+    def without_copies(self, model: Model, start: Start) -> Reduction:
+        """Return the reduction whose factor has no copies of bodies (``linear_algebra.hubs``)."""
+        return self._part(model, start, self.motion, of_body=0)
+
+    def _part(
+        self, model: Model, start: Start, motion: MotionEquations | None, of_body: int = 6
+    ) -> Reduction:
+        if motion is None:
+            return self
+        key = (*(array.tobytes() for array in motion), bytes(of_body))
+        if key not in self.parts:
+            self.parts[key] = _of_stage(model, start, motion, self.decisions, of_body)
+        return self.parts[key]
 
     def factor(self) -> SparseFactor:
         """Memory of the factor."""
@@ -185,15 +209,25 @@ def reduction_of(model: Model, start: Start) -> tuple[Reduction, np.ndarray]:
 
 def _found(model: Model, start: Start) -> Reduction:
     read: list[RandomStates] = []
-    moving, entries = active_entries(model, start.q, start.v, read)
-    row, entry = np.nonzero(entries)
+    motion = MotionEquations(*active_entries(model, start.q, start.v, read))
+    return _of_stage(model, start, motion, StructuralDecisions(model, start, read))
+
+
+def _of_stage(
+    model: Model, start: Start, motion: MotionEquations, decisions: StructuralDecisions, of_body: int = 6
+) -> Reduction:
+    """Return the reduction to these columns and entries; bodies may be split if they have ``of_body``
+    columns each."""
+    row, entry = np.nonzero(motion.entries)
     columns = model.entry_columns
     places = columns.shape[1] * row + entry
-    symbolic = symbolic_factorisation(row, columns[row, entry], places, moving)
-    velocities = symbolic.column.astype(np.int64)
+    symbolic = symbolic_factorisation(row, columns[row, entry], places, motion.moving, of_body)
+    velocities = np.unique(symbolic.column).astype(np.int64)
     return Reduction(
-        primitives=primitives_with(model, np.flatnonzero(entries.any(axis=1))),
-        active=Active(unsigned(active_coordinates(start.q, velocities)), symbolic.column),
+        primitives=primitives_with(model, np.flatnonzero(motion.entries.any(axis=1))),
+        active=Active(unsigned(active_coordinates(start.q, velocities)), unsigned(velocities)),
         symbolic=symbolic,
-        decisions=StructuralDecisions(model, start, read),
+        decisions=decisions,
+        motion=motion,
+        parts={},
     )

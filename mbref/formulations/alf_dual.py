@@ -9,7 +9,8 @@ Regularisation acts on rows of unit length in the metric of M.  The iteration is
 change would be ≤ epsilon, relative to the larger of 1 and the acceleration.  Clearly independent rows need no
 1/α: the first iteration then gives the solution of LM2.  Small inertias cause small singular values; if rows
 are independent, the iteration is repeated with a larger α.  Rows that are nearly dependent at the start, as
-with two slightly tilted hinges, cause even smaller singular values, which conjugate directions resolve.
+with two slightly tilted hinges, cause even smaller singular values, which conjugate directions resolve; so do
+long stacks of loops with redundant rows.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from typing import NamedTuple
 from mbref.formulations.alf import feedback
 from mbref.formulations.base import About, Formulation
 from mbref.kernels.compilation import exchangeable, inlined, kernel
-from mbref.kernels.layout import ACCELERATE, NOT_CONVERGED, OK, SINGULAR, SparseFactor
+from mbref.kernels.layout import ACCELERATE, LINK, NOT_CONVERGED, OK, SINGULAR, SparseFactor
 from mbref.kernels.named_memory import opener
 from mbref.linear_algebra.minimum_norm import go_on_by_conjugate_directions, solve_to_tolerance
 from mbref.linear_algebra.sparse_cholesky import (
@@ -27,6 +28,7 @@ from mbref.linear_algebra.sparse_cholesky import (
     assemble_gradients,
     factorise,
     least_squared_pivot,
+    of_row,
     substitute_back,
     substitute_forward,
 )
@@ -42,7 +44,7 @@ ABOUT = About(
         "By the Woodbury identity the iterates are equal to `alf`. A large α costs no digits here, no "
         "rank is decided, and the matrix is factored sparsely."
     ),
-    use="Any mechanism with all masses, redundant or not; the default for more than 100 bodies.",
+    use="Any mechanism with all masses, redundant or not; the default for many bodies.",
     fails="Bodies without mass or inertia: $M^{-1}$ does not exist.",
 )
 
@@ -60,6 +62,8 @@ class Options(NamedTuple):
 
 # factor for the next α; α above which 1/α is rounding compared with S
 STRONGER, LARGEST_ALPHA = 1e3, 1e16
+# ratio of successive changes of dependent rows, above which conjugate directions continue the iteration
+SLOW = 0.2
 INFINITE = 1e300  # α that stands for a matrix without 1/α
 # squared pivots: of clearly independent rows, and above which one iteration suffices
 INDEPENDENT_ROWS, WIDE = 1e-4, 0.08
@@ -96,7 +100,8 @@ def solve_exactly(system):
     substitute_back(factor, step)
     add_transpose(factor, step, factor.change)
     for i in range(row.shape[0]):
-        system.multipliers[row[i]] = -step[i]
+        if row[i] != LINK:
+            system.multipliers[row[i]] = -step[i]
     size = put_accelerations(system)
     if not pivot > WIDE:
         put_residual(factor.change, system)
@@ -105,7 +110,8 @@ def solve_exactly(system):
             substitute_back(factor, step)
             add_transpose(factor, step, factor.change)
             for i in range(row.shape[0]):
-                system.multipliers[row[i]] -= step[i]
+                if row[i] != LINK:
+                    system.multipliers[row[i]] -= step[i]
             put_accelerations(system)
     return True
 
@@ -125,9 +131,9 @@ def put_accelerations(system):
 def square_of_forces(system):
     """Return the square of the norm of M^(1/2) q̈_0 = M^(-1/2) g."""
     factor, square = factor_of(system.scratch), 0.0
-    column, root = factor.symbolic.column, factor.root
+    column, root, share = factor.symbolic.column, factor.root, factor.share
     for j in range(column.shape[0]):
-        part = root[j] * system.force[column[j]]
+        part = root[j] * system.force[column[j]] * share[j]
         square += part * part
     return square
 
@@ -137,7 +143,8 @@ def iterate_until_solved(system):
     """Iterate, with a larger α if needed; return OK, SINGULAR or NOT_CONVERGED."""
     options, factor = options_of(system.options), factor_of(system.scratch)
     alpha, status = options.alpha, iterate_with(options.alpha, system)
-    if system.settings.nearly_dependent:
+    slow = status == NOT_CONVERGED and not system.settings.independent
+    if system.settings.nearly_dependent or slow:
         status = go_on_by_conjugate_directions(factor, alpha, system.acceleration, system.multipliers)
     while status == NOT_CONVERGED and system.settings.independent and alpha < LARGEST_ALPHA:
         alpha *= STRONGER
@@ -153,8 +160,9 @@ def iterate_with(alpha, system):
     options, factor = options_of(system.options), factor_of(system.scratch)
     if not start(alpha, system):
         return SINGULAR
+    slowest = 1.0 if system.settings.independent else SLOW
     return solve_to_tolerance(
-        factor, options.epsilon, int(options.iterations), system.acceleration, system.multipliers
+        factor, options.epsilon, int(options.iterations), slowest, system.acceleration, system.multipliers
     )
 
 
@@ -166,14 +174,14 @@ def start(alpha, system):
     The results are M^(1/2) q̈_0 in ``factor.change``, b in ``factor.residual``, and L⁻¹ b in ``factor.step``.
     """
     factor = factor_of(system.scratch)
-    column, root, x = factor.symbolic.column, factor.root, factor.change
+    column, root, x, share = factor.symbolic.column, factor.root, factor.change, factor.share
     system.counts.factorisations += 1
     assemble_gradients(factor, system.blocks.reshape(-1), system.inverse_root)
     for j in range(column.shape[0]):
         k = column[j]
         if not system.mass[k] > 0.0:
             return False
-        x[j] = root[j] * system.force[k]
+        x[j] = root[j] * system.force[k] * share[j]
         system.acceleration[k] = root[j] * x[j]
     put_residual(x, system)
     return factorise(factor, alpha, factor.step)
@@ -188,7 +196,7 @@ def put_residual(x, system):
     factor = factor_of(system.scratch)
     row, start, column, d = factor.symbolic.row, factor.symbolic.d_start, factor.symbolic.d_column, factor.d
     for i in range(row.shape[0]):
-        value = system.rhs[row[i]]
+        value = of_row(system.rhs, row[i])
         for p in range(start[i], start[i + 1]):
             value -= d[p] * x[column[p]]
         factor.residual[i], factor.step[i] = value, value

@@ -122,12 +122,16 @@ class Active(NamedTuple):
     velocities: Annotated[Unsigned, "active_velocities"]
 
 
+LINK = 2**32 - 1  # in place of the index of a row that links copies of a body (``linear_algebra.hubs``)
+
+
 class Symbolic(NamedTuple):
     """Positions of all numbers of D, S = D Dᵀ and its factor L; r rows and c columns are in the
     factorisation."""
 
-    row: Annotated[Unsigned, "r"]  # index in the system of each row, in the order of elimination
-    column: Annotated[Unsigned, "c"]  # index in the system of each column
+    row: Annotated[Unsigned, "r"]  # index in the system of each row, in the order of elimination; or LINK
+    column: Annotated[Unsigned, "c"]  # index in the system of each column; copies of a body have equal ones
+    link: Annotated[Unsigned, "links"]  # entries of D in rows that link copies, in pairs
     d_start: Annotated[Unsigned, "r + 1"]  # first entry of each row of D = Φ_q M^(-1/2)
     d_entry: Annotated[Unsigned, "nd"]  # index of each entry of D in the constraint Jacobian
     d_column: Annotated[Unsigned, "nd"]
@@ -155,6 +159,7 @@ class SparseFactor(NamedTuple):
     total: Annotated[Vector, "r"]
     direction: Annotated[Vector, "r"]
     root: Annotated[Vector, "c"]  # M^(-1/2)
+    share: Annotated[Vector, "c"]  # 1 / number of copies of the body
     change: Annotated[Vector, "c"]
 
 
@@ -226,6 +231,8 @@ class Ends(NamedTuple):
     lower: Annotated[Vector, "watched_numbers"]  # lower factor of ``sparse_lu.factorise_product``
     upper: Annotated[Vector, "watched_numbers"]
     pivots: Annotated[Vector, "watched_rows"]
+    past_pivots: Annotated[Vector, "watched_rows"]  # at the start of a part of the step; their signs count
+    alone: Annotated[Vector, "watched_rows"]  # pivots that change sign without a partner, below each row
     rates: Annotated[Matrix, 2, "7*nb"]  # q' at both ends
     pose: Annotated[Vector, "7*nb"]  # inside the step
 
@@ -257,7 +264,7 @@ class Kernels(NamedTuple):
 class Memory(NamedTuple):
     """Everything that kernels share."""
 
-    equations: Equations
+    equations: Equations  # of steps
     state: State
     previous: State  # at the last accepted step
     active: Active
@@ -270,6 +277,9 @@ class Memory(NamedTuple):
     chart: Address  # the stabilisation's own memory
     chart_options: Address  # parameters of the chart
     integrator: Address  # the integrator's own memory
+    # Equations and SparseFactor of samples, with rows that only carry reactions (``equations.planes``)
+    sampled: Address
+    balance: Address
 
 
 MEMORY, SYSTEM = Named(Memory), Named(System)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy import inf, sqrt
 
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry, inlined, kernel
-from mbref.kernels.layout import NOT_CONVERGED, OK, SparseFactor
+from mbref.kernels.layout import LINK, NOT_CONVERGED, OK, SparseFactor
 from mbref.kernels.named_memory import Named, packed
 from mbref.linear_algebra.sparse_cholesky import (
     add_transpose,
@@ -28,7 +28,7 @@ from mbref.linear_algebra.sparse_cholesky import (
     subtract_product,
     times_transpose,
 )
-from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation
+from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_factorisation, system_rows
 from mbref.linear_algebra.vectors import copy
 
 if TYPE_CHECKING:
@@ -40,18 +40,19 @@ LEAST_ITERATIONS = 2
 ALPHA = 1e10  # penalty of projections and single solutions; singular values below 1e-5 are ignored
 # largest number of iterations of a system that is solved once; relative change that ends them
 ITERATIONS, LAST_CHANGE = 20, 1e-15
+OF_BODY = 6  # columns of a body, in matrices that are solved once
 DEPENDENT_ROW = 1e-11  # singular value of unit rows below which a remaining row counts as dependent
 FACTOR = Named(SparseFactor)
 
 
 @inlined
-def solve_to_tolerance(factor, epsilon, most, target, multipliers):
+def solve_to_tolerance(factor, epsilon, most, slowest, target, multipliers):
     """Change ``target`` (n,) by the least change for which Φ_q times the change equals the residual.
 
     The iteration ends when the next change would be ≤ ``epsilon``, estimated from the previous changes.
     ``multipliers`` (m,) become the sums of -Δ in the rows that take part.  Returns OK, or NOT_CONVERGED after
-    ``most`` iterations.  ``factor.step`` contains L⁻¹ times the residual, where ``factorise`` leaves this
-    product.
+    ``most`` iterations, or once a change exceeds the previous change times ``slowest``.  ``factor.step``
+    contains L⁻¹ times the residual, where ``factorise`` leaves this product.
     """
     row, step, total = factor.symbolic.row, factor.step, factor.total
     total[:] = 0.0
@@ -68,9 +69,18 @@ def solve_to_tolerance(factor, epsilon, most, target, multipliers):
         if k + 1 >= min(LEAST_ITERATIONS, most) and expected <= epsilon:
             status = OK
             break
-    for i in range(row.shape[0]):
-        multipliers[row[i]] = total[i]
+        if k > 1 and change > slowest * last:
+            break
+    write_multipliers(row, total, multipliers)
     return status
+
+
+@inlined
+def write_multipliers(row, total, multipliers):
+    """Write the multipliers of the factor's rows to their rows in the system."""
+    for i in range(row.shape[0]):
+        if row[i] != LINK:
+            multipliers[row[i]] = total[i]
 
 
 @kernel
@@ -106,7 +116,7 @@ def go_along(length, factor, target, multipliers):
     row, change, total = factor.symbolic.row, factor.change, factor.total
     for i in range(row.shape[0]):
         total[i] -= length * factor.direction[i]
-        multipliers[row[i]] = total[i]
+    write_multipliers(row, total, multipliers)
     for j in range(change.shape[0]):
         change[j] *= length
     add_scaled(factor, target)
@@ -115,7 +125,7 @@ def go_along(length, factor, target, multipliers):
 @kernel
 def norm_of(target, factor):
     """Return the larger of 1 and the norm of M^(1/2) target (n,)."""
-    column, root, square = factor.symbolic.column, factor.root, 1.0
+    column, root, square = factor.symbolic.column, factor.root, 1.0  # a copy has a part of its body's mass
     for j in range(root.shape[0]):
         value = target[column[j]] / root[j]
         square = max(square, value * value)
@@ -161,8 +171,9 @@ def add_scaled(factor, target):
     """Compute target (n,) += M^(-1/2) x; return the norm of this change, relative to the larger of 1 and the
     target's norm."""
     column, root, x, change, size = factor.symbolic.column, factor.root, factor.change, 0.0, 0.0
+    share = factor.share
     for j in range(x.shape[0]):
-        step, k = root[j] * x[j], column[j]
+        step, k = root[j] * x[j] * share[j], column[j]  # copies make equal changes
         value = target[k] + step
         target[k] = value
         change += step * step
@@ -182,7 +193,7 @@ def find_least_multipliers(factor, force, multipliers):
         factor.symbolic.row, factor.symbolic.column, factor.change, factor.step, factor.total,
     )  # fmt: skip
     for j in range(column.shape[0]):
-        x[j] = factor.root[j] * force[column[j]]
+        x[j] = factor.root[j] * force[column[j]] * factor.share[j]
     total[:] = 0.0
     before = inf
     for _ in range(ITERATIONS):
@@ -199,8 +210,7 @@ def find_least_multipliers(factor, force, multipliers):
         if not LAST_CHANGE * LAST_CHANGE * size < change < before:
             break
         before = change
-    for i in range(row.shape[0]):
-        multipliers[row[i]] = total[i]
+    write_multipliers(row, total, multipliers)
 
 
 @entry(INT(VECTOR, VECTOR, FACTOR))
@@ -243,15 +253,16 @@ class MinimumNorm:
         row = np.repeat(np.arange(self.d.shape[0]), np.diff(self.d.indptr))
         active = np.zeros(self.d.shape[1], dtype=bool)
         active[self.d.indices] = True
-        symbolic = symbolic_factorisation(row, self.d.indices, np.arange(row.size), active)
+        symbolic = symbolic_factorisation(row, self.d.indices, np.arange(row.size), active, OF_BODY)
         self._factor = packed(sparse_factor(symbolic))
         factorise_once(self.d.data, np.ones(self.d.shape[1]), self._factor.argument)
-        self._rows = symbolic.row.astype(int)
+        self._rows, self._places = system_rows(symbolic), np.flatnonzero(symbolic.row != LINK)
 
     def __call__(self, rhs: np.ndarray) -> np.ndarray:
         """Return x (n,) for b = rhs (m,); if rows contradict each other, by least squares of unit rows."""
         x, factor = np.zeros(self.d.shape[1]), self._factor.values
-        factor.residual[:] = (self._scale * rhs)[self._rows]
+        factor.residual[:] = 0.0
+        factor.residual[self._places] = (self._scale * rhs)[self._rows]
         for _ in range(ITERATIONS):
             iterate_once(x, self._factor.argument)
             if np.linalg.norm(factor.change) <= LAST_CHANGE * np.linalg.norm(x):
@@ -260,7 +271,8 @@ class MinimumNorm:
 
     def regularised_solution(self, b: np.ndarray) -> np.ndarray:
         """Return (S + I/α)⁻¹ b (m,) for unit rows."""
-        solution, own = ALPHA * b, np.ascontiguousarray(b[self._rows], dtype=float)
+        solution, own = ALPHA * b, np.zeros(self._factor.values.residual.size)
+        own[self._places] = b[self._rows]
         solve_once(own, self._factor.argument)
-        solution[self._rows] = own
+        solution[self._rows] = own[self._places]
         return solution

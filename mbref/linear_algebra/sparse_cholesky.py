@@ -1,24 +1,39 @@
 """Sparse kernels: D = Φ_q M^(-1/2), the factor L Δ Lᵀ of S + I/α with S = D Dᵀ, solutions and products.
 
 α weighs rows of unit length, S_ii = 1, so that S_ii (1 + 1/α) stands on the diagonal; a row without entries
-has 1 on the diagonal and changes nothing.  Vectors of rows and columns are in the order of
+has 1 on the diagonal and changes nothing. Rows that link copies of a body (``linear_algebra.hubs``) have no
+1/α.  Vectors of rows and columns are in the order of
 ``SparseFactor.symbolic``.
 """
 
 from __future__ import annotations
 
-from mbref.kernels.compilation import inlined
+from numpy import sqrt
+
+from mbref.kernels.compilation import inlined, kernel
+from mbref.kernels.layout import LINK
 
 
 @inlined
 def assemble_gradients(factor, numbers, inverse_root):
     """Compute M^(-1/2) and D from M^(-1/2) (n,) and the flat constraint Jacobian."""
-    symbolic, d, root = factor.symbolic, factor.d, factor.root
-    entry, d_column, column = symbolic.d_entry, symbolic.d_column, symbolic.column
+    symbolic, d, root, share = factor.symbolic, factor.d, factor.root, factor.share
+    entry, d_column, column, link = symbolic.d_entry, symbolic.d_column, symbolic.column, symbolic.link
     for j in range(column.shape[0]):
         root[j] = inverse_root[column[j]]
+    if link.shape[0] > 0:
+        for j in range(column.shape[0]):
+            root[j] /= sqrt(share[j])
     for k in range(entry.shape[0]):
         d[k] = numbers[entry[k]] * root[d_column[k]]
+    for p in range(0, link.shape[0], 2):
+        d[link[p]], d[link[p + 1]] = root[d_column[link[p]]], -root[d_column[link[p + 1]]]
+
+
+@inlined
+def of_row(vector, row):
+    """Return the element of a vector (m,) for a row of the factor: zero for a row that links copies."""
+    return vector[row] if row != LINK else 0.0
 
 
 @inlined
@@ -42,6 +57,16 @@ def eliminate(value, factor, entry):
     return value
 
 
+@kernel
+def square_without_copies(factor, k):
+    """Return S_ii of a row before bodies were split; zero for a row that links copies."""
+    symbolic, d, share, square = factor.symbolic, factor.d, factor.share, 0.0
+    if symbolic.row[k] != LINK:
+        for p in range(symbolic.d_start[k], symbolic.d_start[k + 1]):
+            square += d[p] * d[p] * share[symbolic.d_column[p]]
+    return square
+
+
 @inlined
 def factorise(factor, alpha, b):
     """Compute L of S + I/α, with 1/Δ instead of its unit diagonal, and b := L⁻¹ b; return False if an entry
@@ -50,8 +75,13 @@ def factorise(factor, alpha, b):
     Every number is computed at once from its products, and b while the next column waits for its pivot.
     """
     first, row, l = factor.symbolic.l_start, factor.symbolic.l_row, factor.l
+    has_copies = factor.symbolic.link.shape[0] > 0
     for k in range(first.shape[0] - 1):
-        start, value = first[k], product_of_rows(factor, first[k]) * (1.0 + 1.0 / alpha)
+        start, value = first[k], product_of_rows(factor, first[k])
+        if has_copies:
+            value += square_without_copies(factor, k) / alpha
+        else:
+            value *= 1.0 + 1.0 / alpha
         factor.diagonal[k] = value if value > 0.0 else 1.0
         pivot = eliminate(factor.diagonal[k], factor, start)
         if not pivot > 0.0:

@@ -1,42 +1,42 @@
 """Symbolic factorisation of S = D Dᵀ: the positions of all numbers of D, S and its Cholesky factor L.
 
-The factorisation is made once for each scene. SuperLU determines the order of elimination and the fill
-(multiple minimum degree on the symmetric pattern). This module adds the lists of products for the kernels of
-``sparse_cholesky``. Indices are unsigned, because compiled code tests the sign of signed indices.
+The factorisation is made once for each scene. A body with many joints may be split into copies
+(``linear_algebra.hubs``), if that makes fewer updates. SuperLU determines the order of elimination and the
+fill (multiple minimum degree on the symmetric pattern). This module adds the lists of products for the
+kernels of ``sparse_cholesky``. Indices are unsigned, because compiled code tests the sign of signed indices.
 """
 
 from __future__ import annotations
 
 import functools
 import hashlib
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mbref.input_error import InputError
 from mbref.kernels import checked_file
 from mbref.kernels.compilation import CACHE
-from mbref.kernels.layout import SparseFactor, Symbolic
+from mbref.kernels.layout import LINK, SparseFactor, Symbolic
 from mbref.kernels.named_memory import allocate
+from mbref.linear_algebra.hubs import Pattern, least_updates, split_hubs
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
 MOST_PATTERNS = 64  # number of cached patterns
 MOST_STORED = 2**25  # bytes of a pattern in a file; a larger one is made in each process
+WORTH_SPLITTING = 0.7  # updates with copies / without, below which copies repay their additional rows
 MOST_UPDATES = 20_000_000  # of a factorisation; making the list of one takes about 100 bytes
 
 
 def symbolic_factorisation(
-    row: np.ndarray, column: np.ndarray, entry: np.ndarray, active: np.ndarray
+    row: np.ndarray, column: np.ndarray, entry: np.ndarray, active: np.ndarray, of_body: int = 0
 ) -> Symbolic:
     """Return the symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
-    Places are indices into the flat constraint Jacobian; ``active`` (n,) selects the columns. Scenes of one
-    structure share the arrays of their pattern, which are never changed. Raises InputError for a pattern that
-    is too large.
+    Places are indices into the flat constraint Jacobian; ``active`` (n,) selects the columns. If ``of_body``
+    columns belong to a body each, bodies may be split into copies. Scenes of one structure share the arrays
+    of their pattern, which are never changed. Raises InputError for a pattern that is too large.
     """
     indices = (np.asarray(array, dtype=np.int64).tobytes() for array in (row, column, entry))
-    return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes())
+    return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes(), of_body.to_bytes(1, "little"))
 
 
 @functools.lru_cache(maxsize=MOST_PATTERNS)
@@ -57,16 +57,15 @@ def _of_pattern(*pattern: bytes) -> Symbolic:
     return Symbolic(*np.split(indices.copy(), np.cumsum(sizes)[:-1]))
 
 
-def _made(*pattern: bytes) -> Symbolic:
-    row, column, entry = (np.frombuffer(indices, dtype=np.int64) for indices in pattern[:3])
-    active = np.frombuffer(pattern[3], dtype=bool)
-    from scipy.sparse import csr_array  # slow import, avoided by cached patterns
-
+def _made(*given: bytes) -> Symbolic:
+    row, column, entry = (np.frombuffer(indices, dtype=np.int64) for indices in given[:3])
+    active = np.frombuffer(given[3], dtype=bool)
     kept, row = np.unique(row, return_inverse=True)
-    d = csr_array((np.ones(row.size), (row, column)), shape=(kept.size, active.size))
-    order, l_start, l_row = _factor_pattern(d)
-    below = np.diff(l_start) - 1
-    if (updates := int(np.sum(below * (below + 1) // 2))) > MOST_UPDATES:
+    own = np.flatnonzero(active)
+    whole = Pattern(row, np.searchsorted(own, column), entry, own, kept.size)
+    pattern, (order, l_start, l_row) = _fewest_updates(whole, given[4][0])
+    row, column, entry, own, rows = pattern
+    if (updates := _count(l_start)) > MOST_UPDATES:
         raise InputError(
             f"the scene is too large: {order.size} constraint rows share bodies, so that their factorisation "
             f"has {updates} updates, at most {MOST_UPDATES} fit; use fewer joints on one body"
@@ -77,13 +76,15 @@ def _made(*pattern: bytes) -> Symbolic:
     l_key = np.repeat(np.arange(order.size), np.diff(l_start)) * order.size + l_row
     target, left, right = _products(row, column, l_key, order.size)
     changed, update_left, update_right = _updates(l_start, l_row, l_key, order.size)
-    own, numbers = np.flatnonzero(active), np.arange(l_row.size + 1)
+    numbers = np.arange(l_row.size + 1)
+    of_system = np.append(kept, np.full(rows - kept.size, LINK))
     return Symbolic(
-        row=unsigned(kept[order]),
+        row=unsigned(of_system[order]),
         column=unsigned(own),
+        link=unsigned(np.flatnonzero(of_system[order][row] == LINK)),
         d_start=unsigned(np.searchsorted(row, np.arange(order.size + 1))),
         d_entry=unsigned(entry),
-        d_column=unsigned(np.searchsorted(own, column)),
+        d_column=unsigned(column),
         s_start=unsigned(np.searchsorted(target, numbers)),
         s_left=unsigned(left),
         s_right=unsigned(right),
@@ -93,6 +94,30 @@ def _made(*pattern: bytes) -> Symbolic:
         update_left=unsigned(update_left),
         update_right=unsigned(update_right),
     )
+
+
+OrderAndFill = tuple[np.ndarray, np.ndarray, np.ndarray]  # order, first entries and rows of the columns of L
+
+
+def _fewest_updates(whole: Pattern, of_body: int) -> tuple[Pattern, OrderAndFill]:
+    """Return the pattern, with or without copies of bodies with many rows, that needs fewer updates."""
+    parted = split_hubs(whole, of_body) if of_body else None
+    if parted is None:
+        return whole, _factor_pattern(whole)
+    of_parted = _factor_pattern(parted)
+    most = WORTH_SPLITTING * least_updates(whole, of_body)
+    if _count(of_parted[1]) < most:
+        return parted, of_parted
+    of_whole = _factor_pattern(whole)
+    if _count(of_parted[1]) < WORTH_SPLITTING * _count(of_whole[1]):
+        return parted, of_parted
+    return whole, of_whole
+
+
+def _count(l_start: np.ndarray) -> int:
+    """Return the number of updates of a factorisation, from the first entries of the columns of L."""
+    below = np.diff(l_start) - 1
+    return int(np.sum(below * (below + 1) // 2))
 
 
 def unsigned(indices: np.ndarray | list[int]) -> np.ndarray:
@@ -115,17 +140,26 @@ def sparse_factor(symbolic: Symbolic) -> SparseFactor:
         "nd": symbolic.d_entry.size, "nl": symbolic.l_row.size, "r": symbolic.row.size,
         "c": symbolic.column.size,
     }  # fmt: skip
-    return allocate(SparseFactor, sizes, symbolic=symbolic)
+    factor = allocate(SparseFactor, sizes, symbolic=symbolic)
+    factor.share[:] = 1.0 / np.bincount(symbolic.column)[symbolic.column] if symbolic.column.size else 1.0
+    return factor
 
 
-def _factor_pattern(d: csr_array) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def system_rows(symbolic: Symbolic) -> np.ndarray:
+    """Return the rows of the system in a factorisation, in the order of elimination."""
+    return symbolic.row[symbolic.row != LINK].astype(np.int64)
+
+
+def _factor_pattern(pattern: Pattern) -> OrderAndFill:
     """Return the order of elimination of S = D Dᵀ, and first entries and rows of the columns of its factor.
 
     SuperLU factorises a matrix of that pattern with a dominant diagonal, so that it does not exchange rows.
     """
-    from scipy.sparse import csc_array, csr_array, eye_array
+    from scipy.sparse import csc_array, csr_array, eye_array  # slow import, avoided by cached patterns
     from scipy.sparse.linalg import splu
 
+    places = pattern.row, pattern.column
+    d = csr_array((np.ones(pattern.row.size), places), shape=(pattern.rows, pattern.own.size))
     size = d.shape[0]
     if not size:
         return np.zeros(0, dtype=int), np.zeros(1, dtype=int), np.zeros(0, dtype=int)

@@ -56,7 +56,7 @@ def _accepted(run: Run) -> tuple[np.ndarray, np.ndarray]:
 def _rank(run: Run, t: float, q: np.ndarray) -> int:
     """Return the rank of Φ_q at the start, or the regular rank that the run found."""
     found = int((_singular_values(run, t, q)[0] > run.limits.rank_tolerance).sum())
-    return max(found, int(run.memory.watch.generic_rank), 1)
+    return max(found, int(run.memory.watch.generic_rank) - run.links, 1)
 
 
 def _singular_values(run: Run, t: float, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,10 +17,10 @@ from numpy import inf, sqrt
 from mbref.equations.coordinates import contract, displace, expand, normalise
 from mbref.equations.evaluation import assemble_system, evaluate, violation_rate
 from mbref.kernels.compilation import exchangeable, inlined, kernel
-from mbref.kernels.layout import ACCEPT, ENTER, NOT_CONVERGED, OK, RATES, SINGULAR
+from mbref.kernels.layout import ACCEPT, ENTER, LINK, NOT_CONVERGED, OK, RATES, SINGULAR
 from mbref.kernels.named_memory import Matrix, Vector, opener
 from mbref.linear_algebra.minimum_norm import ALPHA, LEAST_ITERATIONS, solve_fixed_iterations
-from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, regularised_factor
+from mbref.linear_algebra.sparse_cholesky import find_squared_pivots, of_row, regularised_factor
 from mbref.linear_algebra.vectors import copy, flush_denormals, largest, sort
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
 from mbref.stabilisation.all_coordinates import write_rates
@@ -118,7 +118,7 @@ def remove_violation(violation, iterations, factor, target):
     """Change ``target`` (n,) by the least change that removes the violation (m,) of every row."""
     row = factor.symbolic.row
     for i in range(row.shape[0]):
-        factor.residual[i] = -violation[row[i]]
+        factor.residual[i] = -of_row(violation, row[i])
     solve_fixed_iterations(factor, iterations, target)
 
 
@@ -217,12 +217,15 @@ def rates(t, y, y_rate, memory):
     state, equations = memory.state, memory.equations
     expand(y, memory.active, state)
     assemble_system(t, state.coordinates, state.velocities, equations)
-    some = depend_on_others(memory)
+    settings, some = equations.system.settings, depend_on_others(memory)
+    independent = settings.independent
     if some:
         leave_out_dependent_rows(memory)
+        settings.independent = 1
     status = memory.kernels.accelerate(equations.system)
     if some:
         put_back_dependent_rows(memory)
+        settings.independent = independent
     write_rates(y_rate, memory)
     return status
 
@@ -252,7 +255,7 @@ def leave_out_dependent_rows(memory):
     pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
     kept = scratch_of(memory.chart).blocks
     for k in range(pivots.shape[0]):
-        if not pivots[k] > DEPENDENT:
+        if not pivots[k] > DEPENDENT and row[k] != LINK:
             i = row[k]
             copy(system.blocks[i], kept[i])
             system.blocks[i], system.rhs[i] = 0.0, 0.0
@@ -266,7 +269,7 @@ def put_back_dependent_rows(memory):
     pivots, row, system = memory.pivots, memory.factor.symbolic.row, memory.equations.system
     kept = scratch_of(memory.chart).blocks
     for k in range(pivots.shape[0]):
-        if not pivots[k] > DEPENDENT:
+        if not pivots[k] > DEPENDENT and row[k] != LINK:
             copy(kept[row[k]], system.blocks[row[k]])
 
 

@@ -11,6 +11,7 @@ from mbref.equations.units import unit_rows
 from mbref.kernels.layout import SparseFactor, Symbolic
 from mbref.kernels.named_memory import packed
 from mbref.linear_algebra.minimum_norm import factorise_once
+from mbref.linear_algebra.symbolic_factorisation import system_rows
 from mbref.stabilisation.projection import INDEPENDENT
 
 MOST_RANKED_ROWS = 120  # rows; singular values of more rows are not computed
@@ -35,7 +36,7 @@ def ranks_at(
 
     ``blocks`` are the blocks of Φ_q at q, if they are known.
     """
-    size = factor.symbolic.row.size
+    size = system_rows(factor.symbolic).size
     if blocks is None:
         blocks = model.terms(0.0, q).blocks
     if size > MOST_RANKED_ROWS:
@@ -51,7 +52,7 @@ def all_ranks(
 
     Arguments are Φ_q as blocks (s, m, 12) and the inverse roots (s, n) of their metrics.
     """
-    rows, columns = symbolic.row.astype(int), symbolic.column.astype(int)
+    rows, columns = system_rows(symbolic), np.unique(symbolic.column).astype(int)
     if rows.size > MOST_RANKED_ROWS or not rows.size:
         return [NO_RANKS] * len(blocks)
     jacobian = model.structure.dense(blocks)[:, rows[:, None], columns] * metric_root[:, None, columns]

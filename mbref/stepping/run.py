@@ -22,7 +22,7 @@ from mbref.kernels.layout import (
     State,
     Watch,
 )
-from mbref.kernels.memory_pool import Pooled, acquire, release, write_record
+from mbref.kernels.memory_pool import Pooled, acquire, copied, release, write_record
 from mbref.kernels.named_memory import allocate, packed
 from mbref.kernels.records import record
 from mbref.kernels.scene_layout import SceneData
@@ -30,11 +30,12 @@ from mbref.linear_algebra.symbolic_factorisation import empty_factor, unsigned
 from mbref.method import Method
 from mbref.scene import Scene, SceneError
 from mbref.stabilisation.all_coordinates import rates as rates_of_all_rows
+from mbref.stabilisation.all_coordinates import rates_and_balance
 from mbref.stabilisation.base import Stabilisation
 from mbref.stepping.control import control_of
 from mbref.stepping.limits import Limits
 from mbref.stepping.preparation import prepare
-from mbref.stepping.ranks import NO_RANKS, ranks_at
+from mbref.stepping.ranks import NO_RANKS, are_clear, ranks_at
 
 NEARLY = 1e-5  # smallest singular value below which rows are nearly dependent
 
@@ -66,10 +67,12 @@ class Run:
         self.scene, self.method, self.times, self.limits = scene, method, times, limits
         self._blocks: np.ndarray | None = None  # (m, 12) of Φ_q at the start, if it was computed
         self.model, self.start, self.reduction = self._posed()
+        self.steps = self._reduction_of_steps()
         self._control = control_of(self.model, method, times, limits)
         prepare(method)  # before the timed run
         self.pooled = self._acquire_memory()
         self.memory, self.packed = self.pooled.values, self.pooled.packed
+        self.links = self.memory.factor.symbolic.link.size // 2  # rows that link copies of a body
         self.put_start()
         self.crossings: list[Passed] = []
         self.making = 0.0  # s of CPU time for construction during ``advance``
@@ -98,28 +101,47 @@ class Run:
         start, reduction, self._blocks = reduced_start(model)
         return model, start, reduction
 
+    def _reduction_of_steps(self) -> Reduction | None:
+        """Return the part of the reduction that steps of an explicit integrator need; all of it otherwise.
+
+        Copies of bodies would count as redundant in place of a redundant row, which steps leave out.
+        """
+        method, reduction = self.method, self.reduction
+        if reduction is None or method.is_series:
+            return reduction
+        if method.formulation.is_sparse and not method.stabilisation.chooses_coordinates:
+            reduction = reduction.of_steps(self.model, self.start)
+        if reduction.symbolic.link.size and not are_clear(self.model, self._blocks, reduction.factor()):
+            reduction = reduction.without_copies(self.model, self.start)
+        return reduction
+
     def begin_again(self) -> None:
         """Reset the memory, except the stepper's own, to the scene's parameters and the initial state."""
         self.pooled.restore()
-        self._put_numbers(self.memory, self.reduced(self.model.data))
+        self._put_numbers(self.memory)
         self.put_start()
 
     def reduced(self, data: SceneData, axis: int = 0) -> SceneData:
-        """Return the data of a scene with the primitives that the run needs; ``axis`` counts primitives."""
+        """Return the data of a scene with the primitives that samples need; ``axis`` counts primitives."""
+        return self._reduced_by(self.reduction, data, axis)
+
+    def _reduced_by(self, reduction: Reduction | None, data: SceneData, axis: int = 0) -> SceneData:
         is_sparse = self.method.formulation.is_sparse
-        return self.reduction.scene(data, axis) if self.reduction and is_sparse else data
+        return reduction.scene(data, axis) if reduction and is_sparse else data
 
     def _acquire_memory(self) -> Pooled:
         """Return memory with the numbers of this run."""
-        data = self.reduced(self.model.data)
-        key = (Memory, *self._identity(), self.model.structure, self.reduction, self.times.size)
-        memory = acquire(key, lambda: self._allocate(data))
-        self._put_numbers(memory.values, data)
+        key = (Memory, *self._identity(), self.model.structure, self.reduction, self.steps, self.times.size)
+        memory = acquire(key, self._allocate)
+        self._put_numbers(memory.values)
         return memory
 
-    def _put_numbers(self, memory: Memory, data: SceneData) -> None:
+    def _put_numbers(self, memory: Memory) -> None:
         """Write the numbers of the scene, the method and the limits into memory."""
-        self.model.put_numbers(memory.equations, data)
+        data = self.model.data
+        self.model.put_numbers(memory.equations, self._reduced_by(self.steps, data))
+        if memory.sampled:
+            self.model.put_numbers(memory.sampled.values, self.reduced(data))
         write_record(memory.equations.system.settings, self.method.settings(self.limits.rank_tolerance))
         write_record(memory.control, self._control)
         memory.loop.times[:] = self.times
@@ -132,11 +154,12 @@ class Run:
         options = (tuple(self.method.options_of(part).items()) for part in self.method.parts)
         return self._kernels_on(stabilisation), schemas, numbers, *options
 
-    def _allocate(self, data: SceneData) -> Memory:
-        """Return memory of the method for the data of a scene, without numbers."""
-        model, method = self.model, self.method
+    def _allocate(self) -> Memory:
+        """Return memory of the method for the scene, without numbers."""
+        model, method, data = self.model, self.method, self.model.data
         formulation, stabilisation, integrator = method.parts
         factor, active = self._factor()
+        is_part = self.steps is not self.reduction
         pivots = factor.symbolic.row.size
         dense_rows = model.m if formulation.scratch else 0
         sizes = {**model.sizes, "k": self.times.size, "dense_rows": dense_rows, "pivots": pivots}
@@ -146,7 +169,7 @@ class Run:
         sizes["watched_numbers"] = factor.l.size if watched else 0
         equations = model.equations(
             sizes,
-            data,
+            self._reduced_by(self.steps, data),
             options=method.packed_options(formulation),
             scratch=packed(allocate(formulation.scratch, sizes) if formulation.scratch else factor),
         )
@@ -164,25 +187,29 @@ class Run:
             chart=packed(allocate(stabilisation.memory, sizes)) if stabilisation.memory else None,
             chart_options=method.packed_options(stabilisation),
             integrator=packed(allocate(integrator.schema, sizes)),
+            sampled=packed(equations._replace(scene=copied(self.reduced(data)))) if is_part else None,
+            balance=packed(self.reduction.factor()) if self.reduction and is_part else None,
         )
 
     def _factor(self) -> tuple[SparseFactor, Active]:
         """Return the factor, and the entries of y; these are all entries if no equation is left out."""
-        if self.reduction is None:
+        if self.steps is None:
             everything = unsigned(np.arange(7 * self.model.nb)), unsigned(np.arange(self.model.n))
             return empty_factor(), Active(*everything)
-        return self.reduction.factor(), self.reduction.active
+        return self.steps.factor(), self.steps.active
 
     def _kernels_on(self, chart: Stabilisation) -> Kernels:
         """Return the kernels of the method for this chart, which leaves out rows that some formulations need;
         none for a series."""
         integrator, formulation = self.method.integrator, self.method.formulation
         of_all_rows = formulation.needs_all_rows and chart.projects
+        of_part = formulation.is_sparse and self.steps is not self.reduction
+        rates_with_outputs = rates_and_balance if of_part else chart.rates_with_outputs
         chosen = {
             "step": integrator.step,
             "propose": integrator.propose,
             "rates": rates_of_all_rows if of_all_rows else chart.rates,
-            "rates_with_outputs": chart.rates_with_outputs,
+            "rates_with_outputs": rates_with_outputs,
             "accept": chart.accept,
             "accelerate": formulation.accelerate,
         }
@@ -199,10 +226,10 @@ class Run:
         memory.state.velocities[:] = self.start.v
         self.ranks, settings = NO_RANKS, memory.equations.system.settings
         ranks = ranks_at(self.model, self.start.q, memory.factor, self.limits.rank_tolerance, self._blocks)
-        settings.independent = ranks.rank == memory.pivots.size
+        settings.independent = ranks.rank == memory.pivots.size - self.links
         if self.method.stabilisation.projects:
             self.ranks = ranks
-            memory.watch.generic_rank = ranks.rank
+            memory.watch.generic_rank = ranks.rank + self.links
             freedoms = memory.active.velocities.size - ranks.rank  # at a singular position there may be more
             memory.watch.regular = freedoms <= (0 if self.scene.driver else 1)
             settings.nearly_dependent = self.ranks.least < NEARLY

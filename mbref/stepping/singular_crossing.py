@@ -5,9 +5,13 @@ At a drop of the rank of Φ_q, a pivot of its rows falls to zero and rises again
 rows in columns of unit length (``equations.units``), so that they do not depend on masses; the projection
 computes them after every step (``layout.Watch``). A step may end at a singular position. Rows may lose rank
 inside a step if a pivot of the product of the gradients at both ends is negative
-(``linear_algebra.sparse_lu``).  The pose at the zero of that pivot decides: at a singular position fewer
-nonzero pivots are left than the rank. At a regular position a redundant row has replaced the row whose pivot
-vanishes.
+(``linear_algebra.sparse_lu``).
+
+Where a redundant row has replaced an independent row inside the step, both rows have negative pivots, and the
+product of the pivots up to the redundant row is positive. One pass through the elimination tree pairs all
+such rows. Where an independent row has no partner, the step is passed in parts, in which pivots change their
+sign, since two replacements in one part look like two losses of rank. In a short part the pose at the zero of
+the pivot decides: at a singular position fewer nonzero pivots are left than the rank.
 """
 
 from __future__ import annotations
@@ -16,10 +20,10 @@ from numpy import sqrt
 
 from mbref.equations.coordinates import coordinate_rates, normalise
 from mbref.equations.evaluation import evaluate
-from mbref.kernels.compilation import kernel
-from mbref.linear_algebra.sparse_cholesky import find_squared_pivots
+from mbref.kernels.compilation import inlined, kernel
+from mbref.linear_algebra.sparse_cholesky import assemble_gradients, find_squared_pivots
 from mbref.linear_algebra.sparse_lu import factorise_product
-from mbref.linear_algebra.vectors import sort
+from mbref.linear_algebra.vectors import copy, sort
 from mbref.stabilisation.projection import factorise_constraints, keep_end
 
 REACHED = 1e-3  # relative pivot below which a step has reached a singular position
@@ -27,6 +31,7 @@ REACHED = 1e-3  # relative pivot below which a step has reached a singular posit
 VANISHED = 1e-2
 PRODUCT_ALPHA = 1e8  # penalty: redundant rows get the pivot 1/α, far above rounding
 SEARCH, PLACE_ERROR = 30, 1e-9  # evaluations that locate a zero, and error of its place / step
+SHORTEST_PART = 1 / 32  # part of a step that is not halved: it separates replacements of loops out of phase
 
 
 @kernel
@@ -61,25 +66,79 @@ def keep_position(part, h, memory):
 
 @kernel
 def passes_singular_position(h, memory):
-    """Return whether the rank drops inside a step of h seconds.
+    """Return whether the rank drops inside a step of h seconds."""
+    ends = memory.loop.ends
+    factorise_product(memory.factor, ends.gradient, PRODUCT_ALPHA, ends)
+    ends.past_pivots[:] = 1.0
+    if not may_lose_rank(memory):
+        return False
+    put_rates(memory)
+    start, length = 0.0, 0.5
+    while start < 1.0:
+        end = min(1.0, start + length)
+        expand_product_at(end, h, memory)
+        doubtful = may_lose_rank(memory)
+        if doubtful and length > SHORTEST_PART:
+            length *= 0.5
+        elif doubtful and passes_in_part(start, end, h, memory):
+            return True
+        else:
+            copy(ends.pivots, ends.past_pivots)
+            start, length = end, 2.0 * length
+    return False
 
-    Rows whose pivots are small at both ends are redundant, and are not examined.
+
+@kernel
+def passes_in_part(start, end, h, memory):
+    """Return whether the rank drops between two fractions of a step of h seconds, at the zero of a pivot.
+
+    The gradient then belongs to the end of the part again, or to the singular position.
     """
-    ends, factor = memory.loop.ends, memory.factor
-    factorise_product(factor, ends.gradient, PRODUCT_ALPHA, ends)
-    least, looked_at = (REACHED * memory.watch.reference_pivot) ** 2, False
     for k in range(memory.pivots.shape[0]):
-        larger = max(memory.pivots[k] ** 2, ends.squared_pivots[k])
-        if ends.pivots[k] < 0.0 and larger > least:
-            if not looked_at:
-                put_rates(memory)
-                looked_at = True
-            part = zero_of_pivot(k, h, memory)
+        if changes_sign(k, memory) and not is_redundant(k, memory):
+            part = zero_of_pivot(k, start, end, h, memory)
             if pivot_at_pose(memory) < VANISHED * memory.watch.reference_pivot:
                 keep_position(part, h, memory)
                 return True
-            expand_product_at(1.0, h, memory)
+            expand_product_at(end, h, memory)
     return False
+
+
+@kernel
+def may_lose_rank(memory):
+    """Return whether the pivot of an independent row changes its sign, but no redundant partner's pivot.
+
+    The partner is a redundant row further up in the elimination tree: then the rows of the subtree up to the
+    partner have kept their rank.
+    """
+    symbolic, alone = memory.factor.symbolic, memory.loop.ends.alone
+    first, row = symbolic.l_start, symbolic.l_row
+    alone[:] = 0.0
+    for k in range(alone.shape[0]):
+        if changes_sign(k, memory):
+            if not is_redundant(k, memory):
+                alone[k] += 1.0
+            elif alone[k] > 0.0:
+                alone[k] -= 1.0
+        if first[k] + 1 < first[k + 1]:
+            alone[row[first[k] + 1]] += alone[k]
+        elif alone[k] > 0.0:
+            return True
+    return False
+
+
+@inlined
+def changes_sign(k, memory):
+    """Return whether pivot k of the product has another sign than at the start of the part of the step."""
+    ends = memory.loop.ends
+    return (ends.pivots[k] < 0.0) != (ends.past_pivots[k] < 0.0)
+
+
+@inlined
+def is_redundant(k, memory):
+    """Return whether row k of the factor depends on the rows before it at both ends of the step."""
+    least = REACHED * memory.watch.reference_pivot
+    return max(memory.pivots[k] ** 2, memory.loop.ends.squared_pivots[k]) <= least * least
 
 
 @kernel
@@ -105,24 +164,26 @@ def put_pose(part, h, memory):
 
 @kernel
 def expand_product_at(part, h, memory):
-    """Compute the factor at the pose at a fraction of a step of h seconds, and its product with the gradient
-    at the start."""
-    ends, t = memory.loop.ends, memory.loop.clock.time + part * h
+    """Compute the gradient at the pose at a fraction of a step of h seconds, and its product with the
+    gradient at the start."""
+    ends, t, equations = memory.loop.ends, memory.loop.clock.time + part * h, memory.equations
     put_pose(part, h, memory)
-    evaluate(t, ends.pose, memory.state.velocities, memory.equations)
-    factorise_constraints(memory)
+    evaluate(t, ends.pose, memory.state.velocities, equations)
+    assemble_gradients(memory.factor, equations.system.blocks.reshape(-1), equations.scene.metric_root)
     factorise_product(memory.factor, ends.gradient, PRODUCT_ALPHA, ends)
 
 
 @kernel
-def zero_of_pivot(k, h, memory):
-    """Return the fraction of a step of h seconds at which pivot k of the product changes its sign.
+def zero_of_pivot(k, start, end, h, memory):
+    """Return the fraction of a step of h seconds, between two fractions, at which pivot k changes its sign.
 
-    The method is false position with the Pegasus rule (Dowell & Jarratt, BIT 12, 1972). Afterwards the factor
-    belongs to the pose at this fraction.
+    The method is false position with the Pegasus rule (Dowell & Jarratt, BIT 12, 1972). Afterwards rows and
+    gradient belong to the pose at this fraction.
     """
-    pivots, low, high = memory.loop.ends.pivots, 0.0, 1.0
-    at_low, at_high = memory.loop.ends.squared_pivots[k], pivots[k]
+    ends, low, high = memory.loop.ends, start, end
+    pivots, at_low, at_high = ends.pivots, ends.past_pivots[k], ends.pivots[k]
+    if start == 0.0:
+        at_low = ends.squared_pivots[k]
     for _ in range(SEARCH):
         part = low + (high - low) * at_low / (at_low - at_high)
         expand_product_at(part, h, memory)
@@ -139,8 +200,10 @@ def zero_of_pivot(k, h, memory):
 
 @kernel
 def pivot_at_pose(memory):
-    """Return the smallest of as many pivots as there are independent rows, at the pose of the last factor."""
+    """Return the smallest of as many pivots as there are independent rows, at the pose of the last
+    evaluation."""
     factor, rank = memory.factor, memory.watch.generic_rank
+    factorise_constraints(memory)
     find_squared_pivots(factor)
     squares = factor.squared_pivots
     sort(squares)

@@ -77,7 +77,7 @@ def freedoms_of_first_order(run: Run) -> int:
     not computed."""
     if not run.method.stabilisation.projects or run.model.m > MOST_BRANCHED_ROWS:
         return 0
-    return int(run.memory.active.velocities.size - run.memory.watch.generic_rank)
+    return int(run.memory.active.velocities.size - run.memory.watch.generic_rank + run.links)
 
 
 def begins_at_rest(run: Run) -> bool:
@@ -94,7 +94,7 @@ def begins_in_motion(run: Run) -> bool:
 
     Time counts as one velocity if drivers prescribe the motion.
     """
-    if run.ranks.rank == run.memory.pivots.size or not np.any(run.start.v):
+    if run.memory.equations.system.settings.independent or not np.any(run.start.v):
         return False
     return freedoms_of_first_order(run) > (0 if run.scene.driver else 1) and run.model.closed_loops > 0
 

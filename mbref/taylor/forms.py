@@ -12,6 +12,8 @@ from mbref.taylor.expressions import ONE, Expression
 from mbref.taylor.natural import NaturalCoordinates
 from mbref.taylor.orientations import Triple
 
+MOST_STORED_BYTES = 2**26  # bytes of the parts of M by bodies; larger parts are summed without being stored
+
 
 class Forms:
     """Expressions as constants and rows of coefficients of the d variables kept."""
@@ -56,13 +58,18 @@ class Forms:
         return self.spread(np.array(found).reshape(self.of.nb, 3, self.d))
 
     @cached_property
-    def _of_inertia(self) -> np.ndarray:
-        """Return the parts (…, 4 nb, d, d) of M that each body contributes: the part of its mass, and the
-        parts of ∫ x² dm along its three axes."""
+    def _of_bodies(self) -> np.ndarray:
+        """Return coefficients (…, 4 nb, 3, d) of each body's centre of mass and three axes."""
         nb, d = self.of.nb, self.d
         axes = self.spread(np.array([self.of_axes(b)[1] for b in range(nb)]).reshape(nb, 3, 3, d))
         forms = np.concatenate([self.centres[..., None, :, :], axes], axis=-3)
-        return sum_of_products(forms.reshape(*forms.shape[:-4], 4 * nb, 3, d))
+        return forms.reshape(*forms.shape[:-4], 4 * nb, 3, d)
+
+    @cached_property
+    def _of_inertia(self) -> np.ndarray:
+        """Return the parts (…, 4 nb, d, d) of M that each body contributes: the part of its mass, and the
+        parts of ∫ x² dm along its three axes."""
+        return sum_of_products(self._of_bodies)
 
     def of_axes(self, body: int) -> tuple[np.ndarray, np.ndarray]:
         """Return constants (9,) and coefficients (9, d) of the directions of a body's principal axes."""
@@ -78,7 +85,11 @@ class Forms:
         along = principal.sum(axis=-1, keepdims=True) / 2 - principal
         weights = np.concatenate([bodies.mass[..., None], along], axis=-1)
         weights = weights.reshape(*bodies.mass.shape[:-1], -1, 1, 1)
-        return np.asarray((weights * self._of_inertia).sum(axis=-3))
+        if 4 * self.of.nb * self.d * self.d * 8 <= MOST_STORED_BYTES:
+            return np.asarray((weights * self._of_inertia).sum(axis=-3))
+        forms = self._of_bodies
+        flat, weighted = (each.reshape(*each.shape[:-3], -1, self.d) for each in (forms, weights * forms))
+        return np.asarray(np.swapaxes(flat, -1, -2) @ weighted)
 
 
 def sum_of_products(one: np.ndarray, other: np.ndarray | None = None) -> np.ndarray:

@@ -1,0 +1,160 @@
+"""Links side by side in parallel planes move as in one plane; joints carry the moments between them."""
+
+import numpy as np
+import pytest
+
+from mbref import Limits, rotations, simulate
+from mbref.scene import Body, Fixed, Force, Revolute, Scene, Spherical
+from mbref.scenes import find_scene
+from mbref.scenes.planar_slider_crank import slider_crank
+from tests.helpers.newton_euler import unbalanced
+
+METHOD = "alf-dual+projection"
+TIMES = (0.0, 0.02, 0.05)
+
+
+def run_of(scene: Scene, method: str = METHOD, times=TIMES):
+    run = simulate(scene, method, times, Limits(rtol=1e-10))
+    assert run.outcome.name == "COMPLETED", run.message
+    return run
+
+
+def flattened(scene: Scene) -> Scene:
+    """The scene with everything at z = 0."""
+    bodies = tuple(body.model_copy(update={"position": (*body.position[:2], 0.0)}) for body in scene.body)
+    joints = tuple(joint.model_copy(update={"anchor": (*joint.anchor[:2], 0.0)}) for joint in scene.joint)
+    return scene.with_(body=bodies, joint=joints)
+
+
+def turned(scene: Scene, about: tuple[float, float, float]) -> Scene:
+    """The whole scene after a rotation vector (rad)."""
+    q = rotations.from_vector(np.array(about))
+
+    def vector(v):
+        return tuple(map(float, rotations.rotate(q, np.array(v, dtype=float))))
+
+    bodies = [
+        body.model_copy(
+            update={
+                "position": vector(body.position),
+                "orientation": tuple(map(float, rotations.multiply(q, np.array(body.orientation)))),
+                "angular_velocity": None if body.angular_velocity is None else vector(body.angular_velocity),
+            }
+        )
+        for body in scene.body
+    ]
+    joints = [
+        joint.model_copy(update={"anchor": vector(joint.anchor), "axis": vector(joint.axis)})
+        for joint in scene.joint
+    ]
+    return scene.with_(body=tuple(bodies), joint=tuple(joints), gravity=vector(scene.gravity))
+
+
+def doubled(loops: int, apart: float) -> Scene:
+    """A chain of four-bars, each joint two hinges at this distance (m)."""
+    scene = find_scene(f"four_bar_chain[{loops}]")
+    joints = tuple(
+        Revolute(
+            name=f"{joint.name}{side}", bodies=joint.bodies, anchor=(*joint.anchor[:2], z), axis=(0, 0, 1)
+        )
+        for joint in scene.joint
+        for side, z in (("l", -apart / 2), ("r", apart / 2))
+    )
+    return scene.with_(joint=joints)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"),
+    [
+        ("strandbeest[2]", METHOD),
+        ("strandbeest[2]", "alf-dual+baumgarte"),
+        ("slider_crank_chain[2]", METHOD),
+        ("strandbeest[9]", METHOD),  # the crank is split into copies
+    ],
+)
+def test_planes_apart_change_reactions_and_not_the_motion(name, method):
+    scene = find_scene(name)
+    apart, flat = run_of(scene, method), run_of(flattened(scene), method)
+    assert apart.position[..., :2] == pytest.approx(flat.position[..., :2], abs=1e-11)
+    assert apart.angular_velocity == pytest.approx(flat.angular_velocity, abs=1e-9)
+    assert max(unbalanced(scene, apart)) < 1e-8, "reactions balance every body, out of the plane too"
+    size = max(np.abs(wrench[:, 3:5]).max() for wrench in apart.reactions.values())
+    assert size > 0.01, "joints carry moments out of the plane"
+
+
+@pytest.mark.parametrize("about", [(np.pi / 2, 0.0, 0.0), (0.0, np.pi / 2, 0.0), (0.4, 0.2, -0.3)])
+def test_the_plane_may_have_any_direction(about):
+    scene = find_scene("strandbeest[2]")
+    here, there = run_of(scene), run_of(turned(scene, about))
+    q = rotations.from_vector(np.array(about))
+    for values, theirs in ((here.position, there.position), (here.acceleration, there.acceleration)):
+        assert rotations.rotate(q, values) == pytest.approx(theirs, abs=1e-8 * np.abs(values).max())
+    assert max(unbalanced(turned(scene, about), there)) < 1e-8
+
+
+def test_two_hinges_in_place_of_one_halve_its_force():
+    single, pairs = find_scene("four_bar_chain[3]"), doubled(3, 0.2)
+    one, two = run_of(single), run_of(pairs)
+    assert two.position == pytest.approx(one.position, abs=1e-11)
+    assert max(unbalanced(pairs, two)) < 1e-8
+    for joint in single.joint:
+        left, right = (two.reactions[f"{joint.name}{side}"][:, :3] for side in "lr")
+        force = one.reactions[joint.name][:, :3]
+        assert left + right == pytest.approx(force, abs=1e-6)
+        # the share of redundant rows is determined up to the rounding unit times the penalty, 1e10
+        assert left == pytest.approx(right, abs=1e-5 * np.abs(force).max())
+
+
+@pytest.mark.parametrize("method", [METHOD, "taylor"])
+def test_links_between_ball_joints_leave_their_plane_where_a_force_pushes(method):
+    """Ball joints at both ends hold a link in the plane of gravity, and let a force swing it out."""
+    bodies = tuple(
+        Body(name=name, mass=1.0, inertia=(0.01, 0.1, 0.1), position=(0.5, 0.0, z))
+        for name, z in (("lower", 0.0), ("upper", 0.1))
+    )
+    joints = (
+        Spherical(name="A", bodies=("ground", "lower"), anchor=(0.0, 0.0, 0.0)),
+        Revolute(name="B", bodies=("lower", "upper"), anchor=(1.0, 0.0, 0.05), axis=(0.0, 0.0, 1.0)),
+    )
+    scene = Scene(name="loose", gravity=(0.0, -9.81, 0.0), body=bodies, joint=joints)
+    pushed = scene.with_(load=(Force(body="upper", point=(0.5, 0.0, 0.1), force=(0.0, 0.0, 3.0)),))
+    out = run_of(pushed, method).position[-1, :, 2] - [0.0, 0.1]
+    assert np.abs(out).min() > 1e-4
+    moved = run_of(scene, method).position[-1, :, 2] - [0.0, 0.1]
+    assert np.abs(moved).max() > 1e-9, "gravity on links side by side twists a ball joint"
+
+
+def crankshaft(singular: int, count: int) -> Scene:
+    """Slider-cranks on one shaft, of which one has a rod as long as its crank."""
+    cylinders = [
+        slider_crank(0.304, 0.304 if i == singular else 0.4048, 0.3 + 2.0 * i, "c", 30.0, str(i), 0.1 * i)
+        for i in range(count)
+    ]
+    shaft = tuple(
+        Fixed(name=f"E{i}", bodies=(f"crank{i}", f"crank{i + 1}"), anchor=(0.0, 0.0, 0.1 * i))
+        for i in range(count - 1)
+    )
+    return Scene(
+        name="crankshaft",
+        gravity=(0.0, -9.81, 0.0),
+        duration=0.1,
+        body=tuple(body for cylinder in cylinders for body in cylinder.body),
+        joint=tuple(joint for cylinder in cylinders for joint in cylinder.joint) + shaft,
+    )
+
+
+@pytest.mark.parametrize("singular", [0, 3])
+def test_one_singular_loop_among_many_ends_the_run(singular):
+    scene = crankshaft(singular, 5)
+    run = simulate(scene, METHOD, np.linspace(0.0, 0.1, 21))
+    assert run.outcome.name == "SINGULAR_POSITION", run.message
+    [met] = run.crossings
+    k = scene.body_index(f"crank{singular}")
+    reach = met.position[k, :2] / np.linalg.norm(met.position[k, :2])
+    assert abs(reach[0]) < 1e-3, "crank and rod are on one line where the crank is across the slide"
+    assert 0.0 < run.t_end < 2 * np.pi / 30.0
+
+
+def test_no_singular_loop_lets_the_run_complete():
+    run = simulate(crankshaft(-1, 5), METHOD, np.linspace(0.0, 0.1, 21))
+    assert run.outcome.name == "COMPLETED", run.message
