@@ -20,9 +20,8 @@ from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import record
-from mbref.rotations import Vector3
-from mbref.scene_fields import COINCIDENT, meant
-from mbref.scene_loads import Spring
+from mbref.scene_fields import meant
+from mbref.scene_structure import bushings, has_massless, has_parallel_axes, orientations
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 
@@ -30,12 +29,15 @@ if TYPE_CHECKING:
     from mbref.scene import Scene
 
 MOST_NAMES = 256  # names whose parsed methods are cached
+MOST_ORIENTATIONS = 400  # of runs by `taylor` in place of a sparse run: a step takes a second
 # default methods for few and for many bodies
 SERIES_METHOD, SPARSE_METHOD = "taylor", "alf-dual+projection/dop853"
-# Up to this number of bodies `taylor` is the default, because it crosses singular positions. Its matrix is
-# dense. By ``benchmarks/default_method.py`` it takes 6.3 times as long as the sparse method on a chain of
-# four-bars with 81 bodies, and 0.05 times as long on a chain of slider-cranks with 90 bodies.
+# Largest number of bodies of runs by `taylor` that check or repeat another run
 MOST_BODIES = 100
+# Largest (variables of `taylor`)³ / bodies for which it is the default, where all axes are parallel, and in
+# space; an orientation has two variables. By ``benchmarks/growth.py`` both methods cost the same at 3600 on
+# four_bar_chain, 6500 on lattice and 9800 on slider_crank_chain, and at more than 300 000 on sarrus_stack.
+MOST_IN_PLANE, MOST_IN_SPACE = 5500.0, 4e5
 SHORT_NAMES = {
     "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
 }
@@ -45,31 +47,32 @@ Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 
 
 def default_method(scene: Scene) -> str:
-    """Return the name of the default method for a scene.
+    """Return the name of the default method for a scene: the method that is expected to cost less.
 
-    The default is ``taylor``, which crosses singular positions. For more than MOST_BODIES bodies, and with
-    bushings, the default is the sparse method ``alf-dual+projection/dop853``, which ends at a singular
-    position.
+    A step of ``taylor`` costs the third power of the number of different orientations, a step of the sparse
+    method ``alf-dual+projection/dop853`` the number of bodies.  With bushings ``taylor`` has no series, with
+    massless bodies the sparse method has no matrix, and driven motions need no steps of an integrator.
     """
+    bodies = len(scene.body)
+    if bushings(scene):
+        return SPARSE_METHOD
+    if (2.0 * bodies) ** 3 <= MOST_IN_PLANE * bodies:
+        return SERIES_METHOD
+    if scene.driver or has_massless(scene):
+        return crossing_method(scene)
+    most = MOST_IN_PLANE if has_parallel_axes(scene) else MOST_IN_SPACE
+    return SERIES_METHOD if (2.0 * orientations(scene)) ** 3 <= most * bodies else SPARSE_METHOD
+
+
+def crossing_method(scene: Scene) -> str:
+    """Return ``taylor``, which crosses singular positions, for up to MOST_BODIES bodies without bushings;
+    otherwise the sparse method, which ends there."""
     return SERIES_METHOD if len(scene.body) <= MOST_BODIES and not bushings(scene) else SPARSE_METHOD
 
 
-def bushings(scene: Scene) -> list[int]:
-    """Return the numbers of the damped springs whose ends coincide at the start.
-
-    The direction of the damping force is not defined there, so that `taylor` has no series of it.
-    """
-    return [
-        k
-        for k, load in enumerate(scene.load)
-        if isinstance(load, Spring) and load.damping > 0.0 and _coincide(*load.points)
-    ]
-
-
-def _coincide(first: Vector3, second: Vector3) -> bool:
-    """Return whether two points are equal up to rounding of their coordinates."""
-    size = max(map(abs, (*first, *second)))
-    return max(abs(a - b) for a, b in zip(first, second, strict=True)) <= COINCIDENT * size
+def may_be_series(scene: Scene) -> bool:
+    """Return whether a run by ``taylor`` fits into memory and ends in acceptable time."""
+    return orientations(scene) <= MOST_ORIENTATIONS and not bushings(scene)
 
 
 def short_name(name: str) -> str:

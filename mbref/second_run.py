@@ -16,9 +16,10 @@ import numpy as np
 
 from mbref.error_estimate import ErrorEstimate, distances, rounding
 from mbref.input_error import InputError
-from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, bushings, default_method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method, MethodError, crossing_method
 from mbref.motion import Motion
 from mbref.scene import Scene, SceneError
+from mbref.scene_structure import bushings
 from mbref.simulation.simulate import checked_run, finish_run
 from mbref.stepping.limits import AUTO, FINEST, GENERATED, Limits
 
@@ -119,7 +120,7 @@ def _finer(scene: Scene, method: Method, limits: Limits) -> tuple[Method, Limits
     elif method.integrator.adaptive and method.stabilisation.projects:
         by = method
     else:
-        by = Method.parse(default_method(scene))
+        by = Method.parse(crossing_method(scene))
     rtol = max(FINEST, min(RTOL_SERIES if by.is_series else RTOL_EXPLICIT, TIGHTER * limits.rtol))
     if not method.is_series:
         return by, Limits(rtol=rtol)

@@ -79,7 +79,7 @@ class Request(NamedTuple):
     """Arguments of ``simulate``."""
 
     scene: Scene
-    method: str
+    method: str | None  # None for the default
     times: np.ndarray  # (k,), s
     limits: Limits
 
@@ -90,8 +90,9 @@ class Request(NamedTuple):
         """
         from mbref.simulation.simulate import are_compiled, prepare, simulate
 
-        if not are_compiled(Method.parse(self.method)):
-            prepare(Method.parse(self.method))
+        method = Method.parse(self.method or default_method(self.scene))
+        if not are_compiled(method):
+            prepare(method)
         with progress_bar("simulating", float(self.times[-1])) as progress:
             if check:
                 check(simulate(*self._replace(times=self.times[:1]), progress))
@@ -109,7 +110,7 @@ def request_of(options: argparse.Namespace, branches: Mapping[int, int] | None =
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), limits_of(options, branches)
     warn(scene)
-    return Request(scene, options.method or default_method(scene), times, limits)
+    return Request(scene, options.method, times, limits)
 
 
 def sample_times(options: argparse.Namespace, scene: Scene) -> np.ndarray:

@@ -93,7 +93,7 @@ def _animate(options: argparse.Namespace) -> int:
     motions = {"": motion}
     if parted:
         number = chosen_crossing(motion, options.crossing)
-        motions = along_branches(motion, run.method, run.limits, number)
+        motions = along_branches(motion, motion.method, run.limits, number)
         title = f"{scene.name}: {sentence(motion, number)}"
         write(path, side_by_side(scene, motions, title, view))
     else:

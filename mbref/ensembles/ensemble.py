@@ -24,7 +24,7 @@ import numpy as np
 from mbref import __version__, records
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import Ended, run_all
-from mbref.method import Method, default_method
+from mbref.method import Method, crossing_method
 from mbref.scene import Scene
 from mbref.simulation.simulate import Limits, checked_times, prepare
 from mbref.trajectory import Outcome, Trajectory
@@ -86,7 +86,7 @@ def ensemble(
         first = next(scenes, None)
         if first is None:
             return
-        method, scenes = default_method(first), itertools.chain([first], scenes)
+        method, scenes = crossing_method(first), itertools.chain([first], scenes)
     if executor is None:
         with processes() as pool:
             yield from ensemble(scenes, times, method, limits, pool, path)

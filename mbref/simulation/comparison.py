@@ -16,7 +16,7 @@ import numpy as np
 
 from mbref.error_estimate import distances
 from mbref.kernels.layout import SINGULAR_AHEAD
-from mbref.method import Method, default_method
+from mbref.method import Method, crossing_method
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
@@ -44,7 +44,7 @@ def compare_with_default(run: Run, ended: int) -> int:
         return ended
     began = time.process_time()
     limits = Limits(rtol=TOLERANCE, code=GENERIC, most_steps=MOST_COMPARED_STEPS)
-    reference = start_run(run.scene, Method.parse(default_method(run.scene)), run.times, limits)
+    reference = start_run(run.scene, Method.parse(crossing_method(run.scene)), run.times, limits)
     status, _ = reference.stepper.advance(None)
     run.making += time.process_time() - began
     theirs = reference.memory.loop.clock

@@ -16,9 +16,10 @@ from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import Model
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
 from mbref.lazy import LazySequence
-from mbref.method import Method, bushings, default_method
+from mbref.method import Method, default_method
 from mbref.motion import Motion
 from mbref.scene import Scene
+from mbref.scene_structure import bushings
 from mbref.simulation.dead_position import ROUNDED, is_at_dead_position
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice

@@ -11,9 +11,17 @@ import numpy as np
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
 from mbref.kernels.machine_code import NoGeneratedCode
-from mbref.method import Method, MethodError, bushings, default_method
+from mbref.method import (
+    SERIES_METHOD,
+    Method,
+    MethodError,
+    crossing_method,
+    default_method,
+    may_be_series,
+)
 from mbref.motion import Motion
 from mbref.scene import Scene
+from mbref.scene_structure import bushings
 from mbref.scenes import find_scene
 from mbref.simulation.comparison import compare_with_default
 from mbref.simulation.outcome import trajectory_of
@@ -23,9 +31,11 @@ from mbref.stepping.limits import GENERATED, Limits
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
 from mbref.taylor.preparation import KERNELS_OF_SERIES, prepare_series, prepare_series_backwards
+from mbref.trajectory import Outcome
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 
+ProgressCall = Callable[[float], None] | None  # receives the reached time (s)
 SAMPLES = 101  # default number of samples
 
 
@@ -46,7 +56,8 @@ def simulate(
     scene : Scene, str or path
         A Scene, the name of a built-in one, or a .toml file.
     method : Method or str, optional
-        A method or its name. Default: ``taylor``, or ``alf-dual+projection/dop853`` for more than 100 bodies.
+        A method or its name. Default: the cheaper of ``taylor`` and ``alf-dual+projection/dop853``; where the
+        latter ends early, ``taylor``, if the mechanism is not too large.
     times : sequence of float or ndarray, shape (k,), optional
         Increasing sample times, s. Default: 101 from 0 to the scene's duration.
     limits : Limits, optional
@@ -82,12 +93,34 @@ def simulate(
     if rtol is not None:
         limits = replace(limits, rtol=rtol)
     times = checked_times(np.linspace(0.0, scene.duration, SAMPLES) if times is None else times)
-    method = default_method(scene) if method is None else method
-    method = Method.parse(method) if isinstance(method, str) else method
+    if method is None:
+        return _by_default(scene, times, limits, progress)
+    return _by(Method.parse(method) if isinstance(method, str) else method, scene, times, limits, progress)
+
+
+def _by(
+    method: Method, scene: Scene, times: np.ndarray, limits: Limits, progress: Callable[[float], None] | None
+) -> Motion:
+    """Return the motion of a scene by a method."""
     run = checked_run(scene, method, times, limits)
     motion = finish_run(run, progress)
     run.release()
     return motion
+
+
+def _by_default(
+    scene: Scene, times: np.ndarray, limits: Limits, progress: Callable[[float], None] | None
+) -> Motion:
+    """Return the motion by the default method; by `taylor` if the sparse method ends early, as at a singular
+    position, and if limits require what only `taylor` has."""
+    chosen = default_method(scene)
+    if limits.branches or limits.code == GENERATED:
+        chosen = crossing_method(scene)
+    motion = _by(Method.parse(chosen), scene, times, limits, progress)
+    if chosen == SERIES_METHOD or motion.outcome is Outcome.COMPLETED or not may_be_series(scene):
+        return motion
+    followed = _by(Method.parse(SERIES_METHOD), scene, times, limits, progress)
+    return followed if followed.t_end > motion.t_end else motion
 
 
 def checked_run(scene: Scene, method: Method, times: np.ndarray, limits: Limits) -> Run:

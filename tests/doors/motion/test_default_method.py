@@ -1,0 +1,58 @@
+"""The default method is the cheaper one, and follows every motion that `taylor` follows."""
+
+import numpy as np
+import pytest
+
+from crosscheck.judge.truth import closed_form
+from mbref import Limits, simulate
+from mbref.method import default_method
+from mbref.scene import Driver
+from mbref.scenes import find_scene
+
+
+@pytest.mark.parametrize(
+    ("name", "sparse"),
+    [
+        ("four_bar_chain[12]", False),
+        ("four_bar_chain[40]", True),
+        ("slider_crank_chain[33]", False),  # cranks on one shaft and sliders share orientations
+        ("slider_crank_chain[100]", True),
+        ("lattice[6,6]", True),
+        ("sarrus_stack[10]", False),  # spatial loops with redundant rows make sparse matrices expensive
+        ("strandbeest[30]", True),
+    ],
+)
+def test_structure_decides_between_dense_series_and_sparse_matrices(name, sparse):
+    assert default_method(find_scene(name)) == ("alf-dual+projection/dop853" if sparse else "taylor")
+
+
+def test_massless_links_and_drivers_keep_the_method_that_bears_them():
+    scene = find_scene("strandbeest[6]")
+    assert default_method(scene).startswith("alf-dual")
+    link = scene.body[1].model_copy(update={"mass": 0.0, "inertia": (0.0, 0.0, 0.0)})
+    assert default_method(scene.with_(body=(scene.body[0], link, *scene.body[2:]))) == "taylor"
+    turning = Driver(joint="O", polynomial=(0.0, 4.0))
+    assert default_method(scene.with_(driver=(turning,))) == "taylor"
+
+
+def test_default_crosses_singular_positions_of_a_mechanism_with_many_bodies():
+    scene, times = find_scene("four_bar_chain[14]"), np.array([0.5, 1.0])
+    run = simulate(scene, times=times, limits=Limits(rtol=1e-9))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert len(run.crossings) == 1, "all loops are flat at once"
+    truth = closed_form(scene).poses(times).position
+    assert np.abs(run.position - truth).max() < 1e-6
+
+
+def test_branches_of_a_mechanism_with_many_bodies_may_be_chosen():
+    run = simulate("four_bar_chain[14]", times=[0.8], limits=Limits(rtol=1e-9, branches={1: 1}))
+    assert run.outcome.name == "COMPLETED", run.message
+    assert run.method.endswith("taylor")
+
+
+@pytest.mark.parametrize("name", ["sarrus_stack[12]", "sarrus_stack[30]", "four_bar_chain[41]"])
+def test_sparse_matrices_and_dense_series_agree_on_large_mechanisms(name):
+    scene, times = find_scene(name), [0.0, 0.05]
+    runs = [simulate(scene, method, times, Limits(rtol=1e-8)) for method in ("alf-dual+projection", "taylor")]
+    assert [run.outcome.name for run in runs] == ["COMPLETED"] * 2, [run.message for run in runs]
+    assert np.abs(runs[0].position - runs[1].position).max() < 1e-7
