@@ -120,9 +120,9 @@ def _locked_pairs(
     for side in (0, 1):
         own = blocks[:, np.arange(len(rows)), order[:, side]] * (units * out)[pairs[of_pair.ravel(), side]]
         own = own / np.maximum(np.linalg.norm(own, axis=2, keepdims=True), np.finfo(float).tiny)
-        gram = np.zeros((len(blocks), len(pairs), 6, 6))
-        np.add.at(gram, (slice(None), of_pair.ravel()), own[..., :, None] * own[..., None, :])
-        ranks = (np.linalg.eigvalsh(gram) > LOCKED**2).sum(axis=2).min(axis=0)
+        gram = np.zeros((len(pairs), len(blocks), 6, 6))
+        np.add.at(gram, of_pair.ravel(), np.swapaxes(own[..., :, None] * own[..., None, :], 0, 1))
+        ranks = (np.linalg.eigvalsh(gram) > LOCKED**2).sum(axis=2).min(axis=1)
         locked &= ranks == out[pairs[:, side]].sum(axis=1)
     return pairs[locked]
 
@@ -148,7 +148,7 @@ def _without_repeated(model: Model, start: Start, columns: np.ndarray, entries: 
     times, q, v = random_states(STATES, model.n).of(columns).about(start.q, model.scene.duration)
     q, v = _rigid(group, start, q.reshape(STATES, -1, 7), v.reshape(STATES, -1, 6))
     terms = model.terms(times, q.reshape(STATES, -1), v.reshape(STATES, -1))
-    kept: np.ndarray = entries.any(axis=1)
+    kept = np.asarray(entries.any(axis=1))
     bodies = model.structure.row_bodies
     of_group = np.append(group, model.nb)[bodies[:, :2]]
     of_pair = (bodies[:, 2:] == model.nb).all(axis=1) & (of_group[:, 0] != of_group[:, 1])

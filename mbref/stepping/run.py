@@ -111,7 +111,8 @@ class Run:
             return reduction
         if method.formulation.is_sparse and not method.stabilisation.chooses_coordinates:
             reduction = reduction.of_steps(self.model, self.start)
-        if reduction.symbolic.link.size and not are_clear(self.model, self._blocks, reduction.factor()):
+        blocks, has_copies = self._blocks, reduction.symbolic.link.size > 0
+        if has_copies and blocks is not None and not are_clear(self.model, blocks, reduction.factor()):
             reduction = reduction.without_copies(self.model, self.start)
         return reduction
 
