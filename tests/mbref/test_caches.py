@@ -97,6 +97,7 @@ def test_folder_in_place_of_a_file_is_reported(tmp_path: Path, capsys):
 
 
 def test_writers_at_the_same_time_leave_one_whole_file(tmp_path: Path):
+    """Fifty threads write files of different sizes to one path."""
     path, sizes = tmp_path / "a", range(1000, 200_000, 4000)
     writers = [threading.Thread(target=checked_file.write, args=(path, b"x" * size)) for size in sizes]
     for writer in writers:
@@ -114,6 +115,8 @@ def forked(work: Callable[[], None]) -> BaseProcess:
 
 
 def test_a_killed_writer_leaves_a_whole_file(tmp_path: Path, capfd):
+    """A megabyte of one digit is written again and again; after each of five kills the file has one digit
+    only."""
     path = tmp_path / "a"
     checked_file.write(path, b"0" * 1_000_000)
 
@@ -189,7 +192,7 @@ def test_program_runs_without_a_writable_cache(script, says, tmp_path: Path):
 
 
 def test_one_of_two_processes_compiles_a_kernel(tmp_path: Path):
-    """The other one waits, and loads it."""
+    """The number of compilations is printed by each: one compiles, the other waits and loads the result."""
     cache, program = tmp_path / "cache", tmp_path / "program.py"
     program.write_text(SMALL_KERNEL.format(root=str(ROOT)) + COUNT_COMPILATIONS)
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache)}

@@ -31,6 +31,7 @@ def length(scene: Scene, first: str, second: str) -> float:
 
 
 def test_assembled_four_bar_has_the_requested_lengths():
+    """All links have 0.5 m before; the crank's centre of mass stays in its middle."""
     wanted = {("A", "B"): 0.3, ("B", "C"): 0.55, ("C", "D"): 0.45, ("A", "D"): 0.52}
     found = assemble(find_scene("four_bar_gravity"), wanted)
     assert violation(found.scene) < 1e-12
@@ -171,7 +172,7 @@ def test_a_joint_with_an_armature_or_a_coupling_keeps_its_angle(change, kinds):
 
 
 def test_redundancy_within_the_plane_is_not_removed_by_exchanges():
-    """Two rockers of equal length beside the crank: their lengths, not their joints, are redundant."""
+    """Two rockers of equal length, one of them redundant: their lengths, not their joints, make it so."""
     assert exchanges(find_scene("five_bar")) == [] and counts(find_scene("five_bar")).redundant > 0
 
 

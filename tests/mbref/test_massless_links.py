@@ -44,6 +44,7 @@ def test_gantry_with_a_massless_link_swings_and_falls_as_its_closed_form(method)
 
 @pytest.mark.parametrize("method", METHODS)
 def test_two_hinges_at_a_massless_link_move_as_a_universal_joint(method):
+    """The two crossing hinges form this joint, so that the body moves alike."""
     joint = Universal(name="u", bodies=("ground", "load"), anchor=CENTRE, axes=(X, Y))
     other = simulate(
         Scene(name="u", gravity=(0.0, 0.0, -9.81), body=(LOAD,), joint=(joint,)), times=TIMES, rtol=1e-11

@@ -41,6 +41,8 @@ def door() -> Motion:
 
 
 def test_angle_of_a_driven_joint_is_counted_over_full_turns(driven):
+    """The driver's rate is -124.8 rad/s, nearly two turns in 0.1 s; a joint that does not turn about one
+    axis has no angle."""
     joint = driven.joint("A")
     assert np.abs(joint.angle + 124.8 * driven.times).max() < 1e-9
     assert np.abs(joint.rate + 124.8).max() < 1e-8
@@ -63,6 +65,8 @@ def test_displacement_of_a_guide_is_how_far_its_slider_moved(crank):
 
 
 def test_rotation_vector_of_a_universal_joint_is_the_relative_rotation(driven):
+    """The coupler stays parallel to the ground, so that it turns by +124.8 rad/s · t against the crank,
+    modulo 2π."""
     vector = driven.joint("B").rotation
     turned = np.arctan2(np.sin(124.8 * driven.times), np.cos(124.8 * driven.times))
     assert np.abs(vector[:, 2] - turned).max() < 1e-8 and np.abs(vector[:, :2]).max() < 1e-8

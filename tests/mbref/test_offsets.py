@@ -94,6 +94,7 @@ def test_screw_starts_at_its_offset_and_turns_as_its_closed_form(method):
 
 @every
 def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
+    """second = offset + ratio · first, where an angle counts up to 2πk, |k| ≤ 3."""
     scene = shifted(make, name, offset)
     motion = mbref.simulate(scene, times=[0.0, 0.1, 0.2])
     (coupling,) = (c for c in scene.coupling if c.name == name)
@@ -109,6 +110,8 @@ def test_coordinates_obey_the_offset_up_to_full_turns(make, name, offset):
 
 @every
 def test_assembled_scene_obeys_joints_and_has_no_offset(make, name, offset):
+    """It has the counts of the scene without offset, and its motion is that of the scene with it, to the
+    bit."""
     scene = shifted(make, name, offset)
     found = scene.assembled()
     assert found.assembled() is found and found.counts() == make().counts()

@@ -164,6 +164,7 @@ def test_scene_without_masses_and_drivers_names_every_body():
 
 
 def test_slightly_wrong_velocities_are_corrected_and_reported():
+    """Velocities of centres are 0.1 % too large for the rates; corrected ones keep the joints."""
     scene = SCENES["planar_slider_crank_gravity"]()
     start = simulate(scene, "mpi-svd+none", [0.0])
     given = [
@@ -177,6 +178,8 @@ def test_slightly_wrong_velocities_are_corrected_and_reported():
 
 
 def test_run_that_violates_a_joint_too_much_ends_and_names_the_joint():
+    """Without stabilisation a relative tolerance of 1e-3 lets joints drift by more than the allowed 1e-6
+    m."""
     limits = Limits(rtol=1e-3, violation=1e-6)
     trajectory = simulate(SCENES["spatial_slider_crank_driven"](), "lm1+none", [1.0], limits)
     assert trajectory.outcome.label == "VIOLATION" and "joint '" in trajectory.message, trajectory.message

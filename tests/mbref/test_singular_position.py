@@ -171,6 +171,8 @@ def test_default_method_is_taylor_up_to_100_bodies_and_alf_dual_beyond():
 
 
 def test_kernels_return_before_the_step_in_which_the_crossing_lies():
+    """The clock stands before the closed form's first crossing; the end of the step that was attempted is
+    behind it."""
     scene, end = LOOPS["four"]
     run = start_run(scene, Method.parse("alf-dual+projection"), np.array([end]), Limits())
     status, _ = run.stepper.advance(None)

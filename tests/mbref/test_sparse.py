@@ -217,6 +217,8 @@ def test_shares_of_redundant_rows_are_squares_of_left_null_vectors():
 
 @pytest.mark.parametrize("stabilisation", ["projection", "none"])
 def test_many_independent_rows_are_recognised_by_their_pivots(stabilisation):
+    """The chain's rows are independent; the setting ``independent`` lets the solver use all rows without a
+    rank analysis."""
     run = start_run(
         find_scene("four_bar_chain[25]"), Method.parse(f"alf-dual+{stabilisation}"), np.array([0.1]), Limits()
     )
