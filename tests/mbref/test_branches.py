@@ -57,6 +57,7 @@ def test_folding_branch_of_a_driven_rhombus_lays_the_coupler_on_the_crank():
 
 
 def test_second_branch_of_a_swinging_rhombus_keeps_the_energy_and_leaves_the_smooth_motion():
+    """Up to the crossing the poses are those of the smooth branch, and more than 1 mm off after it."""
     scene, times = four_bar_gravity(0.3), np.linspace(0.0, 1.0, 41)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and run.crossings[0].taken == 2
@@ -78,6 +79,7 @@ def test_chain_flat_in_all_loops_lists_the_branch_on_which_its_first_upright_res
 
 @pytest.mark.parametrize("loops", [2, 3])
 def test_second_branch_of_a_chain_folds_its_first_loop_and_keeps_the_energy(loops):
+    """In the folded loop the middles of bar and second upright coincide."""
     scene, times = four_bar_chain(loops), np.linspace(0.0, 1.0, 21)
     run = simulate(scene, "taylor", times, Limits(branches={1: 2}))
     assert run.outcome.label == "COMPLETED" and np.ptp(run.energy) < 1e-8

@@ -47,6 +47,7 @@ def test_assembled_four_bar_has_the_requested_lengths():
 
 
 def test_a_spatial_slider_crank_closes_with_a_longer_rod():
+    """The rod is 10 % longer than the built-in one."""
     scene = find_scene("spatial_slider_crank_gravity")
     first, second = [j.name for j in scene.joint if "rod" in j.bodies]
     longer = 1.1 * length(scene, first, second)

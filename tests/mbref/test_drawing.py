@@ -145,6 +145,7 @@ def test_names_of_bars_that_cross_at_their_middles_do_not_overlap():
 
 
 def test_bars_of_an_animation_keep_their_length_in_every_frame(turning):
+    """The mechanism turns as one rigid body."""
     scene, motion = turning
     lines = [
         node
@@ -253,6 +254,7 @@ def test_planar_mechanism_is_viewed_along_its_normal_and_a_spatial_one_obliquely
 
 
 def test_page_shows_all_points_within_its_margins():
+    """Random points in space, a page of at most 600 by 400 px with margins of 40 px."""
     points = np.random.default_rng(1).normal(size=(30, 3)) * np.array([5.0, 1.0, 0.1])
     page = Page.around(points, View.parse("oblique"), 600.0, 40.0, 400.0)
     seen = page.pixels(points)

@@ -68,6 +68,7 @@ def slope(sizes, errors):
 
 @pytest.mark.parametrize("error", [oscillator_error, pendulum_error])
 def test_rk4_converges_with_order_four(error):
+    """The slope of log error over log step, against the closed form, is 4 to 0.15."""
     steps = np.array([0.01, 0.005, 0.0025])
     found = [error(f"lm1+none/rk4[step={h}]", np.array([0.0, 2.0]))[0] for h in steps]
     assert abs(slope(steps, found) - 4) < 0.15, f"errors {found} at steps {steps} are not of order 4"
@@ -75,6 +76,7 @@ def test_rk4_converges_with_order_four(error):
 
 @pytest.mark.parametrize(("error", "longest"), [(oscillator_error, 0.25), (pendulum_error, 0.125)])
 def test_dop853_converges_with_order_eight(error, longest):
+    """A loose tolerance makes each step the largest one; the slope of log error over log step is 8 to 0.8."""
     steps = longest * np.array([1.0, 0.5, 0.25])
     loose = {"rtol": 0.5, "atol": 1e3}  # the largest step is what is taken
     found = [
@@ -151,6 +153,8 @@ def evaluations_for(error, runs):
 
 @pytest.mark.parametrize("name", REDUCED)
 def test_adams_needs_at_most_a_quarter_more_evaluations_than_scipy_s_codes(name):
+    """Evaluations for an error of 1e-6 against the closed form; LSODA and VODE solve the one reduced
+    equation."""
     error_of, *problem = REDUCED[name]
     times, tolerances = np.array([0.0, problem[2]]), 10.0 ** -np.arange(4, 12, 2)
     runs = [error_of("mpi-svd+projection/adams", times, rtol=rtol) for rtol in tolerances]
@@ -223,6 +227,7 @@ def test_run_at_ten_million_radians_a_second_needs_few_steps():
 
 
 def test_fewer_than_a_tenth_of_the_steps_of_an_accelerating_crank_are_rejected():
+    """Otherwise the control of the step length would be unstable."""
     scene, times = SCENES["planar_slider_crank"](), [0.2]
     run = ran(scene, "alf-dual+projection", times, rtol=1e-7)
     assert run.cost.rejected < 0.1 * run.cost.steps, (run.cost.rejected, run.cost.steps)

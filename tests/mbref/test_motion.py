@@ -94,6 +94,7 @@ def test_kinetic_energy_and_energy_of_springs_are_the_judge_s(name, request):
 
 
 def test_energy_of_a_motion_on_undamped_springs_is_constant(door):
+    """A door on a spring and a torsion spring exchanges more than 1 J."""
     assert np.ptp(door.energy) < 1e-8, door.energy
     assert np.ptp(door.kinetic_energy) > 1.0
 

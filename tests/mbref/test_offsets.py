@@ -148,6 +148,7 @@ def test_natural_angle_of_a_spring_counts_from_the_pose_in_the_file(offset):
 
 
 def test_ends_of_springs_move_with_their_bodies_into_the_assembled_pose():
+    """The offset lifts the rack, and with it the end on the rack, not the end on the ground."""
     spring = {
         "type": "spring",
         "bodies": ["ground", "rack"],

@@ -179,6 +179,7 @@ def test_powers_of_driver_and_loads_sum_to_the_rate_of_energy(sprung):
 
 
 def test_armature_changes_neither_violations_nor_determined_reactions():
+    """An armature adds a rotor of its own, with rows that are no joint's."""
     scene = find_scene("four_bar_gravity")
     joints = [j.model_copy(update={"armature": 0.5}) if j.name == "A" else j for j in scene.joint]
     motion = simulate(scene.with_(joint=joints), times=TIMES[:3] / 10)
@@ -211,6 +212,7 @@ def test_violation_is_the_distance_by_which_a_body_is_out_of_its_plane(ground):
     "name", ["planar_slider_crank", "four_bar", "five_bar", "spatial_slider_crank", "bennett"]
 )
 def test_component_is_determined_where_the_judge_finds_no_open_wrench(name):
+    """The judge's basis of wrenches that may be added to all joints without a change of the motion."""
     scene = find_scene(name)
     motion = simulate(scene, times=np.array([0.0, 0.003]))
     found = motion.determined_reactions

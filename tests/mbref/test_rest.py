@@ -55,6 +55,7 @@ def test_flat_parallelogram_without_forces_stays_and_no_branch_is_chosen():
 
 
 def test_method_that_cannot_choose_the_branch_does_not_complete_on_a_wrong_one():
+    """The judge's closed form follows the parallelogram."""
     scene = flat_parallelogram(5.0)
     for method in ("mpi-svd+none", "alf+baumgarte"):
         run = simulate(scene, method, TIMES)

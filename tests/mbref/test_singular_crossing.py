@@ -37,6 +37,7 @@ def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(rung, allowed)
 
 @pytest.mark.parametrize("unit", [1e-3, 1e3])
 def test_rhombus_in_millimetres_and_in_kilometres_crosses_as_its_closed_form(unit):
+    """Lengths, gravity and inertias are scaled, so that the motion in time stays."""
     scene = four_bar_gravity()
     bodies = tuple(
         body.model_copy(
@@ -107,6 +108,7 @@ def test_door_on_hinges_tilted_by_rounding_swings(tilt, reported, seed):
 
 @pytest.mark.parametrize("tilt", [1e-5, 1e-7, 1e-8])
 def test_flap_on_a_door_that_tilted_hinges_hold_swings_as_on_a_welded_door(tilt):
+    """The held door does not move, so that the flap is a pendulum on a fixed hinge."""
     held = door(tilt, seed=1)
     at = held.body[0].position
     flap = Body(
@@ -318,6 +320,7 @@ def test_driver_that_turns_back_at_the_flat_position_returns_to_the_start_or_is_
 
 @pytest.mark.parametrize("distance", [1e-6, 1e-4])
 def test_driver_that_turns_back_before_the_flat_position_returns_to_the_start(distance):
+    """The driver is at its first angle after 1 s; nothing is crossed."""
     for angle in np.linspace(0.3, 0.9, 10):
         scene = turned_back(float(angle), distance)
         run = simulate(scene, "taylor", [1.0])

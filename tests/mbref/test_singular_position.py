@@ -182,6 +182,7 @@ def test_kernels_return_before_the_step_in_which_the_crossing_lies():
 
 @pytest.mark.parametrize("name", ["point_pendulum", "bricard_thin"])
 def test_bodies_without_inertia_about_an_axis_keep_their_energy(name):
+    """A point mass and a linkage of thin rods, by the default method."""
     scene = SCENES[name]()
     run = simulate(scene, times=np.linspace(0.0, 2.0, 21))
     assert run.outcome.name == "COMPLETED", run.message

@@ -33,6 +33,8 @@ from mbref.stepping.ranks import MOST_RANKED_ROWS, are_clear
 
 @given(bodies=st.integers(1, 12), rows=st.integers(1, 40), seed=st.integers(0, 999))
 def test_sparse_factor_solves_and_multiplies_as_dense_matrices(bodies, rows, seed):
+    """Random blocks of two bodies a row; S = D Dᵀ with its diagonal times 1 + 1/α, solved, multiplied and
+    factorised densely."""
     rng, n = np.random.default_rng(seed), 6 * bodies
     columns = 6 * rng.integers(0, bodies, rows)[:, None] + np.arange(6)
     second = np.where(rng.random(rows) < 0.3, bodies, (columns[:, 0] // 6 + 1) % (bodies + 1))
@@ -145,6 +147,7 @@ def both(scene, stabilisation, times, formulation="alf-dual"):
 def test_sparse_and_dense_runs_have_equal_poses_rates_and_accelerations(
     name, gravity, formulation, stabilisation
 ):
+    """Relative to 1 plus the largest value; the dense formulation uses singular values."""
     scene = find_scene(name).with_(gravity=gravity)
     times = np.linspace(0, 0.01, 4)
     sparse, dense = both(scene, stabilisation, times, formulation)

@@ -211,6 +211,7 @@ def norm_of(v):
 
 @given(n=st.integers(1, 30), seed=st.integers(0, 2**32 - 1))
 def test_lu_and_cholesky_solve_to_rounding_times_the_condition(n, seed):
+    """Random regular matrices A, and A Aᵀ; the solution is known."""
     rng = np.random.default_rng(seed)
     a = rng.normal(size=(n, n)) + n * np.eye(n)
     x = rng.normal(size=n)

@@ -138,6 +138,7 @@ def test_random_scene_has_velocities_that_its_joints_allow_and_survives_its_dict
 @settings(max_examples=6)
 @given(paper_mechanisms(("planar_slider_crank", "spatial_slider_crank")))
 def test_paper_s_mechanisms_with_random_masses_balance_their_reactions(scene):
+    """Newton's and Euler's equations of every body with the reactions, and the constraints."""
     motion = run(scene.with_(duration=0.005))
     assert balance(scene, motion, motion) < 1e-6, scene
     assert float(violation_series(scene, motion).max()) < 1e-8, scene
