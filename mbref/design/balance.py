@@ -81,14 +81,20 @@ class Newton:
 
     def away(self) -> np.ndarray:
         """Return a displacement y (f,) as far as the equilibrium may be from the pose."""
-        parts = np.maximum(np.abs(self.parts(self.off)), self.rounding)
-        moves = np.minimum(parts / np.maximum(self.stiffness, 1e-300), UNDECIDED / self.sizes)
+        parts, most = np.maximum(np.abs(self.parts(self.off)), self.rounding), UNDECIDED / self.sizes
+        moves = np.minimum(parts / np.maximum(self.stiffness, 1e-300), most)
+        moves = np.where(self._leaves_balance, moves, most)
         return np.asarray(self.directions @ np.where(moves * self.sizes > ONE_POSE**1.5, moves, 0.0))
+
+    @property
+    def _leaves_balance(self) -> np.ndarray:
+        """Directions (f,) along which a displacement by UNDECIDED leaves the balance."""
+        return np.asarray(self.stiffness * UNDECIDED / self.sizes > self.bound)
 
     @property
     def is_isolated(self) -> bool:
         """True if every displacement by UNDECIDED leaves the balance."""
-        return bool((self.stiffness * UNDECIDED / self.sizes > self.bound).all())
+        return bool(self._leaves_balance.all())
 
 
 def balanced(tangent: Tangent, freedoms: int) -> Newton | None:

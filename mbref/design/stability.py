@@ -44,7 +44,8 @@ def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
         CHANGES * np.abs(place - other_place) + rounded + np.abs(place) * inverse_steps / tangent.sizes
     )
     if away.any():
-        place_errors = place_errors + np.abs(tangent.slope(away) - tangent.slope())
+        here, around = tangent.slope(), (tangent.slope(away), tangent.slope(-away))
+        place_errors = place_errors + np.max([np.abs(slope - here) for slope in around], axis=0)
     rate_errors = CHANGES * np.abs(rate - other_rate) + rounded / tangent.rate_scale
     return Linear(place, rate, place_errors, rate_errors + ROUNDINGS * EPSILON * np.abs(rate))
 

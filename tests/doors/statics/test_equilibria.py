@@ -53,9 +53,12 @@ def test_hanging_parallelogram_vibrates_as_a_pendulum():
     assert np.allclose(found[0].eigenvalues, [1j * rate, -1j * rate], rtol=1e-10, atol=0.0)
 
 
-def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium():
-    """k = m g l: the stiffness vanishes at the upright pose, the only equilibrium."""
-    found = equilibria(pendulum((0.0, ARM, 0.0), load=[spring(TORQUE)]), starts=8)
+@pytest.mark.parametrize("natural", [0.0, np.pi])
+def test_inverted_pendulum_that_its_spring_just_holds_is_one_indifferent_equilibrium(natural):
+    """k = m g l: the stiffness vanishes at the upright pose, the only equilibrium, where the search begins
+    or half a turn from there."""
+    start = (0.0, ARM * np.cos(natural), 0.0)
+    found = equilibria(pendulum(start, load=[spring(TORQUE, natural_angle=natural)]), starts=8)
     assert [each.stability for each in found] == ["indifferent"]
     assert not found[0].eigenvalues.any()
 
