@@ -26,7 +26,7 @@ from mbref.equations.sparse_rows import SparseRows
 from mbref.equations.units import row_lengths
 from mbref.linear_algebra.minimum_norm import ALPHA
 
-FEW = 5  # rows; for more, singular values take longer than a sparse factorisation
+FEW_ROWS = 5  # rows; for more, singular values take longer than a sparse factorisation
 TANGENT_RANK = 1e-9  # singular value of unit rows / largest one; smaller ones count as zero
 TURNED_AWAY = 0.1  # length of a moved unit null vector; a shorter one may miss a direction of the null space
 
@@ -42,7 +42,7 @@ class Allowed:
     conditioning: float
 
 
-class Rows:
+class ConstraintRows:
     """The constraint rows of a model, at poses near q (7 nb,)."""
 
     def __init__(self, model: Model, q: np.ndarray):
@@ -50,7 +50,7 @@ class Rows:
 
     @cached_property
     def _sparse(self) -> SparseRows | None:
-        return SparseRows(self.model, self._first) if self.model.m > FEW else None
+        return SparseRows(self.model, self._first) if self.model.m > FEW_ROWS else None
 
     def allowed(self, terms: Terms, near: np.ndarray | None) -> Allowed:
         """Return the solutions of the terms' rows; ``near`` (n, f) spans the null space of a near pose."""

@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from mbref.design.allowed_motions import TANGENT_RANK, Rows, by_gauss
+from mbref.design.allowed_motions import TANGENT_RANK, ConstraintRows, by_gauss
 from mbref.design.joint_angles import angles_at, counted_from
 from mbref.design.turning import TURNED_BY, UNCHANGED, Turning
 from mbref.equations.gaps import gaps
@@ -47,11 +47,12 @@ class Tangent:
         self, model: Model, q: np.ndarray, frame: Turning, angles: np.ndarray, before: Tangent | None = None
     ):
         """Store a pose; ``before`` is the tangent at a pose near it."""
+        self.basis: np.ndarray
         self.model, self.q, self.frame = model, q, frame
         self.angles = angles_at(model, q, angles)
         with counted_from(model, self.angles):
             terms = model.terms(0.0, q, frame.velocities(model, q))
-        self.rows = before.rows if before else Rows(model, q)
+        self.rows: ConstraintRows = before.rows if before else ConstraintRows(model, q)
         allowed = self.rows.allowed(terms, before.basis if before else None)
         self.conditioning, free = allowed.conditioning, allowed.free
         self.at_rest, self.weight = by_gauss(model, terms, allowed), terms.mass * model.units**2
@@ -169,7 +170,7 @@ def _norms_by_body(x: np.ndarray) -> np.ndarray:
 def accelerations(model: Model, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Return q'' (n,) at time t (s): of all that the rows allow, the one of Gauss's principle."""
     terms = model.terms(t, q, v)
-    return by_gauss(model, terms, Rows(model, q).allowed(terms, None))
+    return by_gauss(model, terms, ConstraintRows(model, q).allowed(terms, None))
 
 
 def multipliers(tangent: Tangent) -> np.ndarray:

@@ -9,7 +9,10 @@ from __future__ import annotations
 from mbref.equations.packing import Packs
 from mbref.scene import Scene
 
-MOST_KEPT, MOST_BODIES = 16, 200  # number of kept scenes, and of their bodies; longer runs need no such help
+MOST_SCENES, MOST_SCENE_BODIES = (
+    16,
+    200,
+)  # number of kept scenes, and of their bodies; longer runs need no such help
 
 _kept: dict[int, tuple[Scene, Packs]] = {}
 
@@ -20,8 +23,8 @@ def packs_of(scene: Scene) -> Packs:
     if kept is not None:  # the object is alive, because it is kept here
         return kept[1]
     packs = Packs([scene])
-    if len(scene.body) <= MOST_BODIES:
-        while len(_kept) >= MOST_KEPT:
+    if len(scene.body) <= MOST_SCENE_BODIES:
+        while len(_kept) >= MOST_SCENES:
             _kept.pop(next(iter(_kept)), None)
         _kept[id(scene)] = scene, packs
     return packs

@@ -23,7 +23,7 @@ from mbref.equations.model import Model, Terms
 from mbref.scene_joints import Fixed
 
 ROUNDED_TERM = 1e-12  # entry or right-hand side / the largest of its kind, below which it is rounding
-LOCKED = 1e-3  # least singular value of unit rows that lock a pair of bodies
+LOCKED = 1e-3  # smallest singular value of unit rows that lock a pair of bodies
 EQUAL = 1e-9  # largest difference of rows with a largest entry of 1 that repeat each other
 
 

@@ -21,7 +21,7 @@ from mbref.linear_algebra.symbolic_factorisation import sparse_factor, symbolic_
 PENALTY = 1e12  # large, so that pivots of dependent rows, of the size 1/α, are far from others
 # squared pivots of unit rows: above the first a row is independent, below the second it depends on others,
 # as a sum of them with weights of up to some hundreds
-CLEAR, DEPENDENT = 1e-5, 1e-7
+INDEPENDENT_ROW_PIVOT, DEPENDENT_ROW_PIVOT = 1e-5, 1e-7
 
 
 @entry(INT(FLOAT, VECTOR, VECTOR, MATRIX, MATRIX, FACTOR))
@@ -82,16 +82,16 @@ class SparseRows:
     def rank(self) -> int | None:
         """The rank at the last pose, and None if pivots do not show it."""
         squares = self._factor.values.squared_pivots
-        clear = squares > CLEAR
-        return int(clear.sum()) if (clear | (squares < DEPENDENT)).all() else None
+        clear = squares > INDEPENDENT_ROW_PIVOT
+        return int(clear.sum()) if (clear | (squares < DEPENDENT_ROW_PIVOT)).all() else None
 
     @property
     def are_independent(self) -> bool:
         """Whether no row depended on other rows at the last pose; False before the first one."""
-        return bool((self._factor.values.squared_pivots > CLEAR).all())
+        return bool((self._factor.values.squared_pivots > INDEPENDENT_ROW_PIVOT).all())
 
     @property
     def least_pivot(self) -> float:
         """The least pivot of independent unit rows at the last pose; 1 without rows."""
         squares = self._factor.values.squared_pivots
-        return float(np.sqrt(squares.min(initial=1.0, where=squares > CLEAR)))
+        return float(np.sqrt(squares.min(initial=1.0, where=squares > INDEPENDENT_ROW_PIVOT)))

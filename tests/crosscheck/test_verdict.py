@@ -120,7 +120,8 @@ SITUATIONS = {
     "another mechanism": [replace(group(), differences=OTHER_MECHANISM)],
     "another mechanism alone": [replace(group(BEST[1:]), differences=OTHER_MECHANISM)],
     "another mechanism on one of two scenes": [
-        replace(group(), differences=OTHER_MECHANISM), group([{**OWN, "scene": SOUND.name}], SOUND),
+        replace(group(), differences=OTHER_MECHANISM),
+        group([{**OWN, "scene": SOUND.name}], SOUND),
     ],
     "defaults of one engine are wrong": [group([*BEST, record("mujoco", "defaults", 2.8)])],
     "defaults of one engine are inaccurate": [group([BEST[1], record("mujoco", "defaults", 1e-5)])],
@@ -131,7 +132,7 @@ SITUATIONS = {
     "two scenes": of_two_scenes(RECORDS, [OWN, record("pinocchio", "defaults", 1e-9, 0.001)]),
     "own integrators on one of two scenes": of_two_scenes([*ROUGH, OWN], [*BOTH, OWN]),
     "one of two motions is known": [group(), group(STILL, SOUND, **UNKNOWN)],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("situation", SITUATIONS)

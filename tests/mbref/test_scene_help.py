@@ -51,13 +51,14 @@ FAULTY = {
     "one name twice": [('name = "rod"', 'name = "crank"')],
     "table": [("[[load]]", "[load]")],
     "driver of an unknown type": [
-        ('type = "revolute"', 'type = "hinge"'), ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]'),
+        ('type = "revolute"', 'type = "hinge"'),
+        ("[[load]]", '[[driver]]\njoint = "A"\n\n[[load]]'),
     ],
     "skew axes": [
         ('type = "revolute"\nbodies = ["crank", "rod"]', SKEW),
         ("anchor = [0.2, 0.0, 0.0]\naxis = [0.0, 0.0, 1.0]", "anchor = [0.2, 0.0, 0.0]"),
     ],
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", FAULTY)

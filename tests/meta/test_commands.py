@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 
 import pytest
 
@@ -36,3 +37,10 @@ def test_command_that_a_page_prints_is_accepted_by_its_parser(page, words):
         assert any(f"def {name}(" in path.read_text() for path in (ROOT / "tests").rglob("test_*.py"))
     else:
         assert arguments[:2] == ["--pyargs", "crosscheck.conformance"]
+
+
+def test_tests_that_the_gate_names_exist():
+    named = re.findall(r"(tests/\S+\.py)::(\w+)", (ROOT / ".ci" / "run").read_text())
+    assert named
+    for path, name in named:
+        assert f"def {name}(" in (ROOT / path).read_text(), (path, name)
