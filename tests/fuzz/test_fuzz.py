@@ -9,6 +9,7 @@ SHORT = range(1000, 1060)  # seeds
 
 @pytest.mark.parametrize(("target", "count"), [("scene_file", 150), ("scene_data", 300)])
 def test_mutated_scene_is_accepted_or_refused_with_a_scene_error(target, count, tmp_path, monkeypatch):
+    """A case is a seed, how it ended, and its defect, empty unless another error was raised."""
     monkeypatch.chdir(tmp_path)
     endings = [(seed, *targets.case(target, seed)) for seed in range(count)]
     assert not [case for case in endings if case[2]]

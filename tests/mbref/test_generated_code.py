@@ -135,6 +135,7 @@ else:
 
 
 def test_mbref_runs_without_the_optional_generator_of_code(tmp_path):
+    """A copy without mbref/taylor/generated runs by the general kernels, and refuses code="generated"."""
     package = Path(mbref.__file__).parent
     shutil.copytree(package, tmp_path / "mbref", ignore=shutil.ignore_patterns("generated", "__pycache__"))
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(tmp_path)}

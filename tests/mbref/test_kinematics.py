@@ -48,6 +48,7 @@ def test_a_freedom_without_driver_needs_masses():
 
 
 def test_driver_prescribes_the_motion_also_from_a_singular_start():
+    """The straight four-bar has one degree of freedom at other poses, which its driver takes."""
     scene = SCENES["four_bar_straight"]()
     assert scene.counts().degrees_of_freedom == 1
     assert undriven_freedoms(scene) == 0

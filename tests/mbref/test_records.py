@@ -140,6 +140,7 @@ def write_for_ever(path: str) -> None:
 
 
 def test_five_killed_writers_leave_every_record_once_and_in_order(tmp_path: Path):
+    """Each is killed after at least 50 kB; a record has about 5 kB."""
     path = tmp_path / "runs.jsonl"
     for _ in range(5):
         process = multiprocessing.get_context("fork").Process(target=write_for_ever, args=(str(path),))

@@ -108,7 +108,7 @@ def test_pivots_of_a_product_of_gradients_give_dense_determinants(bodies, rows, 
     [
         ("four_bar_chain[5]", (0.0, -9.81, 0.0), 6 * 5 + 2),  # two a joint: the motion is planar
         ("four_bar_chain[5]", (0.0, -9.81, 1.0), 13 * 5 + 5),  # loaded out of the plane
-        ("planar_slider_crank", (0.0, 0.0, 0.0), 7),
+        ("planar_slider_crank", (0.0, 0.0, 0.0), 7),  # two at each hinge and at the ball, one at the slide
         ("spatial_slider_crank", (0.0, 0.0, 0.0), 14),  # the slider and the line never turn: three rows rest
     ],
 )
