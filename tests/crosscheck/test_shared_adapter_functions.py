@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.engines import driver_motion
 from crosscheck.engines.compiler import Compiler, NoLibrary
 from crosscheck.engines.fixed_steps import unended_piece
 from crosscheck.engines.geometry import in_body, point_in_body
@@ -16,18 +15,12 @@ from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through
 from crosscheck.refusals import Owner
 from mbref.scene import (
     Body,
-    Driver,
     Factor,
     Force,
-    JointTorque,
     Moment,
     Revolute,
     Scene,
     Sine,
-    SlideSpring,
-    Spring,
-    TorsionSpring,
-    Translational,
 )
 from mbref.trajectory import Outcome
 
@@ -146,61 +139,6 @@ def test_run_that_fails_keeps_its_samples_and_states_the_reason():
     )
     assert (lost.outcome, lost.t_end, len(lost.times)) == (Outcome.NOT_FINITE, 0.5, 2)
     assert lost.message == "the motion is not finite at 2 s"
-
-
-# --- drivers ----------------------------------------------------------------------------------------------
-def test_driver_has_the_value_rate_and_acceleration_of_its_function():
-    """f = 1 + 2 t + 3 t² + t³ + 0.5 sin(4 t + 0.3), from 1 s to 3 s, at 2 s: f, f' and f''. At a switch the
-    piece that acts since an earlier time still acts. A table of t³ is the cubic."""
-    wave = Sine(amplitude=0.5, frequency=4.0, phase=0.3)
-    factor = Factor(polynomial=(1.0, 2.0, 3.0, 1.0), sine=wave, start=1.0, stop=3.0)
-    s, c = math.sin(8.3), math.cos(8.3)
-    wanted = (25.0 + 0.5 * s, 26.0 + 2.0 * c, 18.0 - 8.0 * s)
-    assert driver_motion.motion(factor, 2.0) == pytest.approx(wanted)
-    assert driver_motion.motion(factor, 0.999) == driver_motion.motion(factor, 3.0) == (0.0, 0.0, 0.0)
-    assert driver_motion.motion(factor, 3.0, since=2.0)[0] > 0
-    cubic = Driver(joint="H", table=tuple((t, t**3) for t in (0.0, 1.0, 2.0, 3.0)))
-    assert driver_motion.motion(cubic, 1.5) == pytest.approx((3.375, 6.75, 9.0))
-    assert driver_motion.mean_rate(cubic, 1.0, 0.5) == pytest.approx(4.75)
-    at = driver_motion.moving(cubic)
-    assert at(1.5) is at(1.5) and at(1.0) == pytest.approx((1.0, 3.0, 6.0))
-
-
-@pytest.mark.parametrize(
-    ("parts", "rate"),
-    [
-        ({}, 0.5),
-        ({"driver": (Driver(joint="H", polynomial=(0.0, 0.0, -2.0)),)}, 8.0),
-        ({"driver": (Driver(joint="H", sine=Sine(amplitude=0.01, frequency=-9.0)),)}, 9.0),
-        ({"load": (Spring(bodies=("b", "ground"), points=(X, Y), stiffness=36.0, natural_length=1.0),)}, 3.0),
-        (
-            {
-                "load": (
-                    Spring(
-                        bodies=("b", "ground"), points=(X, Y), stiffness=0.0, damping=8.0, natural_length=1.0
-                    ),
-                )
-            },
-            2.0,
-        ),
-        ({"load": (TorsionSpring(joint="H", stiffness=18.0),)}, 3.0),
-        ({"load": (TorsionSpring(joint="H", stiffness=0.0, damping=8.0),)}, 4.0),
-        ({"load": (SlideSpring(joint="S", stiffness=36.0),)}, 3.0),
-        (
-            {"load": (Moment(body="b", moment=Z, factor=Factor(sine=Sine(amplitude=1.0, frequency=-7.0))),)},
-            7.0,
-        ),
-        ({"load": (JointTorque(joint="H", torque=99.0),)}, 0.5),
-    ],
-)
-def test_stated_rate_is_the_largest_of_drivers_springs_loads_and_spins(parts, rate):
-    """rad/s: 1 / duration (2 s), largest rate and frequency of drivers and loads, √(k/m) and d/m of springs
-    with the least mass, 4 kg, or middle moment, 2 kg m². A spin of √(6² + 8²) exceeds them all."""
-    slide = Translational(name="S", bodies=("ground", "c"), anchor=(1.0, 2.0, 3.0), axis=X)
-    given = scene(body(), body("c", mass=5.0, inertia=(9.0, 9.0, 9.0)), joint=(HINGE, slide), **parts)
-    assert driver_motion.stated_rate(given) == pytest.approx(rate)
-    turning = given.with_(body=(body(angular_velocity=(6.0, 0.0, 8.0)), given.body[1]))
-    assert driver_motion.stated_rate(turning) == pytest.approx(10.0)
 
 
 # --- compilers and code -----------------------------------------------------------------------------------

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import DOP853
 
-from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, rk4, step_count
-from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
+from mbref.trajectory import Outcome
 
 
 def oscillator(t: float, y: np.ndarray) -> np.ndarray:
@@ -24,39 +22,6 @@ def cosine(t: float) -> np.ndarray:
 def adaptive(rhs, rtol: float = 1e-9, **options) -> Adaptive:
     limits = {"min_step": 1e-4, "max_step": np.inf} | options
     return Adaptive(rhs, None, rtol, limits["min_step"], limits["max_step"], Counts())
-
-
-@pytest.mark.parametrize(("stiffness", "rate", "runs"), [(1e8, 5e2, 1), (1.0, 3.0, 1), (0.0, 2e3, 2)])
-def test_fastest_rate_needs_a_second_coarse_run_only_above_the_first_s_resolution(
-    stiffness: float, rate: float, runs: int
-) -> None:
-    """rad/s: a stiff spring states √(1e8 / 400) = 500, and a spin of 3 is resolved by one coarse run. A spin
-    of 2e3 exceeds the 500 that 2000 steps resolve, so that a run with more steps follows."""
-    scene = Scene(
-        name="mass",
-        duration=2.0,
-        body=[{"name": "m", "mass": 400.0, "inertia": (1, 1, 1), "position": (1.0, 0.0, 0.0)}],
-        load=[
-            {
-                "type": "spring",
-                "bodies": ("ground", "m"),
-                "damping": 0.0,
-                "points": ((0, 0, 0), (1, 0, 0)),
-                "stiffness": stiffness,
-                "natural_length": 1.0,
-            }
-        ],
-    )
-    asked = []
-
-    def coarse(step: float) -> Trajectory:
-        asked.append(step)
-        spin = np.array([[[3.0 if stiffness else 2e3, 0.0, 0.0]]])
-        place, turn = np.ones((1, 1, 3)), np.array([[[1.0, 0.0, 0.0, 0.0]]])
-        return Trajectory("mass", "", "", "", {}, np.zeros(1), ("m",), place, turn, place, spin)
-
-    assert fastest_rate(scene, coarse) == pytest.approx(rate)
-    assert len(asked) == runs, asked
 
 
 @pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])

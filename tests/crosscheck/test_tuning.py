@@ -199,11 +199,6 @@ def test_settings_of_steps_longer_than_the_samples_allow_are_not_chosen():
     assert max(h for _, h in engine.asked) == 0.1
 
 
-def test_work_is_evaluations_otherwise_steps_otherwise_seconds():
-    costs = ({"rhs": 8, "steps": 2, "seconds": 0.5}, {"rhs": 0, "steps": 2, "seconds": 0.5}, {"seconds": 0.5})
-    assert [work({"cost": cost}) for cost in costs] == [8, 2, 0.5]
-
-
 def test_cheapest_step_by_closure_gap_counts_distances_and_no_angles():
     """The block is h² m off: 1 mm at √1e-3 s; it is also tilted by 0.5 rad, which does not count."""
     scene = SCENE.with_(
