@@ -64,12 +64,15 @@ def strandbeest(legs: int = 1, name: str = "strandbeest") -> Scene:
             _triangle(f"bde{k}", (PIVOT, points.upper, points.knee), z),
             _triangle(f"ghi{k}", (points.lower, points.ankle, points.foot), z),
         ]
-        hinges = (
-            ("P", "crank", "j", points.pin), ("R", "crank", "k", points.pin),
-            ("Q", "ground", "bde", PIVOT), ("S", "ground", "c", PIVOT),
-            ("T", "j", "bde", points.upper), ("U", "k", "c", points.lower), ("V", "c", "ghi", points.lower),
-            ("W", "bde", "f", points.knee), ("X", "f", "ghi", points.ankle),
-        )  # fmt: skip
+        from_crank = (("P", "crank", "j", points.pin), ("R", "crank", "k", points.pin))
+        from_ground = (("Q", "ground", "bde", PIVOT), ("S", "ground", "c", PIVOT))
+        at_rods = (
+            ("T", "j", "bde", points.upper),
+            ("U", "k", "c", points.lower),
+            ("V", "c", "ghi", points.lower),
+        )
+        at_foot = (("W", "bde", "f", points.knee), ("X", "f", "ghi", points.ankle))
+        hinges = (*from_crank, *from_ground, *at_rods, *at_foot)
         for name_of, first, second, place in hinges:
             pair = first if first in ("crank", "ground") else f"{first}{k}", f"{second}{k}"
             joints.append(Revolute(name=f"{name_of}{k}", bodies=pair, anchor=(*place, z), axis=Z))
