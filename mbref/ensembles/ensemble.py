@@ -32,8 +32,9 @@ from mbref.trajectory import Outcome, Trajectory
 AHEAD = (
     64  # runs submitted to the executor before the first result is needed; at least twice the number of cores
 )
-# most runs that a process receives at once, and the wall time (s) that they may take
-MOST_AT_ONCE, SECONDS = 256, 0.1
+# most runs that a process receives at once, and the CPU time (s) that they may take: to prepare a batch takes
+# some 20 ms, and an executor of many machines needs milliseconds to pass on a call
+MOST_AT_ONCE, SECONDS = 256, 0.25
 
 
 def ensemble(
