@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from crosscheck.engines.compiled import run as integrators
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method
 from mbref.stepping.preparation import kernels_of
@@ -30,4 +31,5 @@ def prepare(backwards: bool = False) -> None:
 
 
 if __name__ == "__main__":
+    integrators.prepare()  # of engines in compiled families, which each process that runs one needs
     prepare()
