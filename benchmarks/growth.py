@@ -36,7 +36,7 @@ from mbref.scene import Revolute, Scene
 from mbref.scenes import find_scene
 
 ERROR = 1e-6  # m, largest error of a centre at the end
-RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+RTOLS = tuple(10 ** (-k / 2) for k in range(4, 19))
 TRUE_RTOL = 1e-11
 STEPS = tuple(round(4 * 2 ** (k / 2)) for k in range(24))  # of MuJoCo
 TOO_LONG = 20.0  # s of a run; no finer setting is tried
@@ -141,7 +141,7 @@ def measured(name: str, methods: Sequence[str], repeats: int) -> list[Row]:
     truth = of_mbref(scene, methods[0] if methods else default_method(scene), TRUE_RTOL)()[1]
     competitors = []
     for method in methods or (default_method(scene),):
-        attempts = [(f"{method} {rtol:g}", of_mbref(scene, method, rtol)) for rtol in RTOLS]
+        attempts = [(f"{method} {rtol:.0e}", of_mbref(scene, method, rtol)) for rtol in RTOLS]
         if found := cheapest(attempts, truth):
             competitors.append((Row(name, len(scene.body), "mbref", *found[:2]), found[2]))
     theirs = [(Row(name, len(scene.body), "mujoco", *f[:2]), f[2]) for f in mujoco_runs(scene, truth)]

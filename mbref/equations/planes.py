@@ -160,16 +160,15 @@ def _without_repeated(model: Model, start: Start, columns: np.ndarray, entries: 
     sides = np.take_along_axis(sides, order[None, :, :, None], axis=2)
     rates = [terms.phi[:, rows], terms.nu[:, rows], terms.gamma[:, rows] - gamma]
     unit = np.concatenate([sides.reshape(STATES, len(rows), 12), np.stack(rates, axis=2)], axis=2)
-    unit = np.moveaxis(unit, 0, 1).reshape(len(rows), -1)
-    numbers = np.arange(len(rows))
-    largest = np.abs(unit[:, :12]).argmax(axis=1)  # at the first state
-    unit = unit / unit[numbers, largest, None]
+    unit, numbers = np.moveaxis(unit, 0, 1).reshape(len(rows), STATES * 15), np.arange(len(rows))
+    largest = unit[numbers, np.abs(unit[:, :12]).argmax(axis=1)]  # at the first state
+    unit = unit / np.where(largest != 0.0, largest, 1.0)[:, None]
     low, high = np.sort(of_group[rows], axis=1).T
     key = unit @ np.random.default_rng(1).normal(size=unit.shape[1])  # equal for equal rows
     order = np.lexsort((numbers, np.round(key, 6), high, low))
     before, after = order[:-1], order[1:]
     same = (low[before] == low[after]) & (high[before] == high[after])
-    same &= np.abs(unit[before] - unit[after]).max(axis=1, initial=0.0) < EQUAL
+    same &= (np.abs(unit[before] - unit[after]).max(axis=1, initial=0.0) < EQUAL) & (largest[after] != 0.0)
     kept[rows[after[same]]] = False
     return kept
 
