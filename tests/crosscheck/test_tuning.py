@@ -154,16 +154,22 @@ def test_setting_between_two_is_their_geometric_mean():
 
 
 def test_coarser_setting_continues_the_ratio_up_to_the_longest_step_or_tolerance_0_5():
-    """Steps 0.025 and 0.1 s continue to 0.4 s, tolerances 0.01 and 0.1 to 0.5."""
+    """Steps 0.025 and 0.1 s continue to 0.4 s, tolerances 0.01 and 0.1 to 0.5. An option that both share
+    stays; the others, as beta ~ 1 / step, continue by their own ratio."""
     first, second = (Setting("f", {"step": h, "beta": 0.2 / h, "hard": 1e-7}) for h in (0.1, 0.025))
     assert coarser(first, second, longest=1.0) == Setting("f", {"step": 0.4, "beta": 0.5, "hard": 1e-7})
     assert coarser(first, second, longest=0.2) == Setting("f", {"step": 0.2, "beta": 1.0, "hard": 1e-7})
-    assert coarser(first, second, longest=0.1) is None and coarser(first, first, 1.0) is None
     loose = [Setting("f", {"rtol": r}) for r in (0.1, 0.01)]
     assert coarser(*loose, longest=0.01) == Setting("f", {"rtol": 0.5})
-    assert coarser(Setting("f", {"rtol": 0.5}), loose[0], 9.0) is None
     assert coarser(Setting("f", {"rtol": 0.01}), Setting("f", {"rtol": 1e-3}), 9.0) == loose[0]
-    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), 9.0) is None
+
+
+def test_there_is_no_coarser_setting_than_the_longest_step_tolerance_0_5_or_one_iteration():
+    first, second = (Setting("f", {"step": h}) for h in (0.1, 0.025))
+    assert coarser(first, second, longest=0.1) is None
+    assert coarser(first, first, longest=1.0) is None
+    assert coarser(*(Setting("f", {"rtol": r}) for r in (0.5, 0.1)), longest=9.0) is None
+    assert coarser(*(Setting("f", {"iterations": n}) for n in (1.0, 2.0)), longest=9.0) is None
 
 
 def test_steps_are_limited_by_the_longest_interval_between_samples():

@@ -143,7 +143,7 @@ def test_pendulum_without_gravity_is_indifferent():
         ({"body": [{"name": "rod", "position": [ARM, 0.0, 0.0]}]}, r"body\[rod\].mass: is missing"),
     ],
 )
-def test_scenes_that_cannot_rest_or_lack_masses_are_refused(change, says):
+def test_scenes_driven_round_or_without_freedom_or_mass_have_no_equilibria(change, says):
     with pytest.raises(SceneError, match=says):
         equilibria(pendulum().with_(**change))
 

@@ -197,8 +197,9 @@ def test_circles_floors_and_upward_imports_of_a_small_graph_are_found():
     assert floors({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == {"a": 3, "b": 2, "c": 1}
 
 
-def test_imports_inside_functions_and_for_types_count(tmp_path):
-    """An import in a function or for types alone counts; one that ``__init__`` re-exports does not."""
+def test_imports_in_functions_and_for_types_are_arrows_except_for_types_of_a_package(tmp_path):
+    """`import a` under TYPE_CHECKING is an arrow from a module. In an `__init__` it only tells type checkers
+    the names that the package offers, so it is none. `import b.c` in a function is an arrow from both."""
     text = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import a\ndef f():\n    import b.c\n"
     for name, wanted in (
         ("module.py", {"typing", "typing.TYPE_CHECKING", "a", "b.c"}),

@@ -69,7 +69,8 @@ def record(case: Case, outcome: Outcome, t_end: float, steps: int) -> dict[str, 
 
 @pytest.fixture(scope="module")
 def records() -> Records:
-    """Every cell as printed except for three: one ends late, one completes, one drifts sooner."""
+    """Every cell as printed except for three: one ends late, one completes, one drifts sooner. Seed 1 of the
+    draws ends as printed, the others at 0.2 s."""
     changed = {
         ("I", "MPI (SVD)", "θ₂ = π/4"): (Outcome.VIOLATION, 0.0566),
         ("II", "MPI (SVD) + CP", "five-bar"): (Outcome.COMPLETED, 20.0),
@@ -106,9 +107,15 @@ def test_score_counts_the_three_changed_cells(records):
     score = paper.score(records)
     assert f"Of {len(CELLS)} cells" in score and f"{len(CELLS) - 3} have" in score, score
     assert "2 the outcome at another time, 1 another outcome" in score, score
+
+
+def test_score_counts_cells_that_end_as_printed_in_most_draws_and_in_any(records):
+    """A cell runs with 1, 8 or 20 random first steps (draws). Of these records seed 1 alone ends as printed,
+    so a cell matches in most draws if it has a single one, and every cell matches in at least one."""
+    score = paper.score(records)
     alone = sum(runs.draws(cell) == 1 for cell in CELLS)
     assert f"{alone} cells have the printed outcome and time in most draws" in score, score
-    assert f"{len(CELLS)} in at least one" in score, score  # seed 1 of each changed cell ends as printed
+    assert f"{len(CELLS)} in at least one" in score, score
 
 
 def test_changed_cells_are_listed_with_their_causes(blocks):

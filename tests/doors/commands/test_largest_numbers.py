@@ -92,7 +92,7 @@ def test_sample_time_that_no_motion_reaches_is_refused_before_any_run(command: s
 @pytest.mark.parametrize(
     "command", [("run",), ("plot",), ("animate",), ("ensemble", "--vary", "duration=0.1:0.2")], ids=" ".join
 )
-def test_end_of_a_simulation_beyond_its_ends_is_refused(command, option: str, capsys):
+def test_duration_of_more_than_a_billion_seconds_is_refused_with_the_limit(command, option: str, capsys):
     assert mbref([*command, "four_bar", option, "1e20"]) == 2
     assert f"{option}: must be" in (said := capsys.readouterr().err) and "at most 1e+09 s, got 1e+20" in said
 

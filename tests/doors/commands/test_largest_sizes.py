@@ -60,10 +60,11 @@ def test_count_that_is_huge_negative_or_broken_is_refused_with_its_limits(comman
     assert f"argument {option}: must be a whole number from " in capsys.readouterr().err
 
 
-STATES = 10_000_000  # of bodies at samples, that runs may have
+STATES = 10_000_000  # largest number of samples times bodies of a run, about 2 GB
 
 
 def test_samples_of_more_states_than_memory_holds_are_refused_with_the_largest_number(capsys):
+    """The chain has 201 bodies."""
     assert main(["run", "four_bar_chain[100]", "--samples", "1000000"]) == 2
     assert f"--samples: must be at most {STATES // 201} for 201 bodies" in capsys.readouterr().err
 
