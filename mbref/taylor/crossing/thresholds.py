@@ -2,8 +2,7 @@
 
 A pivot is a pivot of the constraint gradient G, whose rows have about unit length; the least pivot of a
 factorisation is about the distance from a singular position.  "Largest pivot" is the largest value that the
-least pivot has had in a run.  A check of each name in ``tests/mbref/interpreted_thresholds.py`` fails when
-the threshold moves.
+least pivot has had in a run.
 """
 
 from __future__ import annotations
