@@ -33,6 +33,7 @@ from mbref.trajectory import Outcome, Trajectory
 Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]
 GREETING = None
+FAR_BEHIND = 100.0  # time / time of the fastest setting; above it further repeats do not change the ranking
 
 
 def get_ready(engine_name: str, families: Sequence[str]) -> tuple[str, float]:
@@ -112,17 +113,24 @@ def _unserved(family: str) -> Cannot:
 def run_interleaved(scene: Scene, times: np.ndarray, jobs: Sequence[Job], repeats: int) -> list[list[float]]:
     """Return ``cost.seconds`` for every repeat of every job, round-robin after a warm-up round.
 
-    A run that did not complete has NaN, since its time is not the time of a complete run.
+    A job that takes more than FAR_BEHIND times as long as the fastest one has one repeat. A run that did not
+    complete has NaN, since its time is not the time of a complete run.
     """
     simulators = [(engine(name), setting) for name, setting in jobs]
 
-    def one_round() -> list[float]:
-        runs = [simulator.run(scene, times, setting) for simulator, setting in simulators]
-        return [r.cost.seconds if r.outcome is Outcome.COMPLETED else float("nan") for r in runs]
+    def seconds_of(job: int) -> float:
+        simulator, setting = simulators[job]
+        run = simulator.run(scene, times, setting)
+        return run.cost.seconds if run.outcome is Outcome.COMPLETED else float("nan")
 
-    one_round()
-    rounds = [one_round() for _ in range(repeats)]
-    return [list(seconds) for seconds in zip(*rounds, strict=True)]
+    warm = [seconds_of(job) for job in range(len(jobs))]
+    limit = FAR_BEHIND * min((s for s in warm if s > 0.0), default=float("inf"))
+    found: list[list[float]] = [[] for _ in jobs]
+    for number in range(repeats):
+        for job, before in enumerate(warm):
+            if number == 0 or not before > limit:
+                found[job].append(seconds_of(job))
+    return found
 
 
 def failed(

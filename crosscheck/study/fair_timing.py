@@ -15,6 +15,7 @@ from crosscheck.judge.model_identity import along, differences, gate_times
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
+from crosscheck.processes.serve import FAR_BEHIND
 from crosscheck.setting import best_family
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.record_view import is_completed
@@ -127,7 +128,13 @@ def timed(
             i for i, case in enumerate(cases) if case.scene.name == scene.name and is_completed(records[i])
         ]
         try:
-            for i, seconds in zip(places, _seconds(scene, [cases[i] for i in places], repeats), strict=True):
+            found = _seconds(scene, [cases[i] for i in places], repeats)
+            if once := sum(len(seconds) < repeats for seconds in found):
+                notice(
+                    f"{scene.name}: {once} of {len(found)} settings take over {FAR_BEHIND:g} times as long "
+                    "as the fastest, and are timed once"
+                )
+            for i, seconds in zip(places, found, strict=True):
                 done[i] = _with_cost(records[i], seconds)
         except ChildFailed as failure:
             notice(f"{scene.name}: no interleaved timing, single runs are shown: {failure}")

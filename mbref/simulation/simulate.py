@@ -10,6 +10,7 @@ import numpy as np
 
 from mbref.input_error import InputError
 from mbref.kernels.background import compiled_in_background
+from mbref.kernels.compilation import Exchangeable
 from mbref.kernels.machine_code import NoGeneratedCode
 from mbref.method import (
     SERIES_METHOD,
@@ -30,7 +31,6 @@ from mbref.stepping import preparation
 from mbref.stepping.limits import GENERATED, Limits
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
-from mbref.taylor.preparation import KERNELS_OF_SERIES, prepare_series, prepare_series_backwards
 from mbref.trajectory import Outcome
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
@@ -164,6 +164,8 @@ def prepare(method: Method) -> None:
 
     Kernels of `taylor` are included, because runs of other methods are compared with `taylor`.
     """
+    from mbref.taylor.preparation import KERNELS_OF_SERIES, prepare_series, prepare_series_backwards
+
     beside = prepare_series_backwards
     with compiled_in_background(KERNELS_OF_SERIES, beside.__module__, beside.__name__):
         preparation.prepare(method)
@@ -172,7 +174,9 @@ def prepare(method: Method) -> None:
 
 def are_compiled(method: Method) -> bool:
     """Return whether the kernels of the method are in the cache of this machine."""
-    of_series = KERNELS_OF_SERIES if method.is_series else ()
+    of_series: Sequence[Exchangeable] = ()
+    if method.is_series:
+        from mbref.taylor.preparation import KERNELS_OF_SERIES as of_series
     return all(kernel.is_kept for kernel in (*preparation.kernels_of(method), *of_series))
 
 

@@ -14,7 +14,6 @@ from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, UNDECIDED
 from mbref.stepping.run import Run
-from mbref.taylor.preparation import KERNELS_OF_SERIES
 
 MOST_TRIAL_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
 
@@ -62,8 +61,11 @@ def passes_with(run: Run, **changes: Any) -> bool | None:
 
 
 def _made(run: Run) -> Trial | None:
-    is_cheap = len(run.scene.body) <= MOST_BODIES and all(kernel.is_kept for kernel in KERNELS_OF_SERIES)
-    if run.method.is_series or not is_cheap or bushings(run.scene):
+    if run.method.is_series or len(run.scene.body) > MOST_BODIES or bushings(run.scene):
+        return None
+    from mbref.taylor.preparation import KERNELS_OF_SERIES  # other methods do not import the series otherwise
+
+    if not all(kernel.is_kept for kernel in KERNELS_OF_SERIES):
         return None
     limits = Limits(code=GENERIC, most_steps=MOST_TRIAL_STEPS)
     trial = start_run(run.scene, Method.parse(SERIES_METHOD), run.times, limits)

@@ -324,6 +324,15 @@ def test_interleaved_runs_take_turns_in_one_process_after_one_untimed_round(tmp_
     assert set(numbered(log)) == {0}
 
 
+def test_setting_a_hundred_times_behind_the_fastest_is_timed_once(tmp_path: Path):
+    jobs = [
+        (f"{FAKES}:RECORDER", Setting(name, {"seconds": seconds}))
+        for name, seconds in (("slow", 0.5), ("fast", 0.001), ("near", 0.09))
+    ]
+    seconds = time_interleaved(still(str(tmp_path / "log")), TIMES, jobs, repeats=3, time_limit=60.0)
+    assert seconds == [[0.5], [0.001] * 3, [0.09] * 3]
+
+
 def test_a_crash_among_interleaved_runs_is_raised_with_its_signal():
     jobs = [(f"{FAKES}:FAKE", PLAIN), (f"{FAKES}:SEGFAULT", PLAIN)]
     with pytest.raises(ChildFailed, match="SIGSEGV") as caught:
