@@ -6,6 +6,7 @@ Everything that follows from names, types and bodies alone is computed once and 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +15,7 @@ import numpy as np
 
 from mbref.equations.joints import ROWS_OF
 from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
+from mbref.machine_memory import refuse_beyond_memory
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -155,7 +157,16 @@ class Structure:
         return loops
 
     def dense(self, blocks: np.ndarray) -> np.ndarray:
-        """Return Φ_q (…, m, n) from its blocks (…, m, 12)."""
+        """Return Φ_q (…, m, n) from its blocks (…, m, 12).
+
+        Raises InputError if the memory of this machine does not hold it.
+        """
+        states, columns = blocks.shape[:-2], 6 * (self.nb + 1)
+        refuse_beyond_memory(
+            8 * math.prod(states) * len(self.rows) * columns,
+            f"the scene is too large for this method or command: a full matrix of {len(self.rows)} "
+            f"constraint rows and {6 * self.nb} columns",
+        )
         matrix = np.zeros((*blocks.shape[:-1], self.nb + 1, 6))
         for side in range(self.sides):
             matrix[..., self.rows, self.row_bodies[:, side], :] = blocks[..., 6 * side : 6 * side + 6]

@@ -24,11 +24,14 @@ class Redundancy:
 
     def __init__(self, jacobian: csr_array):
         self._solution = MinimumNorm(jacobian, np.ones(jacobian.shape[1]))
-        self.shares = np.array([self._share(unit) for unit in np.eye(jacobian.shape[0])])
+        self.shares = np.array([self._share(row) for row in range(jacobian.shape[0])])
         self.rank = jacobian.shape[0] - round(float(np.sum(self.shares)))
 
-    def _share(self, unit: np.ndarray) -> float:
-        """Return the squared component of a unit vector (m,) in the left null space, from 0 to 1."""
+    def _share(self, row: int) -> float:
+        """Return the squared component of the unit vector (m,) of a row in the left null space, from 0 to
+        1."""
+        unit = np.zeros(self._solution.d.shape[0])
+        unit[row] = 1.0
         return float(np.sum((self._solution.regularised_solution(unit) / ALPHA) ** 2))
 
     def singular_values(self) -> tuple[float, float]:

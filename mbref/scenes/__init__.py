@@ -89,8 +89,7 @@ FAMILIES = {
     "sarrus_stack": Family(sarrus_stack, 1, 1),
 }
 
-# rows and columns of a Jacobian grow with the loops: at 3000 its 39 000 by 36 000 numbers take 11 GB
-MOST_LOOPS = 3000
+MOST_LOOPS = 10_000  # 130 000 constraint rows of a chain; more take minutes to prepare, and several GB
 
 
 def find_scene(name: Scene | str | Path) -> Scene:

@@ -23,7 +23,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
         [
             *("input_error", "files", "printable", "terminal", "rotations", "records", "lazy", "crossing"),
-            *("trajectory", "error_estimate", "scene_services"),
+            *("trajectory", "error_estimate", "scene_services", "machine_memory"),
         ],
         [
             *("scene", "scene_bodies", "scene_fields", "scene_functions", "scene_function_faults"),

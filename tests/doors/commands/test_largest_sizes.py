@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from crosscheck.cli import main as crosscheck
-from mbref import simulate
+from mbref import find_scene, simulate
 from mbref.cli import main
+from mbref.equations.model import Model
 from mbref.input_error import InputError
 from mbref.scene import Body, Revolute, Scene
 
@@ -35,7 +37,7 @@ COMMANDS = [
 def test_chain_of_too_many_loops_is_refused(program, words, chain, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert program([*words, f"{chain}[{HUGE}]"]) == 2
-    assert f"{chain}[{HUGE}]: must have at most 3000 loops" in capsys.readouterr().err
+    assert f"{chain}[{HUGE}]: must have at most 10000 loops" in capsys.readouterr().err
     assert not [*tmp_path.iterdir()]
 
 
@@ -73,6 +75,14 @@ def test_ensemble_of_more_states_than_memory_holds_is_refused_with_the_largest_c
     """A four-bar has three bodies, and a run 101 samples."""
     assert main(["ensemble", "four_bar", "--vary", "gravity[1]=0:1", "--count", "1000000"]) == 2
     assert f"--count: must be at most {STATES // (3 * 101)}" in capsys.readouterr().err
+
+
+def test_full_matrix_beyond_the_memory_of_the_machine_is_refused_with_its_size():
+    """The blocks of a thousand million poses take no memory, because they are one block."""
+    structure = Model(find_scene("four_bar")).structure
+    one = np.zeros(structure.entry_columns.shape)
+    with pytest.raises(InputError, match=r"a full matrix of 19 constraint rows and 18 columns takes .* GB"):
+        structure.dense(np.broadcast_to(one, (10**9, *one.shape)))
 
 
 @pytest.mark.slow

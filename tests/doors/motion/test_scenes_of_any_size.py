@@ -110,8 +110,8 @@ def test_legs_keep_their_lengths_and_their_energy(method):
     [
         ("lattice[3]", r"its size in brackets, lattice\[N,M\]"),
         ("strandbeest[1,2]", r"its size in brackets, strandbeest\[N\]"),
-        ("strandbeest[2999]", "at most 3000 loops"),
-        ("lattice[99,99]", "at most 3000 loops"),
+        ("strandbeest[9999]", "at most 10000 loops"),
+        ("lattice[199,199]", "at most 10000 loops"),
         ("strandbest", "did you mean 'strandbeest'"),
     ],
 )

@@ -1,0 +1,21 @@
+"""Refusal of arrays that the memory of this machine does not hold, before they are made."""
+
+from __future__ import annotations
+
+import os
+
+from mbref.input_error import InputError
+
+SHARE = 0.5  # of the memory; a decomposition needs the matrix twice
+
+
+def refuse_beyond_memory(size: int, what: str) -> None:
+    """Raise InputError if arrays of ``size`` bytes exceed half of the memory of this machine.
+
+    ``what`` is the subject of the sentence. Systems that do not say how much memory they have refuse nothing.
+    """
+    if not hasattr(os, "sysconf"):
+        return
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if size > SHARE * memory:
+        raise InputError(f"{what} takes {size / 1e9:.3g} GB, and this machine has {memory / 1e9:.3g} GB")
