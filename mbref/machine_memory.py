@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import math
 import os
 
 from mbref.input_error import InputError
@@ -14,8 +16,13 @@ def refuse_beyond_memory(size: int, what: str) -> None:
 
     ``what`` is the subject of the sentence. Systems that do not say how much memory they have refuse nothing.
     """
-    if not hasattr(os, "sysconf"):
-        return
-    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    if size > SHARE * memory:
+    if size > SHARE * (memory := _memory()):
         raise InputError(f"{what} takes {size / 1e9:.3g} GB, and this machine has {memory / 1e9:.3g} GB")
+
+
+@functools.cache
+def _memory() -> float:
+    """Return the memory of this machine in bytes, infinite if the system does not say it."""
+    if not hasattr(os, "sysconf"):
+        return math.inf
+    return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
