@@ -29,7 +29,8 @@ run_isolated(sys.argv[1], resting(), [0.0, 1.0], Setting("plain", {}), 60.0)
 sys.stdin.read()
 """
 PROGRAM = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it in jobs in the background
 from crosscheck.processes.program import run_program
 sys.exit(run_program("waiting_module", sys.argv[1:]))
 """
