@@ -44,13 +44,13 @@ TOO_LONG = 20.0  # s of a run; no finer setting is tried
 MOST_DENSE = 100  # bodies up to which MuJoCo's dense Jacobian is tried: its cost is cubic
 OFFSET = 0.1  # m from the plane of a doubled hinge
 ENGINES = ("mbref", "mujoco")
-SCENES = (
-    *(f"four_bar_chain[{n}]" for n in (10, 40, 100, 200, 500, 1000, 2000)),
-    *(f"slider_crank_chain[{n}]" for n in (10, 40, 100, 200)),
-    *(f"lattice[{n},{n}]" for n in (3, 4, 6, 10)),
-    *(f"strandbeest[{n}]" for n in (1, 4, 12, 30, 60, 120)),
-    *(f"doubled_hinges[{n}]" for n in (10, 40, 100)),
-    *(f"sarrus_stack[{n}]" for n in (1, 10, 20, 40)),
+SCENES = (  # larger ones by their names, such as four_bar_chain[2000]
+    *(f"four_bar_chain[{n}]" for n in (10, 40, 100, 200)),
+    *(f"slider_crank_chain[{n}]" for n in (10, 40, 100)),
+    *(f"lattice[{n},{n}]" for n in (3, 6, 10)),
+    *(f"strandbeest[{n}]" for n in (4, 12, 30, 60)),
+    *(f"doubled_hinges[{n}]" for n in (40, 100)),
+    *(f"sarrus_stack[{n}]" for n in (10, 40)),
 )
 
 
