@@ -6,6 +6,7 @@ from crosscheck.engines.compiled import run as integrators
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method
 from mbref.stepping.preparation import kernels_of
+from mbref.taylor.driven import follow_drivers
 from mbref.taylor.preparation import KERNELS_OF_SERIES
 
 METHODS = (
@@ -26,7 +27,7 @@ def prepare(backwards: bool = False) -> None:
     Processes that begin at the two ends share the work.
     """
     general = dict.fromkeys(kernel for name in METHODS for kernel in kernels_of(Method.parse(name)))
-    kernels = [*general, *KERNELS_OF_SERIES]
+    kernels = [*general, *KERNELS_OF_SERIES, follow_drivers]
     prepare_all(kernels[::-1] if backwards else kernels)
 
 

@@ -1,7 +1,8 @@
 """Preparation of the series: its kernels, compiled or loaded before the clock of a run starts.
 
 Two processes share the work: one begins with the first kernel, the other one with the last kernel. Neighbours
-call common helpers, which each process compiles for itself.
+call common helpers, which each process compiles for itself. The first run whose motion drivers prescribe
+compiles ``driven.follow_drivers``, which takes long.
 """
 
 from __future__ import annotations
@@ -15,13 +16,12 @@ from mbref.taylor.crossing.long_crossing import (
     end_crossing,
     put_state_along,
 )
-from mbref.taylor.driven import follow_drivers
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import CALLED
 
 FROM_PYTHON = (
     complete_samples, enter_series, put_state_along, begin_crossing, end_crossing, continue_crossing,
-    cross_position, advance_series, follow_drivers,
+    cross_position, advance_series,
 )  # fmt: skip
 MIDDLE = len(CALLED) // 2
 KERNELS_OF_SERIES = *CALLED[:MIDDLE], *FROM_PYTHON, *CALLED[MIDDLE:]

@@ -42,6 +42,7 @@ class SeriesStepper:
         self._decide_rank()
         self._options = series_options(run)
         self._take = follow_drivers if self._options.follows_drivers else advance_series
+        self._take.prepare()  # before the clock of the run
         self.geometry = geometry_of(run.model, run.start, self._moving, bool(self._options.follows_drivers))
         self.polynomials = self.geometry.polynomials(run.model)
         self._pooled = acquire_memory(run, self.geometry, self.polynomials, self._options.accurate_order)
