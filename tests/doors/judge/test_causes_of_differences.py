@@ -205,24 +205,6 @@ def test_the_cause_of_a_difference_is_named_alone(
     assert says in explanation.sentence and explanation.remains < FITTED
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (faster_clock, "all columns: the clock of the table is fast by 0.0001 of the time"),
-        (later, "all columns: later by 0.0225 s"),
-    ],
-)
-def test_a_clock_is_named_where_a_load_is_switched(
-    change: Callable[[Scene, Table], Table], says: str
-) -> None:
-    """Forces and accelerations leap where the motor is switched, also in the table of the other clock."""
-    (found,) = crosscheck.judge_motion(
-        switched_motor(), change(switched_motor(), known("switched_motor"))
-    ).explanations
-    assert found.sentence == says and found.remains < 1e-6
-
-
 def exchanged_columns(*pairs: tuple[str, str]) -> Table:
     """Return columns of the double pendulum of which pairs are exchanged."""
     table = known("double_pendulum")
