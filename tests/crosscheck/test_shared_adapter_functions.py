@@ -11,7 +11,7 @@ import pytest
 from crosscheck.engines.compiler import Compiler, NoLibrary
 from crosscheck.engines.fixed_steps import unended_piece
 from crosscheck.engines.geometry import in_body, point_in_body
-from crosscheck.engines.sampling import Counts, Failed, Sample, rk4, run_through
+from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.refusals import Owner
 from mbref.scene import (
     Body,
@@ -54,29 +54,6 @@ def test_world_vectors_and_points_are_given_in_a_body_s_axes():
 # --- steps ------------------------------------------------------------------------------------------------
 
 
-def test_rk4_corrects_each_state_and_fails_if_it_is_not_finite():
-    """A correction adds 1 after each of two steps; a state that becomes infinite at 0.5 s ends the run."""
-    settled: list[float] = []
-
-    def settle(t: float, y: np.ndarray) -> np.ndarray:
-        settled.append(t)
-        return y + 1.0
-
-    assert rk4(lambda t, y: 0 * y, settle, np.zeros(1), 0.0, 1.0, 0.5, Counts())[0] == 2.0
-    assert settled == [0.5, 1.0]
-    with pytest.raises(Failed, match=r"not finite after the step from 0\.5 s") as caught:
-        rk4(
-            lambda t, y: y + (math.inf if t > 0.5 else 0.0),
-            lambda t, y: y,
-            np.ones(1),
-            0.0,
-            1.0,
-            0.5,
-            Counts(),
-        )
-    assert caught.value.outcome is Outcome.NOT_FINITE and caught.value.t == 0.5
-
-
 def test_switched_and_tabulated_loads_are_refused_for_steps_that_cannot_end_there():
     """A factor that is smooth over the motion needs no end of a step."""
     table = Factor(table=((0.0, 0.0), (1.0, 1.0), (2.0, 3.0), (3.0, 4.0)))
@@ -99,26 +76,6 @@ def sampled(t: float, **parts: Any) -> Sample:
 
 
 LABELS = {"engine": "e", "version": "1", "method": "m", "settings": {}}
-
-
-def test_run_advances_from_sample_to_sample_and_stores_states_and_costs():
-    """Samples at 0, 0.5 and 2 s: two intervals are advanced; states and reactions are functions of time."""
-    moved: list[tuple[float, float]] = []
-    found = run_through(
-        scene(),
-        np.array([0.0, 0.5, 2.0]),
-        lambda t0, t1: moved.append((t0, t1)),
-        lambda t: sampled(t, reactions={"H": np.full(6, t)}),
-        Counts(3, 2, 1),
-        0.25,
-        LABELS,
-    )
-    assert moved == [(0.0, 0.5), (0.5, 2.0)]
-    assert found.outcome is Outcome.COMPLETED and (found.t_end, found.message) == (2.0, "")
-    assert found.position[:, 0, 0].tolist() == [0.0, 0.5, 2.0] and found.bodies == ("b",)
-    assert found.reactions["H"][:, 5].tolist() == [0.0, 0.5, 2.0]
-    cost = found.cost
-    assert (cost.build_seconds, cost.steps, cost.rejected, cost.rhs) == (0.25, 3, 2, 1) and cost.seconds >= 0
 
 
 def test_run_that_fails_keeps_its_samples_and_states_the_reason():
