@@ -13,7 +13,10 @@ from typing import NamedTuple
 import numpy as np
 
 HUB = 30  # rows on a body from which it may be split
-ROWS_ON_COPY = 12  # rows on a copy: as many as its links have in space
+ROWS_ON_COPY = 12  # least number of rows on a copy: as many as its links have in space
+# rows on a body up to which copies are so small; copies of a body with more rows: pivots of rows fall with
+# the mass of a copy, to 3e-4 of their squares at 240 rows, and would seem dependent on more copies
+MOST_FINE_ROWS, LARGE_COPIES = 250, 5
 
 
 class Pattern(NamedTuple):
@@ -74,7 +77,8 @@ def _split(pattern: Pattern, on_hub: np.ndarray, label: np.ndarray) -> Pattern:
     starts = np.flatnonzero(np.diff(label[rows], prepend=-1))
     begin = np.repeat(starts, np.diff(np.append(starts, rows.size)))
     position = np.arange(rows.size)
-    copy_of = np.where(position - begin < ROWS_ON_COPY, begin, position) // ROWS_ON_COPY
+    on_copy = ROWS_ON_COPY if rows.size <= MOST_FINE_ROWS else -(-rows.size // LARGE_COPIES)
+    copy_of = np.where(position - begin < on_copy, begin, position) // on_copy
     copy_of = np.unique(copy_of, return_inverse=True)[1]
     count = int(copy_of.max()) + 1
     if count == 1:
