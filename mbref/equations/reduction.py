@@ -151,14 +151,18 @@ class Reduction:
         """Return the reduction whose factor has no copies of bodies (``linear_algebra.hubs``)."""
         return self._part(model, start, self.motion, of_body=0)
 
+    def with_few_copies(self, model: Model, start: Start) -> Reduction:
+        """Return the reduction whose factor has few copies of a body, so that they have more mass."""
+        return self._part(model, start, self.motion, few=True)
+
     def _part(
-        self, model: Model, start: Start, motion: MotionEquations | None, of_body: int = 6
+        self, model: Model, start: Start, motion: MotionEquations | None, of_body: int = 6, few: bool = False
     ) -> Reduction:
         if motion is None:
             return self
-        key = (*(array.tobytes() for array in motion), bytes(of_body))
+        key = (*(array.tobytes() for array in motion), bytes((of_body, few)))
         if key not in self.parts:
-            self.parts[key] = _of_stage(model, start, motion, self.decisions, of_body)
+            self.parts[key] = _of_stage(model, start, motion, self.decisions, of_body, few)
         return self.parts[key]
 
     def factor(self) -> SparseFactor:
@@ -214,14 +218,19 @@ def _found(model: Model, start: Start) -> Reduction:
 
 
 def _of_stage(
-    model: Model, start: Start, motion: MotionEquations, decisions: StructuralDecisions, of_body: int = 6
+    model: Model,
+    start: Start,
+    motion: MotionEquations,
+    decisions: StructuralDecisions,
+    of_body: int = 6,
+    few: bool = False,
 ) -> Reduction:
     """Return the reduction to these columns and entries; bodies may be split if they have ``of_body``
     columns each."""
     row, entry = np.nonzero(motion.entries)
     columns = model.entry_columns
     places = columns.shape[1] * row + entry
-    symbolic = symbolic_factorisation(row, columns[row, entry], places, motion.moving, of_body)
+    symbolic = symbolic_factorisation(row, columns[row, entry], places, motion.moving, of_body, few)
     velocities = np.unique(symbolic.column).astype(np.int64)
     return Reduction(
         primitives=primitives_with(model, np.flatnonzero(motion.entries.any(axis=1))),

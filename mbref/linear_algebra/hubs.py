@@ -14,9 +14,7 @@ import numpy as np
 
 HUB = 30  # rows on a body from which it may be split
 ROWS_ON_COPY = 12  # least number of rows on a copy: as many as its links have in space
-# rows on a body up to which copies are so small; copies of a body with more rows: pivots of rows fall with
-# the mass of a copy, to 3e-4 of their squares at 240 rows, and would seem dependent on more copies
-MOST_FINE_ROWS, LARGE_COPIES = 250, 5
+FEW_COPIES = 5  # of a body where rows on smaller copies seem dependent: pivots fall with the mass of a copy
 
 
 class Pattern(NamedTuple):
@@ -43,16 +41,16 @@ def _rows_of_bodies(pattern: Pattern, of_body: int) -> tuple[np.ndarray, np.ndar
     return body, np.unique(np.stack([body, pattern.row], axis=1), axis=0)
 
 
-def split_hubs(pattern: Pattern, of_body: int) -> Pattern | None:
-    """Return a pattern in which bodies with many rows are split, with ``of_body`` columns for a body; None if
-    no body has many rows."""
+def split_hubs(pattern: Pattern, of_body: int, few: bool = False) -> Pattern | None:
+    """Return a pattern in which bodies with many rows are split, with ``of_body`` columns for a body, into
+    many small copies or a ``few``; None if no body has many rows."""
     body, pairs = _rows_of_bodies(pattern, of_body)
     hubs = np.flatnonzero(np.bincount(pairs[:, 0]) >= HUB) if len(pairs) else pairs[:0, 0]
     if not hubs.size:
         return None
     label = _parts_without(hubs, pairs, pattern.rows)
     for hub in hubs.tolist():
-        pattern = _split(pattern, np.flatnonzero(body == hub), label)
+        pattern = _split(pattern, np.flatnonzero(body == hub), label, few)
         body = np.append(body, np.full(pattern.row.size - body.size, -1))
     return pattern
 
@@ -69,7 +67,7 @@ def _parts_without(hubs: np.ndarray, pairs: np.ndarray, rows: int) -> np.ndarray
     return label
 
 
-def _split(pattern: Pattern, on_hub: np.ndarray, label: np.ndarray) -> Pattern:
+def _split(pattern: Pattern, on_hub: np.ndarray, label: np.ndarray, few: bool) -> Pattern:
     """Return a pattern with copies of one body, whose numbers in D are ``on_hub``: connected parts stay on
     one copy if they are small."""
     rows = np.unique(pattern.row[on_hub])
@@ -77,7 +75,7 @@ def _split(pattern: Pattern, on_hub: np.ndarray, label: np.ndarray) -> Pattern:
     starts = np.flatnonzero(np.diff(label[rows], prepend=-1))
     begin = np.repeat(starts, np.diff(np.append(starts, rows.size)))
     position = np.arange(rows.size)
-    on_copy = ROWS_ON_COPY if rows.size <= MOST_FINE_ROWS else -(-rows.size // LARGE_COPIES)
+    on_copy = max(ROWS_ON_COPY, -(-rows.size // FEW_COPIES)) if few else ROWS_ON_COPY
     copy_of = np.where(position - begin < on_copy, begin, position) // on_copy
     copy_of = np.unique(copy_of, return_inverse=True)[1]
     count = int(copy_of.max()) + 1

@@ -27,16 +27,22 @@ MOST_UPDATES = 20_000_000  # of a factorisation; making the list of one takes ab
 
 
 def symbolic_factorisation(
-    row: np.ndarray, column: np.ndarray, entry: np.ndarray, active: np.ndarray, of_body: int = 0
+    row: np.ndarray,
+    column: np.ndarray,
+    entry: np.ndarray,
+    active: np.ndarray,
+    of_body: int = 0,
+    few: bool = False,
 ) -> Symbolic:
     """Return the symbolic factorisation of a pattern: row, column and place (k,) of each number of D.
 
     Places are indices into the flat constraint Jacobian; ``active`` (n,) selects the columns. If ``of_body``
-    columns belong to a body each, bodies may be split into copies. Scenes of one structure share the arrays
-    of their pattern, which are never changed. Raises InputError for a pattern that is too large.
+    columns belong to a body each, bodies may be split into copies, many or ``few``. Scenes of one structure
+    share the arrays of their pattern, which are never changed. Raises InputError for a pattern that is too
+    large.
     """
     indices = (np.asarray(array, dtype=np.int64).tobytes() for array in (row, column, entry))
-    return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes(), of_body.to_bytes(1, "little"))
+    return _of_pattern(*indices, np.asarray(active, dtype=bool).tobytes(), bytes((of_body, few)))
 
 
 @functools.lru_cache(maxsize=MOST_PATTERNS)
@@ -63,7 +69,7 @@ def _made(*given: bytes) -> Symbolic:
     kept, row = np.unique(row, return_inverse=True)
     own = np.flatnonzero(active)
     whole = Pattern(row, np.searchsorted(own, column), entry, own, kept.size)
-    pattern, (order, l_start, l_row) = _fewest_updates(whole, given[4][0])
+    pattern, (order, l_start, l_row) = _fewest_updates(whole, *given[4])
     row, column, entry, own, rows = pattern
     if (updates := _count(l_start)) > MOST_UPDATES:
         raise InputError(
@@ -99,9 +105,9 @@ def _made(*given: bytes) -> Symbolic:
 OrderAndFill = tuple[np.ndarray, np.ndarray, np.ndarray]  # order, first entries and rows of the columns of L
 
 
-def _fewest_updates(whole: Pattern, of_body: int) -> tuple[Pattern, OrderAndFill]:
+def _fewest_updates(whole: Pattern, of_body: int, few: int) -> tuple[Pattern, OrderAndFill]:
     """Return the pattern, with or without copies of bodies with many rows, that needs fewer updates."""
-    parted = split_hubs(whole, of_body) if of_body else None
+    parted = split_hubs(whole, of_body, bool(few)) if of_body else None
     if parted is None:
         return whole, _factor_pattern(whole)
     of_parted = _factor_pattern(parted)

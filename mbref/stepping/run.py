@@ -111,9 +111,10 @@ class Run:
             return reduction
         if method.formulation.is_sparse and not method.stabilisation.chooses_coordinates:
             reduction = reduction.of_steps(self.model, self.start)
-        blocks, has_copies = self._blocks, reduction.symbolic.link.size > 0
-        if has_copies and blocks is not None and not are_clear(self.model, blocks, reduction.factor()):
-            reduction = reduction.without_copies(self.model, self.start)
+        for coarser in (Reduction.with_few_copies, Reduction.without_copies):
+            blocks, has_copies = self._blocks, reduction.symbolic.link.size > 0
+            if has_copies and blocks is not None and not are_clear(self.model, blocks, reduction.factor()):
+                reduction = coarser(reduction, self.model, self.start)
         return reduction
 
     def begin_again(self) -> None:
