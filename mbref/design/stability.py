@@ -38,7 +38,8 @@ class Linear(NamedTuple):
 def linear_at(tangent: Tangent, away: np.ndarray) -> Linear:
     """Return the equations of small motions about a pose that may be ``away`` (f,) from the equilibrium."""
     (place, rate), (other_place, other_rate) = tangent.linear_part(), tangent.linear_part(OTHER_STEP)
-    inverse_steps = ROUNDINGS * EPSILON * tangent.sizes / DIFFERENCE_STEP
+    # nearly dependent rows magnify rounding by the inverse of their conditioning
+    inverse_steps = ROUNDINGS * EPSILON / tangent.conditioning * tangent.sizes / DIFFERENCE_STEP
     rounded = tangent.pushes[:, None] * inverse_steps
     place_errors = (
         CHANGES * np.abs(place - other_place) + rounded + np.abs(place) * inverse_steps / tangent.sizes
