@@ -8,7 +8,7 @@ import os
 
 from mbref.input_error import InputError
 
-SHARE = 0.5  # of the memory; a decomposition needs the matrix twice
+LARGEST_SHARE = 0.5  # of the memory; a decomposition needs the matrix twice
 
 
 def refuse_beyond_memory(size: int, what: str) -> None:
@@ -16,7 +16,7 @@ def refuse_beyond_memory(size: int, what: str) -> None:
 
     ``what`` is the subject of the sentence. Systems that do not say how much memory they have refuse nothing.
     """
-    if size > SHARE * (memory := _memory()):
+    if size > LARGEST_SHARE * (memory := _memory()):
         raise InputError(f"{what} takes {size / 1e9:.3g} GB, and this machine has {memory / 1e9:.3g} GB")
 
 

@@ -99,11 +99,13 @@ def test_ida_swings_a_torsion_spring_past_two_turns_as_the_closed_form() -> None
 
 def test_ida_stops_at_the_singular_position_of_a_driven_four_bar() -> None:
     """After a quarter turn at 124.8 rad/s its crank lies on the ground line. Measured: the run ends 2.6e-6 s
-    off this time, and its samples are off the truth by 2.9e-6 m or rad."""
+    off this time, and its samples are off the truth by 2.9e-6 m or rad. Rounding decides whether IDA's
+    iteration or its error test fails there."""
     scene = SCENES["four_bar"]()
     run = simulate(scene, 0.02, 1e-6, 21)
     singular = math.pi / 2 / 124.8
-    assert run.outcome is Outcome.NOT_CONVERGED and abs(run.t_end - singular) < MARGIN * 2.6e-6, run.message
+    assert run.outcome in (Outcome.NOT_CONVERGED, Outcome.STEP_FAILED), run.message
+    assert abs(run.t_end - singular) < MARGIN * 2.6e-6
     assert len(run.times) == 13 and error_of_samples(run, scene) < MARGIN * 2.9e-6
 
 

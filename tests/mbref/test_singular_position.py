@@ -73,6 +73,9 @@ def test_recorded_pose_of_a_flat_parallelogram_has_all_bodies_on_its_line():
     assert np.abs(run.crossings[0].position[:, 1]).max() < 1e-2
 
 
+FAILURES = ("LEFT_MOTION", "NOT_CONVERGED", "STEP_FAILED")  # rounding decides which one
+
+
 @pytest.mark.parametrize("method", CROSSING)
 @pytest.mark.parametrize("loop", LOOPS)
 def test_method_that_claims_to_cross_is_right_after_the_singular_position(loop, method):
@@ -86,7 +89,7 @@ def test_method_that_claims_to_cross_is_right_after_the_singular_position(loop, 
     if run.outcome.name == "COMPLETED":
         assert error < 1e-5
     else:
-        assert method != "taylor" and run.outcome.name in ("LEFT_MOTION", "NOT_CONVERGED"), run.message
+        assert method != "taylor" and run.outcome.name in FAILURES, run.message
 
 
 @pytest.mark.parametrize("method", ["alf-dual+none", "alf+baumgarte"])
