@@ -20,6 +20,7 @@ from mbref import rotations
 from mbref.equations.active_coordinates import STATES, random_states
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms
+from mbref.linear_algebra.connected_parts import connected_parts
 from mbref.scene_joints import Fixed
 
 ROUNDED_TERM = 1e-12  # entry or right-hand side / the largest of its kind, below which it is rounding
@@ -40,10 +41,7 @@ def motion_equations(
     """Return the part of the active columns (n,) and entries (m, width) that determines the motion; None if
     that is all of them."""
     plane = _plane(model, start, moving, entries)
-    columns = moving if plane is None else plane
-    inside = entries
-    if plane is not None:
-        inside = _of_columns(model, plane) & _nonzero(_terms(model, start, plane), entries)
+    columns, inside = plane or (moving, entries)
     kept = _without_repeated(model, start, columns, inside)
     if plane is None and kept[entries.any(axis=1)].all():
         return None
@@ -69,18 +67,20 @@ def _terms(model: Model, start: Start, columns: np.ndarray) -> Terms:
     return model.terms(times, q, v)
 
 
-def _plane(model: Model, start: Start, moving: np.ndarray, entries: np.ndarray) -> np.ndarray | None:
-    """Return the moving columns (n,) in the plane of a planar mechanism; None for other mechanisms, and if
-    all moving columns are in the plane."""
+def _plane(model: Model, start: Start, moving: np.ndarray, entries: np.ndarray) -> MotionEquations | None:
+    """Return the moving columns (n,) in the plane of a planar mechanism, and their entries; None for other
+    mechanisms, and if all moving columns are in the plane."""
     for normal in (2, 1, 0):
         plane = _columns_in_plane(model, start, normal)
         columns = plane & moving
         if not (moving & ~plane).any():
             return None
         if columns.any() and not start.v[~plane].any():
-            pairs = _locked_pairs(model, _terms(model, start, columns), plane, moving, entries)
+            terms = _terms(model, start, columns)
+            nonzero = _nonzero(terms, entries)
+            pairs = _locked_pairs(model, terms, plane, moving, entries, nonzero)
             if _hang_on_ground(model.nb, pairs)[moving.reshape(-1, 6).any(axis=1)].all():
-                return columns
+                return MotionEquations(columns, _of_columns(model, columns) & nonzero)
     return None
 
 
@@ -97,15 +97,21 @@ def _columns_in_plane(model: Model, start: Start, normal: int) -> np.ndarray:
 
 
 def _locked_pairs(
-    model: Model, terms: Terms, plane: np.ndarray, moving: np.ndarray, entries: np.ndarray
+    model: Model,
+    terms: Terms,
+    plane: np.ndarray,
+    moving: np.ndarray,
+    entries: np.ndarray,
+    nonzero: np.ndarray,
 ) -> np.ndarray:
     """Return the pairs (p, 2) of bodies that rows without entries in the plane lock to each other, at all of
     k states; none if these rows require a motion.
 
-    Arguments are the columns (n,) in the plane, the columns that can move, and the entries (m, width).
+    Arguments are the columns (n,) in the plane, the columns that can move, the entries (m, width), and which
+    of these are nonzero in the terms.
     """
-    inside, bodies = _of_columns(model, plane), model.structure.row_bodies
-    holding = ~(_nonzero(terms, entries) & inside).any(axis=1) & entries.any(axis=1)
+    bodies = model.structure.row_bodies
+    holding = ~(nonzero & _of_columns(model, plane)).any(axis=1) & entries.any(axis=1)
     for values in (terms.phi, terms.nu, terms.gamma):
         rounding = ROUNDED_TERM * max(1.0, np.abs(values).max(initial=0.0))
         if np.abs(values[:, holding]).max(initial=0.0) > rounding:
@@ -129,11 +135,7 @@ def _locked_pairs(
 
 def _hang_on_ground(nb: int, pairs: np.ndarray) -> np.ndarray:
     """Return which bodies (nb,) are connected to the ground by pairs (p, 2)."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
-    graph = csr_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(nb + 1, nb + 1))
-    label = connected_components(graph, directed=False)[1]
+    label = connected_parts(nb + 1, pairs)
     held: np.ndarray = label[:nb] == label[nb]
     return held
 
@@ -175,14 +177,10 @@ def _without_repeated(model: Model, start: Start, columns: np.ndarray, entries: 
 
 def _rigid_groups(model: Model) -> np.ndarray:
     """Return for each body (nb,) the first body to which fixed joints connect it."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     pairs = [joint.bodies for joint in model.scene.joint if isinstance(joint, Fixed)]
     ends = np.array([[model.index(name) for name in pair] for pair in pairs], dtype=int).reshape(-1, 2)
     ends = ends[(ends < model.nb).all(axis=1)]
-    graph = csr_array((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), shape=(model.nb, model.nb))
-    label = connected_components(graph, directed=False)[1]
+    label = connected_parts(model.nb, ends)
     first: np.ndarray = np.unique(label, return_index=True)[1][label]
     return first
 

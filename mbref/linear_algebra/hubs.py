@@ -12,6 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mbref.linear_algebra.connected_parts import connected_parts
+
 HUB = 30  # rows on a body from which it may be split
 ROWS_ON_COPY = 12  # least number of rows on a copy: as many as its links have in space
 FEW_COPIES = 5  # of a body where rows on smaller copies seem dependent: pivots fall with the mass of a copy
@@ -57,14 +59,9 @@ def split_hubs(pattern: Pattern, of_body: int, few: bool = False) -> Pattern | N
 
 def _parts_without(hubs: np.ndarray, pairs: np.ndarray, rows: int) -> np.ndarray:
     """Return the connected part (rows,) of the mechanism without hubs to which each row belongs."""
-    from scipy.sparse import csr_array
-    from scipy.sparse.csgraph import connected_components
-
     others = pairs[~np.isin(pairs[:, 0], hubs)]
     size = rows + int(pairs[:, 0].max()) + 1
-    graph = csr_array((np.ones(len(others)), (others[:, 1], rows + others[:, 0])), shape=(size, size))
-    label: np.ndarray = connected_components(graph, directed=False)[1][:rows]
-    return label
+    return connected_parts(size, others[:, ::-1] + [0, rows])[:rows]
 
 
 def _split(pattern: Pattern, on_hub: np.ndarray, label: np.ndarray, few: bool) -> Pattern:

@@ -98,9 +98,7 @@ def simulate(
     return _by(Method.parse(method) if isinstance(method, str) else method, scene, times, limits, progress)
 
 
-def _by(
-    method: Method, scene: Scene, times: np.ndarray, limits: Limits, progress: Callable[[float], None] | None
-) -> Motion:
+def _by(method: Method, scene: Scene, times: np.ndarray, limits: Limits, progress: ProgressCall) -> Motion:
     """Return the motion of a scene by a method."""
     run = checked_run(scene, method, times, limits)
     motion = finish_run(run, progress)
@@ -108,9 +106,7 @@ def _by(
     return motion
 
 
-def _by_default(
-    scene: Scene, times: np.ndarray, limits: Limits, progress: Callable[[float], None] | None
-) -> Motion:
+def _by_default(scene: Scene, times: np.ndarray, limits: Limits, progress: ProgressCall) -> Motion:
     """Return the motion by the default method; by `taylor` if the sparse method ends early, as at a singular
     position, and if limits require what only `taylor` has."""
     chosen = default_method(scene)
