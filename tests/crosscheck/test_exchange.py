@@ -195,7 +195,7 @@ GEAR = '<joint name="gear" joint1="A" joint2="D" polycoef="0 1 0.5 0 0"/>'
     ],
 )
 def test_a_part_that_changes_the_motion_is_refused_unless_it_is_left_out(old, new, kind, says, tmp_path):
-    """Without the part, the scene is that of the unchanged four-bar."""
+    """Without the part, the scene equals the unchanged four-bar."""
     path = changed(tmp_path, old, new)
     with pytest.raises(SceneError, match=f"{says}.*it changes the motion; --without {kind} leaves it out"):
         formats.read(path)

@@ -51,7 +51,7 @@ def test_exact_motions_of_a_scene_pass_with_and_without_accelerations(name):
 
 @pytest.mark.parametrize("name", MODELS)
 def test_a_mass_off_by_five_percent_is_reported_as_a_change_of_a_velocity(name):
-    """Of a linear or of an angular one."""
+    """The velocity is linear or angular, whichever differs first."""
     scene = MODELS[name]
     heavier = with_body(scene, -1, mass=scene.body[-1].mass * 1.05)
     found = gate(scene, [short_run(scene), short_run(heavier, gate_times(scene))])
@@ -60,7 +60,7 @@ def test_a_mass_off_by_five_percent_is_reported_as_a_change_of_a_velocity(name):
 
 @pytest.mark.parametrize("name", ["planar_slider_crank", "four_bar_gravity", "pendulum_all"])
 def test_an_inertia_off_by_five_percent_is_reported_as_a_change_of_a_velocity(name):
-    """Of a linear or of an angular one."""
+    """The velocity is linear or angular, whichever differs first."""
     scene = ALL[name]
     other = with_body(scene, 0, inertia=np.array(scene.body[0].inertia) * 1.05)
     found = gate(scene, [short_run(scene), short_run(other, gate_times(scene))])

@@ -100,7 +100,7 @@ def test_run_that_fails_keeps_its_samples_and_states_the_reason():
 
 # --- compilers and code -----------------------------------------------------------------------------------
 def test_compiler_is_the_environment_variable_s_or_the_first_installed(monkeypatch):
-    """Of programs "one" and "two" only "two" is installed; an empty variable CC counts as none."""
+    """Only the program "two" is installed, not "one". An empty variable CC counts as none."""
     compiler = Compiler("C", "CC", ("one", "two"))
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr("shutil.which", lambda name: None if name == "one" else f"/bin/{name}")

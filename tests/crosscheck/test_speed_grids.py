@@ -53,7 +53,7 @@ def test_speed_grid_recognises_scenes_with_singular_positions(grids):
 
 
 def test_family_that_misses_a_level_by_little_is_named(grids):
-    """Of levels 1e-6 and 1e-9, "tuned" reaches 1.3e-9 at best; "rk4" and "forward" reach both."""
+    """The levels are 1e-6 and 1e-9. "tuned" reaches 1.3e-9 at best; "rk4" and "forward" reach both."""
     rows = [
         {"engine": "p", "family": "tuned", "cost": [0.1, math.inf], "least": (1.3e-9, 0.5)},
         {"engine": "p", "family": "rk4", "cost": [0.3, 2.0], "least": (1e-10, 3.0)},

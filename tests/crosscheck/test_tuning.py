@@ -72,7 +72,7 @@ def test_cheapest_step_is_found_inside_and_beyond_the_grid_of_steps(level):
 
 
 def test_cheapest_setting_is_no_more_accurate_than_needed():
-    """Of settings within 1e-3 it has the least work, and an error above 1e-4; finer settings are not run."""
+    """It has the least work of settings within 1e-3. Its error exceeds 1e-4; finer settings are not run."""
     engine = Modelled(rk4=(4.0, 1.0, 1e-3, 1.0))
     done = tuned(engine.cases(0.1, 0.01, 0.001), 1e-3, engine)
     [cheapest] = done.reached
@@ -127,7 +127,7 @@ def test_cheap_integrator_of_crosscheck_does_not_end_the_search_of_engine_famili
 
 
 def test_family_that_timed_out_is_abandoned():
-    """Its first run times out; no other is made."""
+    """The first run times out, and no other run is made."""
     engine = Modelled(slow=(4.0, 1.0, 1.0, 1.0))
     engine.record = lambda case, record=engine.record: {**record(case), "outcome": "TIMED_OUT"}  # type: ignore
     assert not found(engine, 1e-9, 0.1, 0.01) and len(engine.asked) == 1, engine.asked
