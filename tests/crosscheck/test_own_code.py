@@ -51,6 +51,19 @@ def test_shown_mjcf_and_python_set_the_options_of_a_mujoco_run(family, options):
     assert np.allclose(model.dof_invweight0, factor * before[1], rtol=1e-14)
 
 
+def test_family_defaults_of_mujoco_leaves_every_option_as_the_library_has_it():
+    mujoco = pytest.importorskip("mujoco")
+    from crosscheck.engines.mujoco.simulation import Simulation
+
+    library = mujoco.MjModel.from_xml_string(MODEL.format('<option timestep="5e-4"/>'))
+    own = Simulation(SCENE.with_(gravity=library.opt.gravity), Setting("defaults", {"step": 5e-4})).model
+    for name in (name for name in dir(library.opt) if not name.startswith("_")):
+        given, there = getattr(own.opt, name), getattr(library.opt, name)
+        assert callable(there) or np.array_equal(given, there), name
+    assert np.array_equal(own.eq_solref[0], library.eq_solref[0])
+    assert np.array_equal(own.eq_solimp[0], library.eq_solimp[0])
+
+
 @pytest.mark.parametrize("name", ["planar_slider_crank", "spatial_slider_crank"])
 @pytest.mark.parametrize("family", ["defaults", "trapezoidal", "alpha"])
 def test_shown_python_sets_the_settings_of_an_exudyn_run(name, family):

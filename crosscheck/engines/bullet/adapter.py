@@ -23,7 +23,8 @@ from mbref.trajectory import Trajectory
 ITERATED, DEFAULTS = "iterated", "defaults"
 CLOSES = ("spherical", "revolute")
 FAMILIES = {
-    ITERATED: "1000 iterations; a cut hinge closed by two points, in a planar mechanism by one",
+    ITERATED: "1000 iterations, whatever the residual; a cut hinge closed by two points, in a planar "
+    "mechanism by one",
     DEFAULTS: "50 iterations, the library's default; a cut hinge closed by two points",
 }
 OPTIONS = STEP | {"iterations": "iterations of the solver in a step"}

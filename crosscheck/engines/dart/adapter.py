@@ -26,7 +26,8 @@ CLOSES = ("spherical", "revolute")
 FAMILIES = {
     terms.FAMILY: terms.ABOUT,
     DEFAULTS: "DART's step and its own constraint for every cut joint, the library's parameters",
-    BALLS: "DART's step; cut hinges closed by ball constraints, half of a closure error removed in each step",
+    BALLS: "DART's step; cut hinges closed by ball constraints, half of a closure error removed in each "
+    "step; nothing falls asleep",
 }
 OPTIONS = STEP | {"erp": "fraction of a closure error that a step removes"} | terms.OPTIONS
 OWN_STEPS = {DEFAULTS: {"erp": 0.01}, BALLS: {"erp": 0.5}}

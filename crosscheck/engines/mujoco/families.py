@@ -41,15 +41,16 @@ COMPILED_BETA = 0.1, 10.0
 TOLERANCES, NEWTON_TURN = (1e-4, 1e-7, 1e-10, 1e-13), 0.6
 COMPILED_RTOLS = (1e-3, 1e-5, 1e-7, 1e-9, 1e-11)
 LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
+DENSE = "dense Jacobian, no islands"  # in all families but the first one
 FAMILIES = {
-    "defaults": "the library's own options",
-    "stock": "the stiffest documented closures (time constant two steps, impedance 0.9999), RK4",
-    "euler": "default closures, first-order integrator Euler",
-    "implicit": "default closures, first-order integrator implicit",
-    "implicitfast": "default closures, first-order integrator implicitfast; only where a load damps",
+    "defaults": "the library's own options; the time step alone is given",
+    "stock": f"the stiffest documented closures (time constant two steps, impedance 0.9999), RK4; {DENSE}",
+    "euler": "like stock, first-order integrator Euler",
+    "implicit": "like stock, first-order integrator implicit",
+    "implicitfast": "like stock, first-order integrator implicitfast; only where a load damps",
     "tuned": "the regulariser made negligible through invweight0, critically damped closures at five "
     "times the "
-    "fastest rate of the scene, RK4, Newton's method iterated to convergence",
+    f"fastest rate of the scene, RK4, Newton's method iterated to convergence; {DENSE}",
     "stiff": "the tuned model with the stiffest closures that are stable at the step",
     "forward": "the tuned model's accelerations (mj_forward) integrated by DOP853",
     "projected": "like forward; every accepted state is projected onto the closures",
@@ -148,9 +149,10 @@ def own_code(setting: Setting) -> str:
     if family in INTEGRATED_HERE:
         return ""
     step = options.get("step", DEFAULT_STEP)
-    flags, attributes = {"autoreset": "disable"}, {"timestep": f"{step!r}"}
+    attributes = {"timestep": f"{step!r}"}
     if family == "defaults":
-        return _option(attributes, flags)
+        return f'<option timestep="{step!r}"/>'
+    flags = {"autoreset": "disable"}
     integrator = STOCK.get(family, RK4).removeprefix("mjINT_")
     attributes |= {"integrator": NAMES.get(integrator, integrator), "jacobian": "dense"}
     flags["island"] = "disable"

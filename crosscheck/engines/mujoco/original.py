@@ -19,7 +19,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
-from crosscheck.engines.mujoco.warnings_off import without_warnings
+from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
@@ -145,7 +145,7 @@ class _Original:
         self.mujoco, self.model, self.counts = mujoco, read.original, Counts()
         self.groups = read.groups
         bits = mujoco.mjtDisableBit
-        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS", "AUTORESET"):
+        for name in ("CONTACT", "LIMIT", "FRICTIONLOSS"):
             self.model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
         _change(mujoco, self.model, setting.options)
         self.step = float(self.model.opt.timestep)
@@ -174,7 +174,8 @@ class _Original:
             mujoco.mj_step(model, self.between)
             model.opt.timestep = self.step
             self._count(1)
-        if not (np.isfinite(self.between.qpos).all() and np.isfinite(self.between.qvel).all()):
+        finite = np.isfinite(self.between.qpos).all() and np.isfinite(self.between.qvel).all()
+        if not finite or was_reset(mujoco, self.between):
             message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
             raise Failed(Outcome.NOT_FINITE, t0, message)
 

@@ -23,9 +23,10 @@ from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)
 FAMILIES = {
-    "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4",
-    "euler": "default closures, first-order integrator Euler",
-    "defaults": "the library's own options",
+    "stock": "closures as stiff as documented (time constant two steps, impedance 0.9999), RK4; dense "
+    "Jacobian",
+    "euler": "like stock, first-order integrator Euler",
+    "defaults": "the library's own options; the time step alone is given",
 }
 OWN_STEPS: dict[str, dict[str, float]] = {family: {} for family in FAMILIES}
 DEFAULT_STEPS = {"defaults": 2e-3}
@@ -61,8 +62,8 @@ class PortedModel:
         self.mujoco, self.built = mujoco, compiled(scene)
         self.model = model = self.built.model
         model.opt.timestep = setting.options["step"]
-        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         if setting.family != "defaults":
+            model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
             kind = mujoco.mjtIntegrator
             model.opt.integrator = kind.mjINT_EULER if setting.family == "euler" else kind.mjINT_RK4
             model.eq_solref[:], model.eq_solimp[:] = (2 * setting.options["step"], 1.0), STIFFEST

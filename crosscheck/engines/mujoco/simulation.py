@@ -26,7 +26,7 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.projection import projected
-from crosscheck.engines.mujoco.warnings_off import without_warnings
+from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, step_count
 from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.judge.time_functions import next_end
@@ -57,12 +57,12 @@ class Simulation:
 
     def _configure(self, setting: Setting, scene: Scene) -> None:
         model, options, mujoco = self.model, setting.options, self.mujoco
-        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         self.nominal = options.get("step", DEFAULT_STEP)
         model.opt.timestep = self.nominal
         self.step = self._fixed
         if setting.family == "defaults":
             return
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         model.opt.integrator = getattr(mujoco.mjtIntegrator, STOCK.get(setting.family, RK4))
         # sparse factors of MuJoCo 4.0.0 are wrong for some trees
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
@@ -144,7 +144,8 @@ class Simulation:
         except self.mujoco.FatalError as error:
             raise Failed(Outcome.STEP_FAILED, t, f"MuJoCo stopped after {t:.6g} s: {error}") from error
         self.data.time = t1
-        if not (np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()):
+        finite = np.isfinite(self.data.qpos).all() and np.isfinite(self.data.qvel).all()
+        if not finite or was_reset(self.mujoco, self.data):
             message = f"the state became infinite or NaN between {t0:.6g} s and {t1:.6g} s"
             raise Failed(Outcome.NOT_FINITE, t0, message)
 

@@ -61,8 +61,8 @@ class Simulation:
 
     def _configure(self, setting: Setting) -> None:
         pin, family = self.pin, setting.family
-        for closure in self.mechanism.closures:
-            root = BAUMGARTE / setting.options["step"] if family == "baumgarte" else 0.0
+        for closure in self.mechanism.closures if family == "baumgarte" else ():
+            root = BAUMGARTE / setting.options["step"]
             closure.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(root**2, 2 * root))
         self.closures = pin.StdVec_RigidConstraintModel()
         self.closures.extend(self.mechanism.closures)
