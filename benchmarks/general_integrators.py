@@ -17,7 +17,7 @@ from importlib import metadata
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.shared.initial_velocities import lacks_mass
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY
 from mbref.method import Method

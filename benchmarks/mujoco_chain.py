@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.engines.compiled import dop853
 from crosscheck.engines.mujoco.compiled_run import leave_out_unused
 from crosscheck.engines.mujoco.context import context
 from crosscheck.engines.mujoco.rates import rates
+from crosscheck.engines.shared.compiled import dop853
 
 STIFFEST = "0.9999 0.9999 0.001"
 UNUSED = " ".join(f'{name}="disable"' for name in ("island", "spring", "damper", "autoreset", "refsafe"))

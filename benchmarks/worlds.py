@@ -16,7 +16,7 @@ import numpy as np
 
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.ports import PortedModel
-from crosscheck.engines.warp_graphs import recorded
+from crosscheck.engines.shared.warp_graphs import recorded
 from crosscheck.findings.finding import FOLDER
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene
@@ -75,7 +75,7 @@ def newton(scene: Scene, worlds: int, count: int) -> Run:
     from crosscheck.engines.newton import solvers
     from crosscheck.engines.newton.adapter import JOINTS
     from crosscheck.engines.newton.model import Mechanism
-    from crosscheck.engines.spanning_tree import spanning_tree
+    from crosscheck.engines.shared.spanning_tree import spanning_tree
 
     mechanism = Mechanism(scene, spanning_tree(scene, JOINTS))
     builder = mechanism.newton.ModelBuilder(gravity=scene.gravity)

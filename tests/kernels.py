@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.engines.compiled import run as integrators
+from crosscheck.engines.shared.compiled import run as integrators
 from mbref.kernels.compilation import prepare_all
 from mbref.method import Method
 from mbref.stepping.preparation import kernels_of

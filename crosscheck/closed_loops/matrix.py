@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.closed_loops.records import REFUSED
 from crosscheck.engine import Owner, engine_names
-from crosscheck.engines.terms import FAMILY as TERMS
+from crosscheck.engines.shared.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.command import command
 from crosscheck.study.grid import Record

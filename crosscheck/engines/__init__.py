@@ -1,1 +1,1 @@
-"""Adapters of engines, one folder or file for each; the other modules are shared by several adapters."""
+"""Adapters of engines, one folder or file for each; `shared` has the parts that several adapters use."""

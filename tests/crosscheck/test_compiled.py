@@ -11,10 +11,10 @@ import pytest
 import scipy.integrate
 
 from crosscheck.engine import Engine, Setting, engine
-from crosscheck.engines.compiled import dop853
-from crosscheck.engines.compiled.calls import RATES
-from crosscheck.engines.compiled.run import MOST_STEPS
-from crosscheck.engines.planar_scene import planar_scene
+from crosscheck.engines.shared.compiled import dop853
+from crosscheck.engines.shared.compiled.calls import RATES
+from crosscheck.engines.shared.compiled.run import MOST_STEPS
+from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.judge.metrics import measure, violation_series
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.linalg import block_diag
 
-from crosscheck.engines.constraint_equations import Constraints, frames
-from crosscheck.engines.generalised_forces import Forces
+from crosscheck.engines.shared.constraint_equations import Constraints, frames
+from crosscheck.engines.shared.generalised_forces import Forces
 from crosscheck.engines.sundials.equations import Equations
 from crosscheck.judge import constraints
 from mbref import rotations

@@ -14,7 +14,7 @@ import pytest
 from crosscheck.closed_loops.mechanisms import FOLDER
 from crosscheck.conformance.relations import RELATIONS, unchanged
 from crosscheck.engine import Setting, engine, engine_names
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.truth import truth_for
 from mbref.scene import Scene

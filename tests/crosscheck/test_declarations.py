@@ -9,8 +9,8 @@ import pytest
 
 from crosscheck.conformance.features import BODY, JOINTS
 from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
-from crosscheck.engines.constraint_equations import Constraints
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.constraint_equations import Constraints
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.equations.joints import ROWS_OF, primitives_of
 from mbref.scene import JOINT_TYPES, Driver, JointFacts, Revolute, Scene

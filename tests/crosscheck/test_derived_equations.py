@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.engines.constraint_equations import frames as body_frames
-from crosscheck.engines.generalised_forces import Forces
-from crosscheck.engines.symbolic.equations import TreeEquations
-from crosscheck.engines.symbolic.symbols import NUMBERS
+from crosscheck.engines.shared.constraint_equations import frames as body_frames
+from crosscheck.engines.shared.generalised_forces import Forces
+from crosscheck.engines.shared.symbolic.equations import TreeEquations
+from crosscheck.engines.shared.symbolic.symbols import NUMBERS
 from mbref import rotations
 from mbref.scene import Body, Driver, Force, Moment, Revolute, Scene, Spherical, TorsionSpring, Translational
 

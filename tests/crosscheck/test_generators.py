@@ -15,10 +15,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from crosscheck.engine import GENERATORS, Owner, Setting, default_engines, engine
-from crosscheck.engines import kept
 from crosscheck.engines.casadi import library
-from crosscheck.engines.symbolic.equations import TreeEquations
-from crosscheck.engines.symbolic.symbols import NUMBERS
+from crosscheck.engines.shared import file_cache
+from crosscheck.engines.shared.symbolic.equations import TreeEquations
+from crosscheck.engines.shared.symbolic.symbols import NUMBERS
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
@@ -128,11 +128,14 @@ def test_a_file_in_the_cache_is_found_by_its_origin_unless_it_is_damaged(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert kept.kept("folder", "origin", ".txt") is None
-    path = kept.keep("folder", "origin", ".txt", lambda target: target.write_text("whole"))
-    assert kept.kept("folder", "origin", ".txt") == path and kept.kept("folder", "other", ".txt") is None
+    assert file_cache.stored("folder", "origin", ".txt") is None
+    path = file_cache.store("folder", "origin", ".txt", lambda target: target.write_text("whole"))
+    assert (
+        file_cache.stored("folder", "origin", ".txt") == path
+        and file_cache.stored("folder", "other", ".txt") is None
+    )
     path.write_text("damaged")
-    assert kept.kept("folder", "origin", ".txt") is None
+    assert file_cache.stored("folder", "origin", ".txt") is None
 
 
 def test_a_compiled_library_in_the_cache_is_used_by_another_process(

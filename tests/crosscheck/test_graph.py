@@ -7,9 +7,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.initial_velocities import initial_rates, twist_maps
-from crosscheck.engines.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Link, Tree, effective_mass, spanning_tree
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import (

@@ -11,7 +11,7 @@ import pytest
 from crosscheck.conformance.features import FACTORS, feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.files import FORMAT
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.energy import energy_drift
 from crosscheck.judge.gauss_motion import gauss_motion

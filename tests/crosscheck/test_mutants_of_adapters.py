@@ -148,8 +148,8 @@ def planted(name: str, defect: dict[str, str], folder: Path) -> Engine:
     shutil.copytree(FOLDER, copy, ignore=shutil.ignore_patterns("__pycache__"))
     for path in copy.rglob("*.py"):
         path.write_text(path.read_text().replace("crosscheck.engines", copy.name))
-    own = copy / name / f"{defect['file']}.py"
-    path = own if own.exists() else copy / f"{defect['file']}.py"
+    place = f"{defect['file'].replace('.', '/')}.py"
+    path = next(filter(Path.exists, (copy / name / place, copy / "shared" / place, copy / place)))
     source, text = path.read_text(), defect["text"]
     assert source.count(text) == 1, f"{path.name} has {source.count(text)} times {text!r}"
     path.write_text(source.replace(text, defect["instead"]))

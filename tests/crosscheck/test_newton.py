@@ -12,7 +12,7 @@ from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.newton.adapter import JOINTS
 from crosscheck.engines.newton.model import Mechanism
 from crosscheck.engines.newton.solvers import ALPHAS, FAMILIES
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_twists
 from crosscheck.judge.metrics import error_series

@@ -10,7 +10,7 @@ import pytest
 
 import mbref
 from crosscheck.engine import Setting, engine
-from crosscheck.engines.written import Written
+from crosscheck.engines.exudyn.settings_code import Written
 from crosscheck.study.verdict import Judged
 from mbref import find_scene
 

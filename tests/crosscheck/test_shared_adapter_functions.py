@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.engines.compiler import Compiler, NoLibrary
-from crosscheck.engines.fixed_steps import unended_piece
-from crosscheck.engines.geometry import in_body, point_in_body
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.compiler import Compiler, NoLibrary
+from crosscheck.engines.shared.fixed_steps import unended_piece
+from crosscheck.engines.shared.geometry import in_body, point_in_body
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.refusals import Owner
 from mbref.scene import (
     Body,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import DOP853
 
-from crosscheck.engines.sampling import Adaptive, Counts, Failed, rk4, step_count
+from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, rk4, step_count
 from mbref.trajectory import Outcome
 
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.bullet.model import STRONGEST, Mechanism
-from crosscheck.engines.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.pieces import EVERYTHING
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
+from crosscheck.engines.shared.pieces import EVERYTHING
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

@@ -1,7 +1,7 @@
 """CasADi: generated C code for a mechanism's equations in joint coordinates, integrated by a compiled DOP853.
 
 CasADi eliminates common subexpressions. A C compiler optimises this code together with the integrator for
-this machine. The step control equals the step control of ``crosscheck.engines.compiled.dop853``.
+this machine. The step control equals the step control of ``crosscheck.engines.shared.compiled.dop853``.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.casadi.library import library, why_not
-from crosscheck.engines.driver_motion import stated_rate
-from crosscheck.engines.sampling import Failed
-from crosscheck.engines.symbolic.generator import RTOL, Generator, equations_of, sweep
+from crosscheck.engines.shared.driver_motion import stated_rate
+from crosscheck.engines.shared.sampling import Failed
+from crosscheck.engines.shared.symbolic.generator import RTOL, Generator, equations_of, sweep
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 

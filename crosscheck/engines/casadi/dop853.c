@@ -1,5 +1,5 @@
 /* DOP853 around generated rates, compiled with them into one piece: N numbers of a state, tableau and step control
-   as in crosscheck/engines/compiled/dop853.py.  Included after RATES, SETTLE, STAGES, A, B, C, E3, E5. */
+   as in crosscheck/engines/shared/compiled/dop853.py.  Included after RATES, SETTLE, STAGES, A, B, C, E3, E5. */
 #include <math.h>
 #include <stdint.h>
 #include <string.h>

@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines import kept
-from crosscheck.engines.compiled import dop853
-from crosscheck.engines.compiler import C, NoLibrary
-from crosscheck.engines.symbolic.generator import equations_of, origin
-from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
+from crosscheck.engines.shared import file_cache
+from crosscheck.engines.shared.compiled import dop853
+from crosscheck.engines.shared.compiler import C, NoLibrary
+from crosscheck.engines.shared.symbolic.generator import equations_of, origin
+from crosscheck.engines.shared.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 
 FOLDER = "casadi"  # name of the folder in the cache
@@ -50,7 +50,7 @@ def why_not() -> str:
 def library(scene: Scene, beta: float) -> ctypes.CDLL:
     """Return the compiled integrator with the rates and the projection of a state; raises NoLibrary."""
     made_of = _origin(scene, beta)
-    path = kept.made_once(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
+    path = file_cache.made_once(FOLDER, made_of, ".so", lambda target: _compile(_source(scene, beta), target))
     return ctypes.CDLL(str(path))
 
 

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines import terms
 from crosscheck.engines.dart.model import Mechanism
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.pieces import EVERYTHING
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared import terms
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
+from crosscheck.engines.shared.pieces import EVERYTHING
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
 DEFAULTS, BALLS = "defaults", "balls"

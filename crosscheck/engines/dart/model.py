@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.fixed_steps import held_points
-from crosscheck.engines.geometry import unit
-from crosscheck.engines.initial_velocities import initial_rates
-from crosscheck.engines.joint_coordinates import joint_coordinates, rotation_vector
-from crosscheck.engines.pieces import Piece, assembled
-from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
-from crosscheck.engines.terms import Terms
-from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.shared.fixed_steps import held_points
+from crosscheck.engines.shared.geometry import unit
+from crosscheck.engines.shared.initial_velocities import initial_rates
+from crosscheck.engines.shared.joint_coordinates import joint_coordinates, rotation_vector
+from crosscheck.engines.shared.pieces import Piece, assembled
+from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
+from crosscheck.engines.shared.terms import Terms
+from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 NEGLIGIBLE = 1e-24  # mass of auxiliary bodies in chains of joints / mass of the links

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines import terms
 from crosscheck.engines.drake.model import Mechanism
-from crosscheck.engines.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.pieces import EVERYTHING
-from crosscheck.engines.sampling import Failed
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared import terms
+from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
+from crosscheck.engines.shared.pieces import EVERYTHING
+from crosscheck.engines.shared.sampling import Failed
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.scene import Scene
 from mbref.trajectory import Outcome
 

@@ -14,15 +14,15 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.driver_motion import fastest_rate
 from crosscheck.engines.exudyn.dynamic import Motion, integrate, step_count
 from crosscheck.engines.exudyn.extrapolation import RICHARDSON, extrapolate
 from crosscheck.engines.exudyn.joints import SUPPORTS
 from crosscheck.engines.exudyn.model import build
 from crosscheck.engines.exudyn.reactions import reactions
+from crosscheck.engines.exudyn.settings_code import Written
 from crosscheck.engines.exudyn.static import drive
-from crosscheck.engines.fixed_steps import unended_piece
-from crosscheck.engines.written import Written
+from crosscheck.engines.shared.driver_motion import fastest_rate
+from crosscheck.engines.shared.fixed_steps import unended_piece
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from crosscheck.linearising import Linearising

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.geometry import joint_frame as frame_along
-from crosscheck.engines.geometry import unit
+from crosscheck.engines.shared.geometry import joint_frame as frame_along
+from crosscheck.engines.shared.geometry import unit
 from crosscheck.refusals import FACTOR
 from mbref.scene import LOAD_TYPES, Joint
 

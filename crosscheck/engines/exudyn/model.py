@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.driver_motion import motion, moving
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
-from crosscheck.engines.geometry import unit
+from crosscheck.engines.shared.driver_motion import motion, moving
+from crosscheck.engines.shared.geometry import unit
 from crosscheck.judge.constraints import initial_poses, initial_twists
 from crosscheck.judge.joint_coordinates import coordinate_jacobian
 from mbref import rotations

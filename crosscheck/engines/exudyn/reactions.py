@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
-from crosscheck.engines.geometry import unit
+from crosscheck.engines.shared.geometry import unit
 from mbref import rotations
 from mbref.scene import GROUND, Joint, Scene
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.driver_motion import motion
 from crosscheck.engines.exudyn.dynamic import Motion, finite, said, step_count
 from crosscheck.engines.exudyn.model import System, build
+from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome

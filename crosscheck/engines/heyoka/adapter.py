@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines import kept
-from crosscheck.engines.sampling import Failed
-from crosscheck.engines.symbolic.generator import RTOL, Generator, equations_of, origin, sweep
-from crosscheck.engines.symbolic.symbols import Symbol, bare, symbolic
+from crosscheck.engines.shared import file_cache
+from crosscheck.engines.shared.sampling import Failed
+from crosscheck.engines.shared.symbolic.generator import RTOL, Generator, equations_of, origin, sweep
+from crosscheck.engines.shared.symbolic.symbols import Symbol, bare, symbolic
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Outcome, Trajectory
 
@@ -76,7 +76,7 @@ def _integrator(scene: Scene, rtol: float) -> Any:
     import heyoka
 
     made_of = origin(scene, repr(rtol), heyoka.__version__, platform.node(), Path(__file__).read_text())
-    path = kept.made_once(FOLDER, made_of, ".pickle", lambda target: _write(target, _made(scene, rtol)))
+    path = file_cache.made_once(FOLDER, made_of, ".pickle", lambda target: _write(target, _made(scene, rtol)))
     return pickle.loads(path.read_bytes())
 
 

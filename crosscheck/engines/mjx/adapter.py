@@ -14,10 +14,10 @@ from importlib import import_module
 from typing import Any
 
 from crosscheck.engine import Setting
-from crosscheck.engines import kept
 from crosscheck.engines.mujoco.ports import FAMILIES, OWN_STEPS, Port, PortedModel
-from crosscheck.engines.own_steps import Steps
-from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.shared import file_cache
+from crosscheck.engines.shared.own_steps import Steps
+from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 SINGLE = "stock, single"
@@ -51,7 +51,7 @@ def _mjx(is_single: bool = False) -> Any:
     config.update("jax_platforms", "cpu")
     if not config.jax_compilation_cache_dir:
         with contextlib.suppress(OSError):  # without the folder, no code is stored
-            (folder := kept.cache("mjx")).mkdir(parents=True, exist_ok=True)
+            (folder := file_cache.cache("mjx")).mkdir(parents=True, exist_ok=True)
             config.update("jax_compilation_cache_dir", str(folder))
     from mujoco import mjx
 
@@ -87,7 +87,7 @@ class _World:
 
         self.stepped = _stepped(is_single)
         self.stepped(self.model, self.data, 0)  # compiles the code before the timed run
-        kept.remove_oldest(kept.cache("mjx"))
+        file_cache.remove_oldest(file_cache.cache("mjx"))
 
     def begin(self, h: float) -> None:
         """Set the length of steps to h (s)."""

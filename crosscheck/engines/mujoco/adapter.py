@@ -13,8 +13,6 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines.driver_motion import fastest_rate
-from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.mujoco import compiled_run, linearised, original
 from crosscheck.engines.mujoco.families import (
     COMPILED,
@@ -27,8 +25,10 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import SUPPORTS
 from crosscheck.engines.mujoco.simulation import Simulation
-from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.sampling import run_through
+from crosscheck.engines.shared.driver_motion import fastest_rate
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.planar_scene import planar_scene
+from crosscheck.engines.shared.sampling import run_through
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

@@ -11,15 +11,6 @@ import math
 from numba import carray
 from numba.extending import register_jitable
 
-from crosscheck.engines.compiled.calls import (
-    c_function,
-    call_with_three,
-    call_with_three_and_real,
-    call_with_two,
-    integers,
-    reals,
-    small_integers,
-)
 from crosscheck.engines.mujoco.context import (
     CENTRES,
     CLOSURES,
@@ -46,6 +37,15 @@ from crosscheck.engines.mujoco.context import (
     WORK,
 )
 from crosscheck.engines.mujoco.rates import SIGNATURE, put
+from crosscheck.engines.shared.compiled.calls import (
+    c_function,
+    call_with_three,
+    call_with_three_and_real,
+    call_with_two,
+    integers,
+    reals,
+    small_integers,
+)
 
 ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
 CLOSED = 1e-13  # m and rad; residual at which Newton's method ends

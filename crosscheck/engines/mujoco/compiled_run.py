@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from crosscheck.engines.initial_velocities import may_move_freely
 from crosscheck.engines.mujoco.families import NEWTON, PROJECTED_COMPILED
 from crosscheck.engines.mujoco.model import Compiled
-from crosscheck.engines.sampling import Sample
+from crosscheck.engines.shared.initial_velocities import may_move_freely
+from crosscheck.engines.shared.sampling import Sample
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -48,8 +48,8 @@ def leave_out_unused(mujoco: Any, model: Any) -> None:
 
 def prepare() -> None:
     """Compile the steppers and the C functions, or load them from numba's cache."""
-    from crosscheck.engines.compiled import run
     from crosscheck.engines.mujoco import closures, rates
+    from crosscheck.engines.shared.compiled import run
 
     run.prepare()
     assert all(function.address for function in (rates.rates, closures.settle, closures.follow))
@@ -74,8 +74,8 @@ class CompiledRun:
         labels: dict[str, Any],
     ) -> Trajectory:
         """Return the motion from the start; construction took ``built`` seconds."""
-        from crosscheck.engines.compiled.run import trajectory
         from crosscheck.engines.mujoco.rates import load
+        from crosscheck.engines.shared.compiled.run import trajectory
 
         def put(t: float, y: np.ndarray) -> None:
             load(self.context, t, y)
@@ -84,10 +84,10 @@ class CompiledRun:
         return trajectory(scene, times, system, self.start, put, sample, built, labels)
 
     def _dop853(self) -> Any:
-        from crosscheck.engines.compiled.dop853 import System
-        from crosscheck.engines.compiled.run import MOST_STEPS
         from crosscheck.engines.mujoco.closures import settle
         from crosscheck.engines.mujoco.rates import rates
+        from crosscheck.engines.shared.compiled.dop853 import System
+        from crosscheck.engines.shared.compiled.run import MOST_STEPS
 
         rtol = self.options["rtol"]
         correction = settle.address if self.family == PROJECTED_COMPILED else 0
@@ -104,8 +104,8 @@ class CompiledRun:
         )
 
     def _newton(self) -> Any:
-        from crosscheck.engines.compiled.newton import System
         from crosscheck.engines.mujoco.closures import follow
+        from crosscheck.engines.shared.compiled.newton import System
 
         tolerance = self.options["tolerance"]
         return System(follow.address, self.context.address, tolerance, self.longest)

@@ -10,9 +10,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from crosscheck.engine import Setting
-from crosscheck.engines.initial_velocities import may_move_freely
-from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.initial_velocities import may_move_freely
+from crosscheck.engines.shared.planar_scene import planar_scene
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.scene import Scene
 
 HARD = 1e-7  # factor on the regulariser: relative errors below 1e-9; rounding grows at 1e-8

@@ -20,7 +20,7 @@ from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
 from mbref.scene import Scene

@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
-from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.model import SUPPORTS as OF_MUJOCO
 from crosscheck.engines.mujoco.model import compiled
-from crosscheck.engines.own_steps import STEP, SteppingEngine
-from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.own_steps import STEP, SteppingEngine
+from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 
 SUPPORTS = replace(OF_MUJOCO, over_time=(), massless_links=False)

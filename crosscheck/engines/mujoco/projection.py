@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from crosscheck.engines.driver_motion import motion
 from crosscheck.engines.mujoco.context import NOTHING
-from crosscheck.engines.sampling import Failed
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.sampling import Failed
 from mbref.scene import Driver
 from mbref.trajectory import Outcome
 

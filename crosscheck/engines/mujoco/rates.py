@@ -8,7 +8,6 @@ import numpy as np
 from numba import carray, types
 from numba.extending import register_jitable
 
-from crosscheck.engines.compiled.calls import RATES, c_function, call_with_two, integers, reals
 from crosscheck.engines.mujoco.context import (
     AMPLITUDE,
     DATA,
@@ -36,6 +35,7 @@ from crosscheck.engines.mujoco.context import (
     WIDTH,
     Context,
 )
+from crosscheck.engines.shared.compiled.calls import RATES, c_function, call_with_two, integers, reals
 
 SIGNATURE = types.int32(
     types.CPointer(types.intp), types.float64, types.CPointer(types.float64), types.CPointer(types.float64)

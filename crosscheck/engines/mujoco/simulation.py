@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines.driver_motion import motion, stated_rate
 from crosscheck.engines.mujoco import compiled_run
 from crosscheck.engines.mujoco.families import (
     ADAPTIVE,
@@ -27,8 +26,9 @@ from crosscheck.engines.mujoco.families import (
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
-from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, step_count
-from crosscheck.engines.tree_reactions import LinkMotion, joint_reactions, wrench
+from crosscheck.engines.shared.driver_motion import motion, stated_rate
+from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, step_count
+from crosscheck.engines.shared.tree_reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.judge.time_functions import next_end
 from mbref import rotations
 from mbref.scene import Driver, Scene

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.mujoco.model import COUPLING, description
-from crosscheck.engines.spanning_tree import Link, Tree, spanning_tree
+from crosscheck.engines.shared.spanning_tree import Link, Tree, spanning_tree
 from mbref import rotations
 from mbref.formats import Exported
 from mbref.scene import Force, JointForce, JointTorque, Moment, Scene, SceneError

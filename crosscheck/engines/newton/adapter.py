@@ -14,9 +14,9 @@ import numpy as np
 from crosscheck.engine import Cannot, Owner, Setting, Supports
 from crosscheck.engines.newton import solvers
 from crosscheck.engines.newton.model import Mechanism, imported
-from crosscheck.engines.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.engines.warp_graphs import recorded
+from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
+from crosscheck.engines.shared.spanning_tree import spanning_tree
+from crosscheck.engines.shared.warp_graphs import recorded
 from crosscheck.refusals import FACTOR
 from mbref.scene import Scene
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.geometry import unit
-from crosscheck.engines.initial_velocities import initial_rates, twist_maps
-from crosscheck.engines.spanning_tree import (
+from crosscheck.engines.shared.geometry import unit
+from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
+from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
     FREE,
     GROUND_LINK,
@@ -26,7 +26,7 @@ from crosscheck.engines.spanning_tree import (
     Tree,
     mobilities,
 )
-from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import Scene

@@ -16,9 +16,9 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.fixed_steps import simulated
 from crosscheck.engines.ondsel.model import ACCURATE_ON_GROUND, SUPPORTS, Assembly, Table, is_reversed, table
-from crosscheck.engines.sampling import Counts, Failed, Sample, step_count
+from crosscheck.engines.shared.fixed_steps import simulated
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, step_count
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.geometry import in_body, joint_frame, point_in_body
 from crosscheck.judge.constraints import inertia_matrices
 from mbref import rotations
 from mbref.scene import GROUND, Driver, Joint, Scene

@@ -16,8 +16,6 @@ from dataclasses import replace
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.driver_motion import fastest_rate
-from crosscheck.engines.initial_velocities import lacks_mass
 from crosscheck.engines.pinocchio import compiled_run
 from crosscheck.engines.pinocchio.families import (
     COMPILED,
@@ -28,8 +26,10 @@ from crosscheck.engines.pinocchio.families import (
 )
 from crosscheck.engines.pinocchio.model import SUPPORTS
 from crosscheck.engines.pinocchio.simulation import Simulation
-from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.sampling import run_through
+from crosscheck.engines.shared.driver_motion import fastest_rate
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.planar_scene import planar_scene
+from crosscheck.engines.shared.sampling import run_through
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from crosscheck.engines.pinocchio import library
 from crosscheck.engines.pinocchio.model import DRIVEN_ARMATURE, Loads, Mechanism
-from crosscheck.engines.sampling import Sample
-from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN
+from crosscheck.engines.shared.sampling import Sample
+from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN
 from mbref.scene import Driver, Scene
 from mbref.trajectory import Trajectory
 
@@ -44,7 +44,7 @@ def why_not(scene: Scene) -> str:
 
 def prepare() -> None:
     """Compile the integrator and the library, or load them from their caches; raises NoLibrary."""
-    from crosscheck.engines.compiled import run
+    from crosscheck.engines.shared.compiled import run
 
     run.prepare()
     library.library()
@@ -101,8 +101,8 @@ class CompiledRun:
     ) -> Trajectory:
         """Return the motion; ``load`` puts a state at its time into the data, and construction took ``built``
         seconds."""
-        from crosscheck.engines.compiled.dop853 import System
-        from crosscheck.engines.compiled.run import MOST_STEPS, trajectory
+        from crosscheck.engines.shared.compiled.dop853 import System
+        from crosscheck.engines.shared.compiled.run import MOST_STEPS, trajectory
 
         rtol, settle = options["rtol"], self._function("settle") if is_projected else 0
         system = System(

@@ -11,8 +11,8 @@ import ctypes
 import functools
 from pathlib import Path
 
-from crosscheck.engines import kept
-from crosscheck.engines.compiler import CXX, NoLibrary
+from crosscheck.engines.shared import file_cache
+from crosscheck.engines.shared.compiler import CXX, NoLibrary
 
 FOLDER = "pinocchio"  # name of the folder in the cache
 SOURCE = Path(__file__).with_name("rates.cpp")
@@ -85,17 +85,17 @@ def _origin() -> str:
     """Return a hash of Pinocchio's version, the compiler command and the source."""
     import pinocchio
 
-    return kept.hashed(pinocchio.__version__, *_command(Path("library")), SOURCE.read_text())
+    return file_cache.hashed(pinocchio.__version__, *_command(Path("library")), SOURCE.read_text())
 
 
 def _kept() -> Path | None:
     """Return the library in the cache."""
-    return kept.kept(FOLDER, _origin(), ".so")
+    return file_cache.stored(FOLDER, _origin(), ".so")
 
 
 def _compiled() -> Path:
     """Compile the library and store it in the cache."""
-    return kept.keep(FOLDER, _origin(), ".so", _compile)
+    return file_cache.store(FOLDER, _origin(), ".so", _compile)
 
 
 def _compile(target: Path) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.initial_velocities import initial_rates, twist_maps
-from crosscheck.engines.spanning_tree import (
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
+from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
     FREE,
     GROUND_LINK,

@@ -11,12 +11,12 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Setting
-from crosscheck.engines.driver_motion import motion, stated_rate
 from crosscheck.engines.pinocchio import compiled_run
 from crosscheck.engines.pinocchio.families import BAUMGARTE, CONVERGED, FIXED, TUNED_COMPILED
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
-from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample, rk4
-from crosscheck.engines.tree_reactions import LinkMotion, sample_of
+from crosscheck.engines.shared.driver_motion import motion, stated_rate
+from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
+from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines import xml_files
 from crosscheck.engines.sdf.frames import Frames, Pose, numbers
+from crosscheck.engines.shared import xml_files
 from mbref.formats import numbered
 from mbref.scene import SceneError
 

@@ -8,8 +8,8 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from crosscheck.engines import xml_files
-from crosscheck.engines.xml_files import DEEPEST
+from crosscheck.engines.shared import xml_files
+from crosscheck.engines.shared.xml_files import DEEPEST
 from mbref.scene import SceneError
 
 VARIABLES = ("SDF_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH")

@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines import xml_files
-from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.left_out import Part, checked, refuse_others
 from crosscheck.engines.sdf import gearing, limits
 from crosscheck.engines.sdf.elements import (
@@ -27,6 +25,8 @@ from crosscheck.engines.sdf.elements import (
 from crosscheck.engines.sdf.flattening import STATIC, flattened
 from crosscheck.engines.sdf.frames import ORIGIN, WORLD, Frames, check_names, numbers, pose_of
 from crosscheck.engines.sdf.including import expanded
+from crosscheck.engines.shared import xml_files
+from crosscheck.engines.shared.entries import entry
 from mbref import rotations
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import (

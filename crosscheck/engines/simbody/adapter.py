@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.fixed_steps import simulated
-from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.sampling import Counts, Failed, Sample
+from crosscheck.engines.shared.fixed_steps import simulated
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK
+from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of, wrench
 from crosscheck.engines.simbody.model import SUPPORTS, Mechanism
-from crosscheck.engines.spanning_tree import GROUND_LINK
-from crosscheck.engines.tree_reactions import LinkMotion, sample_of, wrench
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 

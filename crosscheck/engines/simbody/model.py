@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.geometry import joint_frame, unit
-from crosscheck.engines.initial_velocities import initial_rates
-from crosscheck.engines.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
+from crosscheck.engines.shared.geometry import joint_frame, unit
+from crosscheck.engines.shared.initial_velocities import initial_rates
+from crosscheck.engines.shared.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
 from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
 
 JOINTS = {  # joint type → OpenSim's joint, and its coordinates in the tree's order

@@ -19,8 +19,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Supports
-from crosscheck.engines.fixed_steps import simulated
-from crosscheck.engines.initial_velocities import lacks_mass
+from crosscheck.engines.shared.fixed_steps import simulated
+from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.sundials.ida import Run
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.constraint_equations import Constraints, Frames, frames
-from crosscheck.engines.generalised_forces import Forces
+from crosscheck.engines.shared.constraint_equations import Constraints, Frames, frames
+from crosscheck.engines.shared.generalised_forces import Forces
 from mbref import rotations
 from mbref.scene import Scene
 

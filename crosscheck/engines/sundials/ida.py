@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from crosscheck.engines.constraint_equations import Frames
-from crosscheck.engines.driver_motion import stated_rate
-from crosscheck.engines.sampling import Counts, Failed, Sample
+from crosscheck.engines.shared.constraint_equations import Frames
+from crosscheck.engines.shared.driver_motion import stated_rate
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample
 from crosscheck.engines.sundials.equations import Equations, pure
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.tolerances import RANK

@@ -7,10 +7,10 @@ from typing import Any
 
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.ports import Port, PortedModel
-from crosscheck.engines.own_steps import Steps
-from crosscheck.engines.spanning_tree import spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion
-from crosscheck.engines.warp_graphs import recorded
+from crosscheck.engines.shared.own_steps import Steps
+from crosscheck.engines.shared.spanning_tree import spanning_tree
+from crosscheck.engines.shared.tree_reactions import LinkMotion
+from crosscheck.engines.shared.warp_graphs import recorded
 from mbref.scene import Scene
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.groups import WORLD, Groups, Piece
+from crosscheck.engines.shared.entries import entry
 from mbref.scene import (
     Cylindrical,
     Distance,

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.groups import Groups
+from crosscheck.engines.shared.entries import entry
 from mbref import rotations
 from mbref.scene import Cylindrical, Fixed, Joint, Revolute, SceneError, Spherical, Translational
 

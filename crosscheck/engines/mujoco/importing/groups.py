@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.entries import entry
+from crosscheck.engines.shared.entries import entry
 from mbref import rotations
 from mbref.scene import GROUND, Body
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing.actuators import Actuators
 from crosscheck.engines.mujoco.importing.chains import kind_of
 from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
+from crosscheck.engines.shared.entries import entry
 from mbref.scene import Joint, JointForce, JointTorque, Load, SlideSpring, Spring, TorsionSpring
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
 

@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.entries import entry
 from crosscheck.engines.mujoco.importing import (
     couplings,
     keyframes,
@@ -36,6 +35,7 @@ from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow, Poses
 from crosscheck.engines.mujoco.warnings_off import without_warnings
+from crosscheck.engines.shared.entries import entry
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import Body, Coupling, Driver, Joint, Scene, SceneError
 from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines import xml_files
 from crosscheck.engines.mujoco.importing import urdf_faults
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow
+from crosscheck.engines.shared import xml_files
 from mbref.scene import SceneError
 
 KNOWN = {  # outer elements → inner elements that are read, or that change no motion

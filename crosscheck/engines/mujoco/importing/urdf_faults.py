@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from crosscheck.engines import xml_files
+from crosscheck.engines.shared import xml_files
 from mbref.scene import SceneError
 from mbref.scene_fields import LARGEST, shown
 

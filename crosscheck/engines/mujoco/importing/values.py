@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.mujoco.importing.left_out import joint_name
-from crosscheck.engines.xml_files import DEEPEST
+from crosscheck.engines.shared.xml_files import DEEPEST
 from mbref.scene import SceneError
 from mbref.scene_fields import LARGEST
 

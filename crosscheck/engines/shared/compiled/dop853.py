@@ -16,8 +16,8 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from crosscheck.engines.compiled import dop853_coefficients as tableau
-from crosscheck.engines.compiled.calls import rates_of
+from crosscheck.engines.shared.compiled import dop853_coefficients as tableau
+from crosscheck.engines.shared.compiled.calls import rates_of
 
 STAGES = tableau.STAGES
 A = np.array([[*row, *(0.0,) * (STAGES - len(row))] for row in tableau.A])

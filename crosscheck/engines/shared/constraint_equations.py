@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
 from mbref import rotations
 from mbref.scene import Driver, Joint, Scene
 

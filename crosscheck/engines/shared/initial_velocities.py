@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 
 from crosscheck.engine import Cannot, Owner
-from crosscheck.engines.driver_motion import motion
-from crosscheck.engines.geometry import cross_matrix
-from crosscheck.engines.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Link, Tree
+from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.geometry import cross_matrix
+from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Link, Tree
 from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
 from mbref.scene import Scene
 

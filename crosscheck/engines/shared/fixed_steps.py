@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
-from crosscheck.engines.driver_motion import fastest_rate
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through, step_count
-from crosscheck.engines.spanning_tree import Closure, Tree
-from crosscheck.engines.tree_reactions import LinkMotion, applied, sample_of
+from crosscheck.engines.shared.driver_motion import fastest_rate
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through, step_count
+from crosscheck.engines.shared.spanning_tree import Closure, Tree
+from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.time_functions import ends
 from mbref.scene import Moment, Scene

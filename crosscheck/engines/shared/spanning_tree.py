@@ -21,7 +21,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.engines.geometry import cross_matrix, joint_frame, unit
+from crosscheck.engines.shared.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
 from mbref.scene import Body, Coupling, Distance, Driver, Joint, JointFacts, JointLoad, Scene, Spherical
 from mbref.scene_joints import DISPLACEMENT, Coordinate

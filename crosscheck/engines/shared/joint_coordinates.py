@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.spanning_tree import BALL_JOINT, COORDINATES, FREE, Tree
+from crosscheck.engines.shared.spanning_tree import BALL_JOINT, COORDINATES, FREE, Tree
 from mbref import rotations
 
 UNIT = np.array([1.0, 0.0, 0.0, 0.0])

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.spanning_tree import TURN
-from crosscheck.engines.symbolic.symbols import NOTHING, Arithmetic
+from crosscheck.engines.shared.spanning_tree import TURN
+from crosscheck.engines.shared.symbolic.symbols import NOTHING, Arithmetic
 
 Vector = np.ndarray  # (3,) numbers or symbols
 

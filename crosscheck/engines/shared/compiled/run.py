@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.compiled import dop853, newton
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.compiled import dop853, newton
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from mbref.scene import Scene
 from mbref.trajectory import Outcome, Trajectory
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.spanning_tree import GROUND_LINK, Mobility, Tree
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Mobility, Tree
 from crosscheck.refusals import FACTOR
 from mbref.scene import JOINT_TYPES, LOAD_TYPES
 

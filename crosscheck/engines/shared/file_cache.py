@@ -20,7 +20,7 @@ def hashed(*parts: str) -> str:
     return _hash("\n".join(parts).encode())
 
 
-def kept(name: str, origin: str, suffix: str) -> Path | None:
+def stored(name: str, origin: str, suffix: str) -> Path | None:
     """Return the file of an origin in a folder of the cache; its name contains the hash of its content."""
     for path in sorted(cache(name).glob(f"{origin}-*{suffix}")):
         with contextlib.suppress(OSError):
@@ -29,7 +29,7 @@ def kept(name: str, origin: str, suffix: str) -> Path | None:
     return None
 
 
-def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
+def store(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
     """Store the file that ``make`` writes in the cache, or in a temporary folder if storing fails; no reader
     sees a part of the file."""
     folder = cache(name)
@@ -53,7 +53,7 @@ def keep(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> P
 
 def made_once(name: str, origin: str, suffix: str, make: Callable[[Path], None]) -> Path:
     """Return the file of an origin in a folder of the cache; ``make`` writes it if it is missing."""
-    return kept(name, origin, suffix) or keep(name, origin, suffix, make)
+    return stored(name, origin, suffix) or store(name, origin, suffix, make)
 
 
 def cache(name: str) -> Path:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from crosscheck.engines.constraint_equations import Frames
-from crosscheck.engines.geometry import in_body, joint_frame, point_in_body
+from crosscheck.engines.shared.constraint_equations import Frames
+from crosscheck.engines.shared.geometry import in_body, joint_frame, point_in_body
 from crosscheck.judge.constraints import inertia_matrices
 from mbref.rotations import cross
 from mbref.scene import Force, Moment, Scene, Spring, TorsionSpring

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.engines.sampling import UNKNOWN, Sample
-from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
+from crosscheck.engines.shared.sampling import UNKNOWN, Sample
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Tree
 from crosscheck.judge.loads import at_time
 from crosscheck.judge.time_functions import value
 from mbref import rotations

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
-from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.kept import hashed
-from crosscheck.engines.sampling import Counts, Failed, Sample, run_through
-from crosscheck.engines.symbolic.equations import TreeEquations
-from crosscheck.engines.tree_reactions import joint_reactions
+from crosscheck.engines.shared.file_cache import hashed
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
+from crosscheck.engines.shared.symbolic.equations import TreeEquations
+from crosscheck.engines.shared.tree_reactions import joint_reactions
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.trajectory import Cost, Trajectory

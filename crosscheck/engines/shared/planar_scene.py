@@ -12,9 +12,9 @@ import functools
 
 import numpy as np
 
-from crosscheck.engines.geometry import unit
-from crosscheck.engines.initial_velocities import RANK_TOLERANCE
-from crosscheck.engines.spanning_tree import spanning_tree
+from crosscheck.engines.shared.geometry import unit
+from crosscheck.engines.shared.initial_velocities import RANK_TOLERANCE
+from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
 from mbref.scene import (
     Fixed,

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from crosscheck.engines.compiled.calls import rates_of
-from crosscheck.engines.compiled.dop853 import EVALUATIONS, NOT_FINITE, REACHED, STEPS, is_finite
+from crosscheck.engines.shared.compiled.calls import rates_of
+from crosscheck.engines.shared.compiled.dop853 import EVALUATIONS, NOT_FINITE, REACHED, STEPS, is_finite
 
 NOT_MET = 10  # further status: the closures could not be satisfied at a time
 STRETCH = 1e-9  # relative extension of a step so that it ends at a sample

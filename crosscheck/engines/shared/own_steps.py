@@ -10,9 +10,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting
-from crosscheck.engines import terms
-from crosscheck.engines.driver_motion import mean_rate, stated_rate
-from crosscheck.engines.fixed_steps import (
+from crosscheck.engines.shared import terms
+from crosscheck.engines.shared.driver_motion import mean_rate, stated_rate
+from crosscheck.engines.shared.fixed_steps import (
     MOST_STEPS,
     FixedSteps,
     Loads,
@@ -23,11 +23,11 @@ from crosscheck.engines.fixed_steps import (
     steps,
     unended_piece,
 )
-from crosscheck.engines.initial_velocities import lacks_mass
-from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.sampling import step_count
-from crosscheck.engines.spanning_tree import Tree, spanning_tree
-from crosscheck.engines.tree_reactions import LinkMotion
+from crosscheck.engines.shared.initial_velocities import lacks_mass
+from crosscheck.engines.shared.planar_scene import planar_scene
+from crosscheck.engines.shared.sampling import step_count
+from crosscheck.engines.shared.spanning_tree import Tree, spanning_tree
+from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

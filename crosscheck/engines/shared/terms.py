@@ -20,13 +20,13 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from crosscheck.engine import Setting
-from crosscheck.engines.driver_motion import motion, stated_rate
-from crosscheck.engines.geometry import cross_matrix
-from crosscheck.engines.initial_velocities import initial_rates
-from crosscheck.engines.joint_coordinates import JointCoordinates, rotation_vector
-from crosscheck.engines.sampling import Adaptive, Counts, Failed, Sample
-from crosscheck.engines.spanning_tree import GROUND_LINK, Tree
-from crosscheck.engines.tree_reactions import LinkMotion, applied, sample_of, wrench
+from crosscheck.engines.shared.driver_motion import motion, stated_rate
+from crosscheck.engines.shared.geometry import cross_matrix
+from crosscheck.engines.shared.initial_velocities import initial_rates
+from crosscheck.engines.shared.joint_coordinates import JointCoordinates, rotation_vector
+from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Tree
+from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of, wrench
 from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import Scene

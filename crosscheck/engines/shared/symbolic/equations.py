@@ -1,7 +1,7 @@
 """Equations of motion in joint coordinates, in any arithmetic: numbers, or symbols of a code generator.
 
-The mechanism is a spanning tree of slides and turns (`crosscheck.engines.spanning_tree`) whose loops are
-closed by points:
+The mechanism is a spanning tree of slides and turns (`crosscheck.engines.shared.spanning_tree`) whose loops
+are closed by points:
 
     M q̈ + Gᵀ λ = f,    G q̈ = γ - 2 β G q' - β² Φ
 
@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.initial_velocities import RANK_TOLERANCE, initial_rates
-from crosscheck.engines.planar_scene import planar_scene
-from crosscheck.engines.spanning_tree import GROUND_LINK, SLIDE, TURN, spanning_tree
-from crosscheck.engines.symbolic.frames import Frame, cross, moved_by, velocity_of
-from crosscheck.engines.symbolic.symbols import NOTHING, NUMBERS, Arithmetic
-from crosscheck.engines.tree_reactions import LinkMotion, wrench
+from crosscheck.engines.shared.initial_velocities import RANK_TOLERANCE, initial_rates
+from crosscheck.engines.shared.planar_scene import planar_scene
+from crosscheck.engines.shared.spanning_tree import GROUND_LINK, SLIDE, TURN, spanning_tree
+from crosscheck.engines.shared.symbolic.frames import Frame, cross, moved_by, velocity_of
+from crosscheck.engines.shared.symbolic.symbols import NOTHING, NUMBERS, Arithmetic
+from crosscheck.engines.shared.tree_reactions import LinkMotion, wrench
 from mbref.scene import Moment, Scene
 
 Entries = Sequence[Any] | np.ndarray  # numbers or symbols
