@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Any
 
 from crosscheck.engine import Setting
-from crosscheck.study.speed_sentences import COMPILED
+from crosscheck.study.words.speed import COMPILED
 from mbref.scene import Scene
 from mbref.simulation.simulate import simulate
 

@@ -34,7 +34,7 @@ from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.search.cheapest import tuned
 from crosscheck.study.search.neighbours import LOOSEST, STEP, longest_step, work
 from crosscheck.study.search.selection import families
-from crosscheck.study.speed_sentences import COMPILED
+from crosscheck.study.words.speed import COMPILED
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 

@@ -6,8 +6,8 @@ import functools
 from collections.abc import Mapping
 
 from crosscheck.engine import engine_names
-from crosscheck.study.speed_sentences import title
-from crosscheck.study.verdict import DEFAULTS, Grade
+from crosscheck.study.grades import DEFAULTS, Grade
+from crosscheck.study.words.speed import title
 
 TONES = 7  # number of colours in the style sheet; third-party engines share the last one
 SIGNS: Mapping[Grade, str] = {

@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 from crosscheck.cli.tables import own_code
 from crosscheck.findings.finding import findings
+from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
-from crosscheck.study.speed_sentences import LEVEL, SAID, title
-from crosscheck.study.verdict import Grade, Judged
+from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.command_line import Parser
 from mbref.files import file_name
 from mbref.records import strict_json

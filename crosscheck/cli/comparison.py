@@ -17,11 +17,11 @@ from crosscheck.judge.start import started
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.fair_timing import force_differences, model_differences
+from crosscheck.study.grades import Judged, grade, judged
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
 from crosscheck.study.search import selection
-from crosscheck.study.sentences import Verdict, verdict
-from crosscheck.study.verdict import Judged, grade, judged
+from crosscheck.study.words.verdict import Verdict, verdict
 from mbref.files import write
 from mbref.scene import Scene
 from mbref.terminal import Console

@@ -21,7 +21,7 @@ from crosscheck.study.difference import (
     circumstances,
     load,
 )
-from crosscheck.study.wording import runs
+from crosscheck.study.words.text import runs
 
 COUNT = (
     "{} of {} runs of both sets changed. Changes are: another outcome or end; an error "

@@ -20,8 +20,8 @@ from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_judged, public
 from crosscheck.study.search.execution import Hurried
 from crosscheck.study.search.selection import QUICK_LIMIT, thinned
-from crosscheck.study.truth_sentences import unknown
 from crosscheck.study.truths import known_at
+from crosscheck.study.words.truth import unknown
 from mbref.formats import import_options
 from mbref.scene import Scene
 from mbref.terminal import Console

@@ -16,6 +16,7 @@ from crosscheck.engine import Engine, Setting, engine
 from crosscheck.judge.mobility import mobility
 from crosscheck.setting import ORIGIN
 from crosscheck.study.command import command
+from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import (
     by_scene,
@@ -28,9 +29,8 @@ from crosscheck.study.record_view import (
     varied_settings,
 )
 from crosscheck.study.search.cheapest import Criterion, known_error
-from crosscheck.study.sentences import Verdict
-from crosscheck.study.speed_sentences import LEVEL, SAID, title
-from crosscheck.study.verdict import Grade, Judged
+from crosscheck.study.words.speed import LEVEL, SAID, title
+from crosscheck.study.words.verdict import Verdict
 from mbref.scene import Scene
 
 MEASURED = ("violation_position", "energy_error")  # metrics in further columns of the table of runs

@@ -12,10 +12,10 @@ from crosscheck.engine import Owner, engine_names
 from crosscheck.engines.shared.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.command import command
+from crosscheck.study.grades import DEFAULTS, Grade, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error, error_bound
 from crosscheck.study.search.least_errors import rank
-from crosscheck.study.verdict import DEFAULTS, Grade, grade
 from mbref.trajectory import Outcome
 
 SIGNS = {Grade.RIGHT: "✓", Grade.INACCURATE: "≈", Grade.WRONG: "✗", Grade.FAILED: "!", Grade.UNJUDGED: "?"}

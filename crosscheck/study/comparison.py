@@ -17,6 +17,7 @@ from crosscheck.judge.deadline import given_up
 from crosscheck.processes.pool import end_idle
 from crosscheck.study import pictures
 from crosscheck.study.fair_timing import identity_cases
+from crosscheck.study.grades import Grade, grade
 from crosscheck.study.grid import Case, Record, key, known, record_of, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.record_shape import Truth, checked
@@ -25,11 +26,10 @@ from crosscheck.study.search.execution import Chains, Hurried
 from crosscheck.study.search.neighbours import MOST_COARSER
 from crosscheck.study.search.offers import default_cases, scout, unasked
 from crosscheck.study.search.selection import Family, beyond, families, finest, first
-from crosscheck.study.speed_sentences import COMPILED
 from crosscheck.study.timings import REPEATS, with_timings
 from crosscheck.study.truths import key as truth_key
 from crosscheck.study.truths import truth_record
-from crosscheck.study.verdict import Grade, grade
+from crosscheck.study.words.speed import COMPILED
 from mbref.files import file_name
 from mbref.records import append, opened, stored
 from mbref.scene import Scene

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
-from crosscheck.study.wording import runs
+from crosscheck.study.words.text import runs
 from mbref.records import looked_at
 from mbref.scene import Scene, SceneError
 

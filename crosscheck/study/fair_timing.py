@@ -17,12 +17,12 @@ from crosscheck.judge.truth import NoSolution, truth_for
 from crosscheck.processes.pool import ChildFailed, time_interleaved
 from crosscheck.processes.serve import FAR_BEHIND
 from crosscheck.setting import best_family
+from crosscheck.study.grades import Grade, grade
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.search.least_errors import least_errors
 from crosscheck.study.search.offers import settings
-from crosscheck.study.speed_sentences import COMPILED
-from crosscheck.study.verdict import Grade, grade
+from crosscheck.study.words.speed import COMPILED
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 

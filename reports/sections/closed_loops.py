@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_refusal, is_run, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.study.grades import Grade, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error
-from crosscheck.study.verdict import Grade, grade
 
 from ..blocks import Block, Heading, HeatMap, Listing, Table, Text
 from ..blocks import Cell as Shown

@@ -13,7 +13,7 @@ from typing import Any
 
 from crosscheck.conformance.explained import explanations, proofs
 from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, abouts
-from crosscheck.study.speed_sentences import title
+from crosscheck.study.words.speed import title
 
 from ..blocks import Block, Heading, Table, Text
 

@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Sequence
 
 from crosscheck.study.command import command
-from crosscheck.study.verdict import grade
+from crosscheck.study.grades import grade
 from mbref.files import file_name
 
 from .. import places

@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
+from crosscheck.study.grades import DEFAULTS, Grade, Judged, grade
 from crosscheck.study.record_view import ended
-from crosscheck.study.sentences import verdict
-from crosscheck.study.speed_sentences import title
-from crosscheck.study.verdict import DEFAULTS, Grade, Judged, grade
+from crosscheck.study.words.speed import title
+from crosscheck.study.words.verdict import verdict
 
 from .. import places
 from ..blocks import Block, Heading, Matrix, Opening, Verdict

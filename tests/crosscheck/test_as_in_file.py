@@ -18,11 +18,11 @@ from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import violation_series
 from crosscheck.setting import AS_IN_FILE
 from crosscheck.study.command import command
-from crosscheck.study.file_sentences import as_in_file, free_falls
+from crosscheck.study.grades import Judged
 from crosscheck.study.grid import Case, run_here
 from crosscheck.study.search.offers import of_file, offer
 from crosscheck.study.search.selection import of_few_families
-from crosscheck.study.verdict import Judged
+from crosscheck.study.words.file import as_in_file, free_falls
 from mbref.formats import ImportOptions
 from mbref.scene import SceneError
 from mbref.scenes import SCENES

@@ -19,7 +19,7 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.fair_timing import identity_cases, model_difference
 from crosscheck.study.grid import run_case
-from crosscheck.study.speed_sentences import COMPILED
+from crosscheck.study.words.speed import COMPILED
 from mbref.scenes import SCENES
 from tests.crosscheck.measured import MARGIN
 

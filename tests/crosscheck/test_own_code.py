@@ -11,7 +11,7 @@ import pytest
 import mbref
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.exudyn.settings_code import Written
-from crosscheck.study.verdict import Judged
+from crosscheck.study.grades import Judged
 from mbref import find_scene
 
 SCENE = find_scene("planar_slider_crank")

@@ -13,7 +13,7 @@ from crosscheck.engine import BUILT_IN, Cannot, Owner, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.reference.taylor import natural_motion
-from crosscheck.study.speed_sentences import COMPILED
+from crosscheck.study.words.speed import COMPILED
 from mbref.scene import Joint, Load, Scene, Universal
 from mbref.scene_validation import DRIVABLE
 from mbref.trajectory import Outcome

@@ -15,10 +15,10 @@ from rich.console import Console
 from crosscheck.cli import differences, tables
 from crosscheck.cli.terminal_plot import scatter
 from crosscheck.study.difference import load
-from crosscheck.study.sentences import breaks, headline, right, verdict
-from crosscheck.study.speed_sentences import fast
-from crosscheck.study.truth_sentences import truth
-from crosscheck.study.verdict import Grade, Judged, grade, judged
+from crosscheck.study.grades import Grade, Judged, grade, judged
+from crosscheck.study.words.speed import fast
+from crosscheck.study.words.truth import truth
+from crosscheck.study.words.verdict import breaks, headline, right, verdict
 from mbref.records import append
 from mbref.scenes import SCENES
 from reports.runs import Run

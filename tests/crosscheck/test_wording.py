@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from crosscheck.study import wording
+from crosscheck.study.words import text
 
 
 def test_list_is_joined_by_commas_and_the_word_and():
-    assert [wording.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
+    assert [text.listed(names) for names in ([], "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
 
 
 @pytest.mark.parametrize(
@@ -22,22 +22,22 @@ def test_list_is_joined_by_commas_and_the_word_and():
     ],
 )
 def test_error_is_rounded_up_or_called_less_than_the_bound(value, bound, said):
-    assert wording.at_most(value, bound) == said
+    assert text.at_most(value, bound) == said
 
 
 def test_verbs_and_pronouns_agree_with_the_number():
-    assert [wording.runs(n) for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
+    assert [text.runs(n) for n in (0, 1, 2)] == ["0 runs", "1 run", "2 runs"]
     for names, words in ((["a"], ("is", "its", "agrees")), (["a", "b"], ("are", "their", "agree"))):
-        assert (wording.is_or_are(names), wording.its_or_their(names), wording.agree(names)) == words
+        assert (text.is_or_are(names), text.its_or_their(names), text.agree(names)) == words
 
 
 def test_first_word_loses_its_capital_except_for_names():
-    assert wording.uncapitalised("Both engines") == "both engines"
-    assert wording.uncapitalised("MuJoCo is") == "MuJoCo is"
+    assert text.uncapitalised("Both engines") == "both engines"
+    assert text.uncapitalised("MuJoCo is") == "MuJoCo is"
 
 
 def test_times_and_ratios_are_rounded_across_their_units():
-    assert [wording.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
-    assert [wording.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
-    assert [wording.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
-    assert (wording.span(2.0, 2.04), wording.span(1.5, 30.0)) == ("2.0 times", "1.5 to 30 times")
+    assert [text.seconds(t) for t in (1.0, 0.999, 1e-3, 9.99e-4)] == ["1 s", "999 ms", "1 ms", "999 µs"]
+    assert [text.seconds(t) for t in (0.9996, 0.9994, 9.996e-4)] == ["1 s", "999 ms", "1 ms"]
+    assert [text.multiple(r) for r in (9.94, 9.95)] == ["9.9 times", "10 times"]
+    assert (text.span(2.0, 2.04), text.span(1.5, 30.0)) == ("2.0 times", "1.5 to 30 times")

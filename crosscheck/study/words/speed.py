@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping, Sequence
 
 from crosscheck.engine import engine
 from crosscheck.judge.tolerances import ERROR_LEVELS
+from crosscheck.study.grades import Judged
 from crosscheck.study.grid import Record
-from crosscheck.study.verdict import Judged
-from crosscheck.study.wording import listed, multiple, seconds, span
+from crosscheck.study.words.text import listed, multiple, seconds, span
 
 TITLES = {
     "mujoco": "MuJoCo",

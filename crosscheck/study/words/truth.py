@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from crosscheck.study.verdict import Judged
-from crosscheck.study.wording import listed
+from crosscheck.study.grades import Judged
+from crosscheck.study.words.text import listed
 from mbref.scene import Scene
 
 

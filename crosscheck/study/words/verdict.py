@@ -7,13 +7,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from crosscheck.study.file_sentences import as_in_file, free_falls
+from crosscheck.study.grades import Grade, Judged, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_text
-from crosscheck.study.speed_sentences import fast, title
-from crosscheck.study.truth_sentences import names, truth, up_to
-from crosscheck.study.verdict import Grade, Judged, grade
-from crosscheck.study.wording import (
+from crosscheck.study.words.file import as_in_file, free_falls
+from crosscheck.study.words.speed import fast, title
+from crosscheck.study.words.text import (
     agree,
     at_most,
     is_or_are,
@@ -21,6 +20,7 @@ from crosscheck.study.wording import (
     listed,
     uncapitalised,
 )
+from crosscheck.study.words.truth import names, truth, up_to
 
 TIMED_OUT = "TIMED_OUT"
 

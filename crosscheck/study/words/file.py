@@ -10,11 +10,11 @@ from pathlib import Path
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.free_fall import falls_freely
 from crosscheck.setting import AS_IN_FILE
+from crosscheck.study.grades import Grade, Judged, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, is_completed
 from crosscheck.study.search.cheapest import opened
-from crosscheck.study.verdict import Grade, Judged, grade
-from crosscheck.study.wording import listed
+from crosscheck.study.words.text import listed
 from mbref.scene import Scene
 
 SETTINGS = {"step": "time step {:g} s", "integrator": "{}", "solref": "solref {}", "solimp": "solimp {}"}
