@@ -62,7 +62,11 @@ PROBES := --scene "dead end" --scene "tumbling body" --scene "heavy top" --scene
 
 VERIFIED = $$($(BIN)/python -c "from crosscheck.engine import default_engines as names; print(*names())")
 
+REFERENCE := reports/reference
 ANEW := build/reference
+KEEP = $(BIN)/python -m reports.keep
+UNPACKED = rm -rf build/kept && $(BIN)/python -m zipfile -e $(REFERENCE)/records.zip build/kept
+PACKED = $(KEEP) build/kept $(REFERENCE) && $(BIN)/crosscheck report --render $(REFERENCE)
 ON_REQUEST := dart drake mjx bullet warp newton
 PROBES_drake := $(PROBES)
 PROBES_dart := # all mechanisms of the suite
@@ -70,36 +74,37 @@ PROBES_warp :=
 PROBES_mjx := $(PROBES) --scene planar_slider_crank # a fast loop, on which MJX is wrong
 PROBES_bullet := $(PROBES)
 PROBES_newton := $(PROBES)
-KEPT := $(wildcard reports/reference/conformance/*_*.json) $(ON_REQUEST:%=reports/reference/conformance/%.json)
+KEPT = build/kept/conformance/*_*.json $(ON_REQUEST:%=build/kept/conformance/%.json)
 
 reference: $(VENV)/ready ## the committed report with its records, anew, into reports/reference/
 	rm -rf $(ANEW) && $(BIN)/crosscheck report --quick --out $(ANEW)
-	mkdir $(ANEW)/conformance && cp $(KEPT) $(ANEW)/conformance
+	$(UNPACKED) && mkdir $(ANEW)/conformance && cp $(KEPT) $(ANEW)/conformance
 	for engine in $(VERIFIED); do $(BIN)/crosscheck verify $$engine --in-process --json \
 	    $(PROBES) > $(ANEW)/conformance/$$engine.json; done
-	rm -rf reports/reference && mv $(ANEW) reports/reference
-	$(BIN)/crosscheck report --render reports/reference
+	rm -rf $(REFERENCE) && $(KEEP) $(ANEW) $(REFERENCE)
+	$(BIN)/crosscheck report --render $(REFERENCE)
 
 request: $(VENV)/ready ## every check on engines that run on request, if installed, for the committed report
+	$(UNPACKED)
 	-$(foreach engine,$(ON_REQUEST),$(BIN)/crosscheck verify $(engine) --in-process --json \
-	    $(PROBES_$(engine)) > reports/reference/conformance/$(engine).json;)
-	$(BIN)/crosscheck report --render reports/reference
+	    $(PROBES_$(engine)) > build/kept/conformance/$(engine).json;)
+	$(PACKED)
 
 DRAWN := mechanisms 200 --beside mbref=taylor
 
 drawn: $(VENV)/ready ## every check on random mechanisms, for the committed report; resumes from build/drawn/
-	mkdir -p build/drawn
+	mkdir -p build/drawn && $(UNPACKED)
 	for engine in mujoco pinocchio exudyn; do $(BIN)/crosscheck verify $$engine --$(DRAWN) --json \
-	    --records build/drawn/$$engine.jsonl > reports/reference/conformance/$${engine}_drawn.json; done
+	    --records build/drawn/$$engine.jsonl > build/kept/conformance/$${engine}_drawn.json; done
 	$(BIN)/crosscheck verify mbref --family taylor --mechanisms 2000 --json \
-	    --records build/drawn/mbref.jsonl > reports/reference/conformance/mbref_drawn.json
-	$(BIN)/crosscheck report --render reports/reference
+	    --records build/drawn/mbref.jsonl > build/kept/conformance/mbref_drawn.json
+	$(PACKED)
 
 PAPER := reports/paper
 
 paper: $(VENV)/ready ## the committed page on the paper with its records, anew, into reports/paper/
 	rm -rf build/paper && $(BIN)/crosscheck paper --out build/paper
-	rm -rf $(PAPER) && mv build/paper $(PAPER)
+	rm -rf $(PAPER) && $(KEEP) build/paper $(PAPER)
 	$(BIN)/crosscheck report --section paper --render $(PAPER)
 
 KINDS := bennett 'slider_crank_chain[4]' planar_slider_crank_equal flyball_governor
@@ -113,7 +118,7 @@ LADDERS := build/stability
 
 ladders: $(VENV)/ready ## mbref's methods on mechanisms that become difficult, with records, anew, into reports/stability/
 	$(BIN)/crosscheck report --section stability --engine mbref --out $(LADDERS)
-	$(BIN)/python -m reports.ladders $(LADDERS) reports/stability
+	$(KEEP) --without-motions $(LADDERS) reports/stability
 	$(BIN)/crosscheck report --section stability --render reports/stability
 
 picture: $(VENV)/ready ## the README's moving picture, into reports/rendered/

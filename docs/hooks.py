@@ -163,8 +163,7 @@ def formulas(markdown: str) -> str:
 def paper() -> str:
     """The committed report on the paper without its title, its figures among those of the site."""
     _, _, text = (PAPER / "report.md").read_text().partition("\n## ")
-    body = text.partition("\n")[2].replace("\n### ", "\n## ")
-    return re.sub(r"\(figures/([\w-]+)\.png\)", r"(figures/\1.svg)", body)
+    return text.partition("\n")[2].replace("\n### ", "\n## ")
 
 
 @cache

@@ -3,7 +3,7 @@ again.
 
 A line is strict JSON (NaN becomes null, an infinite number 1e999), written by one call of the operating
 system. So a kill or a power failure can leave only the last line incomplete. An incomplete last line is
-removed when the file is read.
+removed when the file is read. Files that are complete may be compressed (xz), to be read only.
 """
 
 from __future__ import annotations
@@ -13,11 +13,14 @@ import json
 import math
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from mbref import files
 from mbref.input_error import InputError
+
+COMPRESSED = b"\xfd7zXZ\x00"  # first bytes of a compressed file
 
 INFINITE_MARKS = {math.inf: "\ue000+", -math.inf: "\ue000-"}  # placeholders until the text is made
 
@@ -31,25 +34,40 @@ def stored(path: str | Path | None) -> dict[str, dict[str, Any]]:
     no file.
 
     Lines that contain no record are reported by number on stderr and not changed. Raises RecordsError if no
-    line contains a record, OSError if the file cannot be read.
+    line contains a record or the file is compressed, OSError if the file cannot be read.
     """
-    records, whole, size = _parsed(path)
-    if path is not None and whole < size:
+    text = _content(path)
+    if text.startswith(COMPRESSED):
+        raise RecordsError(f"{path}: is compressed, so no record can be added; name another file")
+    records, whole = _parsed(path, text)
+    if path is not None and whole < len(text):
         os.truncate(path, whole)
     return records
 
 
 def looked_at(path: str | Path | None) -> dict[str, dict[str, Any]]:
-    """Read records like ``stored``, without repairing an incomplete last line."""
-    return _parsed(path)[0]
+    """Read records like ``stored``, also of a compressed file, without repairing an incomplete last line."""
+    return _parsed(path, _decompressed(path, _content(path)))[0]
 
 
-def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, int]:
-    """Return the records of the file by ``key``, the size of its complete lines and the size of the file
-    (bytes)."""
-    if path is None or not Path(path).exists():
-        return {}, 0, 0
-    text = Path(path).read_bytes()
+def _content(path: str | Path | None) -> bytes:
+    return Path(path).read_bytes() if path is not None and Path(path).exists() else b""
+
+
+def _decompressed(path: str | Path | None, text: bytes) -> bytes:
+    """Return the text of a file; raises RecordsError for a damaged compressed file."""
+    if not text.startswith(COMPRESSED):
+        return text
+    import lzma
+
+    try:
+        return lzma.decompress(text)
+    except lzma.LZMAError:
+        raise RecordsError(f"{path}: is damaged; name another file, or restore it") from None
+
+
+def _parsed(path: str | Path | None, text: bytes) -> tuple[dict[str, dict[str, Any]], int]:
+    """Return the records of a file's text by ``key``, and the size of its complete lines (bytes)."""
     end = text.rfind(b"\n") + 1
     lines = [_record(line) for line in text[:end].splitlines()]
     foreign = [number for number, record in enumerate(lines, 1) if record is None]
@@ -58,7 +76,7 @@ def _parsed(path: str | Path | None) -> tuple[dict[str, dict[str, Any]], int, in
     if foreign:
         numbers = ", ".join(map(str, foreign))
         print(f"{path}: line {numbers} holds no record and was left unchanged", file=sys.stderr)
-    return {record["key"]: record for record in lines if record is not None}, end, len(text)
+    return {record["key"]: record for record in lines if record is not None}, end
 
 
 def opened(path: str | Path | None) -> dict[str, dict[str, Any]]:
@@ -88,6 +106,19 @@ def append(path: str | Path | None, record: dict[str, Any]) -> None:
             if isinstance(error, OSError):
                 error.filename = str(path)
             raise
+
+
+def rewrite(path: str | Path, records: Iterable[Mapping[str, Any]]) -> None:
+    """Replace a file by records, one a line; it is compressed if its name ends in ``.xz``.
+
+    A reader sees the old file or the new one. Raises OSError.
+    """
+    text = "".join(strict_json(record) + "\n" for record in records).encode()
+    if Path(path).suffix == ".xz":
+        import lzma
+
+        text = lzma.compress(text)
+    files.write(path, text)
 
 
 def json_content(path: str | Path) -> Any:

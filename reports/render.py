@@ -78,7 +78,7 @@ def html(blocks: Sequence[Block], drawn: dict[str, str], title: str = TITLE) -> 
 
 
 def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
-    """Return the report as Markdown that shows figures/NAME.png."""
+    """Return the report as Markdown that shows figures/NAME.svg."""
     return "\n\n".join([f"# {_words(title)}", *map(_markdown, blocks)]) + "\n"
 
 
@@ -91,7 +91,7 @@ def _markdown(block: Block) -> str:
         case Table():
             return f"{_words(block.caption)}\n\n{_rows(block)}"
         case Figure():
-            picture = f"![{_words(block.name)}](figures/{files.file_name(block.name)}.png)"
+            picture = f"![{_words(block.name)}](figures/{files.file_name(block.name)}.svg)"
             return f"{_words(block.caption)}\n\n{picture}"
         case Plot():
             return _markdown(block.figure)

@@ -13,7 +13,8 @@ from crosscheck.judge.model_identity import gate_times
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Run, Timing, Truth, Verdicts, checked
 from crosscheck.study.record_view import of_scenes, with_time
-from mbref.records import json_content, looked_at
+from crosscheck.study.store import read, unpacked
+from mbref.records import json_content
 from mbref.scene import Scene
 
 from .runs import SceneRuns, by_scene
@@ -29,14 +30,18 @@ SHAPES: dict[str, type[Run] | type[Truth]] = {
 
 def groups(folder: Path) -> list[SceneRuns]:
     """Return the runs of a folder by scene; raises FileNotFoundError if it has no scenes or records."""
+    with unpacked(folder) as place:
+        return _groups(place)
+
+
+def _groups(folder: Path) -> list[SceneRuns]:
     if not (folder / "records.jsonl").exists() or not (folder / "scenes").is_dir():
         raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
     named = {scene.name: scene for scene in scenes}
-    times = {record["key"]: record for record in _read(folder / "timings.jsonl", Timing)}
-    records, *more = (
-        of_scenes(_read(folder / f"{name}.jsonl", shape), scenes) for name, shape in SHAPES.items()
-    )
+    times = read(folder / "timings.jsonl", Timing)
+    stored = (read(folder / f"{name}.jsonl", shape) for name, shape in SHAPES.items())
+    records, *more = (of_scenes(list(found.values()), scenes) for found in stored)
     gates = [r for r in records if _is_gate(named[r["scene"]], r)]
     runs = [with_time(r, times) for r in records if not any(r is gate for gate in gates)]
     return by_scene(_ordered(runs), named, gates, *more)
@@ -46,13 +51,10 @@ def verified(folder: Path) -> list[Record]:
     """Return the verdicts that `crosscheck verify ENGINE --json` wrote to ``folder``/conformance/*.json,
     crosscheck's own engines first."""
     order = list(engine_names())
-    paths = sorted((folder / "conformance").glob("*.json"))
-    found = [record for path in paths for record in checked(path, [json_content(path)], Verdicts)]
+    with unpacked(folder) as place:
+        paths = sorted((place / "conformance").glob("*.json"))
+        found = [record for path in paths for record in checked(path, [json_content(path)], Verdicts)]
     return sorted(found, key=lambda f: order.index(f["engine"]) if f["engine"] in order else len(order))
-
-
-def _read(path: Path, shape: type[Run] | type[Truth] | type[Timing]) -> Sequence[Record]:
-    return checked(path, list(looked_at(path).values()), shape)
 
 
 def _is_gate(scene: Scene, record: Record) -> bool:

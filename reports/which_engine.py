@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from crosscheck.cli.tables import own_code
@@ -16,10 +17,11 @@ from crosscheck.findings.finding import findings
 from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
+from crosscheck.study.store import MOTION, pack
 from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.command_line import Parser
 from mbref.files import file_name
-from mbref.records import strict_json
+from mbref.records import rewrite
 from mbref.trajectory import Outcome
 
 from .runs import SceneRuns, duration, plain
@@ -28,7 +30,6 @@ from .stored import groups, verified
 HERE = Path(__file__).parent
 KINDS_FOLDER = HERE / "kinds"
 FOLDERS = (HERE / "reference", KINDS_FOLDER)  # of committed records
-MOTION = ("bodies", "reactions", "open_reactions", "angles", "crossings")  # the page needs none
 HEAD = f"""# Which engine, which settings, for my mechanism?
 
 This page answers by kind of mechanism: which engines reach an error of {SAID}, at which settings, in which
@@ -287,19 +288,14 @@ def _checks(folder: Path) -> Iterator[tuple[str, int, int]]:
 
 
 def keep(found: Sequence[SceneRuns], folder: Path) -> None:
-    """Write scenes, truths, and the records of runs without their motions into a folder."""
-    (folder / "scenes").mkdir(parents=True, exist_ok=True)
-    for group in found:
-        group.scene.save(folder / "scenes" / f"{file_name(group.scene.name)}.toml")
-    records = [
-        {k: v for k, v in run.record.items() if k not in MOTION} for group in found for run in group.runs
-    ]
-    _write(folder / "records.jsonl", records)
-    _write(folder / "truths.jsonl", [group.truth for group in found if group.truth])
-
-
-def _write(path: Path, records: Sequence[Record]) -> None:
-    path.write_text("".join(strict_json(record) + "\n" for record in records))
+    """Pack scenes, truths, and the records of runs without their motions into a folder."""
+    with TemporaryDirectory() as place:
+        (Path(place) / "scenes").mkdir()
+        for group in found:
+            group.scene.save(Path(place) / "scenes" / f"{file_name(group.scene.name)}.toml")
+        rewrite(Path(place) / "records.jsonl", [run.record for group in found for run in group.runs])
+        rewrite(Path(place) / "truths.jsonl", [group.truth for group in found if group.truth])
+        pack(Path(place), folder, MOTION)
 
 
 if __name__ == "__main__":

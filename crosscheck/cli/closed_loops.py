@@ -16,6 +16,7 @@ from crosscheck.cli.running import COMPLETED, console, notice
 from crosscheck.closed_loops import document, records
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
 from crosscheck.study.progress import shown as progress_of
+from crosscheck.study.store import read_runs
 from mbref.files import write
 
 LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
@@ -26,7 +27,7 @@ def closed_loops(arguments: argparse.Namespace) -> int:
     path = Path(arguments.records)
     if arguments.run:
         _measure(arguments, path)
-    found = records.read(path)
+    found = read_runs(path)
     if arguments.page:
         write(arguments.page, document.page(found))
         notice(f"written: {arguments.page}")

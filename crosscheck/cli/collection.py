@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.cli.request import RequestError, find_engines
-from crosscheck.closed_loops.records import read
+from crosscheck.closed_loops.records import FILE as CLOSED_LOOPS
 from crosscheck.paper import runs, store
 from crosscheck.paper.illustration import Illustration, illustration
 from crosscheck.study import stability
@@ -17,11 +17,11 @@ from crosscheck.study.comparison import Collection, Wanted, collected
 from crosscheck.study.dead_positions import followed
 from crosscheck.study.grid import Case, Record, shown_name
 from crosscheck.study.progress import shown
-from crosscheck.study.record_shape import Ladder, Timing, checked
+from crosscheck.study.record_shape import Ladder, Timing
 from crosscheck.study.record_view import with_time
 from crosscheck.study.search import selection
+from crosscheck.study.store import read, read_runs, unpacked
 from crosscheck.study.timings import with_timings
-from mbref.records import looked_at
 from mbref.scene import Scene
 
 TIMINGS, ILLUSTRATION = "paper-timings.jsonl", "paper-illustration.jsonl"
@@ -86,7 +86,7 @@ def comparison(out: Path, wanted: Runs, notice: Notice) -> Collection:
 
 def closed_loops() -> list[Record]:
     """Return the stored records of engines on closed loops."""
-    return read()
+    return read_runs(CLOSED_LOOPS)
 
 
 def stability_ladders(out: Path, engines: Sequence[str] | None, notice: Notice) -> list[Record]:
@@ -100,10 +100,10 @@ def stored_ladders(out: Path) -> list[Record]:
 
     Raises FileNotFoundError if the folder has none.
     """
-    if not (out / stability.FILE).exists():
-        raise FileNotFoundError(f"{out}: has no {stability.FILE} of a report")
-    path = out / stability.FILE
-    return list(checked(path, list(looked_at(path).values()), Ladder))
+    with unpacked(out) as place:
+        if not (place / stability.FILE).exists():
+            raise FileNotFoundError(f"{out}: has no {stability.FILE} of a report")
+        return list(read(place / stability.FILE, Ladder).values())
 
 
 def paper(out: Path, is_whole: bool, notice: Notice) -> Paper:
@@ -128,7 +128,7 @@ def stored_paper(out: Path) -> Paper:
 
     Raises FileNotFoundError if the folder has none.
     """
-    records, times = store.indexed(out), looked_at(out / TIMINGS)
-    checked(out / TIMINGS, list(times.values()), Timing)
-    timed = {label: with_time(record, times) for label, record in records.items()}
-    return Paper(timed, illustration(out / ILLUSTRATION))
+    with unpacked(out) as place:
+        records, times = store.indexed(place), read(place / TIMINGS, Timing)
+        timed = {label: with_time(record, times) for label, record in records.items()}
+        return Paper(timed, illustration(place / ILLUSTRATION))

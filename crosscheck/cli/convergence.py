@@ -11,9 +11,9 @@ from rich.table import Table
 
 from crosscheck.cli import request
 from crosscheck.cli.running import COMPLETED, console, notice
-from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document, ladders
 from crosscheck.study.grid import Record
+from crosscheck.study.store import read_runs
 from mbref.files import write
 
 
@@ -22,7 +22,7 @@ def convergence(arguments: argparse.Namespace) -> int:
     path = Path(arguments.records)
     if arguments.run:
         ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
-    found = read(path)
+    found = read_runs(path)
     if arguments.page:
         write(arguments.page, document.page(found))
         notice(f"written: {arguments.page}")

@@ -16,6 +16,7 @@ from crosscheck.engine import all_engines
 from crosscheck.small_motions import document, records
 from crosscheck.small_motions.records import Record
 from mbref.files import write
+from mbref.records import rewrite
 
 # engines whose accelerations at a pose are asked for, if they are installed
 ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
@@ -29,7 +30,7 @@ def modes(arguments: argparse.Namespace) -> int:
         found = records.measured(scene, engines, starts=arguments.starts, progress=notice)
     else:
         if arguments.run:
-            records.write(records.merged(records.of_mechanisms(engines, notice), records.read()))
+            rewrite(records.FILE, records.merged(records.of_mechanisms(engines, notice), records.read()))
         found = records.read()
     if arguments.page:
         write(arguments.page, document.page(found))

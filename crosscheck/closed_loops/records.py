@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -13,13 +12,12 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import engine
 from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.origin import made_by
-from crosscheck.study.record_shape import Measured, Refused, checked
 from crosscheck.study.search.offers import Unable, default_cases
-from mbref import files
-from mbref.records import looked_at
+from crosscheck.study.store import read_runs
+from mbref.records import rewrite
 from mbref.trajectory import Outcome
 
-FILE = Path(__file__).parent / "records.jsonl"
+FILE = Path(__file__).parent / "records.jsonl.xz"
 SAMPLES = 21
 TIME_LIMIT = 60.0  # s of CPU time of a run, so that all runs of the table take an hour
 REFUSED = "REFUSED"  # outcome of a record without a run
@@ -43,22 +41,6 @@ KEPT = (
 METRICS = ("error", "error_bound", "violation_position")
 
 
-def read(path: Path = FILE) -> list[Record]:
-    """Return the records of a file in their order; no records if the file does not exist.
-
-    Raises RecordsError.
-    """
-    found = list(looked_at(path).values())
-    for record in found:
-        checked(path, [record], Measured if record.get("outcome") in Outcome.__members__ else Refused)
-    return found
-
-
-def write(records: Sequence[Record], path: Path = FILE) -> None:
-    """Replace the file; a reader sees the old file or the new one."""
-    files.write(path, "".join(json.dumps(record) + "\n" for record in records))
-
-
 def cases(
     engines: Sequence[str],
     families: Sequence[str] | None,
@@ -70,7 +52,7 @@ def cases(
     A setting is left out that ran out of time by the file's records, or would by the CPU time of a run with a
     longer step, so that the next coarser one follows.
     """
-    stored = read(path)
+    stored = read_runs(path)
     wanted: list[Case] = []
     unable: list[Unable] = []
     for column in columns:
@@ -106,7 +88,7 @@ def measure(
     """Run the cases that the file lacks, and store each record as its run ends."""
     for refusal in unable:
         _store(_refused(refusal), path)
-    known = {record["key"] for record in read(path)}
+    known = {record["key"] for record in read_runs(path)}
 
     def store(done: int, total: int, record: Record) -> None:
         _store(kept(record), path)
@@ -140,7 +122,7 @@ def _refused(refusal: Unable) -> Record:
 
 def _store(record: Record, path: Path) -> None:
     """Add a record to the file in place of the records that it supersedes."""
-    write([*(old for old in read(path) if not supersedes(record, old)), record], path)
+    rewrite(path, [*(old for old in read_runs(path) if not supersedes(record, old)), record])
 
 
 def supersedes(new: Record, old: Record) -> bool:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.closed_loops.mechanisms import Difficulty
-from crosscheck.closed_loops.records import REFUSED, kept, read, write
+from crosscheck.closed_loops.records import REFUSED, kept
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
@@ -19,8 +19,10 @@ from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
 from crosscheck.study.search.offers import default_cases
+from crosscheck.study.store import read_runs
+from mbref.records import rewrite
 
-FILE = Path(__file__).parent / "records.jsonl"
+FILE = Path(__file__).parent / "records.jsonl.xz"
 SAMPLES = 11
 TIME_LIMIT = 2.0  # s of CPU time of a run, so that all runs of the page take half an hour
 SLOW = 10.0  # s of CPU time of a run of a family whose step takes 0.1 s
@@ -163,22 +165,24 @@ def point(record: Record) -> str:
 
 
 def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], None] = print) -> None:
-    """Make and store the runs that the file lacks, one at a time; ``report`` gets a line for each run."""
+    """Make the runs that the file lacks, one at a time, and store them after each row on a mechanism;
+    ``report`` gets a line for each run."""
+    known = {record["key"]: record for record in read_runs(path)}
     with ThreadPoolExecutor(1) as one:
 
         def run(case: Case) -> Record:
-            known = {record["key"]: record for record in read(path)}
-            if key(case) in known:
-                return known[key(case)]
-            [made] = study([case], one, run=run_in_turn)
-            write([*known.values(), short(made)], path)
-            report(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}")
-            return made
+            if key(case) not in known:
+                [made] = study([case], one, run=run_in_turn)
+                known[made["key"]] = short(made)
+                report(f"{made['engine']} {made['family']} {made['scene']}: {point(made)}")
+            return known[key(case)]
 
         for row in (row for row in ROWS if row.engine in engines):
             for mechanism in MECHANISMS:
                 if not climb(ladder(row, mechanism), run, row.time_limit):
-                    _refuse(row, mechanism, path)
+                    refusal = _refusal(row, mechanism)
+                    known[refusal["key"]] = refusal
+                rewrite(path, known.values())
     end_idle()
 
 
@@ -188,12 +192,18 @@ def short(record: Record) -> Record:
     return found | {"cost": {name: record["cost"][name] for name in ("seconds", "steps")}}
 
 
-def _refuse(row: Row, mechanism: Difficulty, path: Path) -> None:
-    """Store the refusal of a mechanism by an engine or by its family."""
+def _refusal(row: Row, mechanism: Difficulty) -> Record:
+    """Return the record of the refusal of a mechanism by an engine or by its family."""
     unserved = Cannot(Owner.ADAPTER, f"the family {row.family} does not serve this mechanism")
     cannot = engine(row.engine).cannot(mechanism.make()) or unserved
-    found = {"key": f"{row.name} {mechanism.scene}", "engine": row.engine, "family": row.family}
-    found |= {"scene": mechanism.scene, "outcome": REFUSED}
-    found |= {"message": cannot.reason, "owner": cannot.owner.value}
-    found |= {"version": engine(row.engine).version(), "date": made_by()["date"]}
-    write([*(r for r in read(path) if r["key"] != found["key"]), found], path)
+    return {
+        "key": f"{row.name} {mechanism.scene}",
+        "engine": row.engine,
+        "family": row.family,
+        "scene": mechanism.scene,
+        "outcome": REFUSED,
+        "message": cannot.reason,
+        "owner": cannot.owner.value,
+        "version": engine(row.engine).version(),
+        "date": made_by()["date"],
+    }

@@ -10,9 +10,9 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.paper.runs import GROWTH, PEAKS, Cases, Label, Records
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown
-from crosscheck.study.record_shape import checked
+from crosscheck.study.store import read
 from mbref.files import write
-from mbref.records import RecordsError, json_content, looked_at
+from mbref.records import RecordsError, json_content
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory
 
@@ -83,8 +83,7 @@ def index(path: str | Path, chosen: Cases) -> None:
 
 def indexed(folder: Path) -> Records:
     """Return the records of a folder by label; raises FileNotFoundError if the folder has no records."""
-    known = looked_at(folder / FILE)
-    checked(folder / FILE, list(known.values()))
+    known = read(folder / FILE)
     keys = json_content(folder / INDEX)
     try:
         return {Label(*json.loads(label)): known[k] for label, k in keys.items() if k in known}

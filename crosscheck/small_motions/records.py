@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,10 +15,10 @@ from crosscheck.processes import pool
 from crosscheck.processes.child import ChildFailed
 from crosscheck.small_motions.compare import Result, distance, error, of_engine
 from crosscheck.small_motions.mechanisms import MECHANISMS
-from mbref import files
+from mbref.records import looked_at
 from mbref.scene import Scene
 
-FILE = Path(__file__).parent / "records.json"
+FILE = Path(__file__).parent / "records.jsonl.xz"
 SAME = 1e-6  # largest distance of a pose that an engine's search found / length, or rad
 REGULAR = (
     1e-3  # part of the largest eigenvalue by which exact ones may differ from the judge's to be of a pose
@@ -46,7 +45,10 @@ def measured(
     kept = [(each, of) for each, of in zip(poses, exact, strict=True) if of is not None or not known]
     progress("mbref's search")
     own = search(scene)
-    return [_record(scene, each, of, own, _results(scene, each, engines, progress)) for each, of in kept]
+    return [
+        {"key": f"{scene.name} {k}"} | _record(scene, each, of, own, _results(scene, each, engines, progress))
+        for k, (each, of) in enumerate(kept, 1)
+    ]
 
 
 def _nearest(found: np.ndarray, known: Sequence[tuple[complex, ...]]) -> np.ndarray | None:
@@ -135,10 +137,4 @@ def _others(record: Record, old: Sequence[Record]) -> list[Record]:
 
 def read(path: Path = FILE) -> list[Record]:
     """Return the stored records."""
-    found: list[Record] = json.loads(path.read_text())
-    return found
-
-
-def write(records: Sequence[Record], path: Path = FILE) -> None:
-    """Store records, one a line."""
-    files.write(path, "[\n" + ",\n".join(json.dumps(record) for record in records) + "\n]\n")
+    return list(looked_at(path).values())

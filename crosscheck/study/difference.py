@@ -11,6 +11,7 @@ from typing import NamedTuple
 from crosscheck.study.grid import Record
 from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import ended, error, error_bound, error_text, is_completed, of_scenes
+from crosscheck.study.store import read, unpacked
 from crosscheck.study.words.text import runs
 from mbref.records import looked_at
 from mbref.scene import Scene, SceneError
@@ -47,11 +48,16 @@ def load(path: str | Path) -> dict[Identity, Record]:
 
     Raises ValueError for a file without records.
     """
-    file = Path(path) / "records.jsonl" if Path(path).is_dir() else Path(path)
+    if Path(path).is_dir():
+        with unpacked(Path(path)) as place:
+            return _loaded(place / "records.jsonl")
+    return _loaded(Path(path))
+
+
+def _loaded(file: Path) -> dict[Identity, Record]:
     if not file.exists():
         raise ValueError(f"{file}: no such file")
-    times, records = looked_at(file.parent / "timings.jsonl"), list(looked_at(file).values())
-    checked(file.parent / "timings.jsonl", list(times.values()), Timing)
+    times, records = read(file.parent / "timings.jsonl", Timing), list(looked_at(file).values())
     if any("asked" not in record for record in records):
         raise ValueError(
             f"{file}: its records lack the field `asked` with the request of the run; run them again"

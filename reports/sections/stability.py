@@ -66,11 +66,15 @@ def _runs(records: Iterable[Record]) -> dict[str, Runs]:
     """Return the runs of each ladder, mbref's methods first."""
     order = {method: k for k, method in enumerate(METHODS)}
     found: dict[str, dict[Curve, dict[float, Record]]] = {}
-    for record in sorted(records, key=lambda r: (r["engine"] != MBREF, order.get(r["family"], 0))):
+    for record in sorted(records, key=lambda r: _place(r, order)):
         ladder, difficulty = place(record["scene"])
         curve = record["engine"], record["family"]
         found.setdefault(ladder, {}).setdefault(curve, {})[difficulty] = record
     return dict(found)
+
+
+def _place(record: Record, order: Mapping[str, int]) -> tuple[bool, int, str, str]:
+    return record["engine"] != MBREF, order.get(record["family"], 0), record["engine"], record["family"]
 
 
 def is_false(record: Record) -> bool:

@@ -11,6 +11,7 @@ from crosscheck.closed_loops import document, records
 from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
 from crosscheck.judge.truth import truth_for
+from crosscheck.study.store import read_runs
 from mbref.scenes import find_scene
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "closed-loops.md"
@@ -133,6 +134,6 @@ def test_a_record_supersedes_its_run_older_versions_and_refusals_of_engine_and_m
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:
-    assert DOCUMENT.read_text() == document.page(records.read()), (
+    assert DOCUMENT.read_text() == document.page(read_runs(records.FILE)), (
         "docs/closed-loops.md is stale: crosscheck closed-loops --page docs/closed-loops.md renews it"
     )

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.closed_loops.records import read
 from crosscheck.convergence import document
 from crosscheck.convergence.document import cell, order
 from crosscheck.convergence.ladders import FILE, MECHANISMS, ROWS, VAIN, climb, in_vain, ladder
 from crosscheck.study.grid import Case
+from crosscheck.study.store import read_runs
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "convergence.md"
 
@@ -94,6 +94,6 @@ def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> Non
 
 
 def test_committed_page_follows_from_the_committed_records() -> None:
-    assert DOCUMENT.read_text() == document.page(read(FILE)), (
+    assert DOCUMENT.read_text() == document.page(read_runs(FILE)), (
         "docs/convergence.md is stale: crosscheck convergence --page docs/convergence.md renews it"
     )

@@ -75,7 +75,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
         ["sections"],
         ["render", "stored"],
-        ["__main__", "ladders", "which_engine"],
+        ["__main__", "keep", "which_engine"],
     ),
 }
 

@@ -9,7 +9,7 @@ import pytest
 from crosscheck.cli.collection import stored_ladders
 from crosscheck.study import stability
 from reports import __main__ as program
-from reports import ladders, render
+from reports import render
 from reports.sections import stability as section
 
 FOLDER = Path(__file__).parents[2] / "reports" / "stability"
@@ -33,10 +33,3 @@ def test_every_method_has_a_stored_run_at_every_difficulty(records):
     assert not missing, missing
     [commit] = {record["commit"] for record in records}
     assert "+" not in commit, f"made from a clean checkout: {commit}"
-    assert (FOLDER / stability.FILE).stat().st_size < 3e6
-
-
-def test_ladders_are_stored_without_motions(tmp_path):
-    ladders.keep(FOLDER, tmp_path)
-    assert (tmp_path / stability.FILE).read_text() == (FOLDER / stability.FILE).read_text()
-    assert not any("bodies" in record for record in stored_ladders(tmp_path))

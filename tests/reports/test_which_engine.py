@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import pytest
@@ -27,6 +28,8 @@ def test_every_scene_of_the_page_has_records():
 def folder(tmp_path):
     """A folder with the records of one scene: the plane slider-crank of the reference report."""
     keep([group for group in groups(FOLDERS[0]) if group.scene.name == "planar_slider_crank"], tmp_path)
+    zipfile.ZipFile(tmp_path / "records.zip").extractall(tmp_path)
+    (tmp_path / "records.zip").unlink()
     return tmp_path
 
 

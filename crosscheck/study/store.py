@@ -1,0 +1,81 @@
+"""The store of records: files that are read with checks of their fields, and packed folders of reports."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from pydantic import BaseModel
+
+from crosscheck.study.record_shape import Measured, Record, Refused, Run, checked
+from mbref.records import RecordsError, looked_at, strict_json
+from mbref.trajectory import Outcome
+
+PACK = "records.zip"  # name of the file in which a folder's records and scenes are packed
+PACKED = ("*.jsonl", "*.json", "*.toml")
+MOTION = ("bodies", "reactions", "open_reactions", "angles", "crossings")  # fields of a run's motion
+ALWAYS = (1980, 1, 1, 0, 0, 0)  # date of packed files: equal records give equal bytes
+
+
+def read(path: Path, shape: type[BaseModel] = Run) -> dict[str, Record]:
+    """Return the records of a file by key; empty if there is no file. Raises RecordsError."""
+    found = looked_at(path)
+    checked(path, list(found.values()), shape)
+    return found
+
+
+def read_runs(path: Path) -> list[Record]:
+    """Return runs without motions, and refusals, in their order; empty if there is no file.
+
+    Raises RecordsError.
+    """
+    found = list(looked_at(path).values())
+    for record in found:
+        checked(path, [record], Measured if record.get("outcome") in Outcome.__members__ else Refused)
+    return found
+
+
+@contextmanager
+def unpacked(folder: Path) -> Iterator[Path]:
+    """Yield a report's folder with its records as files: the folder itself, or a temporary one if its records
+    are packed. Raises RecordsError for a damaged pack."""
+    if not (folder / PACK).exists():
+        yield folder
+        return
+    with TemporaryDirectory() as place:
+        _extract(folder / PACK, place)
+        yield Path(place)
+
+
+def _extract(path: Path, place: str) -> None:
+    from lzma import LZMAError
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            archive.extractall(place)
+    except (zipfile.BadZipFile, LZMAError, EOFError, NotImplementedError):
+        raise RecordsError(f"{path}: is damaged; restore it") from None
+
+
+def pack(source: Path, folder: Path, dropped: Collection[str] = ()) -> None:
+    """Write the records and scenes of a folder as one compressed file into another folder.
+
+    Fields ``dropped`` of records are left out.
+    """
+    with unpacked(source) as place:
+        paths = sorted(path for pattern in PACKED for path in place.rglob(pattern))
+        texts = {path.relative_to(place).as_posix(): _text(path, dropped) for path in paths}
+    folder.mkdir(parents=True, exist_ok=True)
+    with zipfile.ZipFile(folder / PACK, "w") as archive:
+        for name, text in texts.items():
+            archive.writestr(zipfile.ZipInfo(name, ALWAYS), text, zipfile.ZIP_LZMA)
+
+
+def _text(path: Path, dropped: Collection[str]) -> str:
+    if path.suffix != ".jsonl" or not dropped:
+        return path.read_text()
+    records = ({k: v for k, v in r.items() if k not in dropped} for r in looked_at(path).values())
+    return "".join(strict_json(record) + "\n" for record in records)

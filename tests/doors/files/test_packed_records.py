@@ -1,0 +1,69 @@
+"""Packed records of a report, and compressed files of records: read as the files are; damage is named."""
+
+from __future__ import annotations
+
+import lzma
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli import main as crosscheck
+from mbref.records import RecordsError, looked_at, rewrite, stored
+from mbref.scenes import SCENES
+from reports.__main__ import main as report
+from tests.fuzz.broken_files import RECORD
+
+REPORTS = Path(__file__).parents[3] / "reports"
+
+
+def folder(place: Path) -> Path:
+    """Return a new folder of a report with one run of the four-bar."""
+    (place / "scenes").mkdir(parents=True)
+    SCENES["four_bar"]().save(place / "scenes" / "four_bar.toml")
+    rewrite(place / "records.jsonl", [RECORD])
+    return place
+
+
+def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_path, capsys):
+    plain, packed = folder(tmp_path / "plain"), tmp_path / "packed"
+    command = [sys.executable, "-m", "reports.keep", str(plain), str(packed)]
+    subprocess.run(command, cwd=REPORTS.parent, check=True, capture_output=True)
+    assert [path.name for path in packed.iterdir()] == ["records.zip"]
+    assert crosscheck(["diff", str(plain), str(packed)]) == 0
+    assert "0 of 1 runs of both sets changed" in " ".join(capsys.readouterr().out.split())
+    for place in (plain, packed):
+        assert report(["--render", str(place), "--section", "records"]) == 0
+    assert (packed / "report.md").read_text() == (plain / "report.md").read_text()
+
+
+def test_a_damaged_pack_is_named_in_one_sentence(tmp_path, capsys):
+    (tmp_path / "records.zip").write_bytes((REPORTS / "kinds" / "records.zip").read_bytes()[:-100])
+    assert report(["--render", str(tmp_path)]) == 2
+    said = capsys.readouterr().err
+    assert "records.zip: is damaged" in said and said.count("\n") == 1
+
+
+def test_a_compressed_file_is_read_and_refused_where_records_are_added(tmp_path):
+    path = tmp_path / "records.jsonl.xz"
+    rewrite(path, [RECORD])
+    assert list(looked_at(path).values()) == [RECORD] and path.read_bytes()[:1] == b"\xfd"
+    with pytest.raises(RecordsError, match=r"records\.jsonl\.xz: is compressed"):
+        stored(path)
+
+
+@pytest.mark.parametrize("damage", [lambda text: text[:-9], lambda text: lzma.compress(b"no record\n")])
+def test_a_damaged_compressed_file_is_named(damage, tmp_path, capsys):
+    path = tmp_path / "records.jsonl.xz"
+    rewrite(path, [RECORD])
+    path.write_bytes(damage(path.read_bytes()))
+    assert crosscheck(["convergence", "--records", str(path)]) == 2
+    assert "records.jsonl.xz: " in capsys.readouterr().err
+
+
+def test_committed_reports_have_at_most_6_megabytes_and_one_file_of_records_each():
+    paths = [path for path in REPORTS.rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+    kept = [path for path in paths if path.suffix != ".png" and path.name != "index.html"]
+    assert sum(path.stat().st_size for path in kept) < 6e6
+    assert not [path for path in kept if path.suffix in (".jsonl", ".json")]
