@@ -16,7 +16,7 @@ from least_errors import asked_for
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.conformance.relations import RELATIONS, Relation, shaken, unchanged
+from crosscheck.conformance.changes.relations import RELATIONS, Relation, shaken, unchanged
 from crosscheck.engine import Setting
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import FLOOR

@@ -17,8 +17,8 @@ from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-from crosscheck.conformance.hard_mechanisms import GRAVITY, bar, hinge
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.parts import GRAVITY, bar, hinge
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series, exact_motion
 from crosscheck.judge.truth import truth_for
 from mbref import Limits, Scene, simulate

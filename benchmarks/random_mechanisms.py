@@ -10,7 +10,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from crosscheck.conformance.random_mechanisms import PRINCIPLE, Comparison, compare, random_mechanism
+from crosscheck.conformance.initial_accelerations import PRINCIPLE, Comparison, compare
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from mbref.command_line import Parser
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")

@@ -22,10 +22,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
-from crosscheck.conformance.closed_forms import CLOSED_FORMS
-from crosscheck.conformance.hard_mechanisms import HARD
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS
+from crosscheck.conformance.mechanisms.hard import HARD
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference import cache

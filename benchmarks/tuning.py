@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.cli.planning import Choice, plan
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.engine import Setting, engine, installed
 from crosscheck.study.grid import Case, Record, run_here
 from crosscheck.study.record_view import error, is_completed

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.cli.scene_request import Notice, RequestError
-from crosscheck.conformance.planar import left_out, planar_specimens
-from crosscheck.conformance.specimens import Specimen, specimens
+from crosscheck.conformance.mechanisms.planar import left_out, planar_specimens
+from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.engine import ALL, BUILT_IN, all_engines, default_engines, engine
 from crosscheck.judge.constraints import scene_length
 from mbref.command_line import MOST_DURATION

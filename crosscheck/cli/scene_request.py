@@ -115,6 +115,6 @@ def find_certifiable(name: str) -> Scene:
     seed = name.removeprefix("random_")
     if seed == name or not seed.isdecimal():
         return find_scenes([name])[0]
-    from crosscheck.conformance.random_mechanisms import random_mechanism
+    from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 
     return random_mechanism(int(seed))

@@ -10,8 +10,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
-from crosscheck.conformance.geared_forms import armature_pendulum, gear_pair, rack, screw
+from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
+from crosscheck.conformance.mechanisms.geared_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
 from mbref.command_line import Parser
 from mbref.scene import Scene

@@ -14,10 +14,10 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from crosscheck.conformance import suite
+from crosscheck.conformance.mechanisms.random_scenes import floating, mechanism, rotor, without_masses
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.properties import PROPERTIES
-from crosscheck.conformance.random_scenes import floating, mechanism, rotor, without_masses
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import Specimen
 from crosscheck.conformance.suite import CANNOT, FAIL, PASS, REFUSAL, RUN, Verdict
 from crosscheck.conformance.trial import Bench, Broken, difference, set_up
 from crosscheck.engine import engine

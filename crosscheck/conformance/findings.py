@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from crosscheck.conformance import suite
-from crosscheck.conformance.changes import replaced
+from crosscheck.conformance.changes.copies import replaced
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
-from crosscheck.conformance.specimens import Specimen
 from crosscheck.conformance.trial import Bench, set_up
 from mbref.files import file_name
 from mbref.scene import GROUND, Joint, Load, Scene, SceneError

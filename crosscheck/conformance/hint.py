@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
-from crosscheck.conformance.specimens import Specimen
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, set_up
 from crosscheck.judge.constraints import initial_twists, scene_length
 from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants

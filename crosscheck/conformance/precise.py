@@ -7,7 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crosscheck.conformance.trial import SWEPT, Bench, Finding, Outside
+from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.trial import SWEPT, Bench, Finding
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.precision import grain, motion_rate, single_precision
 from crosscheck.judge.push_difference import accelerations_apart

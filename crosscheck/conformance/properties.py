@@ -9,17 +9,11 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.conformance.precise import double_precision, refined, settled, smooth
 from crosscheck.conformance.related import related
-from crosscheck.conformance.relations import RELATIONS
-from crosscheck.conformance.trial import (
-    NEIGHBOURS,
-    Bench,
-    Finding,
-    Outside,
-    Specimen,
-    difference,
-)
+from crosscheck.conformance.trial import NEIGHBOURS, Bench, Finding, Specimen, difference
 from crosscheck.conformance.vanishing import vanishing
 from crosscheck.engine import Cannot
 from crosscheck.judge.constraints import scene_length

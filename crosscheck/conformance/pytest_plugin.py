@@ -61,10 +61,10 @@ class Session:
     """The benches of a test run; a bench is made at first access."""
 
     def __init__(self, config: pytest.Config):
-        from crosscheck.conformance.features import undetermined
-        from crosscheck.conformance.planar import is_planar, planar_specimens
-        from crosscheck.conformance.random_mechanisms import random_mechanism
-        from crosscheck.conformance.specimens import Specimen, specimens
+        from crosscheck.conformance.mechanisms.features import undetermined
+        from crosscheck.conformance.mechanisms.planar import is_planar, planar_specimens
+        from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
+        from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
         from crosscheck.conformance.suite import runner
         from crosscheck.engine import engine
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from crosscheck.conformance.relations import RELATIONS, Relation
-from crosscheck.conformance.trial import OWN_ACCURACY, Bench, Broken, Finding, Outside, completed, difference
+from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.changes.relations import RELATIONS, Relation
+from crosscheck.conformance.trial import OWN_ACCURACY, Bench, Broken, Finding, completed, difference
 from crosscheck.engine import Cannot
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.push_difference import pushes_apart

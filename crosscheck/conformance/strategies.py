@@ -15,8 +15,8 @@ from typing import cast
 import numpy as np
 from hypothesis import strategies as st
 
-from crosscheck.conformance.moving import consistent
-from crosscheck.conformance.random_mechanisms import null_space
+from crosscheck.conformance.mechanisms.moving import consistent
+from crosscheck.conformance.mechanisms.random_mechanisms import null_space
 from crosscheck.judge.gauss_principle import goes_on
 from mbref import rotations
 from mbref.scene import (

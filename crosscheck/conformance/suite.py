@@ -13,12 +13,13 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.features import is_undetermined, undetermined
+from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.hint import Failure, hint
+from crosscheck.conformance.mechanisms.features import is_undetermined, undetermined
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.properties import PROPERTIES, Finding
 from crosscheck.conformance.runners import InProcess, Isolated, Runner
-from crosscheck.conformance.specimens import Specimen
-from crosscheck.conformance.trial import Bench, Broken, NoExact, Outside, set_up
+from crosscheck.conformance.trial import Bench, Broken, NoExact, set_up
 from crosscheck.engine import engine
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import ChildFailed

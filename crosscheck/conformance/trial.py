@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.conformance.changes import nudged, weighed
+from crosscheck.conformance.changes.copies import nudged, weighed
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
-from crosscheck.conformance.specimens import Specimen
 from crosscheck.engine import Cannot, Setting
 from crosscheck.judge.gauss_motion import NAME as GAUSS
 from crosscheck.judge.gauss_motion import gauss_motion
@@ -53,13 +53,6 @@ class Broken(Exception):
 
 class NoExact(Exception):
     """The exact motion that a check needs is not available; the message is the reason."""
-
-
-@dataclass(frozen=True)
-class Outside:
-    """A check does not apply to a scene; the message is the reason."""
-
-    reason: str
 
 
 class Finding(NamedTuple):

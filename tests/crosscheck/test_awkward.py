@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
+from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
 from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.bound import differences

@@ -13,11 +13,11 @@ from rich.console import Console
 
 from crosscheck.cli.commands import main
 from crosscheck.conformance import suite, trial
-from crosscheck.conformance.features import undetermined
-from crosscheck.conformance.geared_forms import GEARED
-from crosscheck.conformance.relations import shaken
+from crosscheck.conformance.changes.relations import shaken
+from crosscheck.conformance.mechanisms.features import undetermined
+from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess, Isolated
-from crosscheck.conformance.specimens import specimens
 from crosscheck.engine import engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion

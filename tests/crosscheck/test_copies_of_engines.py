@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from crosscheck.closed_loops.mechanisms import FOLDER
-from crosscheck.conformance.relations import RELATIONS, unchanged
+from crosscheck.conformance.changes.relations import RELATIONS, unchanged
 from crosscheck.engine import Setting, engine, engine_names
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import error_series, in_scene_order

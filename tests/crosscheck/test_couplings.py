@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import mbref
-from crosscheck.conformance.geared_mechanisms import geared_mechanism
-from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
+from crosscheck.conformance.initial_accelerations import PRINCIPLE, compare
+from crosscheck.conformance.mechanisms.geared import geared_mechanism
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure, violation_series

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.arithmetic import EXTENDED
 from crosscheck.judge.deadline import TimeIsUp, ask, within
 from crosscheck.judge.reference.certify import NotCertified, certified

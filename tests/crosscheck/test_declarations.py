@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from crosscheck.conformance.features import BODY, JOINTS
+from crosscheck.conformance.mechanisms.features import BODY, JOINTS
 from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Engine, Owner, Setting, Supports, engine
 from crosscheck.engines.shared.constraint_equations import Constraints
 from crosscheck.engines.shared.spanning_tree import spanning_tree

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.conformance import rewritings
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes import rewritings
+from crosscheck.conformance.changes.copies import Outside
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical
 from mbref.scene_fields import SMALLEST

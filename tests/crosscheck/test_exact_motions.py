@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 
-from crosscheck.conformance.moving import heavy_top, moving_probes
+from crosscheck.conformance.mechanisms.moving import heavy_top, moving_probes
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import violation_series

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_scenes import mechanism
+from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.engines.exudyn.singular_crossing import UPRIGHT, extrapolated_states, projected

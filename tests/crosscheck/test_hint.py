@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.hint import Failure, hint
+from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import specimens
 from crosscheck.conformance.suite import held_against
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.gauss_motion import gauss_motion

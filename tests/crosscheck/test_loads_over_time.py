@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from crosscheck.conformance.features import FACTORS, feature_scenes
+from crosscheck.conformance.mechanisms.features import FACTORS, feature_scenes
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.engines.mujoco.files import FORMAT
 from crosscheck.engines.shared.spanning_tree import spanning_tree

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.relations import RELATIONS
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.joint_reactions import resultants

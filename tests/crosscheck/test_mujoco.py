@@ -8,8 +8,8 @@ import numpy as np
 import psutil
 import pytest
 
-from crosscheck.conformance.moving import moving_probes
-from crosscheck.conformance.random_scenes import mechanism
+from crosscheck.conformance.mechanisms.moving import moving_probes
+from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.mujoco.adapter import ENGINE
 from crosscheck.engines.mujoco.context import LIBRARIES, library

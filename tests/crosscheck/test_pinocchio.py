@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.moving import moving_probes
-from crosscheck.conformance.rewritings import duplicated
+from crosscheck.conformance.changes.rewritings import duplicated
+from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.engines.pinocchio.adapter import ENGINE
 from crosscheck.engines.pinocchio.model import Loads, Mechanism

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from crosscheck.cli.request import find_specimens
-from crosscheck.conformance.planar import is_planar, planar_loops
+from crosscheck.conformance.mechanisms.planar import is_planar, planar_loops
 from crosscheck.engine import Cannot, Owner, Supports, engine
 from mbref.scene import GROUND, Scene
 from tests.helpers.fake_engines import Fake

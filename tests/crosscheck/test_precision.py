@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance import suite, trial
+from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import specimens
 from crosscheck.judge.precision import grain, not_finite, single_precision
 from tests.zoo.defects import DEFECTS, engine
 

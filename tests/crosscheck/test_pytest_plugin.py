@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from crosscheck.conformance.findings import shrunk, violates
-from crosscheck.conformance.moving import moving_probes
+from crosscheck.conformance.mechanisms.moving import moving_probes
 from crosscheck.conformance.runners import InProcess
 from tests.zoo.defects import DEFECTS, SOURCE, engine
 

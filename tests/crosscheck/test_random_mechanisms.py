@@ -9,8 +9,9 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from crosscheck.conformance import random_scenes
-from crosscheck.conformance.random_mechanisms import KINDS, PRINCIPLE, Comparison, compare, random_mechanism
+from crosscheck.conformance.initial_accelerations import PRINCIPLE, Comparison, compare
+from crosscheck.conformance.mechanisms import random_scenes
+from crosscheck.conformance.mechanisms.random_mechanisms import KINDS, random_mechanism
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import simulate

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance import random_scenes
-from crosscheck.conformance.relations import RELATIONS
+from crosscheck.conformance.changes.relations import RELATIONS
+from crosscheck.conformance.mechanisms import random_scenes
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, violation_series

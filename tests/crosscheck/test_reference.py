@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from crosscheck.cli.scene_request import find_certifiable
-from crosscheck.conformance.closed_forms import CLOSED_FORMS, free_fall, pendulum
-from crosscheck.conformance.features import feature_scenes, massless, undetermined
-from crosscheck.conformance.moving import moving_probes, several_springs
-from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.conformance.relations import ASKEW, Isometry
+from crosscheck.conformance.changes.isometry import ASKEW, Isometry
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, free_fall, pendulum
+from crosscheck.conformance.mechanisms.features import feature_scenes, massless, undetermined
+from crosscheck.conformance.mechanisms.moving import moving_probes, several_springs
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge import constraints, metrics
 from crosscheck.judge.arithmetic import DOUBLE, EXTENDED, doubles, many_digits
 from crosscheck.judge.deadline import GivenUp, given_up

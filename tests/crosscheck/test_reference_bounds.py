@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from crosscheck.conformance.hard_mechanisms import HARD
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.hard import HARD
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.arithmetic import EXTENDED, many_digits
 from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import judged, runs

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.conformance import replays
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes import replays
+from crosscheck.conformance.changes.copies import Outside
 from mbref.scene import Body, Cylindrical, Driver, Moment, Revolute, Scene, Translational
 from mbref.trajectory import Trajectory
 

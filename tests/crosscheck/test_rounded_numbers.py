@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import PRINCIPLE, compare
+from crosscheck.conformance.initial_accelerations import PRINCIPLE, compare
 from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank, singular_values
 from mbref import rotations, simulate

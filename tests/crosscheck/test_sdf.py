@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.engines.sdf.reading import FORMAT
 from crosscheck.judge.constraints import closure, inertia_matrices, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank

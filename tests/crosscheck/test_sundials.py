@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from crosscheck.conformance.closed_forms import free_fall
+from crosscheck.conformance.mechanisms.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring

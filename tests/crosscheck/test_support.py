@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from crosscheck.cli import support
-from crosscheck.conformance.features import JOINTS, LOADS, PIVOT, PLACES, feature_scenes, massless_link
+from crosscheck.conformance.mechanisms.features import (
+    JOINTS,
+    LOADS,
+    PIVOT,
+    PLACES,
+    feature_scenes,
+    massless_link,
+)
 from crosscheck.engine import BUILT_IN, Cannot, Owner, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_poses, jacobian

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-from crosscheck.conformance.moving import dead_end, moving_probes
+from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.gauss_principle import gauss, stacked

@@ -7,9 +7,9 @@ from dataclasses import replace
 import pytest
 
 from crosscheck.conformance import suite, trial
-from crosscheck.conformance.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.specimens import RELATED, specimens
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import RELATED, specimens
 from crosscheck.engine import BUILT_IN, engine
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance import relations
+from crosscheck.conformance.changes import relations
 from mbref import rotations
 from mbref.scene import Scene
 

@@ -6,16 +6,16 @@ from collections.abc import Callable
 from functools import partial
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
-from crosscheck.conformance import random_scenes
-from crosscheck.conformance.awkward_mechanisms import AWKWARD, awkward
-from crosscheck.conformance.closed_forms import CLOSED_FORMS
-from crosscheck.conformance.features import feature_scenes, massless_link, undetermined
-from crosscheck.conformance.geared_forms import GEARED
-from crosscheck.conformance.geared_mechanisms import geared_mechanism
-from crosscheck.conformance.hard_mechanisms import HARD
-from crosscheck.conformance.moving import dead_end, moving_probes
-from crosscheck.conformance.planar import planar_loops
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms import random_scenes
+from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS
+from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
+from crosscheck.conformance.mechanisms.geared import geared_mechanism
+from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.hard import HARD
+from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
+from crosscheck.conformance.mechanisms.planar import planar_loops
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.small_motions.mechanisms import MECHANISMS
 from crosscheck.study import stability
 from mbref.scene import Scene

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crosscheck.conformance.geared_mechanisms import geared_mechanism
-from crosscheck.conformance.random_mechanisms import null_space, triple
-from crosscheck.conformance.random_scenes import REGULAR, with_loads_of_joints
+from crosscheck.conformance.mechanisms.geared import geared_mechanism
+from crosscheck.conformance.mechanisms.parts import triple
+from crosscheck.conformance.mechanisms.random_mechanisms import null_space
+from crosscheck.conformance.mechanisms.random_scenes import REGULAR, with_loads_of_joints
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import Body, Driver, Joint, Revolute, Scene, Sine, TorsionSpring, Translational
 

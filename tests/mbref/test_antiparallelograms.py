@@ -8,7 +8,7 @@ parallelogram.
 import numpy as np
 import pytest
 
-from crosscheck.conformance.hard_mechanisms import linkage
+from crosscheck.conformance.mechanisms.parts import linkage
 from mbref.scene import Driver
 from mbref.simulation.simulate import Limits, simulate
 

@@ -15,7 +15,7 @@ from mbref.kernels.compilation import PLAIN
 if PLAIN:
     pytest.skip("without compilation there is no generated code", allow_module_level=True)
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.constraints import scene_length
 from mbref.method import Method
 from mbref.scene import Driver

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from crosscheck.conformance.hard_mechanisms import linkage
+from crosscheck.conformance.mechanisms.parts import linkage
 from mbref.scene import Body, Driver, Revolute, Scene
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar_gravity

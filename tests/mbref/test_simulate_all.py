@@ -9,7 +9,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from mbref.crossing import Crossing
 from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.equations.parts import shape_of

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.truth import truth_for

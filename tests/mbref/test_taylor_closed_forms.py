@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from crosscheck.conformance.closed_forms import CLOSED_FORMS, pendulum, torsion
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, pendulum, torsion
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spring

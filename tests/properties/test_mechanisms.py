@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from crosscheck.conformance.replays import started
+from crosscheck.conformance.changes.replays import started
 from crosscheck.conformance.strategies import matrices, mechanisms, paper_mechanisms
 from crosscheck.conformance.trial import difference
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length

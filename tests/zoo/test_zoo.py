@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from crosscheck.conformance import suite, trial
-from crosscheck.conformance.features import undetermined
+from crosscheck.conformance.mechanisms.features import undetermined
+from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import Specimen, specimens
 from tests.zoo.defects import DEFECTS, engine
 from tests.zoo.table import FOR_REPORTS, data, page
 

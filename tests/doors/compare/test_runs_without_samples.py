@@ -11,7 +11,7 @@ import pytest
 
 import crosscheck
 from crosscheck.cli import main
-from crosscheck.conformance.specimens import specimens
+from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.judge.openings import opening
 from crosscheck.processes.pool import end_idle
 from mbref.scene import Scene

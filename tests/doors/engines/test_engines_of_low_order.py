@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 
 from crosscheck.conformance import suite
+from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
-from crosscheck.conformance.specimens import specimens
 from tests.helpers.low_order_engines import FAULTS, Step, euler, low_order, midpoint, symplectic_euler
 
 # without changed scenes, whose runs take most of the time

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 
 import crosscheck
 from crosscheck.cli import main
-from crosscheck.conformance.relations import in_other_units
+from crosscheck.conformance.changes.units import in_other_units
 from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SlideSpring, Spring, TorsionSpring
 from tests.helpers.parts import hinge, slide
 from tests.helpers.statics import parallelogram, rod

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from crosscheck import truth_for
-from crosscheck.conformance.relations import RELATIONS
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes.copies import Outside
+from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.judge.reaction_balance import balance, with_exact_reactions
 from mbref.scene import Scene
 from mbref.trajectory import Trajectory

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.conformance.relations import in_other_units, scaled
+from crosscheck.conformance.changes.units import in_other_units, scaled
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from mbref import Outcome, Scene, find_scene, simulate
 from tests.helpers.statics import ORIGIN, hinge, rod
 

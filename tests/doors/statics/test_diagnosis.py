@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.conformance.relations import in_other_units
+from crosscheck.conformance.changes.units import in_other_units
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.mobility import mobility
 from mbref import Scene, diagnose, find_scene
 from mbref.cli.commands import main

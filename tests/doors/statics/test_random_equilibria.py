@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
 
-from crosscheck.conformance.random_mechanisms import random_mechanism
-from crosscheck.conformance.relations import in_other_units, scaled
+from crosscheck.conformance.changes.units import in_other_units, scaled
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.small_motions.equations import Balance
 from crosscheck.judge.small_motions.error_bounds import error_bounds

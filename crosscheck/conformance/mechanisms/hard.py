@@ -7,18 +7,18 @@ other velocities.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import numpy as np
 
-from crosscheck.conformance.relations import ASKEW, Isometry
+from crosscheck.conformance.changes.isometry import ASKEW, Isometry
+from crosscheck.conformance.mechanisms.parts import GRAVITY, Z, bar, hinge, linkage, turning
 from mbref.scene import (
     Body,
     Distance,
     Driver,
     Force,
     Planar,
-    Revolute,
     Scene,
     Sine,
     Spherical,
@@ -28,43 +28,7 @@ from mbref.scene import (
     Universal,
 )
 
-GRAVITY, Z = (0.0, -9.81, 0.0), (0.0, 0.0, 1.0)
 TURNED = Isometry(ASKEW, np.array([0.3, -0.7, 0.45]))
-Point = Sequence[float] | np.ndarray
-
-
-def bar(name: str, start: Point, stop: Point, mass: float = 1.0) -> Body:
-    """Return a bar between two points of the xy-plane, with its x axis along the bar."""
-    way = np.subtract(stop, start)
-    half, length = math.atan2(way[1], way[0]) / 2, float(np.linalg.norm(way))
-    long = mass * length**2 / 12
-    return Body(
-        name=name,
-        mass=mass,
-        inertia=(0.1 * long, long, 1.1 * long),
-        orientation=_q(half),
-        position=tuple((np.add(start, stop) / 2).tolist()),
-    )
-
-
-def _q(half: float) -> tuple[float, float, float, float]:
-    return math.cos(half), 0.0, 0.0, math.sin(half)
-
-
-def hinge(name: str, first: str, second: str, place: Point) -> Revolute:
-    """Return a hinge about z."""
-    x, y, z = place
-    return Revolute(name=name, bodies=(first, second), anchor=(x, y, z), axis=Z)
-
-
-def linkage(name: str, places: Sequence[Point], masses: Sequence[float] = (1.0, 1.0, 1.0)) -> Scene:
-    """Return bars between successive points, hinged to each other and to the ground at both ends."""
-    names = ["ground", *(f"bar{k}" for k in range(len(places) - 1)), "ground"]
-    bars = [bar(n, p, q, m) for n, p, q, m in zip(names[1:-1], places[:-1], places[1:], masses, strict=True)]
-    pins = [
-        hinge(f"P{k}", a, b, p) for k, (a, b, p) in enumerate(zip(names[:-1], names[1:], places, strict=True))
-    ]
-    return Scene(name=name, gravity=GRAVITY, duration=0.5, body=tuple(bars), joint=tuple(pins))
 
 
 FOUR = ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0), (0.6, 0.5, 0.0), (0.7, -0.1, 0.0))
@@ -109,12 +73,6 @@ def start_near_singular() -> Scene:
     aside = math.sqrt(coupler**2 - along**2) * np.array([-way[1], way[0], 0.0])
     places = ((0.0, 0.0, 0.0), pin.tolist(), (pin + along * way + aside).tolist(), (ground, 0.0, 0.0))
     return turning(linkage("start_near_singular", places), 1e-3).with_(duration=0.3)
-
-
-def turning(scene: Scene, rate: float) -> Scene:
-    """Return the linkage with the first bar at a given rate (rad/s)."""
-    first = scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)})
-    return scene.with_(body=(first, *scene.body[1:]))
 
 
 def two_crossings() -> Scene:

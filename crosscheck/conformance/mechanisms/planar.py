@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
-from crosscheck.conformance.features import feature_scenes
-from crosscheck.conformance.specimens import Specimen
+from crosscheck.conformance.mechanisms.features import feature_scenes
+from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.engine import Engine
 from mbref.scene import (
     Body,

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from crosscheck.conformance.changes import mapped, replaced
+from crosscheck.conformance.changes.copies import mapped, replaced
 from mbref.scene import Coupling, Scene, TimeFunction
 from mbref.scene_joints import DISPLACEMENT
 

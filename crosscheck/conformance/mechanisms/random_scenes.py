@@ -12,10 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from crosscheck.conformance.changes import replaced
-from crosscheck.conformance.features import massless
-from crosscheck.conformance.moving import consistent
-from crosscheck.conformance.random_mechanisms import random_mechanism, triple
+from crosscheck.conformance.changes.copies import replaced
+from crosscheck.conformance.mechanisms.features import massless
+from crosscheck.conformance.mechanisms.moving import consistent
+from crosscheck.conformance.mechanisms.parts import triple
+from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.constraints import closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_principle import goes_on, rank, rank_of, singular_values
 from mbref.scene import (

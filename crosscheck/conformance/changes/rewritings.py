@@ -7,8 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from crosscheck.conformance.changes import mapped, replaced
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes.copies import Outside, mapped, replaced
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError

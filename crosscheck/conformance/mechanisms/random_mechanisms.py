@@ -1,17 +1,15 @@
-"""Random closed-loop mechanisms from seeds, and their initial accelerations in several engines compared with
-mbref's."""
+"""Random closed-loop mechanisms from seeds."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from crosscheck.engine import engine
+from crosscheck.conformance.mechanisms.parts import Triple, direction, triple
 from crosscheck.judge.constraints import initial_poses, jacobian
-from crosscheck.judge.gauss_principle import gauss, goes_on, rank_of, singular_values, stacked
+from crosscheck.judge.gauss_principle import goes_on, rank_of
 from mbref import rotations
 from mbref.scene import (
     GROUND,
@@ -26,10 +24,7 @@ from mbref.scene import (
     Spherical,
     Spring,
 )
-from mbref.trajectory import Outcome
 
-Triple = tuple[float, float, float]
-REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
 KINDS = ("revolute", "universal", "spherical", "translational", "cylindrical", "distance", "fixed", "planar")
 # probability of each joint type when a body is added to the tree
 TREE = (0.34, 0.14, 0.14, 0.12, 0.12, 0.08, 0.03, 0.03)
@@ -40,21 +35,6 @@ TRIES = 60
 MOST_DRAWS = 1000  # largest number of attempts to generate a mechanism; usually a few suffice
 DURATION = 0.01  # s
 CONTINUES = 1e-9  # relative residual of the acceleration equations below which a mobility is finite
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Comparison on one mechanism: its redundant rows, its ``distance`` to singularity, and the error of each
-    engine.
-
-    ``distance`` is the smallest nonzero singular value of the Jacobian, with rows of unit length and lengths
-    relative to the scene's.
-    """
-
-    scene: Scene
-    redundant: int
-    distance: float
-    errors: dict[str, float]  # largest relative difference of an acceleration from mbref's; inf if none
 
 
 @cache
@@ -72,50 +52,13 @@ def random_mechanism(seed: int) -> Scene:
     raise RuntimeError(f"seed {seed}: no mechanism that moves in {MOST_DRAWS} draws")
 
 
-def compare(scene: Scene, engines: Sequence[str]) -> Comparison:
-    """Compare initial accelerations with mbref's: of each engine at the finest setting of its best family,
-    and by Gauss's principle with the judge's equations.
-
-    All runs are in this process.
-    """
-    reference = initial_accelerations(scene, REFERENCE)
-    values = singular_values(scene)
-    rank = rank_of(values)
-    if reference is None:
-        raise RuntimeError(f"{scene.name}: mbref gives no initial acceleration")
-    scale = np.linalg.norm(reference, axis=-1).max()
-    others = {name: initial_accelerations(scene, name) for name in engines}
-    others[PRINCIPLE] = gauss(scene)
-    errors = {name: _apart(found, reference) / scale for name, found in others.items()}
-    rows, _ = jacobian(scene, 0.0, *initial_poses(scene))
-    return Comparison(scene, len(rows) - rank, float(values[rank - 1]), errors)
-
-
-def initial_accelerations(scene: Scene, name: str) -> np.ndarray | None:
-    """Return an engine's own output of the accelerations at t = 0, and of the angular accelerations times the
-    scene's length (2 nb, 3), m/s², world axes.
-
-    None if the run fails or contains no accelerations.
-    """
-    simulator = engine(name)
-    setting = simulator.best_settings(scene)[-1]
-    run = simulator.run(scene, np.array([0.0, scene.duration / 100]), setting)
-    if run.outcome is not Outcome.COMPLETED or run.acceleration is None:
-        return None
-    return stacked(scene, run, 0)
-
-
-def _apart(found: np.ndarray | None, reference: np.ndarray) -> float:
-    return np.inf if found is None else float(np.linalg.norm(found - reference, axis=-1).max())
-
-
 class _Drawing:
     """State of the generation of one mechanism: random numbers, the axis of planar mechanisms, and the parts
     so far."""
 
     def __init__(self, rng: np.random.Generator):
         self.rng = rng
-        self.axis = self.direction()
+        self.axis = direction(self.rng)
         self.planar = rng.random() < PLANAR
         self.bodies = tuple(self.body(f"b{k}") for k in range(rng.integers(3, 9)))
         self.joints: list[Joint] = []
@@ -194,7 +137,7 @@ class _Drawing:
         common axis."""
         kind = str(self.rng.choice(KINDS, p=weights))
         middle = self.point((places[first] + places[second]) / 2)
-        along, across = self.axis if self.planar else self.direction(), self.direction()
+        along, across = self.axis if self.planar else direction(self.rng), direction(self.rng)
         across = np.cross(along, across) / np.linalg.norm(np.cross(along, across))
         far = np.array(middle) + self.rng.uniform(0.3, 0.8) * across if kind == "distance" else across
         has_rotation = JOINT_TYPES[kind].facts.free_rotations > 0
@@ -219,16 +162,6 @@ class _Drawing:
 
     def point(self, near: np.ndarray) -> Triple:
         return triple(near + self.rng.uniform(-0.3, 0.3, 3))
-
-    def direction(self) -> np.ndarray:
-        v = self.rng.normal(size=3)
-        return v / np.linalg.norm(v)
-
-
-def triple(v: np.ndarray) -> Triple:
-    """Return an array (3,) as a tuple of floats."""
-    x, y, z = map(float, v)
-    return x, y, z
 
 
 def null_space(scene: Scene) -> np.ndarray:

@@ -1,5 +1,5 @@
-"""Parts of the random mechanisms with numerical difficulties: rods with products of inertia, chains of
-joints, rounded numbers."""
+"""Parts of mechanisms: bars and linkages in the xy-plane, rods with products of inertia, chains of joints,
+rounded numbers."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.hard_mechanisms import bar, hinge
-from crosscheck.conformance.relations import Isometry
+from crosscheck.conformance.changes.isometry import Isometry
 from mbref import rotations
 from mbref.scene import (
     JOINT_TYPES,
     Body,
     Joint,
+    Revolute,
     Scene,
     Spherical,
     Translational,
 )
 
-DOWN, Z = (0.0, 0.0, -9.81), (0.0, 0.0, 1.0)
+GRAVITY, DOWN = (0.0, -9.81, 0.0), (0.0, 0.0, -9.81)
+Z = (0.0, 0.0, 1.0)
 Triple = tuple[float, float, float]
 Rng = np.random.Generator
 Place = Sequence[float] | np.ndarray
@@ -43,6 +44,46 @@ def direction(rng: Rng) -> np.ndarray:
     """Return a random unit vector (3,)."""
     v = rng.normal(size=3)
     return np.asarray(v / np.linalg.norm(v))
+
+
+def bar(name: str, start: Place, stop: Place, mass: float = 1.0) -> Body:
+    """Return a bar between two points of the xy-plane, with its x axis along the bar."""
+    way = np.subtract(stop, start)
+    half, length = math.atan2(way[1], way[0]) / 2, float(np.linalg.norm(way))
+    long = mass * length**2 / 12
+    return Body(
+        name=name,
+        mass=mass,
+        inertia=(0.1 * long, long, 1.1 * long),
+        orientation=_q(half),
+        position=tuple((np.add(start, stop) / 2).tolist()),
+    )
+
+
+def _q(half: float) -> tuple[float, float, float, float]:
+    return math.cos(half), 0.0, 0.0, math.sin(half)
+
+
+def hinge(name: str, first: str, second: str, place: Place) -> Revolute:
+    """Return a hinge about z."""
+    x, y, z = place
+    return Revolute(name=name, bodies=(first, second), anchor=(x, y, z), axis=Z)
+
+
+def linkage(name: str, places: Sequence[Place], masses: Sequence[float] = (1.0, 1.0, 1.0)) -> Scene:
+    """Return bars between successive points, hinged to each other and to the ground at both ends."""
+    names = ["ground", *(f"bar{k}" for k in range(len(places) - 1)), "ground"]
+    bars = [bar(n, p, q, m) for n, p, q, m in zip(names[1:-1], places[:-1], places[1:], masses, strict=True)]
+    pins = [
+        hinge(f"P{k}", a, b, p) for k, (a, b, p) in enumerate(zip(names[:-1], names[1:], places, strict=True))
+    ]
+    return Scene(name=name, gravity=GRAVITY, duration=0.5, body=tuple(bars), joint=tuple(pins))
+
+
+def turning(scene: Scene, rate: float) -> Scene:
+    """Return the linkage with the first bar at a given rate (rad/s)."""
+    first = scene.body[0].model_copy(update={"angular_velocity": (0.0, 0.0, rate)})
+    return scene.with_(body=(first, *scene.body[1:]))
 
 
 def turned(rng: Rng, scene: Scene) -> Scene:

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 
-from crosscheck.conformance.closed_forms import CLOSED_FORMS, Exact
-from crosscheck.conformance.features import feature_scenes
-from crosscheck.conformance.geared_forms import GEARED
-from crosscheck.conformance.moving import dead_end, moving_probes
-from crosscheck.conformance.random_scenes import mechanism
+from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, Exact
+from crosscheck.conformance.mechanisms.features import feature_scenes
+from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
+from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from crosscheck.judge.reference.reference import SECONDS
 from mbref.scene import Scene
 from mbref.scenes import SCENES

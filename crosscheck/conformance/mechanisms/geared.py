@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.conformance.random_mechanisms import CONTINUES, random_mechanism, triple
+from crosscheck.conformance.mechanisms.parts import triple
+from crosscheck.conformance.mechanisms.random_mechanisms import CONTINUES, random_mechanism
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.gauss_principle import goes_on, rank_of
 from mbref.scene import Coupling, Joint, Scene

@@ -7,18 +7,20 @@ import math
 
 import numpy as np
 
-from crosscheck.conformance.awkward_parts import (
+from crosscheck.conformance.mechanisms.parts import (
     DOWN,
     Rng,
     direction,
+    hinge,
+    linkage,
     ring,
     rod,
     slider_crank,
     triple,
     turned,
+    turning,
     turning_first,
 )
-from crosscheck.conformance.hard_mechanisms import hinge, linkage, turning
 from mbref.scene import (
     Driver,
     Force,

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 from scipy.special import ellipj
 
-from crosscheck.conformance.closed_forms import Exact
+from crosscheck.conformance.mechanisms.closed_forms import Exact
 from mbref import rotations
 from mbref.scene import Body, Coupling, Cylindrical, Joint, Moment, Revolute, Scene, Translational
 

@@ -12,9 +12,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from crosscheck.conformance.changes import replaced
-from crosscheck.conformance.features import DRIVERS, JOINTS, LOADS
-from crosscheck.conformance.random_mechanisms import null_space
+from crosscheck.conformance.changes.copies import replaced
+from crosscheck.conformance.mechanisms.features import DRIVERS, JOINTS, LOADS
+from crosscheck.conformance.mechanisms.random_mechanisms import null_space
 from mbref import rotations
 from mbref.scene import (
     Body,

@@ -11,7 +11,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from crosscheck.conformance.awkward_loops import (
+from crosscheck.conformance.mechanisms.awkward_loops import (
     locking,
     nearly_folding,
     nearly_parallel,
@@ -23,19 +23,21 @@ from crosscheck.conformance.awkward_loops import (
     two_straight,
     universal_loop,
 )
-from crosscheck.conformance.awkward_parts import (
+from crosscheck.conformance.mechanisms.parts import (
     DOWN,
     Rng,
     Z,
+    bar,
     direction,
+    hinge,
     joint,
+    linkage,
     ring,
     rod,
     rows,
     triple,
     turned,
 )
-from crosscheck.conformance.hard_mechanisms import bar, hinge, linkage
 from mbref import rotations
 from mbref.scene import (
     Body,

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.conformance.changes import mapped, replaced
-from crosscheck.conformance.trial import Outside
+from crosscheck.conformance.changes.copies import Outside, mapped, replaced
 from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.joint_coordinates import COORDINATES
 from crosscheck.judge.time_functions import value

@@ -1,8 +1,9 @@
-"""Functions that return changed copies of scenes, bodies, joints, drivers and loads."""
+"""Functions that return changed copies of scenes, bodies, joints, drivers and loads, or why there is none."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from crosscheck.judge.tolerances import ROUNDING
@@ -10,6 +11,13 @@ from mbref.scene import Scene
 from mbref.scene_fields import SceneEntry
 
 Item = TypeVar("Item", bound=SceneEntry)
+
+
+@dataclass(frozen=True)
+class Outside:
+    """A scene to which a change or a check does not apply, with the reason."""
+
+    reason: str
 
 
 def mapped(item: Item, fields: Mapping[str, Callable[[Any], Any]]) -> Item:

@@ -1,0 +1,1 @@
+"""Changes of a scene after which the motion is known: other frames, units, forms, starts and drivers."""
