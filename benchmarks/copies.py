@@ -25,8 +25,8 @@ from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_completed
 from crosscheck.study.search.least_errors import LeastError
 from crosscheck.study.search.selection import LEAST_ERROR_LIMIT
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 COPIES = {name: [RELATIONS[name]] for name in ("rotated", "translated", "mirrored")}
 SHAKEN = {"shaken": [unchanged("off by rounding", partial(shaken, seed=seed)) for seed in range(3)]}

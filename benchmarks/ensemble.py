@@ -26,9 +26,9 @@ from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import run_all
 from mbref.method import SERIES_METHOD
 from mbref.scene import Scene
+from mbref.scene.variation import Variation, variants
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.variation import Variation, variants
 
 REPEATS = 5
 LIMITS = Limits(rtol=1e-6)

@@ -24,9 +24,9 @@ from crosscheck.judge.truth import truth_for
 from mbref import Limits, Scene, simulate
 from mbref.command_line import Parser
 from mbref.equations.diagnosis import undriven_freedoms
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Spherical, Spring, Translational
 from mbref.scenes import SCENES, find_scene
-from mbref.trajectory import Trajectory
 
 METHODS = ("taylor", "mpi-svd+projection", "mpi-svd+none")
 SHOWN = (1e-3, 1e-6, 1e-9, 1e-12)  # tolerances in the table of sensitive motions

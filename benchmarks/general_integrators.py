@@ -21,9 +21,9 @@ from crosscheck.engines.shared.initial_velocities import lacks_mass
 from mbref.kernels.compilation import FLOAT, INT, VECTOR, entry
 from mbref.kernels.layout import MEMORY
 from mbref.method import Method
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.stepping.run import Limits, Run
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself
     os.environ.setdefault(f"SUNLOGGER_{kind}_FILENAME", os.devnull)

@@ -27,8 +27,8 @@ from mbref.kernels.layout import OK, Clock, Control, OperationCounts
 from mbref.kernels.named_memory import Address, Vector, allocate, packed
 from mbref.kernels.records import record
 from mbref.linear_algebra.vectors import copy
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 REPEATS = 100  # within one reading of the clock: one run is a matter of microseconds
 STEPS, REJECTED, EVALUATIONS = range(3)

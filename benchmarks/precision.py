@@ -14,7 +14,7 @@ from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
-from mbref.trajectory import Trajectory
+from mbref.motions.trajectory import Trajectory
 
 END, STEP = 0.2, 1e-3  # s
 FAST = {"singular": (0.06, 1e-4)}  # END and STEP of a mechanism that turns ten times as fast

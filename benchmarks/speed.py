@@ -37,9 +37,9 @@ from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.origin import machine, versions
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Cost, Outcome
 
 OURS, LIMIT_NAME, SERIES = "mbref", LIMIT.name, "taylor"
 ENGINES = ("mbref", "mujoco", "pinocchio", "exudyn", "sundials", "casadi", "heyoka")

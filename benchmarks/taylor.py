@@ -22,10 +22,10 @@ from crosscheck.judge.metrics import cost_at_error, measure
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
 from mbref.command_line import Parser
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Outcome
 
 FAMILIES = (
     ("taylor", "generated"),

@@ -17,9 +17,9 @@ from crosscheck.judge.constraints import inertia_matrices, initial_poses, initia
 from crosscheck.refusals import Cannot, Owner, Supports
 from crosscheck.setting import FamilyParts, Setting, best_family
 from mbref import rotations
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import GROUND, Scene
-from mbref.scene_fields import meant
-from mbref.trajectory import Cost, Outcome, Trajectory
+from mbref.scene.fields import meant
 
 __all__ = [
     "ALL",

@@ -16,8 +16,8 @@ from mkdocs.structure.files import File
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import find_scene, simulate
-from mbref.drawing.picture import moving, still
-from mbref.drawing.view import View
+from mbref.motions.drawing.picture import moving, still
+from mbref.motions.drawing.view import View
 from mbref.scene import JOINT_TYPES, Scene
 
 ROOT = Path(__file__).parents[1]

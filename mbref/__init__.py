@@ -15,15 +15,15 @@ if TYPE_CHECKING:
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.ensembles.ensemble import ensemble
     from mbref.equations.diagnosis import Diagnosis, counts, diagnose
-    from mbref.error_estimate import ErrorEstimate
     from mbref.input_error import InputError
     from mbref.method import Method, MethodError
-    from mbref.motion import Motion
+    from mbref.motions.error_estimate import ErrorEstimate
+    from mbref.motions.motion import Motion
+    from mbref.motions.trajectory import Cost, Outcome, Trajectory
     from mbref.scene import Scene, SceneError
+    from mbref.scene.variation import Variation, variants
     from mbref.scenes import SCENES, find_scene
     from mbref.simulation.simulate import Limits, simulate
-    from mbref.trajectory import Cost, Outcome, Trajectory
-    from mbref.variation import Variation, variants
 
 __version__ = "0.2.0"
 
@@ -31,15 +31,15 @@ _PUBLIC = {  # module → its public names
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
     "ensembles.ensemble": ("ensemble",),
     "equations.diagnosis": ("Diagnosis", "counts", "diagnose"),
-    "error_estimate": ("ErrorEstimate",),
     "input_error": ("InputError",),
     "method": ("Method", "MethodError"),
-    "motion": ("Motion",),
+    "motions.error_estimate": ("ErrorEstimate",),
+    "motions.motion": ("Motion",),
+    "motions.trajectory": ("Cost", "Outcome", "Trajectory"),
     "scene": ("Scene", "SceneError"),
+    "scene.variation": ("Variation", "variants"),
     "scenes": ("SCENES", "find_scene"),
     "simulation.simulate": ("Limits", "simulate"),
-    "trajectory": ("Cost", "Outcome", "Trajectory"),
-    "variation": ("Variation", "variants"),
 }
 _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
 
@@ -48,8 +48,8 @@ _SERVICES = {  # functions behind methods of Scene and Motion
     "assembled": "mbref.design.offsets",
     "counts": "mbref.equations.diagnosis",
     "determined_reactions": "mbref.equations.along_trajectory",
-    "estimate_error": "mbref.second_run",
-    "still": "mbref.drawing.picture",
+    "estimate_error": "mbref.simulation.second_run",
+    "still": "mbref.motions.drawing.picture",
     "violations": "mbref.equations.along_trajectory",
 }
 

@@ -14,8 +14,8 @@ from typing import Any, NoReturn
 
 from mbref.files import free, writable
 from mbref.input_error import InputError
-from mbref.scene_fields import meant
-from mbref.scene_validation import SceneError
+from mbref.scene.fields import meant
+from mbref.scene.validation import SceneError
 from mbref.terminal import OUTPUT, discard_output, printable_streams
 
 CHOICE = re.compile(r"invalid choice: '?(.*?)'? \(choose from (.*)\)")

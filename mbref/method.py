@@ -20,8 +20,8 @@ from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed
 from mbref.kernels.records import record
-from mbref.scene_fields import meant
-from mbref.scene_structure import bushings, has_massless, has_parallel_axes, orientations
+from mbref.scene.fields import meant
+from mbref.scene.structure import bushings, has_massless, has_parallel_axes, orientations
 from mbref.stabilisation import STABILISATIONS
 from mbref.stabilisation.base import Stabilisation
 

@@ -17,8 +17,8 @@ from matplotlib.text import Text as Words
 from matplotlib.ticker import LogFormatterSciNotation
 
 from crosscheck.engine import engine_names
-from mbref.drawing import film
-from mbref.drawing.svg import COLOURS, GREY, INK
+from mbref.motions.drawing import film
+from mbref.motions.drawing.svg import COLOURS, GREY, INK
 from mbref.printable import printable
 
 from .runs import Curve

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from mbref.drawing.labels import names
-from mbref.drawing.picture import Form, Layer, Look, Panel, longest, picture, signs
-from mbref.drawing.svg import GREY
-from mbref.drawing.timeline import Timeline
+from mbref.motions.drawing.labels import names
+from mbref.motions.drawing.picture import Form, Layer, Look, Panel, longest, picture, signs
+from mbref.motions.drawing.svg import GREY
+from mbref.motions.drawing.timeline import Timeline
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 from . import figures
 from .runs import Run, power

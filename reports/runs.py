@@ -17,8 +17,8 @@ from crosscheck.judge.truth import NoSolution, Truth, truth_for
 from crosscheck.study.fair_timing import force_differences, model_difference, model_differences
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import drawn, error_text, varied_settings
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 LEVELS, WRONG = ERROR_LEVELS, FALSE_SUCCESS
 Curve = tuple[str, str]  # engine, family

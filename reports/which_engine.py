@@ -21,8 +21,8 @@ from crosscheck.study.store import MOTION, pack
 from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.command_line import Parser
 from mbref.files import file_name
+from mbref.motions.trajectory import Outcome
 from mbref.records import rewrite
-from mbref.trajectory import Outcome
 
 from .runs import SceneRuns, duration, plain
 from .stored import groups, verified

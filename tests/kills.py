@@ -30,8 +30,8 @@ from crosscheck.study.grid import Case, study
 from mbref.ensembles.ensemble import ensemble
 from mbref.ensembles.processes import processes
 from mbref.scene import Body, Scene
+from mbref.scene.variation import Variation, variants
 from mbref.scenes import SCENES
-from mbref.variation import Variation, variants
 
 HERE = Path(__file__).parent
 PARENT = """

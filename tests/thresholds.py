@@ -16,7 +16,7 @@ from mbref.command_line import Parser
 ROOT = Path(__file__).parents[1]
 LEFT_OUT = (
     "cli/",
-    "drawing/",
+    "motions/drawing/",
     "scenes/",
     "taylor/crossing/thresholds.py",
 )  # layouts, data, a table of its own

@@ -33,7 +33,7 @@ from crosscheck.study.grid import Record, key
 from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
 from mbref.command_line import status_of
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 KILLED = 128  # plus the number of the signal that ended a program
 

@@ -12,7 +12,7 @@ from rich.table import Table
 from crosscheck.cli.request import RequestError
 from crosscheck.findings.finding import Finding, findings
 from crosscheck.study.progress import counted
-from mbref.scene_fields import meant
+from mbref.scene.fields import meant
 
 
 def chosen(names: Sequence[str]) -> list[Finding]:

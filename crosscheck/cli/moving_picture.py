@@ -11,9 +11,9 @@ from crosscheck.judge.truth import truth_for
 from crosscheck.paper.singular import rank, scaled_singular_values
 from crosscheck.study.grid import Case, Record, study
 from crosscheck.study.search.offers import settings
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 
 SCENE, SAMPLES = "planar_slider_crank_equal", 161
 FINE = 1001  # equally spaced times at which the constraint Jacobian is evaluated

@@ -14,8 +14,8 @@ from crosscheck.study.grid import MOST_SECONDS, TIME_LIMIT
 from crosscheck.study.search.selection import QUICK_LIMIT
 from mbref import formats
 from mbref.command_line import MOST_DURATION, add_force, add_output, number, output_folder, whole
-from mbref.scene_fields import LARGEST
-from mbref.scene_units import in_si
+from mbref.scene.fields import LARGEST
+from mbref.scene.units import in_si
 
 FILES = "an MJCF (.xml), URDF or SDF file; MJCF also runs in MuJoCo at its own settings"
 MOST_ERROR = 1.0  # of the mechanism's length, or rad: a larger error says nothing about a motion

@@ -16,7 +16,7 @@ from crosscheck.study.grid import MOST_SECONDS, Case, shown_name
 from crosscheck.study.search.offers import default_cases, of_file, scout, settings
 from crosscheck.study.search.selection import of_few_families
 from mbref.scene import Scene
-from mbref.scene_fields import meant
+from mbref.scene.fields import meant
 
 
 class Choice(NamedTuple):

@@ -16,7 +16,7 @@ from crosscheck.engine import ALL, BUILT_IN, all_engines, default_engines, engin
 from crosscheck.judge.constraints import scene_length
 from mbref.command_line import MOST_DURATION
 from mbref.scene import Scene
-from mbref.scene_fields import meant
+from mbref.scene.fields import meant
 
 SAMPLES = 101
 MOST_STATES = 5_000_000  # states of a body that all runs of a command keep: they need about 1 kB each

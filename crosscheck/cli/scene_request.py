@@ -11,8 +11,8 @@ from crosscheck.study.search.offers import remember
 from mbref import formats
 from mbref.formats import ImportOptions
 from mbref.scene import GROUND, Fixed, Scene, SceneError
-from mbref.scene_fields import meant
-from mbref.scene_toml import with_lines
+from mbref.scene.fields import meant
+from mbref.scene.toml import with_lines
 from mbref.scenes import SCENES, find_scene
 
 

@@ -16,7 +16,7 @@ from crosscheck.study.grades import DEFAULTS, Grade, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error, error_bound
 from crosscheck.study.search.least_errors import rank
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 SIGNS = {Grade.RIGHT: "✓", Grade.INACCURATE: "≈", Grade.WRONG: "✗", Grade.FAILED: "!", Grade.UNJUDGED: "?"}
 REFUSES, NOT_RUN = "–", "○"

@@ -14,8 +14,8 @@ from crosscheck.study.grid import Case, Record, key, study
 from crosscheck.study.origin import made_by
 from crosscheck.study.search.offers import Unable, default_cases
 from crosscheck.study.store import read_runs
+from mbref.motions.trajectory import Outcome
 from mbref.records import rewrite
-from mbref.trajectory import Outcome
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
 SAMPLES = 21

@@ -10,8 +10,8 @@ import numpy as np
 from crosscheck.engine import engine
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.gauss_principle import gauss, rank_of, singular_values, stacked
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 REFERENCE, PRINCIPLE = "mbref", "Gauss's principle"
 

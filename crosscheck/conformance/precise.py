@@ -14,7 +14,7 @@ from crosscheck.judge.precision import grain, motion_rate, single_precision
 from crosscheck.judge.push_difference import accelerations_apart
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import GRAINS, LIKE_TRUTH, OWN_ACCURACY, PERTURBED, ROUNDING, SAME_MOTION
-from mbref.trajectory import Trajectory
+from mbref.motions.trajectory import Trajectory
 
 
 def double_precision(bench: Bench) -> Finding | Outside:

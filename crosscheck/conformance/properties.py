@@ -33,8 +33,8 @@ from crosscheck.judge.tolerances import (
 )
 from crosscheck.refusals import shortened
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Moment, Scene
-from mbref.trajectory import Outcome, Trajectory
 
 SECOND = ("acceleration", "angular_acceleration")
 NORMS = 4.0  # largest deviation of a quaternion's length from 1, in roundings of the engine

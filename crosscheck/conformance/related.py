@@ -8,8 +8,8 @@ from crosscheck.conformance.trial import OWN_ACCURACY, Bench, Broken, Finding, c
 from crosscheck.engine import Cannot
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.push_difference import pushes_apart
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, SceneError
-from mbref.trajectory import Trajectory
 
 
 def related(name: str, bench: Bench) -> Finding | Cannot | Outside:

@@ -20,8 +20,8 @@ from crosscheck.processes import serve
 from crosscheck.processes.answer import answered
 from crosscheck.processes.pool import ChildFailed, Observation, ask, observe, run_isolated
 from crosscheck.refusals import shortened
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 Task = tuple[Scene, Setting]
 

@@ -31,8 +31,8 @@ from crosscheck.judge.tolerances import (
 )
 from crosscheck.judge.truth import NoSolution, closed_form, truth_for
 from crosscheck.processes.pool import Observation
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 SAMPLES = 9
 STEP = 1e-4  # spacing of neighbouring samples / duration; second differences then have errors of about 1e-8

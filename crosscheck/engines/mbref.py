@@ -12,9 +12,9 @@ from crosscheck.engine import Cannot, Engine, Owner, Setting, Supports
 from crosscheck.judge.tolerances import ROUNDING
 from crosscheck.refusals import FACTOR, TABLE
 from crosscheck.setting import BRANCHES, FamilyParts
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JOINT_TYPES, LOAD_TYPES, Scene
-from mbref.scene_joints import Coordinate
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import Coordinate
 
 if TYPE_CHECKING:
     from mbref.method import Method

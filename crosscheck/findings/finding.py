@@ -24,8 +24,8 @@ from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.child import Child, ChildFailed
 from crosscheck.processes.pool import run_isolated
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 FOLDER = Path(__file__).parent
 SAMPLES = 11

@@ -24,7 +24,7 @@ from crosscheck.judge.joint_residuals import JointFrames, grounded, with_ground
 from crosscheck.judge.tolerances import CONTRADICTED, CONTRADICTION, RANK
 from mbref import rotations
 from mbref.scene import Scene, SceneError
-from mbref.scene_joints import DISPLACEMENT
+from mbref.scene.joints import DISPLACEMENT
 
 Residuals = dict[str, np.ndarray]
 

@@ -14,7 +14,7 @@ from crosscheck.judge.constraints import closure, jacobian, joint_coordinates, l
 from crosscheck.judge.joint_residuals import wrapped
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.scene_joints import DISPLACEMENT
+from mbref.scene.joints import DISPLACEMENT
 
 NEWTON = 15  # iterations; a regular pose needs about five
 PARTS = 16  # least number of steps of time, so that no driver leaves the reach and returns within a step

@@ -15,8 +15,8 @@ from crosscheck.judge.joint_coordinates import reflected
 from crosscheck.judge.joint_reactions import unit_rows
 from crosscheck.judge.reaction_balance import demanded
 from crosscheck.judge.tolerances import RANK
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 # smallest share of a unit row that the other rows do not span; a redundant row has a share of at most 1/2
 DETERMINED = 1 - 1e-6

@@ -17,8 +17,8 @@ from crosscheck.judge.joint_coordinates import COORDINATES, counted
 from crosscheck.judge.loads import attachment, world_inertia
 from crosscheck.judge.tolerances import AT_REST, PARALLEL
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Force, Joint, JointLoad, Moment, Scene, Spring
-from mbref.trajectory import Trajectory
 
 
 def energy_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:

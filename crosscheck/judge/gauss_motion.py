@@ -27,9 +27,9 @@ from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.time_functions import next_end
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.rotations import cross
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 NAME = "Gauss's principle"
 RTOL = 1e-10

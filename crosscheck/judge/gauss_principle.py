@@ -18,8 +18,8 @@ from crosscheck.judge.joint_loads import joint_wrenches
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 # relative residual of the accelerations; a larger residual shows that the mobility is infinitesimal only
 CONTINUES = 1e-8

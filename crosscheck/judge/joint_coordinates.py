@@ -28,7 +28,7 @@ from crosscheck.judge.joint_residuals import (
 )
 from mbref import rotations
 from mbref.scene import Scene
-from mbref.scene_joints import ANGLE, DISPLACEMENT
+from mbref.scene.joints import ANGLE, DISPLACEMENT
 
 COORDINATES = (ANGLE, DISPLACEMENT)  # columns of joint coordinates
 

@@ -9,7 +9,7 @@ from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian,
 from crosscheck.judge.joint_residuals import grounded, joint_frames, with_ground
 from crosscheck.judge.time_functions import value
 from mbref.scene import JointLoad, Scene
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 
 def joint_loads(scene: Scene) -> list[JointLoad]:

@@ -23,9 +23,9 @@ from crosscheck.judge.joint_coordinates import COORDINATES, coordinate_jacobian
 from crosscheck.judge.loads import attachment
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Joint, Scene
-from mbref.scene_joints import Coordinate
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import Coordinate
 
 LEAST = 1e-3  # m/s²; forces that cause smaller accelerations of the masses count as zero
 POSES = 64  # poses whose undetermined wrenches are kept

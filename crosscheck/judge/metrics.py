@@ -21,8 +21,8 @@ from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import LEAST_ORDER, ROUNDING, STRAIGHT_LINE
 from crosscheck.judge.truth import NoSolution, Truth
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 MANY = 50  # bodies; the comparison of reactions is left out for more, because it would take too long
 

@@ -34,9 +34,9 @@ from crosscheck.judge.tolerances import (
     SINGLE_CHANGE,
 )
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Force, Load, Moment, Scene, Spring
-from mbref.scene_joints import ANGLE
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import ANGLE
 
 ALONG = 6  # number of samples at which the accelerations of a run are compared
 DRIVEN_SAMPLES = 101  # samples of a driver's motion among which its largest acceleration is found

@@ -14,8 +14,8 @@ import numpy as np
 from crosscheck.judge import constraints
 from crosscheck.judge.loads import world_inertia
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Force, Moment, Scene
-from mbref.trajectory import Trajectory
 
 
 def momentum_series(scene: Scene, trajectory: Trajectory) -> np.ndarray | None:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.judge import constraints
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 
 class Opening(NamedTuple):

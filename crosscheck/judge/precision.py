@@ -9,8 +9,8 @@ from math import comb
 import numpy as np
 
 from crosscheck.judge.constraints import scene_length
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 SIMPLE = 12  # bits of the significand; shorter numbers, such as halves and eighths, do not show the precision
 SMALL = 2.0**-12  # fraction of the scale; smaller numbers may have lost bits by cancellation

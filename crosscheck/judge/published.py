@@ -19,9 +19,9 @@ from crosscheck.judge.arithmetic import doubles
 from crosscheck.judge.published_measures import Measure
 from crosscheck.judge.reference.cache import canonical
 from crosscheck.judge.reference.motion import Motion
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.trajectory import Trajectory
 
 Observe = Callable[[Scene, Motion | Trajectory], dict[str, float]]
 OURS = 1e-6  # accepted error, in the unit of the measure, if none is published

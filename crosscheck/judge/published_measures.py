@@ -13,8 +13,8 @@ import numpy as np
 from crosscheck.judge import constraints
 from crosscheck.judge.energy import energy_drift
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 Measure = Callable[[Scene, Trajectory, Trajectory | None], float | None]
 NEAR_ZERO = 1e-3  # smallest denominator of relative errors in problem A02, by its definition

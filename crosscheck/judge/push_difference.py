@@ -7,8 +7,8 @@ import numpy as np
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.joint_reactions import LEAST, shared_wrenches
 from crosscheck.judge.tolerances import RANK
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 Part = tuple[float, str]
 

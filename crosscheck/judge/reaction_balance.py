@@ -23,8 +23,8 @@ from crosscheck.judge.joint_reactions import (
 from crosscheck.judge.loads import world_inertia
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 ABSURD = 10.0  # multiple of the largest exact force above which a reaction is implausible
 

@@ -16,8 +16,8 @@ from scipy.optimize import brentq
 
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.tolerances import LEAST_ORDER
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 HIGHEST_ORDER = 12.0
 

@@ -18,8 +18,8 @@ from crosscheck.judge.gauss_motion import State, applied
 from crosscheck.judge.gauss_principle import of_least_constraint
 from crosscheck.judge.joint_loads import turning_loads
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 GYRATION = "the gyroscopic moments ω × Jω"
 GRAVITY = "gravity"

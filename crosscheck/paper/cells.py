@@ -9,7 +9,7 @@ from __future__ import annotations
 import enum
 from dataclasses import dataclass
 
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 CLOSE = 0.002
 """s; end times this near are one: the paper prints milliseconds, and a crossing lasts about as long."""

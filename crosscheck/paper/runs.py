@@ -12,9 +12,9 @@ from crosscheck.paper import settings
 from crosscheck.paper.cells import CELLS, COUNTS_III, COUNTS_IV, FIVE_BAR, FOUR_BAR_COLUMNS, SPATIAL, Cell
 from crosscheck.paper.settings import BASE, DRAWN, END, FEW, SEEDS, SIZED, STRICT, SWEEP, TIGHT, Variant
 from crosscheck.study.grid import Case, Record
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 
 ENGINE = "mbref"  # the engine that has the paper's methods
 SHARE = 0.95  # fraction of a failed run's end time at which its error is measured

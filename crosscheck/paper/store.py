@@ -12,9 +12,9 @@ from crosscheck.study.grid import Case, Record, key, run_in_turn, study
 from crosscheck.study.progress import Shown
 from crosscheck.study.store import read
 from mbref.files import write
+from mbref.motions.trajectory import Trajectory
 from mbref.records import RecordsError, json_content
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 DRAWN_PARTS = ("figures", "dynamic", "peaks")  # parts whose motions are plotted
 PLACES = 6  # significant digits of a plotted motion

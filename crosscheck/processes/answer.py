@@ -16,8 +16,8 @@ import numpy as np
 
 from crosscheck.engine import Engine, Setting
 from crosscheck.refusals import shortened
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 WIDTHS = {"position": 3, "orientation": 4, "velocity": 3, "angular_velocity": 3}
 OPTIONAL = {"acceleration": 3, "angular_acceleration": 3}

@@ -26,7 +26,7 @@ import psutil
 
 from crosscheck.processes import fork_server, serve
 from crosscheck.processes.fork_server import Forked
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 INTERVAL = 0.2  # s, between two readings of a child's CPU time

@@ -19,8 +19,8 @@ import numpy as np
 from crosscheck.engine import BUILT_IN, ON_REQUEST, OPTIONAL, Cannot, Setting, engine_names
 from crosscheck.processes import fork_server, serve
 from crosscheck.processes.child import Child, ChildFailed, Observation
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 OWN_ENGINES = (*BUILT_IN, *OPTIONAL, *ON_REQUEST)
 MOST_IDLE = 8  # idle children: about one for every engine

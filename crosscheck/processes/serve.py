@@ -27,8 +27,8 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Owner, Setting, engine
 from crosscheck.processes.answer import answered
 from crosscheck.refusals import shortened
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 Job = tuple[str, Setting]  # engine name and setting
 Capabilities = tuple[str, Cannot | None, list[Setting]]

@@ -11,9 +11,9 @@ from crosscheck.judge.energy import kinetic_energy, potential_energy
 from crosscheck.judge.loads import attachment
 from crosscheck.judge.time_functions import value
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JointLoad, Scene, Spring
-from mbref.scene_joints import ANGLE
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import ANGLE
 
 ENERGIES = ("kinetic_energy", "potential_energy", "energy")
 SPRING = ("length", "length_rate", "force", "power")

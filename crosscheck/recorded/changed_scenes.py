@@ -15,7 +15,7 @@ from crosscheck.judge.truth import NoSolution, closed_form
 from crosscheck.recorded.columns import kind_of, values
 from crosscheck.recorded.explanations import Cause, Columns, Difference, with_signs
 from mbref.scene import Factor, JointLoad, Scene, SceneError, SlideSpring, TorsionSpring
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 ITERATIONS = 5
 # fraction of the difference that remains after a linear fit; a change with a larger remainder is not fitted

@@ -11,9 +11,9 @@ from crosscheck.judge.joint_coordinates import COORDINATES
 from crosscheck.judge.start import start_coordinates, started
 from crosscheck.recorded.actions import action_names, actions
 from crosscheck.recorded.reactions import reaction_names, reactions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JointLoad, Scene
-from mbref.scene_joints import ANGLE, DISPLACEMENT
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import ANGLE, DISPLACEMENT
 
 # SI unit → its other units with their factors to SI
 KNOWN_UNITS: dict[str, dict[str, float]] = {

@@ -15,8 +15,8 @@ from crosscheck.judge.truth import NoSolution, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.recorded.columns import SI, kind_of, start_columns, values
 from mbref.files import replaced
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 DENSE = 400  # least number of further times at which the exact motion is computed
 UNEVEN = 0.3  # largest fraction of a step by which a further time is moved: it shows amplitudes over 0.4 rad

@@ -9,8 +9,8 @@ import numpy as np
 from crosscheck.judge.joint_reactions import shared_wrenches
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.tolerances import RANK
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 COMPONENTS = tuple(f"{kind}.{axis}" for kind in ("force", "moment") for axis in "xyz")
 

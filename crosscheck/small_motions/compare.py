@@ -17,8 +17,8 @@ from crosscheck.judge.small_motions.equilibria import Steady
 from crosscheck.judge.small_motions.posed import posed
 from crosscheck.linearising import Linearising
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 H = 2e-3  # increment of differences of an engine's accelerations, rad or lengths; its fourth power is 1.6e-11
 CENTRAL = ((1, 2 / 3), (2, -1 / 12))  # weights of central differences of order 4

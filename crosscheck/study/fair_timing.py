@@ -23,8 +23,8 @@ from crosscheck.study.record_view import is_completed
 from crosscheck.study.search.least_errors import least_errors
 from crosscheck.study.search.offers import settings
 from crosscheck.study.words.speed import COMPILED
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 
 def identity_cases(scene: Scene, engines: Sequence[str], time_limit: float) -> list[Case]:

@@ -16,8 +16,8 @@ from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.search.least_errors import LeastError, least_errors
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 Fastest = tuple[float, Record]  # CPU seconds, and the record of a run of the fastest family
 DEFAULTS = "defaults"  # family of the settings that a library has by default

@@ -27,9 +27,9 @@ from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
 from crosscheck.study.origin import made_by
 from crosscheck.study.record_shape import checked
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.records import append, stored
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 SCHEMA = 1
 TIME_LIMIT = 60.0  # s, of a default case

@@ -14,8 +14,8 @@ from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Case, Record, record_of, study
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.search.execution import Chains
-from mbref.crossing import Crossing
-from mbref.trajectory import Trajectory
+from mbref.motions.crossing import Crossing
+from mbref.motions.trajectory import Trajectory
 
 DIGITS = 6  # decimal digits kept of a position, relative to the size of the mechanism: finer than a pixel
 FRAMES = 75  # frames of the motion on a branch

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError
 
+from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError
-from mbref.trajectory import Outcome
 
 Record = dict[str, Any]
 

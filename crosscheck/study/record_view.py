@@ -9,8 +9,8 @@ from typing import Any
 from crosscheck.judge.reference.cache import mechanism
 from crosscheck.setting import ORIGIN
 from crosscheck.study.grid import Record
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 PUBLIC = (
     "engine",

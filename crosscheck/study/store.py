@@ -11,8 +11,8 @@ from tempfile import TemporaryDirectory
 from pydantic import BaseModel
 
 from crosscheck.study.record_shape import Measured, Record, Refused, Run, checked
+from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError, looked_at, strict_json
-from mbref.trajectory import Outcome
 
 PACK = "records.zip"  # name of the file in which a folder's records and scenes are packed
 PACKED = ("*.jsonl", "*.json", "*.toml")

@@ -10,8 +10,8 @@ from crosscheck.study.fair_timing import timed
 from crosscheck.study.grid import Case, Record
 from crosscheck.study.record_shape import Timing, checked
 from crosscheck.study.record_view import with_time
+from mbref.motions.trajectory import Outcome
 from mbref.records import append, stored
-from mbref.trajectory import Outcome
 
 REPEATS = 5
 LONG = 0.5  # s; a longer run is timed by its single run, whose relative noise is small

@@ -17,8 +17,8 @@ from crosscheck.judge.truth import NoSolution, Truth, closed_form
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.study.grid import Record
 from crosscheck.study.pictures import shortened
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 DENSE = 600  # number of equal parts of the duration at whose ends the true motion is evaluated
 FRAMES = 90  # largest number of frames of the animated motion

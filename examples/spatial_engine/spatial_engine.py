@@ -13,8 +13,8 @@ from scipy.integrate import solve_ivp
 from crosscheck.engine import Cannot, Engine, Owner, Setting
 from crosscheck.judge.constraints import inertia_matrices, initial_twists
 from mbref import rotations
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.rotations import cross
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 # axes of the first frame that displacement keeps off, and pairs of axes kept at right angles
 ALL, HINGE = (0, 1, 2), ((0, 2), (1, 2))

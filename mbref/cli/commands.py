@@ -21,7 +21,7 @@ from mbref.cli.tables import add as add_tables
 from mbref.command_line import Parser, commands, status_of
 from mbref.method import MethodError
 from mbref.scene import SceneError
-from mbref.scene_toml import with_lines
+from mbref.scene.toml import with_lines
 
 EPILOG = """\
 first steps:

@@ -12,8 +12,8 @@ from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
-from mbref.scene_slips import link_lengths
-from mbref.scene_units import echoed
+from mbref.scene.slips import link_lengths
+from mbref.scene.units import echoed
 from mbref.scenes import find_scene
 
 if TYPE_CHECKING:

@@ -14,10 +14,10 @@ from mbref.cli.options import MOST_STATES, add_method_options, add_scene, limits
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
 from mbref.command_line import record_file, whole
 from mbref.input_error import InputError
+from mbref.motions.trajectory import Trajectory
 from mbref.records import strict_json
 from mbref.scene import Scene
 from mbref.scenes import find_scene
-from mbref.trajectory import Trajectory
 
 MOST_VARIANTS, MOST_WORKERS = 1_000_000, 1000
 MOST_SEED = 10**12
@@ -60,7 +60,7 @@ def add(commands: Any) -> None:
 def _ensemble(options: argparse.Namespace) -> int:
     from mbref.ensembles.ensemble import ensemble
     from mbref.ensembles.processes import processes
-    from mbref.variation import Variation, variants
+    from mbref.scene.variation import Variation, variants
 
     scene = find_scene(options.scene)
     times, limits = sample_times(options, scene), limits_of(options)

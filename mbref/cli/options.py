@@ -26,7 +26,7 @@ from mbref.scenes import find_scene
 from mbref.stabilisation import STABILISATIONS
 
 if TYPE_CHECKING:
-    from mbref.motion import Motion
+    from mbref.motions.motion import Motion
     from mbref.stepping.limits import Limits
 
 MOST_SAMPLES = 1_000_000

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mbref.outputs import UNIT_OF, quantity_of
+from mbref.motions.outputs import UNIT_OF, quantity_of
 from mbref.scene import Scene
-from mbref.scene_slips import probable_slips
+from mbref.scene.slips import probable_slips
 from mbref.terminal import Console
 
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from mbref.motion import Motion
+    from mbref.motions.motion import Motion
 
 PIPED_WIDTH = 80  # characters of a line without a terminal
 TIME = "s"

@@ -10,17 +10,17 @@ from typing import Any
 from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
 from mbref.command_line import MOST_PLACE, add_output, whole
-from mbref.drawing.film import MOVING, png, write_film
-from mbref.drawing.picture import side_by_side, still
-from mbref.drawing.view import View
 from mbref.equations.branches import SMOOTH
 from mbref.files import free, write
 from mbref.input_error import InputError
 from mbref.method import MethodError
-from mbref.motion import Motion
+from mbref.motions.drawing.film import MOVING, png, write_film
+from mbref.motions.drawing.picture import side_by_side, still
+from mbref.motions.drawing.view import View
+from mbref.motions.motion import Motion
+from mbref.motions.trajectory import Outcome
 from mbref.scenes import find_scene
 from mbref.stepping.limits import Limits
-from mbref.trajectory import Outcome
 
 BRANCH_SAMPLES = 101  # number of samples of a motion along a branch
 VIEW = """\

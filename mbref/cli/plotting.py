@@ -11,7 +11,7 @@ from mbref.cli.pictures import path_of
 from mbref.command_line import add_output
 from mbref.files import replaced
 from mbref.input_error import InputError
-from mbref.outputs import OUTPUTS
+from mbref.motions.outputs import OUTPUTS
 
 COLUMN_LIST = "columns:\n" + "\n".join(f"  {o.column:31} {o.unit:13} {o.meaning}" for o in OUTPUTS)
 

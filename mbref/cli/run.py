@@ -15,11 +15,11 @@ from mbref.cli.output import body_table, column_table, console, progress_bar, ro
 from mbref.command_line import add_output
 from mbref.input_error import InputError
 from mbref.method import short_name
-from mbref.motion import Motion
-from mbref.outputs import UNIT_OF
+from mbref.motions.motion import Motion
+from mbref.motions.outputs import UNIT_OF
+from mbref.motions.trajectory import DRIVER
 from mbref.records import strict_json
 from mbref.scene import Scene
-from mbref.trajectory import DRIVER
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0

@@ -11,8 +11,8 @@ from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
 from mbref.command_line import MOST_PLACE, add_output, whole
-from mbref.drawing.film import MOVING, write_film
 from mbref.input_error import InputError
+from mbref.motions.drawing.film import MOVING, write_film
 from mbref.records import strict_json
 from mbref.rotations import to_vector
 from mbref.scenes import find_scene

@@ -12,7 +12,7 @@ from rich.table import Table
 from mbref.cli.output import console
 from mbref.formulations import FORMULATIONS
 from mbref.integrators import INTEGRATORS
-from mbref.outputs import OUTPUTS
+from mbref.motions.outputs import OUTPUTS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.crossing import Crossing
 from mbref.equations.along_trajectory import poses
 from mbref.equations.branches import MOST_BRANCHED_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
@@ -15,11 +14,12 @@ from mbref.equations.gaps import is_closed
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.linear_algebra.least_norm import null_space
-from mbref.motion import Motion
+from mbref.motions.crossing import Crossing
+from mbref.motions.motion import Motion
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits, simulate
 from mbref.stepping.run import NEARLY
-from mbref.trajectory import Outcome
 
 POSES_ALONG = 61  # poses of a motion at which ranks are computed
 MOST_ROWS_ALONG = 300  # constraint rows; for more, singular values at every pose take too long

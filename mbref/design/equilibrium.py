@@ -21,7 +21,7 @@ from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced
 from mbref.input_error import InputError
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
-from mbref.drawing.shapes import at_rest
 from mbref.equations.model import Model
-from mbref.joint_motion import along, joint_motion
+from mbref.motions.drawing.shapes import at_rest
+from mbref.motions.joint_motion import along, joint_motion
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
-from mbref.trajectory import Trajectory
 
 
 def placed(model: Model, q: np.ndarray) -> Scene:

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mbref.crossing import Crossing
 from mbref.ensembles.candidates import Candidates, Parameters, candidates_of
 from mbref.equations.initial_state import LARGE
 from mbref.equations.joint_angles import angles_by_joint
@@ -24,7 +23,8 @@ from mbref.equations.model import motion_of
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import OperationCounts
 from mbref.kernels.memory_pool import SavedNumbers
-from mbref.motion import Motion
+from mbref.motions.crossing import Crossing
+from mbref.motions.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, lazy_crossings, report_of
 from mbref.stepping.loop import DONE

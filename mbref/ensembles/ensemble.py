@@ -25,9 +25,9 @@ from mbref import __version__, records
 from mbref.ensembles.processes import processes
 from mbref.ensembles.simulate_all import Ended, run_all
 from mbref.method import Method, crossing_method
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.simulation.simulate import Limits, checked_times, prepare
-from mbref.trajectory import Outcome, Trajectory
 
 AHEAD = (
     64  # runs submitted to the executor before the first result is needed; at least twice the number of cores

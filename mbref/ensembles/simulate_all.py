@@ -11,7 +11,7 @@ import numpy as np
 from mbref.ensembles.batch import BatchResult, may_lead, run_batch
 from mbref.equations.parts import shape_of
 from mbref.method import Method
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.comparison import DROPS
 from mbref.simulation.simulate import checked_run, finish_run, simulate

@@ -10,10 +10,10 @@ from mbref import rotations
 from mbref.equations.couplings import couplings_of
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
-from mbref.joint_motion import along, joint_motion
+from mbref.motions.joint_motion import along, joint_motion
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 from mbref.scene_services import Violation
-from mbref.trajectory import Trajectory
 
 
 def violations(scene: Scene, motion: Trajectory) -> Violation:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 from mbref.equations.joints import AXES, ORIGIN, Primitive, of_coordinate
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE
 from mbref.scene import Body, Joint, Revolute, Scene, Translational
-from mbref.scene_joints import ANGLE, Coordinate
+from mbref.scene.joints import ANGLE, Coordinate
 
 
 class Coupled(NamedTuple):

@@ -14,13 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.lazy import LazyMapping
 from mbref.equations.model import Model
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import COUPLED_ANGLE
-from mbref.lazy import LazyMapping
+from mbref.motions.trajectory import DRIVER
 from mbref.scene import Scene
-from mbref.trajectory import DRIVER
 
 MOST_OPEN_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
 OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from mbref.kernels.scene_layout import COUPLED_ANGLE, COUPLED_SLIDE, DISTANCE, DOT1, DOT2, POINT
 from mbref.rotations import Vector3
 from mbref.scene import JOINT_TYPES, Joint, SceneError
-from mbref.scene_joints import ANGLE, Coordinate, X, Y, Z
+from mbref.scene.joints import ANGLE, Coordinate, X, Y, Z
 
 ORIGIN = (0.0, 0.0, 0.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

@@ -9,7 +9,7 @@ from mbref.equations.parts import ORIGIN
 from mbref.equations.structure import LoadPlace
 from mbref.kernels.scene_layout import ABOUT_AXIS, ALONG_AXIS, FORCE, MOMENT, SPRING
 from mbref.scene import Force, Joint, JointLoad, Load, Moment, Scene, SceneError, Spring
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 Values = tuple[float, ...]
 

@@ -44,7 +44,7 @@ from mbref.scene import (
     Joint,
     Scene,
 )
-from mbref.scene_fields import COINCIDENT
+from mbref.scene.fields import COINCIDENT
 
 OF_MASS = np.array([7, 7, 7, 8, 9, 10])  # indices of a body's parameters on the diagonal of M
 

@@ -21,7 +21,7 @@ from mbref.equations.active_coordinates import STATES, random_states
 from mbref.equations.initial_state import Start
 from mbref.equations.model import Model, Terms
 from mbref.linear_algebra.connected_parts import connected_parts
-from mbref.scene_joints import Fixed
+from mbref.scene.joints import Fixed
 
 ROUNDED_TERM = 1e-12  # entry or right-hand side / the largest of its kind, below which it is rounding
 LOCKED = 1e-3  # smallest singular value of unit rows that lock a pair of bodies

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from mbref.equations.joints import ROWS_OF
+from mbref.equations.machine_memory import refuse_beyond_memory
 from mbref.kernels.scene_layout import ALONG_AXIS, COUPLED_ANGLE, FORCE, SPRING
-from mbref.machine_memory import refuse_beyond_memory
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

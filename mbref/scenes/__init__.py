@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mbref.scene import Scene, SceneError
-from mbref.scene_fields import meant
+from mbref.scene.fields import meant
 from mbref.scenes.andrews_squeezer import andrews_squeezer
 from mbref.scenes.bennett import bennett
 from mbref.scenes.bricard import bricard

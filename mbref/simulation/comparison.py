@@ -14,9 +14,9 @@ import time
 
 import numpy as np
 
-from mbref.error_estimate import distances
 from mbref.kernels.layout import SINGULAR_AHEAD
 from mbref.method import Method, crossing_method
+from mbref.motions.error_estimate import distances
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED

@@ -8,18 +8,19 @@ from typing import Any
 import numpy as np
 
 from mbref import __version__
-from mbref.crossing import Crossing
 from mbref.equations.branches import Passed, branches_passed, tangents
 from mbref.equations.initial_state import Start
 from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import lazy_reactions
+from mbref.equations.lazy import LazySequence
 from mbref.equations.model import Model
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
-from mbref.lazy import LazySequence
 from mbref.method import Method, default_method
-from mbref.motion import Motion
+from mbref.motions.crossing import Crossing
+from mbref.motions.motion import Motion
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
-from mbref.scene_structure import bushings
+from mbref.scene.structure import bushings
 from mbref.simulation.dead_position import ROUNDED, is_at_dead_position
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice
@@ -37,7 +38,6 @@ from mbref.stepping.loop import (
 from mbref.stepping.ranks import Ranks
 from mbref.stepping.run import NEARLY, Run
 from mbref.stepping.singular_start import begins_at_rest, fits_no_branch, leaving_acceleration
-from mbref.trajectory import Cost, Outcome
 
 OUTCOMES = {
     DONE: Outcome.COMPLETED,

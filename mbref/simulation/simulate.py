@@ -20,9 +20,10 @@ from mbref.method import (
     default_method,
     may_be_series,
 )
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.scene_structure import bushings
+from mbref.scene.structure import bushings
 from mbref.scenes import find_scene
 from mbref.simulation.comparison import compare_with_default
 from mbref.simulation.outcome import trajectory_of
@@ -31,7 +32,6 @@ from mbref.stepping import preparation
 from mbref.stepping.limits import GENERATED, Limits
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import Run
-from mbref.trajectory import Outcome
 
 __all__ = ["Limits", "are_compiled", "checked_times", "prepare", "simulate", "why_no_code"]
 

@@ -9,7 +9,7 @@ from weakref import WeakKeyDictionary
 
 from mbref.input_error import InputError
 from mbref.method import MOST_BODIES, SERIES_METHOD, Method
-from mbref.scene_structure import bushings
+from mbref.scene.structure import bushings
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, UNDECIDED

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from mbref.input_error import InputError
-from mbref.scene_fields import LARGEST, SMALLEST, shown
+from mbref.scene.fields import LARGEST, SMALLEST, shown
 
 AUTO, GENERIC, GENERATED = "auto", "generic", "generated"
 CODES = (AUTO, GENERIC, GENERATED)

@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.setting import BRANCHES
 from crosscheck.study.grid import Record
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 from .. import mechanisms
 from ..blocks import Block, Heading, Moving, Table, Text

@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.judge.truth import truth_for
 from crosscheck.paper.runs import HEAVY, RAISED, TRUE_BRANCH, UNEQUAL, Label, Records, dynamic_scene
-from mbref.trajectory import Trajectory
+from mbref.motions.trajectory import Trajectory
 
 from ..blocks import Block, Heading, Table, Text
 from ..runs import Run, ended_briefly, number, power

@@ -22,8 +22,8 @@ from crosscheck.paper.runs import (
     linkage,
 )
 from crosscheck.paper.settings import BASE
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 from .. import figures, mechanisms
 from ..blocks import Block, Figure, Heading

@@ -16,7 +16,7 @@ from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import SPATIAL
 from crosscheck.paper.illustration import DISTANCES, GAMMA_ERRORS, TURNED, Illustration
 from crosscheck.paper.runs import ALPHAS, DUAL, EXACT, PENALTY, Label, Records, digits_scene
-from mbref.trajectory import Trajectory
+from mbref.motions.trajectory import Trajectory
 
 from .. import figures
 from ..blocks import Block, Figure, Heading, Table, Text

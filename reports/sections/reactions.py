@@ -7,8 +7,8 @@ from collections.abc import Mapping
 
 from crosscheck.judge.joint_reactions import Comparison, compare, largest_reaction, side_by_side
 from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 from ..blocks import Block, Heading, Table, Text
 from ..runs import ROUNDING, Run, SceneRuns, beyond_rounding, number

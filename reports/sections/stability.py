@@ -12,7 +12,7 @@ from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, is_completed
 from crosscheck.study.stability import MBREF, METHODS, RTOL, Ladder, ladders, place
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 from ..blocks import Block, Cell, Heading, HeatMap, Table, Text
 from ..runs import Curve

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 MARGIN = 10.0  # for other processors, and other versions of libraries
 ROUNDING = 1e-14  # stands for measured errors that are smaller

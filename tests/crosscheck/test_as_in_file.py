@@ -24,9 +24,9 @@ from crosscheck.study.search.offers import of_file, offer
 from crosscheck.study.search.selection import of_few_families
 from crosscheck.study.words.file import as_in_file, free_falls
 from mbref.formats import ImportOptions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import SceneError
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 
 # four-bar whose last pin is a soft connect; the keyframe leaves the loop open
 FOUR_BAR = """<mujoco><compiler angle="radian"/><option timestep="0.004" integrator="implicitfast"/>

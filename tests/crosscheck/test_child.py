@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 from crosscheck.processes.child import Child, ChildFailed
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 from tests.helpers.fake_engines import converse
 
 

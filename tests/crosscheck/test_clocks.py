@@ -16,9 +16,9 @@ from crosscheck.cli.scene_request import find_scenes
 from crosscheck.engine import Setting, engine
 from crosscheck.study.search.offers import of_file
 from mbref.formats import ImportOptions
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 from tests.crosscheck.driven_arm import ENGINES, able, coarsest, driven_arm
 
 IN_ONE_CALL = ("mbref", "exudyn", "casadi", "heyoka")  # other engines step from sample to sample

@@ -17,9 +17,9 @@ from crosscheck.engines.shared.compiled.run import MOST_STEPS
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.judge.metrics import measure, violation_series
 from crosscheck.judge.truth import truth_for
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Driver, Revolute, Scene, Sine, Spherical
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.crosscheck.tree_scenes import every_joint
 

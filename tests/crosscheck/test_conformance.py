@@ -22,7 +22,7 @@ from crosscheck.engine import engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 from tests.helpers.fake_engines import FAKES, Fake
 
 SPECIMENS = {specimen.scene.name: specimen for specimen in specimens()}

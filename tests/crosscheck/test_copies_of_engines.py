@@ -17,8 +17,8 @@ from crosscheck.engine import Setting, engine, engine_names
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.truth import truth_for
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 TIMES = np.array([0.0, 0.1, 0.2])
 TERMS = {"rtol": 1e-9, "min_step": 1e-3}

@@ -13,10 +13,10 @@ from crosscheck.engines.shared.constraint_equations import Constraints
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, jacobian
 from mbref.equations.joints import ROWS_OF, primitives_of
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JOINT_TYPES, Driver, JointFacts, Revolute, Scene
-from mbref.scene_joints import JointEntry
-from mbref.scene_loads import LoadEntry
-from mbref.trajectory import Trajectory
+from mbref.scene.joints import JointEntry
+from mbref.scene.loads import LoadEntry
 
 EVERY_ENGINE = (*BUILT_IN, *OPTIONAL, *ON_REQUEST)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from crosscheck.engine import engine
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 from tests.crosscheck.driven_arm import END, ENGINES, SLIDE, TURN, able, driven_arm, middle
 
 TIMES = np.array([0.0, 0.4 * END, END])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from crosscheck.judge.energy import energy_drift, energy_series, kinetic_energy, potential_energy
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Force, Moment, Revolute, Scene, Spring, TorsionSpring
-from mbref.trajectory import Trajectory
 
 HINGE = Revolute(name="A", bodies=("ground", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
 START = (2.0, 0.0, 0.0)  # m, of the centre of mass

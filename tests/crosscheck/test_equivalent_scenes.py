@@ -11,7 +11,7 @@ from crosscheck.conformance.changes import rewritings
 from crosscheck.conformance.changes.copies import Outside
 from mbref import rotations
 from mbref.scene import Body, Driver, Revolute, Scene, Spherical
-from mbref.scene_fields import SMALLEST
+from mbref.scene.fields import SMALLEST
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 ORIGIN = (0.0, 0.0, 0.0)

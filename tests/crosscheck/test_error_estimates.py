@@ -12,9 +12,9 @@ from crosscheck.processes import serve
 from crosscheck.processes.pool import run_isolated
 from crosscheck.study.grid import Case, run_case
 from crosscheck.study.record_view import public
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Body, Revolute, Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 from tests.helpers.fake_engines import FAKES, Fake
 
 SCENE = SCENES["spatial_slider_crank_gravity"]().with_(duration=0.3)

@@ -16,9 +16,9 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Moment, Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 
 PROBES = moving_probes()
 

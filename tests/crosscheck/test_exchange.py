@@ -15,9 +15,9 @@ from crosscheck.judge.model_identity import gate, gate_times
 from mbref import formats, rotations, simulate
 from mbref.cli import main
 from mbref.formats import ImportOptions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
-from mbref.trajectory import Trajectory
 from tests.crosscheck.measured import MARGIN
 
 ALIKE = 6.1e-10  # measured difference of accelerations / the largest acceleration

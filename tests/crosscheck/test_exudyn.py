@@ -13,9 +13,9 @@ from crosscheck.engines.exudyn.adapter import ENGINE
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Cylindrical, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
 from tests.crosscheck.tree_scenes import driven, every_joint
 

@@ -8,8 +8,8 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.engines.exudyn.adapter import ENGINE
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import JOINT_TYPES, Body, Driver, Moment, Revolute, Scene, Sine
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 
 MEASURED = 1.6e-10  # measured difference / largest force or moment

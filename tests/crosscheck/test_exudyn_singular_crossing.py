@@ -13,9 +13,9 @@ from crosscheck.judge.constraints import closure, closure_rates, initial_poses
 from crosscheck.judge.metrics import error_series, measure
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 from tests.crosscheck.measured import MARGIN, ROUNDING
 
 ROUGH = 1e-4  # m, rad and their rates; error of the states that are projected

@@ -18,6 +18,7 @@ from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.joint_reactions import compare
 from crosscheck.judge.metrics import in_scene_order
 from crosscheck.judge.reaction_balance import with_exact_reactions
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import (
     Coupling,
     Cylindrical,
@@ -35,7 +36,6 @@ from mbref.scene import (
     Translational,
 )
 from mbref.scenes import SCENES as SHIPPED
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.driven_arm import driven_arm
 from tests.crosscheck.tree_scenes import body, driven, every_joint, ring
 

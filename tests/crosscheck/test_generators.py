@@ -22,8 +22,8 @@ from crosscheck.engines.shared.symbolic.symbols import NUMBERS
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 
 ERROR = 1e-8
 SETTINGS = {

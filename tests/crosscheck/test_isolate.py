@@ -30,9 +30,9 @@ from crosscheck.processes.pool import (
     starting,
     time_interleaved,
 )
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.helpers.fake_engines import FAKE, FAKES, CompilingModels, converse
 from tests.helpers.still_engines import resting as still
 

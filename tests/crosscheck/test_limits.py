@@ -12,8 +12,8 @@ from crosscheck.judge.metrics import error_series
 from crosscheck.judge.richardson import limit
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 
 SCENE = SCENES["spatial_slider_crank_driven"]()
 TRUTH = truth_for(SCENE).poses(np.linspace(0, 0.02, 5))

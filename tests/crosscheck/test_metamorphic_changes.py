@@ -16,8 +16,8 @@ from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.joint_reactions import resultants
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 from tests.crosscheck.driven_arm import TURN, driven_arm
 from tests.crosscheck.test_first_samples_of_engines import loaded
 from tests.crosscheck.tree_scenes import driven, every_joint, ring

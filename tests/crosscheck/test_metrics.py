@@ -13,9 +13,9 @@ from crosscheck.judge.energy import energy_series, kinetic_energy
 from crosscheck.judge.metrics import cost_at_error, measure, order_of_convergence
 from crosscheck.judge.truth import NoSolution, truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Moment
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.truth_scenes import SPRUNG, free, pendulum
 

@@ -13,8 +13,8 @@ from crosscheck.conformance import findings
 from crosscheck.conformance.suite import FAIL, Verdict
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.momentum import momentum_series
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Distance, Force, Moment, Revolute, Scene, Spherical, Spring
-from mbref.trajectory import Trajectory
 
 FIRST = Body(name="a", mass=2.0, inertia=(1.0, 1.0, 2.0), position=(0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0))
 SECOND = Body(

@@ -17,9 +17,9 @@ from crosscheck.engines.mujoco.families import ADAPTIVE, HARD
 from crosscheck.engines.mujoco.model import compiled
 from crosscheck.judge.metrics import error_series, order_of_convergence, violation_series
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Driver, Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, completed_error
 from tests.crosscheck.tree_scenes import every_joint
 

@@ -17,9 +17,9 @@ import crosscheck.engines
 from crosscheck.engine import Engine, Setting, engine
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import Truth, truth_for
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Force, Moment, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 from tests.crosscheck.tree_scenes import every_joint, ring
 
 FOLDER = Path(crosscheck.engines.__path__[0])

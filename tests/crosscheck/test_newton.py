@@ -18,9 +18,9 @@ from crosscheck.judge.constraints import initial_twists
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Body, Force, Moment, Revolute, Scene, Spherical, Spring, TorsionSpring, Universal
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 
 INSTALLED = pytest.mark.skipif(find_spec("newton") is None, reason="newton is not installed")
 STEP = 1e-3  # s

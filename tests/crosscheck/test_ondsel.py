@@ -12,6 +12,7 @@ from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -27,7 +28,6 @@ from mbref.scene import (
     Universal,
 )
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
 from tests.crosscheck.tree_scenes import INERTIA
 

@@ -15,8 +15,8 @@ from crosscheck.engine import Setting, engine
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Revolute, Scene
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 
 POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float)

@@ -13,6 +13,7 @@ from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, in_scene_order
 from crosscheck.judge.tolerances import LIKE_TRUTH
 from crosscheck.processes.serve import run_once
+from mbref.motions.trajectory import Outcome
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -25,7 +26,6 @@ from mbref.scene import (
     Spring,
     TorsionSpring,
 )
-from mbref.trajectory import Outcome
 from tests.crosscheck.side_by_side import side_by_side
 
 GRAVITY = (0.0, -9.81, 0.0)  # m/s²

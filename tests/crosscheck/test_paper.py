@@ -15,10 +15,10 @@ from crosscheck.paper import runs, settings, singular
 from crosscheck.paper.cells import CELLS, CLOSE, Cell, Match, match
 from crosscheck.paper.runs import Label
 from mbref.method import Method
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scenes import SCENES
 from mbref.scenes.four_bar import four_bar
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Outcome, Trajectory
 
 
 @cache

@@ -12,9 +12,9 @@ from crosscheck.engines.pinocchio.adapter import ENGINE
 from crosscheck.engines.pinocchio.model import Loads, Mechanism
 from crosscheck.judge.metrics import violation_series
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
 from tests.crosscheck.tree_scenes import driven, every_joint
 

@@ -10,9 +10,9 @@ from crosscheck.judge.reference.bound import differences
 from crosscheck.judge.reference.reference import Reference, judged, runs
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Cylindrical, Driver, Planar, Revolute, Scene, SceneError, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
 
 FINE = {

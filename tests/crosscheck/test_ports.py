@@ -18,9 +18,9 @@ from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.side_by_side import side_by_side
 from tests.helpers.coupled_mechanisms import EVERY as COUPLED

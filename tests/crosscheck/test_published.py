@@ -13,9 +13,9 @@ from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
 from crosscheck.judge.truth import closed_form
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scenes import SCENES, find_scene
 from mbref.simulation.simulate import simulate
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING
 
 SECONDS = 100.0

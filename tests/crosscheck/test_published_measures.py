@@ -9,8 +9,8 @@ import pytest
 
 from crosscheck.judge import published_measures as measures
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Revolute, Scene
-from mbref.trajectory import Trajectory
 
 ARM = Body(name="arm", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(1.0, 0.0, 0.0))
 FAR = Body(name="far", mass=3.0, inertia=(1.0, 1.0, 1.0), position=(3.0, 4.0, 0.0))

@@ -15,8 +15,8 @@ from crosscheck.conformance.mechanisms.random_mechanisms import KINDS, random_me
 from crosscheck.judge.constraints import closure, closure_rates, initial_poses, initial_twists
 from crosscheck.judge.gauss_motion import gauss_motion
 from mbref import simulate
-from mbref.scene_loads import LOAD_TYPES
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
+from mbref.scene.loads import LOAD_TYPES
 from tests.crosscheck.measured import MARGIN
 
 ENGINES = ("mujoco", "pinocchio", "exudyn")

@@ -11,8 +11,8 @@ from crosscheck.judge.constraints import closure, closure_rates, initial_poses, 
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.metrics import error_series, violation_series
 from mbref import Limits, simulate
+from mbref.motions.trajectory import Outcome
 from mbref.scene import GROUND
-from mbref.trajectory import Outcome
 
 
 def test_random_mechanisms_meet_their_joints_and_drivers_with_the_given_velocities():

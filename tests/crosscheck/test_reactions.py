@@ -12,9 +12,9 @@ from crosscheck.judge.constraints import initial_poses
 from crosscheck.judge.gauss_motion import gauss_motion
 from crosscheck.judge.joint_reactions import compare, resultants, shared_wrenches, side_by_side
 from crosscheck.judge.reaction_balance import absurd, with_exact_reactions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Revolute, Scene, Spherical
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 from tests.crosscheck.measured import MARGIN
 
 Z = (0.0, 0.0, 1.0)

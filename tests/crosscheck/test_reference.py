@@ -32,9 +32,9 @@ from crosscheck.judge.truth import closed_form, truth_for
 from crosscheck.judge.truth.reference_truth import trajectory
 from crosscheck.study.comparison import Wanted, collected
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Driver, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 from tests.crosscheck.truth_scenes import ALL
 
 SMOOTH = 1e-12  # bound where nothing is singular

@@ -14,8 +14,8 @@ import pytest
 
 from crosscheck.conformance.changes import replays
 from crosscheck.conformance.changes.copies import Outside
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Cylindrical, Driver, Moment, Revolute, Scene, Translational
-from mbref.trajectory import Trajectory
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 HALF = math.sqrt(0.5)

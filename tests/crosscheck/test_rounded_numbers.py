@@ -12,12 +12,12 @@ from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank, singular_values
 from mbref import rotations, simulate
 from mbref.method import Method
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scenes import find_scene
 from mbref.simulation.rounded_numbers import advice
 from mbref.simulation.simulate import Limits
 from mbref.simulation.start_run import start_run
-from mbref.trajectory import Outcome
 
 TURN = rotations.from_vector(np.array([0.3, -0.7, 0.5]))
 LOOPS = ("four_bar_gravity", "planar_slider_crank", "spatial_slider_crank_gravity")

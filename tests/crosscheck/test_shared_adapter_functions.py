@@ -13,6 +13,7 @@ from crosscheck.engines.shared.fixed_steps import unended_piece
 from crosscheck.engines.shared.geometry import in_body, point_in_body
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.refusals import Owner
+from mbref.motions.trajectory import Outcome
 from mbref.scene import (
     Body,
     Factor,
@@ -22,7 +23,6 @@ from mbref.scene import (
     Scene,
     Sine,
 )
-from mbref.trajectory import Outcome
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 HALF = math.sqrt(0.5)

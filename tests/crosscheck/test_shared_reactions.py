@@ -9,8 +9,8 @@ import pytest
 
 from crosscheck.judge import joint_reactions
 from crosscheck.judge.constraints import initial_poses, jacobian
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Coupling, Revolute, Scene, Translational
-from mbref.trajectory import Trajectory
 
 O, X, Z = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)
 

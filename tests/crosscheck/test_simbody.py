@@ -9,9 +9,9 @@ import pytest
 
 from crosscheck.engine import Owner, Setting, engine
 from crosscheck.judge.constraints import closure, joint_coordinates
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene, Sine
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, ROUNDING, completed_error
 from tests.crosscheck.tree_scenes import BODIES, every_joint, ring
 

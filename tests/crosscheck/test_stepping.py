@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import DOP853
 
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, rk4, step_count
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 
 
 def oscillator(t: float, y: np.ndarray) -> np.ndarray:

@@ -13,9 +13,9 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.study.grid import Case, key, run_case, run_here, study
 from crosscheck.study.search.offers import default_cases
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Force, Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Trajectory
 from tests.helpers.fake_engines import FAKE, FAKES
 
 TIMES = np.array([0.0, 0.1, 0.3])

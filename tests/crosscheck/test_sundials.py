@@ -10,9 +10,9 @@ import pytest
 from crosscheck.conformance.mechanisms.closed_forms import free_fall
 from crosscheck.engine import Setting, engine
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Body, Driver, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN, completed_error, error_of_samples
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 

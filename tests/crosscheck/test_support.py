@@ -21,9 +21,9 @@ from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.study.words.speed import COMPILED
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Joint, Load, Scene, Universal
-from mbref.scene_validation import DRIVABLE
-from mbref.trajectory import Outcome
+from mbref.scene.validation import DRIVABLE
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "engines.md"
 

@@ -16,9 +16,9 @@ from crosscheck.judge.gauss_principle import gauss, stacked
 from crosscheck.judge.metrics import error_series, violation_series
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.truth import truth_for
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import driven, every_joint, ring
 

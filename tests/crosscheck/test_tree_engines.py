@@ -13,6 +13,7 @@ from crosscheck.judge.joint_reactions import compare
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import (
     Body,
     Cylindrical,
@@ -30,7 +31,6 @@ from mbref.scene import (
     Translational,
     Universal,
 )
-from mbref.trajectory import Outcome, Trajectory
 from tests.crosscheck.measured import MARGIN
 from tests.crosscheck.tree_scenes import BODIES, INERTIA, JOINTS, driven, every_joint, ring
 

@@ -15,8 +15,8 @@ from crosscheck.study.grid import Case, key
 from crosscheck.study.search.cheapest import by_closure, tuned
 from crosscheck.study.search.neighbours import STEP, between, coarser, longest_step, within, work
 from mbref import rotations
+from mbref.motions.trajectory import Cost
 from mbref.scene import Body, Scene
-from mbref.trajectory import Cost
 from tests.helpers.fake_engines import FAKES
 
 BLOCK = Body(name="b", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))

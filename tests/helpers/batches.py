@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
 from mbref.scene import Body, Force, Revolute, Scene, Spring, Translational
 from mbref.scenes import SCENES
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.trajectory import Trajectory
+from mbref.motions.trajectory import Trajectory
 
 
 def turned_between(first: np.ndarray, second: np.ndarray) -> np.ndarray:

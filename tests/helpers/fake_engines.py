@@ -16,8 +16,8 @@ from pathlib import Path
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Owner, Setting
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 from tests.helpers.still_engines import Still
 
 FAKES = __name__  # an engine is named f"{FAKES}:NAME"

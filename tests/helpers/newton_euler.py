@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 
 def unbalanced(scene: Scene, run: Trajectory) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from mbref.equations.branches import ALONE, MULTIPLE, second_order
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
 from mbref.method import MethodError
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
 from mbref.scene import GROUND, Body, Revolute, Scene
 from mbref.scenes.five_bar import five_bar
 from mbref.scenes.four_bar import four_bar, four_bar_gravity

@@ -9,13 +9,13 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from mbref.drawing.film import png
-from mbref.drawing.labels import LETTER, LINE_HEIGHT
-from mbref.drawing.marks import SIGNS
-from mbref.drawing.picture import moving, side_by_side, still
-from mbref.drawing.shapes import at_rest, shapes
-from mbref.drawing.timeline import Timeline
-from mbref.drawing.view import Page, View, view_of
+from mbref.motions.drawing.film import png
+from mbref.motions.drawing.labels import LETTER, LINE_HEIGHT
+from mbref.motions.drawing.marks import SIGNS
+from mbref.motions.drawing.picture import moving, side_by_side, still
+from mbref.motions.drawing.shapes import at_rest, shapes
+from mbref.motions.drawing.timeline import Timeline
+from mbref.motions.drawing.view import Page, View, view_of
 from mbref.scene import JOINT_TYPES, Scene
 from mbref.scenes import SCENES
 

@@ -16,10 +16,10 @@ from mbref.cli import main
 from mbref.ensembles.ensemble import ensemble
 from mbref.ensembles.processes import processes
 from mbref.scene import Scene, SceneError
+from mbref.scene.variation import Variation, variants
 from mbref.scenes import SCENES
 from mbref.scenes.spatial_slider_crank import OFFSET, RADIUS, ROD
 from mbref.simulation.simulate import Limits, simulate
-from mbref.variation import Variation, variants
 
 TIMES = np.array([0.0, 0.004, 0.01])
 LIMITS = Limits(rtol=1e-8)

@@ -14,9 +14,9 @@ from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
 from mbref import ErrorEstimate, Limits, Motion, Scene, find_scene, simulate
 from mbref.cli.commands import main
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Body, Driver, Revolute, Spring, Translational
-from mbref.second_run import perturbed
-from mbref.trajectory import Cost, Outcome
+from mbref.simulation.second_run import perturbed
 
 TIMES = np.array([0.0, 0.5, 1.0, 1.5])
 UNIT = 2.0**-52

@@ -18,10 +18,10 @@ if PLAIN:
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.constraints import scene_length
 from mbref.method import Method
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Driver
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Outcome
 
 ORDER_16 = Method.parse("taylor[order=16]")
 MECHANISMS = (
@@ -120,7 +120,7 @@ import importlib.util
 from mbref.method import MethodError
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 assert importlib.util.find_spec("mbref.taylor.generated") is None
 for code in ("auto", "generic"):
     motion = simulate(SCENES["four_bar"](), "taylor", [0.0, 0.01], Limits(code=code))

@@ -141,7 +141,7 @@ FAULTS = {
 def test_faulty_function_of_time_is_refused_by_path_and_line(message, tmp_path):
     text = scenes.pushed(Factor()).to_dict()
     text["load"][0]["factor"] = FAULTS[message]
-    from mbref.scene_toml import scene_text
+    from mbref.scene.toml import scene_text
 
     path = tmp_path / "slide.toml"
     path.write_text(scene_text(text))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mbref import simulate
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Body, Revolute, Scene, SceneError, SlideSpring, Translational, Universal
-from mbref.trajectory import Outcome
 
 TIMES = np.linspace(0.0, 0.5, 6)
 LOAD = Body(name="load", mass=2.0, inertia=(0.1, 0.2, 0.3), position=(0.3, 0.1, -1.0))

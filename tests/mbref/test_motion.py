@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck.judge.energy import kinetic_energy, potential_energy
 from mbref import Limits, Motion, Scene, SceneError, Trajectory, find_scene, simulate
-from mbref.drawing.plot import grouped
+from mbref.motions.drawing.plot import grouped
 from mbref.scene import Body
 
 ROOT = Path(__file__).parents[2]

@@ -10,9 +10,9 @@ import pytest
 
 from mbref.cli import main
 from mbref.cli.run import show
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Scene
-from mbref.trajectory import Trajectory
 
 NAMES = (
     "[red]x[/]",

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import mbref
-from mbref.drawing.shapes import at_rest
 from mbref.ensembles.simulate_all import simulate_all
 from mbref.equations.model import Model
+from mbref.motions.drawing.shapes import at_rest
 from mbref.scene import Scene, SceneError
 from mbref.simulation.simulate import Limits
 from tests.helpers.coupled_mechanisms import (

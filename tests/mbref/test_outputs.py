@@ -13,7 +13,7 @@ import pytest
 from crosscheck.judge.joint_reactions import shared_wrenches
 from mbref import Motion, Scene, find_scene, simulate
 from mbref.cli.commands import main
-from mbref.outputs import OUTPUTS
+from mbref.motions.outputs import OUTPUTS
 
 PAGE = Path(__file__).parents[2] / "docs" / "outputs.md"
 TIMES = np.linspace(0.0, 1.0, 21)

@@ -13,9 +13,9 @@ import pytest
 from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
-from mbref.motion import Motion
+from mbref.motions.motion import Motion
 from mbref.scene import Driver, Scene, SceneError
-from mbref.scene_slips import probable_slips
+from mbref.scene.slips import probable_slips
 from mbref.scenes import SCENES, find_scene
 
 

@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
-from mbref.crossing import Crossing
 from mbref.ensembles.simulate_all import run_all, simulate_all
 from mbref.equations.parts import shape_of
+from mbref.motions.crossing import Crossing
 from mbref.scene import Force, Scene, SceneError, Spring
-from mbref.scene_paths import replaced_at
+from mbref.scene.paths import replaced_at
+from mbref.scene.variation import Variation, variants
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import Limits, simulate
-from mbref.variation import Variation, variants
 from tests.helpers.batches import CRANK, NUMBERS_DECIDE, results
 from tests.helpers.coupled_mechanisms import gear_pair
 

@@ -61,7 +61,7 @@ def test_engine_is_imported_only_in_adapters_and_inside_functions():
 def test_matplotlib_is_imported_only_by_reports_and_the_plot_of_a_motion():
     others = [path for path in FILES if "reports" not in path.parts]
     plotting = [path for path in others if "matplotlib" in imports(path)]
-    assert plotting == [ROOT / "mbref" / "drawing" / "plot.py"], plotting
+    assert plotting == [ROOT / "mbref" / "motions" / "drawing" / "plot.py"], plotting
     assert not [name(path) for path in plotting if "matplotlib" in imports(path, False)]
 
 

@@ -8,32 +8,23 @@ import pytest
 from imports import ROOT, children, circles, floors, graph, imported, sources, upward
 
 DOORS = (
-    r"command_line|files|formats|printable|terminal|scene|scene_fields|scene_joints|scene_toml|scene_loads|scenes(\.\w+)?|scene_units|scene_validation|crossing|trajectory|rotations|records"
-    r"|__version__"
+    r"command_line|files|formats|printable|terminal|scene(\.(fields|joints|loads|toml|units|validation))?"
+    r"|scenes(\.\w+)?|motions\.(crossing|trajectory)|rotations|records|__version__"
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
     "reports": re.compile(
-        r"mbref(\.(command_line|files|printable|scene|trajectory|rotations|records|drawing(\.\w+)?)(\.\w+)?)?"
+        r"mbref(\.(command_line|files|printable|scene|motions\.trajectory|rotations|records|motions\.drawing(\.\w+)?)(\.\w+)?)?"
     ),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        [
-            *("input_error", "files", "printable", "terminal", "rotations", "records", "lazy", "crossing"),
-            *("trajectory", "error_estimate", "scene_services", "machine_memory"),
-        ],
-        [
-            *("scene", "scene_bodies", "scene_fields", "scene_functions", "scene_function_faults"),
-            *("scene_joints", "scene_loads", "scene_paths", "scene_structure", "scene_toml", "scene_units"),
-            "scene_validation",
-        ],
-        ["command_line", "formats", "scenes", "scene_slips", "variation", "outputs"],
-        ["joint_motion", "driving_forces", "actuation", "energy"],
-        ["drawing"],
-        ["motion", "motion_files"],
+        ["input_error", "files", "printable", "terminal", "rotations", "records", "scene_services"],
+        ["scene"],
+        ["command_line", "formats", "scenes"],
+        ["motions"],
         ["kernels"],
         ["linear_algebra"],
         ["equations"],
@@ -44,7 +35,6 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["stepping"],
         ["taylor"],
         ["simulation"],
-        ["second_run"],
         ["ensembles"],
         ["design"],
         ["cli"],

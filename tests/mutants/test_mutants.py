@@ -35,7 +35,7 @@ def test_{0}():
 
 
 def test_every_mutant_differs_from_its_source_and_compiles():
-    path = "mbref/energy.py"
+    path = "mbref/motions/energy.py"
     source = (ROOT / path).read_text()
     made = mutants(path, source)
     assert {m.kind for m in made} <= set(KINDS) and len(made) > 20
@@ -45,9 +45,9 @@ def test_every_mutant_differs_from_its_source_and_compiles():
 
 
 def test_random_mutants_depend_on_the_seed_alone():
-    first, again, other = (drawn(ROOT, seed, 20, ["mbref/drawing"]) for seed in (1, 1, 2))
+    first, again, other = (drawn(ROOT, seed, 20, ["mbref/motions/drawing"]) for seed in (1, 1, 2))
     assert first == again and len(set(first)) == 20 and set(first) != set(other)
-    assert all(mutant.file.startswith("mbref/drawing/") for mutant in first)
+    assert all(mutant.file.startswith("mbref/motions/drawing/") for mutant in first)
 
 
 @pytest.mark.slow

@@ -21,8 +21,8 @@ from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import RANK
 from mbref import Limits, rotations, simulate
 from mbref.equations.diagnosis import diagnose
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 METHOD = "taylor"
 NEAR = 1e-4  # least singular value below which a scene counts as at a singular position

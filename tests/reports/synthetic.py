@@ -13,9 +13,9 @@ from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from crosscheck.study.truths import truth_record
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.trajectory import Cost, Outcome, Trajectory
 from reports.runs import SceneRuns, by_scene
 
 MADE_OF = {

@@ -11,8 +11,8 @@ from synthetic import exact, motion, record, scene, truths
 
 from crosscheck.cli.moving_picture import singular_instants
 from crosscheck.study.truths import FRAMES, TURN, truth_record
-from mbref.drawing.shapes import shapes
-from mbref.joint_motion import carried
+from mbref.motions.drawing.shapes import shapes
+from mbref.motions.joint_motion import carried
 from mbref.scenes import SCENES
 from reports import mechanisms
 from reports.figures import colour

@@ -17,9 +17,9 @@ from crosscheck.paper.cells import CELLS
 from crosscheck.paper.illustration import illustration
 from crosscheck.paper.runs import Label, Records
 from crosscheck.study.grid import Case, key
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.records import append
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 from reports.blocks import Figure, Heading, Table
 from reports.runs import Run
 from reports.sections import paper, paper_cranks, paper_methods, paper_sweep, paper_teaching

@@ -14,7 +14,7 @@ from crosscheck.conformance.suite import Conformance, Verdict
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.model_identity import gate_times
 from crosscheck.judge.truth import truth_for
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 from reports.blocks import Figure, Heading, Plot, Table, Text
 from reports.runs import Run, SceneRuns, by_scene, ratio
 from reports.sections import (

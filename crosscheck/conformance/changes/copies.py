@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from crosscheck.judge.tolerances import ROUNDING
 from mbref.scene import Scene
-from mbref.scene_fields import SceneEntry
+from mbref.scene.fields import SceneEntry
 
 Item = TypeVar("Item", bound=SceneEntry)
 

@@ -11,8 +11,8 @@ import numpy as np
 from crosscheck.conformance.changes.copies import mapped
 from crosscheck.conformance.changes.units import times
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JointLoad, Scene
-from mbref.trajectory import Trajectory
 
 Mapped = Callable[[Any], Any]
 # reflects the body frames of a mirrored scene, so that they stay right-handed

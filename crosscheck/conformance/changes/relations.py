@@ -26,8 +26,8 @@ from crosscheck.conformance.changes.rewritings import (
 from crosscheck.conformance.changes.units import in_other_units, scaled, times
 from crosscheck.judge.tolerances import ROUNDING
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 HEAVIER = 2.5
 

@@ -14,8 +14,8 @@ from crosscheck.judge.constraints import joint_coordinates
 from crosscheck.judge.joint_coordinates import COORDINATES
 from crosscheck.judge.time_functions import value
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Driver, Factor, Joint, Load, Moment, Scene
-from mbref.trajectory import Trajectory
 
 CONSTANT = 1e-6  # relative variation below which a driver's moment counts as constant
 

@@ -10,8 +10,8 @@ import numpy as np
 from crosscheck.conformance.changes.copies import Outside, mapped, replaced
 from crosscheck.judge.constraints import initial_twists
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Body, Cylindrical, Fixed, Joint, Scene, SceneError
-from mbref.trajectory import Trajectory
 
 HALF = " half"  # suffix of the second half's name
 LIMIT = 0.2  # part of the middle principal moment that is due to the distance of the halves; 0.5 is the most

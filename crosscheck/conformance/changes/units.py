@@ -9,7 +9,7 @@ import numpy as np
 
 from crosscheck.conformance.changes.copies import mapped, replaced
 from mbref.scene import Coupling, Scene, TimeFunction
-from mbref.scene_joints import DISPLACEMENT
+from mbref.scene.joints import DISPLACEMENT
 
 Function = TypeVar("Function", bound=TimeFunction)
 

@@ -9,7 +9,7 @@ from crosscheck.conformance.mechanisms.random_mechanisms import CONTINUES, rando
 from crosscheck.judge.constraints import initial_poses, jacobian, scene_length
 from crosscheck.judge.gauss_principle import goes_on, rank_of
 from mbref.scene import Coupling, Joint, Scene
-from mbref.scene_joints import Coordinate
+from mbref.scene.joints import Coordinate
 
 GEARED = 0.5  # probability that a joint has an armature
 TRIES = 40

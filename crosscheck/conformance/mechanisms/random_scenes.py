@@ -36,7 +36,7 @@ from mbref.scene import (
     SlideSpring,
     TorsionSpring,
 )
-from mbref.scene_joints import ANGLE, DISPLACEMENT
+from mbref.scene.joints import ANGLE, DISPLACEMENT
 
 DURATION = 0.05  # s; in this time bodies of half a metre turn by about 0.1 rad
 # smallest singular value of the normalised constraint rows and driver row; below it the driver hardly moves

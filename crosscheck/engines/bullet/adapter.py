@@ -17,8 +17,8 @@ from crosscheck.engines.bullet.model import STRONGEST, Mechanism
 from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
 from crosscheck.engines.shared.pieces import EVERYTHING
 from crosscheck.engines.shared.spanning_tree import spanning_tree
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 ITERATED, DEFAULTS = "iterated", "defaults"
 CLOSES = ("spherical", "revolute")

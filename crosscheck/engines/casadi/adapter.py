@@ -18,8 +18,8 @@ from crosscheck.engines.casadi.library import library, why_not
 from crosscheck.engines.shared.driver_motion import stated_rate
 from crosscheck.engines.shared.sampling import Failed
 from crosscheck.engines.shared.symbolic.generator import RTOL, Generator, equations_of, sweep
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 PLAIN, PROJECTED = "dop853, compiled", "projected, compiled"
 FAMILIES = {

@@ -19,8 +19,8 @@ from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
 from crosscheck.engines.shared.pieces import EVERYTHING
 from crosscheck.engines.shared.sampling import Failed
 from crosscheck.engines.shared.spanning_tree import spanning_tree
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 DISCRETE = "discrete"
 CLOSES = ("spherical", "revolute")

@@ -27,8 +27,8 @@ from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from crosscheck.linearising import Linearising
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene
-from mbref.trajectory import Trajectory
 
 STEPS = (100, 400, 1600, 6400, 25600)  # numbers of steps over a scene's duration
 TUNED_STEPS = (0.4, 0.15, 0.05, 0.015, 0.006)  # rad turned per step

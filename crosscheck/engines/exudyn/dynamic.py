@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.engines.exudyn.model import System, build
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome
 
 SAME = 1e-12  # fraction of the end time: sample times nearer to each other count as equal
 

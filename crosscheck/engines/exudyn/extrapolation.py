@@ -27,8 +27,8 @@ from crosscheck.engines.exudyn.dynamic import (
     step_count,
 )
 from crosscheck.engines.exudyn.singular_crossing import extrapolated_states
+from mbref.motions.trajectory import Cost
 from mbref.scene import Scene
-from mbref.trajectory import Cost
 
 RICHARDSON = {4: 64 / 45, 2: -20 / 45, 1: 1 / 45}  # divisor of the step: weight; cancels h² and h⁴
 BEFORE, BEHIND = 2.0, 2.0  # distances of the ends of the window from the failure, in steps

@@ -16,8 +16,8 @@ from crosscheck.engines.exudyn.dynamic import Motion, finite, said, step_count
 from crosscheck.engines.exudyn.model import System, build
 from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.judge.tolerances import RANK
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome
 
 JUMP = 0.5  # relative deviation from the trapezoidal rule above which a step has changed branch
 

@@ -22,8 +22,8 @@ from crosscheck.engines.shared import file_cache
 from crosscheck.engines.shared.sampling import Failed
 from crosscheck.engines.shared.symbolic.generator import RTOL, Generator, equations_of, origin, sweep
 from crosscheck.engines.shared.symbolic.symbols import Symbol, bare, symbolic
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 FOLDER = "heyoka"  # folder in the cache
 FAMILY = "taylor"

@@ -29,8 +29,8 @@ from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.sampling import run_through
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 

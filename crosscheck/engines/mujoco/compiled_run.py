@@ -17,8 +17,8 @@ from crosscheck.engines.mujoco.families import NEWTON, PROJECTED_COMPILED
 from crosscheck.engines.mujoco.model import Compiled
 from crosscheck.engines.shared.initial_velocities import may_move_freely
 from crosscheck.engines.shared.sampling import Sample
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.context import Context

@@ -23,8 +23,8 @@ from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 FINER, STIFFER, STIFFER_RK4 = "as in file, finer", "as in file, stiffer", "as in file, stiffer, RK4"
 OFF = "contacts, limits and dry friction are off"

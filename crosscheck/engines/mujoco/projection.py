@@ -11,8 +11,8 @@ from scipy.linalg import solve_triangular
 from crosscheck.engines.mujoco.context import NOTHING
 from crosscheck.engines.shared.driver_motion import motion
 from crosscheck.engines.shared.sampling import Failed
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Driver
-from mbref.trajectory import Outcome
 
 ITERATIONS = 10  # largest number of Newton iterations; usually two suffice
 CLOSED = 1e-13  # m and rad; residual at which Newton's method ends

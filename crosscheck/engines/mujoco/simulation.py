@@ -31,8 +31,8 @@ from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample,
 from crosscheck.engines.shared.tree_reactions import LinkMotion, joint_reactions, wrench
 from crosscheck.judge.time_functions import next_end
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, Scene
-from mbref.trajectory import Outcome, Trajectory
 
 # rad; largest motion of a driver in an adaptive step, since closures may change branch within larger ones
 TURN_PER_STEP = 0.25

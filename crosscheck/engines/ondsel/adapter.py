@@ -22,8 +22,8 @@ from crosscheck.engines.shared.sampling import Counts, Failed, Sample, step_coun
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import GROUND, Distance, Joint, Scene
-from mbref.trajectory import Outcome, Trajectory
 
 FAMILY = "kinematics"
 FAMILIES = {FAMILY: "kinematics and inverse dynamics of a driven mechanism, pose by pose"}

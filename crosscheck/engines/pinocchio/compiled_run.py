@@ -16,8 +16,8 @@ from crosscheck.engines.pinocchio import library
 from crosscheck.engines.pinocchio.model import DRIVEN_ARMATURE, Loads, Mechanism
 from crosscheck.engines.shared.sampling import Sample
 from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, SLIDE, TURN
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Driver, Scene
-from mbref.trajectory import Trajectory
 
 KINDS = {TURN: 0, SLIDE: 1, BALL_JOINT: 2, FREE: 3}
 QUATERNION = {BALL_JOINT: 0, FREE: 3}  # index of the quaternion in the coordinates of a joint

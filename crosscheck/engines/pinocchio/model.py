@@ -28,7 +28,7 @@ from crosscheck.engines.shared.spanning_tree import (
     spanning_tree,
 )
 from mbref.scene import LOAD_TYPES, Force, JointLoad, Moment, Scene, Spring
-from mbref.scene_loads import Action
+from mbref.scene.loads import Action
 
 SUPPORTS = Supports(
     joints=(

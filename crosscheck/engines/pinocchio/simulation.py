@@ -18,8 +18,8 @@ from crosscheck.engines.shared.driver_motion import motion, stated_rate
 from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample, rk4
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of
 from crosscheck.judge.constraints import scene_length
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 # (state, its time, a later time) → state at the later time
 Step = Callable[[np.ndarray, float, float], np.ndarray]

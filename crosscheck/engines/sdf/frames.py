@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.scene import SceneError
-from mbref.scene_fields import LARGEST, shown
+from mbref.scene.fields import LARGEST, shown
 
 MODEL = "__model__"
 WORLD = "world"

@@ -10,7 +10,7 @@ from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.judge.constraints import initial_poses, joint_coordinates, joint_rates
 from crosscheck.judge.gauss_principle import gauss
 from mbref.scene import Scene
-from mbref.scene_joints import DISPLACEMENT
+from mbref.scene.joints import DISPLACEMENT
 
 AT_LIMIT = 1e-9  # rad or m; a coordinate this near to its limit is at the limit
 PUSHES = 1e-9  # of the largest acceleration; a smaller acceleration along a coordinate is rounding

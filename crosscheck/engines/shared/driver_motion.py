@@ -11,9 +11,9 @@ import numpy as np
 
 from crosscheck.judge import time_functions
 from crosscheck.judge.arithmetic import DOUBLE
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Driver, JointLoad, Scene, Spring, TimeFunction
-from mbref.scene_joints import ANGLE
-from mbref.trajectory import Outcome, Trajectory
+from mbref.scene.joints import ANGLE
 
 SCOUT = (2000, 16000)  # numbers of steps of the coarse run that measures the scene's fastest rate
 SCOUT_TURN = 0.5  # rad; largest rotation in a step of the coarse run

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from mbref.scene import SceneError
-from mbref.scene_validation import field_faults
+from mbref.scene.validation import field_faults
 
 Entry = TypeVar("Entry")
 

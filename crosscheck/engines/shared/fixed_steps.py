@@ -16,8 +16,8 @@ from crosscheck.engines.shared.spanning_tree import Closure, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.time_functions import ends
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Moment, Scene
-from mbref.trajectory import Outcome, Trajectory
 
 ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad; rotation in a step, for each setting
 MOST_STEPS = 250_000

@@ -28,8 +28,8 @@ from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.sampling import step_count
 from crosscheck.engines.shared.spanning_tree import Tree, spanning_tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 STEP = {"step": "time step, s"}  # the option of each family with own steps
 

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import DOP853
 
+from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Outcome, Trajectory
 
 WIDTHS = {
     "position": 3,

@@ -24,7 +24,7 @@ import numpy as np
 from crosscheck.engines.shared.geometry import cross_matrix, joint_frame, unit
 from mbref import rotations
 from mbref.scene import Body, Coupling, Distance, Driver, Joint, JointFacts, JointLoad, Scene, Spherical
-from mbref.scene_joints import DISPLACEMENT, Coordinate
+from mbref.scene.joints import DISPLACEMENT, Coordinate
 
 GROUND_LINK = -1
 NO_AXES = np.zeros((0, 3))

@@ -28,9 +28,9 @@ from crosscheck.engines.shared.sampling import Adaptive, Counts, Failed, Sample
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample_of, wrench
 from mbref import rotations
+from mbref.motions.trajectory import Outcome
 from mbref.rotations import cross
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 FAMILY = "terms"
 ABOUT = "the engine's mass matrix, bias and Jacobians; DOP853, closures solved and projected by crosscheck"

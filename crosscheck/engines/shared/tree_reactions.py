@@ -19,7 +19,7 @@ from crosscheck.judge.time_functions import value
 from mbref import rotations
 from mbref.rotations import cross
 from mbref.scene import Distance, Force, JointLoad, Load, Moment, Scene, Spring
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 ZERO = np.zeros(3)
 

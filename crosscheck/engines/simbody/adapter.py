@@ -20,8 +20,8 @@ from crosscheck.engines.shared.sampling import Counts, Failed, Sample
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK
 from crosscheck.engines.shared.tree_reactions import LinkMotion, sample_of, wrench
 from crosscheck.engines.simbody.model import SUPPORTS, Mechanism
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 INTEGRATORS = {"merson": "RungeKuttaMerson", "feldberg": "RungeKuttaFeldberg", "cpodes": "CPodes"}
 FAMILIES = {

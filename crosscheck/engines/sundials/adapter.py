@@ -22,8 +22,8 @@ from crosscheck.engine import Cannot, Engine, Setting, Supports
 from crosscheck.engines.shared.fixed_steps import simulated
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.sundials.ida import Run
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 RTOLS = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 FAMILY = "ggl"

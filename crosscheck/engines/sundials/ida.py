@@ -14,8 +14,8 @@ from crosscheck.engines.sundials.equations import Equations, pure
 from crosscheck.judge.constraints import initial_poses, initial_twists, scene_length
 from crosscheck.judge.tolerances import RANK
 from mbref import rotations
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
-from mbref.trajectory import Outcome
 
 INCREMENT = 1e-7  # increment of difference quotients / scale of the component
 WORSE = 1e-2  # replace the chosen rows if their least pivot falls below this fraction of the best choice's

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from mbref.scene import Joint
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 SETTLING = 3  # corrections of an angle, each of which leaves the cube of the previous error
 

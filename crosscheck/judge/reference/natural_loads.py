@@ -15,7 +15,7 @@ from crosscheck.judge.reference.held_rows import function_series
 from crosscheck.judge.reference.natural import NaturalCoordinates, skew
 from crosscheck.judge.reference.natural_joints import AngleForm, SlideForm, convolved
 from mbref.scene import Factor, Force, JointLoad, Moment, Spring
-from mbref.scene_joints import ANGLE
+from mbref.scene.joints import ANGLE
 
 
 class Loads:

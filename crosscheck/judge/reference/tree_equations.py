@@ -22,7 +22,7 @@ from crosscheck.judge.reference.vectors import apply, product, saddle_solve, uni
 from crosscheck.judge.time_functions import values
 from crosscheck.judge.tolerances import RANK
 from mbref.scene import Scene
-from mbref.scene_joints import ANGLE, DISPLACEMENT
+from mbref.scene.joints import ANGLE, DISPLACEMENT
 
 COORDINATES = (ANGLE, DISPLACEMENT)
 WORSE = 0.5  # conditioning / best conditioning, below which other rows are selected

@@ -26,8 +26,8 @@ from crosscheck.judge.truth.planar_slider_crank import planar_slider_crank
 from crosscheck.judge.truth.reference_truth import ReferenceTruth
 from crosscheck.judge.truth.slider import slider
 from crosscheck.judge.truth.spatial_slider_crank import spatial_slider_crank
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import JointLoad, Scene, TorsionSpring
-from mbref.trajectory import Trajectory
 
 PATHS: tuple[Callable[[Scene], Path | None], ...] = (
     parallelogram,

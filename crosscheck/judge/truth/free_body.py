@@ -12,8 +12,8 @@ from crosscheck.judge.loads import Motion, cross, wrenches
 from crosscheck.judge.tolerances import TRUTH_DYNAMIC
 from crosscheck.judge.truth.one_dof import trajectory
 from crosscheck.judge.truth.picard import REAL, Solution
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene, TorsionSpring
-from mbref.trajectory import Trajectory
 
 NO_TURN = np.zeros(3)
 

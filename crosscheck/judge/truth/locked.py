@@ -8,8 +8,8 @@ from crosscheck.judge import constraints
 from crosscheck.judge.tolerances import TRUTH_DRIVEN
 from crosscheck.judge.truth.one_dof import freedoms_at, trajectory
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 
 class Locked:

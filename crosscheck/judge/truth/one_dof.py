@@ -21,8 +21,8 @@ from crosscheck.judge.time_functions import value
 from crosscheck.judge.tolerances import FREEDOM, ON_PATH, PARALLEL, TRUTH_DRIVEN, TRUTH_DYNAMIC
 from crosscheck.judge.truth.picard import REAL, NoSolution, Solution
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Cylindrical, Driver, Revolute, Scene, TorsionSpring
-from mbref.trajectory import Trajectory
 
 EYE = np.eye(3)
 TURNS = (Revolute, Cylindrical)  # joint types that can have a torsion spring

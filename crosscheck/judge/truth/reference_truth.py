@@ -8,8 +8,8 @@ import numpy as np
 
 from crosscheck.judge.reference.reference import NoReference, Reference, reference
 from crosscheck.judge.truth.picard import NoSolution
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 SAMPLES = 101  # samples over the duration from which the accuracy is computed before poses are requested
 

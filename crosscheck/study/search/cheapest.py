@@ -25,8 +25,8 @@ from crosscheck.study.search.neighbours import (
     work,
 )
 from crosscheck.study.search.selection import Family, families
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 
 NEAR = 1.12  # ratio of the work of two settings below which no setting between them is tried
 HALVINGS = 6  # largest number of bisections in a family

@@ -15,7 +15,7 @@ from typing import Any
 from crosscheck.processes.pool import run_estimated
 from crosscheck.processes.serve import failed
 from crosscheck.study.grid import Case, Record, record_of
-from mbref.trajectory import Outcome, Trajectory
+from mbref.motions.trajectory import Outcome, Trajectory
 
 NOT_STARTED = "not started: a coarser setting of the family reached the time limit"
 

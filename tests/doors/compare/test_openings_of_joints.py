@@ -9,8 +9,8 @@ import pytest
 
 from crosscheck.judge.openings import opening
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 from tests.helpers.geared_arms import arms
 
 TIMES = np.array([0.0, 1.0])

@@ -14,8 +14,8 @@ from crosscheck.cli import main
 from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.judge.openings import opening
 from crosscheck.processes.pool import end_idle
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 from tests.helpers.geared_arms import arms
 
 FAILING = "tests.helpers.still_engines:FAILING"

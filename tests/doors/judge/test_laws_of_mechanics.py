@@ -17,8 +17,8 @@ from crosscheck.judge.model_identity import along
 from crosscheck.judge.reaction_balance import with_exact_reactions
 from crosscheck.judge.time_functions import value
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 from tests.helpers.newton_euler import unbalanced
 from tests.helpers.short_motions import CROSSED, MOTIONS
 

@@ -12,8 +12,8 @@ from crosscheck.judge.reference.isostatic import isostatic, replaced
 from crosscheck.judge.reference.reference import Reference, reference
 from crosscheck.judge.truth import closed_form
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Driver, Revolute, Scene
-from mbref.trajectory import Trajectory
 from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
 from tests.helpers.errors import pose_error, rate_error, turned_between
 from tests.helpers.exact_motions import stored

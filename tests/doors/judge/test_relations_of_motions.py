@@ -11,8 +11,8 @@ from crosscheck import truth_for
 from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.judge.reaction_balance import balance, with_exact_reactions
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Trajectory
 from tests.helpers.errors import turned_between
 from tests.helpers.short_motions import MOTIONS
 

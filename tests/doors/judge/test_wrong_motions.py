@@ -20,8 +20,8 @@ from crosscheck.judge.precision import grain, single_precision
 from crosscheck.judge.reaction_balance import absurd, balance, with_exact_reactions
 from crosscheck.judge.truth import Truth
 from mbref import rotations
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Body, Scene
-from mbref.trajectory import Trajectory
 from tests.helpers.changed_scenes import in_another_frame, in_another_order, in_other_units
 from tests.helpers.parts import SKEW, Z, block, hinge, turning_about
 from tests.helpers.short_motions import GRAVITY, MOTIONS, made

@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck.engine import Setting
 from crosscheck.processes.pool import end_idle, run_isolated
-from mbref.trajectory import Outcome
+from mbref.motions.trajectory import Outcome
 from tests.helpers.still_engines import resting
 
 ENGINES = "tests.helpers.still_engines"

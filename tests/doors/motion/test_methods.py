@@ -7,9 +7,9 @@ import pytest
 
 import mbref
 from mbref.formulations import FORMULATIONS
+from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.stabilisation import STABILISATIONS
-from mbref.trajectory import Outcome
 from tests.helpers.errors import pose_error, rate_error
 from tests.helpers.exact_motions import stored
 from tests.helpers.short_motions import MOTIONS, times_of

@@ -10,7 +10,7 @@ import pytest
 import mbref
 from mbref import Motion
 from mbref.cli import main
-from mbref.trajectory import Outcome, Trajectory
+from mbref.motions.trajectory import Outcome, Trajectory
 from tests.fuzz.mutations import EVERYTHING
 
 STUCK = ["planar_slider_crank", "--method", "lm1"]  # redundant rows, which this method cannot solve

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from mbref.scene import SceneError
-from mbref.scene_fields import meant
+from mbref.scene.fields import meant
 
 SHOWN = 8  # names in a message
 

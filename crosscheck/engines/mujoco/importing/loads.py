@@ -14,7 +14,7 @@ from crosscheck.engines.mujoco.importing.groups import Groups
 from crosscheck.engines.mujoco.importing.left_out import Part, joint_name
 from crosscheck.engines.shared.entries import entry
 from mbref.scene import Joint, JointForce, JointTorque, Load, SlideSpring, Spring, TorsionSpring
-from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
+from mbref.scene.joints import ANGLE, DISPLACEMENT, Coordinate
 
 COORDINATES: dict[str, Coordinate] = {"hinge": ANGLE, "slide": DISPLACEMENT}
 

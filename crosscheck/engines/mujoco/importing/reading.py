@@ -38,7 +38,7 @@ from crosscheck.engines.mujoco.warnings_off import without_warnings
 from crosscheck.engines.shared.entries import entry
 from mbref.formats import Imported, ImportOptions
 from mbref.scene import Body, Coupling, Driver, Joint, Scene, SceneError
-from mbref.scene_joints import ANGLE, DISPLACEMENT, Coordinate
+from mbref.scene.joints import ANGLE, DISPLACEMENT, Coordinate
 
 OPEN = 1e-6  # gap / extent of the model; a wider gap at the start is reported
 

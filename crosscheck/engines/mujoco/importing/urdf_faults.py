@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.engines.shared import xml_files
 from mbref.scene import SceneError
-from mbref.scene_fields import LARGEST, shown
+from mbref.scene.fields import LARGEST, shown
 
 REMEDY = "write the URDF with `xacro FILE > robot.urdf`"
 LOOPS = ("loop", "constraint", "loop_joint")

@@ -10,7 +10,7 @@ import numpy as np
 from crosscheck.engines.mujoco.importing.left_out import joint_name
 from crosscheck.engines.shared.xml_files import DEEPEST
 from mbref.scene import SceneError
-from mbref.scene_fields import LARGEST
+from mbref.scene.fields import LARGEST
 
 UNIT = 1e-6  # largest deviation of the length of an axis from 1
 FIELDS = {

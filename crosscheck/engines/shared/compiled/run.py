@@ -11,8 +11,8 @@ import numpy as np
 
 from crosscheck.engines.shared.compiled import dop853, newton
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
+from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Outcome, Trajectory
 
 MOST_STEPS = 10**6
 ENDS = {  # status code → outcome and sentence

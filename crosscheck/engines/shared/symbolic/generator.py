@@ -19,8 +19,8 @@ from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_throu
 from crosscheck.engines.shared.symbolic.equations import TreeEquations
 from crosscheck.engines.shared.tree_reactions import joint_reactions
 from mbref import rotations
+from mbref.motions.trajectory import Cost, Trajectory
 from mbref.scene import Scene
-from mbref.trajectory import Cost, Trajectory
 
 JOINTS = ("fixed", "revolute", "universal", "spherical", "translational", "cylindrical", "planar")
 RTOL = {"rtol": "relative tolerance"}

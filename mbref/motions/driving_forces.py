@@ -1,0 +1,90 @@
+"""Forces and torques of drivers from reactions of joints: inverse dynamics of driven and coupled coordinates.
+
+Along a joint coordinate q, the reaction on the second body is R = Σ driver + Σ coupling - I q'', with the
+armature I. A driver gives its force or torque to one coordinate; a coupling q₂ - ratio q₁ = 0 gives μ to q₂
+and -ratio μ to q₁, so that its power is zero.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mbref import rotations
+from mbref.motions.joint_motion import (
+    acceleration_of,
+    angular_acceleration_of,
+    angular_velocity_of,
+    position_of,
+    turned_since_start,
+    velocity_of,
+)
+from mbref.motions.trajectory import Trajectory
+from mbref.scene import Joint, Scene
+from mbref.scene.joints import ANGLE, Coordinate
+
+# singular value / largest one below which drivers replace each other; ratios of couplings are scaled to 1
+REPLACEABLE = 1e-12
+
+
+def driving_forces(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
+    """Return force (N) or torque (N m) (k,) of the driver of each driven joint, on the joint's second body.
+
+    Drivers that can replace each other share the load with the least sum of squares. The result is empty if
+    the motion lacks a reaction or an acceleration that it needs.
+    """
+    driven = [scene.joint_named(driver.joint) for driver in scene.driver]
+    unknown = [{(joint.name, joint.facts.driven): 1.0} for joint in driven]
+    for coupling in scene.coupling:
+        (first, one), (second, other) = scene.coupled(coupling)
+        size, shares = max(1.0, abs(coupling.ratio)), {(second.name, other): 1.0}
+        shares[first.name, one] = shares.get((first.name, one), 0.0) - coupling.ratio
+        unknown.append({coordinate: share / size for coordinate, share in shares.items()})
+    coordinates = list(dict.fromkeys(coordinate for shares in unknown for coordinate in shares))
+    found = [_demanded(scene, motion, scene.joint_named(name), kind or ANGLE) for name, kind in coordinates]
+    if any(each is None for each in found) or not driven:
+        return {}
+    matrix = np.array([[shares.get(coordinate, 0.0) for shares in unknown] for coordinate in coordinates])
+    forces = np.linalg.pinv(matrix, rcond=REPLACEABLE) @ np.array(found)
+    return {joint.name: size for joint, size in zip(driven, forces, strict=False)}
+
+
+def _demanded(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate) -> np.ndarray | None:
+    """Return R + I q'' (k,) of a joint coordinate, N or N m; None without reaction or accelerations."""
+    wrench = (motion.reactions or {}).get(joint.name)
+    if wrench is None:
+        return None
+    part = wrench[:, 3:] if coordinate == ANGLE else wrench[:, :3]
+    size = _dot(part, _axis(scene, motion, joint))
+    if not joint.reflected_inertia or coordinate != joint.facts.driven:
+        return size
+    if motion.acceleration is None or motion.angular_acceleration is None:
+        return None
+    return np.asarray(size + joint.reflected_inertia * _acceleration(scene, motion, joint, coordinate))
+
+
+def _acceleration(scene: Scene, motion: Trajectory, joint: Joint, coordinate: Coordinate) -> np.ndarray:
+    """Return the second derivative (k,) of an angle, (ω₂ - ω₁)·a, or of a displacement, (r₂ - r₁)·a, with the
+    axis a on the first body."""
+    spins = [angular_velocity_of(scene, motion, name) for name in joint.bodies]
+    spin_rates = [angular_acceleration_of(scene, motion, name) for name in joint.bodies]
+    axis = _axis(scene, motion, joint)
+    axis_rate = rotations.cross(spins[0], axis)
+    if coordinate == ANGLE:
+        return _dot(spin_rates[1] - spin_rates[0], axis) + _dot(spins[1] - spins[0], axis_rate)
+    ends = list(zip(joint.bodies, joint.anchor_pair, strict=True))
+    apart, rate, second = (
+        of(scene, motion, *ends[1]) - of(scene, motion, *ends[0])
+        for of in (position_of, velocity_of, acceleration_of)
+    )
+    axis_second = rotations.cross(spin_rates[0], axis) + rotations.cross(spins[0], axis_rate)
+    return _dot(second, axis) + 2 * _dot(rate, axis_rate) + _dot(apart, axis_second)
+
+
+def _axis(scene: Scene, motion: Trajectory, joint: Joint) -> np.ndarray:
+    """Return the joint's axis (k, 3), a unit vector that the first body carries, in the world."""
+    first = turned_since_start(scene, motion, joint.bodies[0])
+    return rotations.rotate(first, rotations.unit(joint.directions[0])[None])
+
+
+def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("ki,ki->k", one, other))

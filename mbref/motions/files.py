@@ -1,0 +1,54 @@
+"""Files of a motion: one JSON object with scene and trajectory, and tables of its columns."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbref.files import replaced, write
+from mbref.input_error import InputError
+from mbref.motions.error_estimate import ErrorEstimate
+from mbref.motions.trajectory import Trajectory
+from mbref.records import strict_json
+from mbref.scene import Scene, SceneError
+
+
+def write_json(path: str | Path, scene: Scene, record: Mapping[str, Any]) -> None:
+    """Write scene and record of a motion; raises InputError unless the path ends in ``.json``."""
+    if Path(path).suffix.lower() != ".json":
+        raise InputError(f"{path}: a motion is saved as .json; for a picture use animate or plot")
+    whole = {"scene": scene.to_dict(), "record": record}
+    write(path, strict_json(whole) + "\n")
+
+
+def read_json(path: str | Path) -> tuple[Scene, Trajectory, ErrorEstimate | None]:
+    """Return what ``write_json`` wrote; raises InputError for another file, OSError."""
+    try:
+        whole = json.loads(Path(path).read_text(encoding="utf-8"))
+        scene, record = Scene(**whole["scene"]), whole["record"]
+        trajectory, estimate = Trajectory.from_record(scene.name, record), record.get("error_estimate")
+        return scene, trajectory, ErrorEstimate.from_record(trajectory.times, estimate) if estimate else None
+    except (ValueError, KeyError, TypeError, AttributeError, SceneError):
+        raise InputError(f"{path}: is not a file that Motion.save wrote") from None
+
+
+def write_csv(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns (k,) with all digits, below a line with their names."""
+    with replaced(path) as fresh, open(fresh, "w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(columns)
+        writer.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))
+
+
+def dataframe(columns: Mapping[str, np.ndarray]) -> Any:
+    """Return columns (k,) as a pandas DataFrame, indexed by time; raises ImportError without pandas."""
+    try:
+        import pandas
+    except ImportError:
+        raise ImportError("to_dataframe needs pandas: pip install pandas; columns() does not") from None
+    return pandas.DataFrame(columns).set_index("time")

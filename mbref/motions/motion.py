@@ -1,0 +1,296 @@
+"""Motion: a trajectory together with its scene, from which joint motions, energies, tables, files and
+pictures follow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mbref.motions.actuation import DriverMotion, LoadMotion, driver_motion, largest_force, load_motion
+from mbref.motions.drawing.picture import moving, still
+from mbref.motions.drawing.view import View
+from mbref.motions.energy import kinetic, potential
+from mbref.motions.error_estimate import ErrorEstimate
+from mbref.motions.files import dataframe, read_json, write_csv, write_json
+from mbref.motions.joint_motion import JointMotion, joint_motion
+from mbref.motions.outputs import all_columns, chosen
+from mbref.motions.trajectory import Trajectory
+from mbref.scene import Scene
+from mbref.scene_services import SERVICES, Violation
+
+
+@dataclass(frozen=True, repr=False)
+class Motion(Trajectory):
+    """A trajectory with its scene: the motion of body ``motion["rod"]`` and of joint ``motion.joint("A")``.
+
+    All attributes of Trajectory are present.
+
+    Attributes
+    ----------
+    mechanism : Scene
+        The scene that moves.
+    """
+
+    mechanism: Scene = field(kw_only=True)
+
+    @staticmethod
+    def of(scene: Scene, trajectory: Trajectory) -> Motion:
+        """Return the trajectory of any engine together with its scene.
+
+        Parameters
+        ----------
+        scene : Scene
+            The scene that moves.
+        trajectory : Trajectory
+            Its motion, with the bodies in any order.
+        """
+        return Motion(**{f.name: getattr(trajectory, f.name) for f in fields(Trajectory)}, mechanism=scene)
+
+    def joint(self, name: str) -> JointMotion:
+        """Return angle, displacement and reaction of one joint.
+
+        Parameters
+        ----------
+        name : str
+            Name of the joint.
+
+        Raises
+        ------
+        KeyError
+            If no joint has this name; the message lists the joints.
+        """
+        return joint_motion(self.mechanism, self, name)
+
+    @property
+    def kinetic_energy(self) -> np.ndarray:
+        """Kinetic energy, J, shape (k,). Raises InputError if a body has no mass."""
+        return kinetic(self.mechanism, self)
+
+    @property
+    def potential_energy(self) -> np.ndarray:
+        """Energy of gravity and springs, J, shape (k,). Raises InputError if a body has no mass."""
+        return potential(self.mechanism, self)
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Kinetic plus potential energy, J, shape (k,), constant without drivers, dampers, forces and
+        moments."""
+        return self.kinetic_energy + self.potential_energy
+
+    def driver(self, joint: str) -> DriverMotion:
+        """Return force or torque, and power that the driver of a joint supplies.
+
+        Parameters
+        ----------
+        joint : str
+            Name of the driven joint.
+
+        Raises
+        ------
+        KeyError
+            If the joint has no driver; the message lists the driven joints.
+        """
+        return driver_motion(self.mechanism, self, joint)
+
+    def load_at(self, place: int) -> LoadMotion:
+        """Return length or angle, rate, force or torque, and power of one load.
+
+        Parameters
+        ----------
+        place : int
+            Index of the load in the scene, from 0.
+
+        Raises
+        ------
+        IndexError
+            If the scene has no such load.
+        """
+        return load_motion(self.mechanism, self, place)
+
+    @property
+    def violation(self) -> Violation:
+        """Largest violation of a constraint row at position, velocity and acceleration level."""
+        return SERVICES["violations"](self.mechanism, self)
+
+    @property
+    def largest_reaction(self) -> np.ndarray | None:
+        """Largest reaction force of a joint at each sample, N, shape (k,). None if a body has no mass."""
+        return largest_force(self)
+
+    @property
+    def determined_reactions(self) -> dict[str, np.ndarray]:
+        """Components of the reactions that equilibrium determines, by joint, shape (k, 6). An entry is true
+        for a component of force (x, y, z) or moment (x, y, z), world axes, that does not depend on how
+        redundant constraints share the load: in a plane across z force x, force y and moment z."""
+        return SERVICES["determined_reactions"](self.mechanism, self)
+
+    @cached_property
+    def error_estimate(self) -> ErrorEstimate:
+        """Estimated global error of the motion at its samples, by a second run at a smaller tolerance. The
+        second run is made on first access and takes about twice the time of the motion. Raises InputError if
+        the motion is of another engine than mbref."""
+        return SERVICES["estimate_error"](self)
+
+    def with_error_estimate(
+        self, seconds: float = math.inf, progress: Callable[[float], None] | None = None
+    ) -> Motion:
+        """Return the motion with its error estimate. The estimate's warning, if any, is part of ``message``.
+
+        Parameters
+        ----------
+        seconds : float
+            Limit of CPU time, s, of the motion and of its second run; a longer run has no estimate.
+        progress : callable, optional
+            Called with the time reached (s) between steps of the second run.
+
+        Raises
+        ------
+        InputError
+            If the motion is of another engine than mbref.
+        """
+        estimate = SERVICES["estimate_error"](self, seconds, progress)
+        message = "; ".join(filter(None, (self.message, estimate.warning)))
+        return replace(self, message=message)._keeping(estimate)
+
+    def _keeping(self, estimate: ErrorEstimate) -> Motion:
+        """Return the motion with the given error estimate."""
+        self.__dict__["error_estimate"] = estimate
+        return self
+
+    @property
+    def known_estimate(self) -> ErrorEstimate | None:
+        """Error estimate, or None if no estimate has been made."""
+        return self.__dict__.get("error_estimate")
+
+    def to_record(self) -> dict[str, Any]:
+        """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made."""
+        estimate = self.known_estimate
+        return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
+
+    def columns(self, *names: str) -> dict[str, np.ndarray]:
+        """Return numbers over time as columns.
+
+        Parameters
+        ----------
+        *names : str
+            Columns or their beginnings, such as ``"rod.position"`` or ``"driver(A).torque"``. Default: all.
+            ``mbref list outputs`` prints the names.
+
+        Returns
+        -------
+        dict of str to ndarray, shape (k,)
+            ``time``, ``rod.position.x``, ``A.angle``, ``energy`` and so on, in SI units.
+
+        Raises
+        ------
+        InputError
+            If a name fits no column.
+        """
+        table = all_columns(self)
+        return {name: table[name] for name in ["time", *chosen(table, names)]} if names else table
+
+    def to_dataframe(self) -> Any:
+        """Return the columns as a pandas DataFrame, indexed by time.
+
+        Returns
+        -------
+        pandas.DataFrame, shape (k, columns)
+
+        Raises
+        ------
+        ImportError
+            If pandas is not installed.
+        """
+        return dataframe(self.columns())
+
+    def to_csv(self, path: str | Path, *names: str) -> None:
+        """Write columns as CSV. The first line has their names, numbers have all digits.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        *names : str
+            Columns or their beginnings, as for ``columns``, with its error. Default: all.
+        """
+        write_csv(path, self.columns(*names))
+
+    def save(self, path: str | Path) -> None:
+        """Write scene and trajectory as one JSON object, which ``Motion.load`` reads.
+
+        Parameters
+        ----------
+        path : str or path
+            The file, which ends in ``.json``.
+
+        Raises
+        ------
+        InputError
+            If the file's name does not end in ``.json``.
+        """
+        write_json(path, self.mechanism, self.to_record())
+
+    @staticmethod
+    def load(path: str | Path) -> Motion:
+        """Return the motion in a file that ``Motion.save`` wrote.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+
+        Raises
+        ------
+        OSError, InputError
+            If the file cannot be read, or contains no saved motion.
+        """
+        scene, trajectory, estimate = read_json(path)
+        motion = Motion.of(scene, trajectory)
+        return motion._keeping(estimate) if estimate else motion
+
+    def plot(self, *names: str) -> Any:
+        """Plot columns over time, one panel for each quantity.
+
+        Parameters
+        ----------
+        *names : str
+            Columns or their beginnings, such as ``"rod.position"``. Default: joint coordinates and energy.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        InputError, ImportError
+            If a name fits no column, or matplotlib is not installed.
+        """
+        from mbref.motions.drawing.plot import plot
+
+        return plot(self.columns(), names)
+
+    def picture(self, view: str | None = None) -> str:
+        """Return the moving mechanism as the text of an animated SVG.
+
+        Parameters
+        ----------
+        view : str, optional
+            ``"xy"``, ``"xz"``, ``"yz"``, ``"oblique"`` or ``"AZIMUTH,ELEVATION"`` in degrees.
+
+        Raises
+        ------
+        InputError
+            If the view is unknown, or the motion has no sample.
+        """
+        return moving(self.mechanism, self, View.parse(view) if view else None)
+
+    def _repr_html_(self) -> str:
+        shown = self.picture() if self.times.size else still(self.mechanism)
+        return f"<figure>{shown}<figcaption>{escape(repr(self)[1:-1])}</figcaption></figure>"

@@ -1,0 +1,209 @@
+"""Outputs: the names, units and meanings of all time-dependent numbers of a motion.
+
+``Motion.columns``, CSV files, tables, plots, ``mbref list outputs`` and docs/outputs.md follow this table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from mbref.input_error import InputError
+from mbref.motions.trajectory import DRIVER
+from mbref.scene.fields import meant
+
+Owner = Literal["body", "joint", "driver", "load", "mechanism"]
+PREFIXES: dict[Owner, str] = {  # prefix of a column, by its owner
+    "body": "{}.",
+    "joint": "{}.",
+    "driver": f"{DRIVER}.",
+    "load": "load({}).",
+    "mechanism": "",
+}
+EXAMPLES: dict[Owner, str] = {"body": "rod", "joint": "A", "driver": "A", "load": "0", "mechanism": ""}
+MASSES = "the mass and inertia of every body"
+ACCELERATIONS = "accelerations, which the engine does not give"
+SECOND_RUN = "a second run: mbref run without --estimate no, or motion.error_estimate before"
+TURNING = "a joint that turns about one axis"
+SLIDING = "a joint that slides along one axis"
+LOAD_ABOUT_AXIS = "a load about a joint's axis"
+LOAD_ALONG_AXIS = "a load along a joint's axis"
+PULLING = f"a spring, or {LOAD_ALONG_AXIS}"
+
+
+class Output(NamedTuple):
+    """A time-dependent number of a body, joint, driver, load or mechanism: name, unit, components and
+    meaning.
+
+    ``needs`` names the data that a motion without this number lacks.
+    """
+
+    owner: Owner
+    name: str
+    unit: str
+    components: str
+    meaning: str
+    needs: str = ""
+
+    @property
+    def column(self) -> str:
+        """Example of the column's name, with all components."""
+        axes = f".{self.components[0]}…{self.components[-1]}" if self.components else ""
+        return f"{PREFIXES[self.owner].format(EXAMPLES[self.owner])}{self.name}{axes}"
+
+    @property
+    def shape(self) -> str:
+        """Shape of the array in Python, for k sample times."""
+        return f"(k, {len(self.components)})" if self.components else "(k,)"
+
+    def columns(self, owner: str, values: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+        """Yield names and values (k,) of the columns for an owner's values (k,) or (k, components)."""
+        name = f"{PREFIXES[self.owner].format(owner)}{self.name}"
+        if not self.components:
+            yield name, values
+        for i, component in enumerate(self.components):
+            yield f"{name}.{component}", values[:, i]
+
+
+OUTPUTS = (
+    Output("body", "orientation", "", "wxyz", "unit quaternion, body to world"),
+    Output("body", "position", "m", "xyz", "centre of mass, world"),
+    Output("body", "velocity", "m/s", "xyz", "velocity of the centre of mass, world"),
+    Output("body", "angular_velocity", "rad/s", "xyz", "angular velocity, world"),
+    Output("body", "acceleration", "m/s²", "xyz", "acceleration of the centre of mass, world", ACCELERATIONS),
+    Output("body", "angular_acceleration", "rad/s²", "xyz", "angular acceleration, world", ACCELERATIONS),
+    Output("joint", "angle", "rad", "", "angle about the axis since t = 0, full turns counted", TURNING),
+    Output("joint", "rate", "rad/s", "", "rate of the angle", TURNING),
+    Output("joint", "displacement", "m", "", "displacement along the axis since t = 0", SLIDING),
+    Output("joint", "displacement_rate", "m/s", "", "rate of the displacement", SLIDING),
+    Output(
+        "joint", "open", "", "", "number of reaction components that equilibrium does not determine", MASSES
+    ),
+    Output("joint", "force", "N", "xyz", "reaction on the second body at its anchor, world", MASSES),
+    Output("joint", "moment", "N m", "xyz", "reaction moment on the second body, world", MASSES),
+    Output(
+        "driver",
+        "force",
+        "N",
+        "",
+        "force on the second body along the axis of a sliding joint",
+        f"{MASSES}, and {SLIDING}",
+    ),
+    Output(
+        "driver",
+        "torque",
+        "N m",
+        "",
+        "torque on the second body about the axis of a turning joint",
+        f"{MASSES}, and {TURNING}",
+    ),
+    Output(
+        "driver", "power", "W", "", "power into the mechanism: torque times rate, or force times rate", MASSES
+    ),
+    Output(
+        "driver",
+        "open",
+        "",
+        "",
+        "1 where equilibrium does not determine the force or torque, else 0",
+        MASSES,
+    ),
+    Output("load", "length", "m", "", "length of a spring", "a spring"),
+    Output("load", "length_rate", "m/s", "", "rate of the length of a spring", "a spring"),
+    Output("load", "force", "N", "", "pull of a spring; force on the second body along an axis", PULLING),
+    Output("load", "angle", "rad", "", "angle of its joint since t = 0", LOAD_ABOUT_AXIS),
+    Output("load", "rate", "rad/s", "", "rate of the angle of its joint", LOAD_ABOUT_AXIS),
+    Output("load", "displacement", "m", "", "displacement of its joint since t = 0", LOAD_ALONG_AXIS),
+    Output("load", "displacement_rate", "m/s", "", "rate of the displacement of its joint", LOAD_ALONG_AXIS),
+    Output("load", "torque", "N m", "", "torque on the second body about the axis", LOAD_ABOUT_AXIS),
+    Output("load", "power", "W", "", "power into the bodies"),
+    Output("load", "energy", "J", "", "energy that a spring stores", "a spring"),
+    Output("mechanism", "position_violation", "m or rad", "", "largest violation of a constraint row"),
+    Output("mechanism", "velocity_violation", "m/s or rad/s", "", "largest violation at velocity level"),
+    Output(
+        "mechanism",
+        "acceleration_violation",
+        "m/s² or rad/s²",
+        "",
+        "largest violation at acceleration level",
+        ACCELERATIONS,
+    ),
+    Output("mechanism", "largest_reaction", "N", "", "largest reaction force of a joint", MASSES),
+    Output("mechanism", "kinetic_energy", "J", "", "kinetic energy", MASSES),
+    Output("mechanism", "potential_energy", "J", "", "energy of gravity and springs", MASSES),
+    Output("mechanism", "energy", "J", "", "kinetic plus potential energy", MASSES),
+    Output("mechanism", "error_estimate", "", "", "estimated error, relative or rad", SECOND_RUN),
+)
+UNIT_OF = {output.name: output.unit for output in OUTPUTS}
+
+
+def columns_of(owner: Owner, name: str, numbers: Mapping[str, Any]) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the columns of an owner: its numbers that the table of outputs contains and that are not None."""
+    for output in OUTPUTS:
+        if output.owner == owner and (values := numbers.get(output.name)) is not None:
+            yield from output.columns(name, values)
+
+
+def all_columns(motion: Any) -> dict[str, np.ndarray]:
+    """Return ``time`` and all columns (k,) of a Motion, by name."""
+    scene, table = motion.mechanism, {"time": motion.times}
+    for name in motion.bodies:
+        table.update(columns_of("body", name, vars(motion[name])))
+    for joint in scene.joint:
+        table.update(columns_of("joint", joint.name, vars(motion.joint(joint.name))))
+    for driver in scene.driver:
+        table.update(columns_of("driver", driver.joint, vars(motion.driver(driver.joint))))
+    for place in range(len(scene.load)):
+        table.update(columns_of("load", str(place), vars(motion.load_at(place))))
+    table.update(columns_of("mechanism", "", _totals(motion)))
+    return table
+
+
+def _totals(motion: Any) -> dict[str, np.ndarray | None]:
+    """Return the numbers of the whole mechanism by their names in the table of outputs."""
+    levels = {f"{level}_violation": rows for level, rows in motion.violation._asdict().items()}
+    energies = ("kinetic_energy", "potential_energy", "energy") if motion.mechanism.has_mass() else ()
+    found = {name: getattr(motion, name) for name in energies}
+    estimate = None if motion.known_estimate is None else motion.known_estimate.error
+    return {**levels, "largest_reaction": motion.largest_reaction, **found, "error_estimate": estimate}
+
+
+def chosen(columns: Mapping[str, Any] | Sequence[str], names: Sequence[str]) -> list[str]:
+    """Return the columns with these names or beginnings, such as ``rod.position``.
+
+    Raises InputError for a name that fits no column. The message names the missing data, a similar name, or
+    the existing columns.
+    """
+    found: list[str] = []
+    for name in names:
+        fitting = [column for column in columns if column == name or column.startswith(f"{name}.")]
+        if not fitting:
+            raise InputError(f"no column {name!r}{_hint(list(columns), name)}")
+        found += [column for column in fitting if column not in found]
+    return found
+
+
+def quantity_of(column: str) -> str:
+    """Return the quantity of a column: ``position`` of ``rod.position.x``, ``angle`` of ``A.angle``."""
+    return next(part for part in reversed(column.split(".")) if part in UNIT_OF)
+
+
+def _hint(columns: Sequence[str], name: str) -> str:
+    """Return the data that the column needs, a similar name, or the existing columns, as a clause."""
+    parts = [column.split(".") for column in columns]
+    beginnings = list(dict.fromkeys(".".join(p[:n]) for p in parts for n in range(1, len(p) + 1)))
+    owner, _, quantity = name.rpartition(".")
+    needs = f" in this motion; it needs {_needs(owner, quantity)}" * bool(_needs(owner, quantity))
+    if needs and (not owner or owner in beginnings):
+        return needs
+    owners = dict.fromkeys(c[: c.index(quantity_of(c))].rstrip(".") or c for c in columns if c != "time")
+    return meant(name, beginnings) or needs or f"; there are columns of {', '.join(owners)}"
+
+
+def _needs(owner: str, quantity: str) -> str:
+    """Return the data that the motion lacks for a quantity of an owner, by the owner's type."""
+    own = ("mechanism",) if not owner else ("body", "joint")
+    kinds = (owner.partition("(")[0],) if owner.endswith(")") else own
+    return next((o.needs for o in OUTPUTS if o.name == quantity and o.owner in kinds), "")

@@ -1,0 +1,76 @@
+"""Scene: the mechanism as plain, validated, frozen data; reads and writes TOML. The classes here contain no
+numerics.
+
+Units are SI, angles radians; positions, axes and velocities are in the world frame at t = 0
+unless a field says otherwise.  ``"ground"`` names the fixed frame in fields that name a body. Field names are
+equal in Python and in the file, so that the path of a fault (``body[2].mass``) is also the Python expression
+of the faulty value.
+"""
+
+from __future__ import annotations
+
+from mbref.scene.bodies import Body, Driver
+from mbref.scene.functions import Factor, Sine, TimeFunction
+from mbref.scene.joints import (
+    JOINT_TYPES,
+    Coupling,
+    Cylindrical,
+    Distance,
+    Fixed,
+    Inline,
+    Joint,
+    JointFacts,
+    Planar,
+    Revolute,
+    Spherical,
+    Translational,
+    Universal,
+)
+from mbref.scene.loads import (
+    LOAD_TYPES,
+    Force,
+    JointForce,
+    JointLoad,
+    JointTorque,
+    Load,
+    Moment,
+    SlideSpring,
+    Spring,
+    TorsionSpring,
+)
+from mbref.scene.scene import Scene
+from mbref.scene.validation import GROUND, SceneError
+
+__all__ = [
+    "GROUND",
+    "JOINT_TYPES",
+    "LOAD_TYPES",
+    "Body",
+    "Coupling",
+    "Cylindrical",
+    "Distance",
+    "Driver",
+    "Factor",
+    "Fixed",
+    "Force",
+    "Inline",
+    "Joint",
+    "JointFacts",
+    "JointForce",
+    "JointLoad",
+    "JointTorque",
+    "Load",
+    "Moment",
+    "Planar",
+    "Revolute",
+    "Scene",
+    "SceneError",
+    "Sine",
+    "SlideSpring",
+    "Spherical",
+    "Spring",
+    "TimeFunction",
+    "TorsionSpring",
+    "Translational",
+    "Universal",
+]

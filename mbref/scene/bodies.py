@@ -1,0 +1,79 @@
+"""Bodies and drivers as data: rigid bodies, and prescribed motions of joints."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+from pydantic import Field, ValidationInfo, field_validator
+
+from mbref.scene.fields import Mass, Measures, Name, PointValue, Quaternion, SceneEntry, VectorValue, as_list
+from mbref.scene.functions import TimeFunction
+from mbref.scene.validation import checked_inertia
+
+UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
+
+
+InertiaValue = tuple[float, float, float] | tuple[VectorValue, VectorValue, VectorValue] | None
+
+
+class Body(SceneEntry):
+    """A rigid body; its frame sits at the centre of mass.
+
+    ``inertia`` is about the centre of mass along the body axes: three principal moments or a symmetric 3x3
+    (kg m²).  A kinematic analysis needs neither ``mass`` nor ``inertia``; a body has both or none of them.
+    A body of mass 0 and inertia 0 is a massless link, whose motion follows from the bodies at its joints.
+    ``velocity`` and ``angular_velocity`` (world) are optional: omitted velocities are computed from the
+    constraints and the given velocities.
+    """
+
+    name: Name
+    mass: Mass | None = None
+    inertia: InertiaValue = None
+    position: PointValue
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    velocity: VectorValue | None = None
+    angular_velocity: VectorValue | None = None
+
+    @field_validator("inertia", mode="plain", json_schema_input_type=InertiaValue)
+    @classmethod
+    def _inertia_is_physical(cls, value: Any) -> Any:
+        return None if value is None else checked_inertia(as_list(value))
+
+    @field_validator("orientation")
+    @classmethod
+    def _orientation_is_unit(cls, q: tuple[float, ...]) -> tuple[float, ...]:
+        norm = math.hypot(*q)
+        if abs(norm - 1) > UNIT_TOLERANCE:
+            raise ValueError(f"must be a unit quaternion (w, x, y, z), got one of length {norm:.9g}")
+        return q if abs(norm - 1) <= 1e-15 else tuple(x / norm for x in q)
+
+
+class Driver(TimeFunction):
+    """Prescribed motion of the second body of ``joint`` relative to the first, from t = 0.
+
+    value(t) = c0 + c1 t + c2 t² + … + sine + table: the angle of a revolute or cylindrical joint about its
+    axis (rad), or the displacement of a translational one along it (m).  value(0) must be zero.
+    """
+
+    joint: Name
+    polynomial: Annotated[Measures, Field(validate_default=True)] = (0.0,)
+
+    @field_validator("polynomial")
+    @classmethod
+    def _motion_begins_at_zero(cls, polynomial: tuple[float, ...], info: ValidationInfo) -> tuple[float, ...]:
+        if not {"sine", "table"} <= info.data.keys():
+            return polynomial  # a fault of another field is reported
+        sine, table = info.data["sine"], info.data["table"]
+        start = polynomial[0] + (sine.amplitude * math.sin(sine.phase) if sine else 0.0)
+        what = "c0 + amplitude·sin(phase) must be 0, motion is measured from t = 0"
+        if table:
+            start += cls.model_construct(sine=None, table=table, polynomial=(0.0,)).pieces()[0].cubic[0]
+            what = "the value at t = 0 must be 0, because the motion is measured from its start"
+        if abs(start) > 1e-12:  # otherwise it is rounding
+            raise ValueError(f"{what}; got {start:g}")
+        return polynomial
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        return self.polynomial

@@ -1,0 +1,147 @@
+"""Functions of time as data: polynomial, sine and table, of drivers and of loads; loads can be switched.
+
+A table is interpolated by a cubic spline: twice continuously differentiable, "not-a-knot" at both ends. So
+the spline through values of a cubic polynomial equals the polynomial (C. de Boor, A Practical Guide to
+Splines, 1978, chapter IV).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from pydantic import BeforeValidator, field_validator
+
+from mbref.scene.fields import Angle, LengthOrAngle, NotNegative, Positive, Real, Reals, SceneEntry, as_list
+
+FEWEST_ROWS = 4  # least number of rows of a table; four rows determine a cubic polynomial
+
+Row = tuple[Real, Real]
+Table = Annotated[tuple[Row, ...], BeforeValidator(as_list)]
+Cubic = tuple[float, float, float, float]
+ZEROS: Cubic = (0.0, 0.0, 0.0, 0.0)
+
+
+class Sine(SceneEntry):
+    """amplitude · sin(frequency · t + phase); frequency in rad/s."""
+
+    amplitude: LengthOrAngle = 0.0
+    frequency: Real = 1.0
+    phase: Angle = 0.0
+
+
+class Piece(NamedTuple):
+    """A piece of a function: from ``begin`` (s) on, part · (polynomial + sine) + Σ cubic[k] (t - begin)^k."""
+
+    begin: float
+    part: float  # 1 where polynomial and sine act, 0 where the function is switched off
+    cubic: Cubic
+
+
+class TimeFunction(SceneEntry):
+    """polynomial + sine + table; each part is optional.
+
+    ``table`` has rows (time in s, value), times increasing.
+    """
+
+    sine: Sine | None = None
+    table: Table | None = None
+
+    @field_validator("table")
+    @classmethod
+    def _table_makes_a_spline(cls, table: Any) -> Any:
+        if table is None:
+            return None
+        if len(table) < FEWEST_ROWS:
+            raise ValueError(f"must have at least {FEWEST_ROWS} rows [time, value], got {len(table)}")
+        for k, ((before, _), (after, _)) in enumerate(itertools.pairwise(table)):
+            if not after > before:
+                raise ValueError(
+                    f"times must increase, but row {k + 1} is at {after:g} s and row {k} at {before:g} s"
+                )
+        return table
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """Coefficients c0, c1, c2, … of the polynomial."""
+        raise NotImplementedError
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Times (s) between which the function is switched on."""
+        return -np.inf, np.inf
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """Pieces on which the function is analytic, from t = 0 on."""
+        start, stop = self.interval
+        cuts = {0.0, *(t for t in (start, stop) if 0.0 < t < np.inf)}
+        if self.table is not None:
+            cuts |= {t for t, _ in self.table[1:-1] if t > 0.0}
+        cubics = self._cubics(sorted(cuts))
+        return tuple(
+            Piece(t, 1.0, cubic) if start <= t < stop else Piece(t, 0.0, ZEROS) for t, cubic in cubics
+        )
+
+    def _cubics(self, begins: list[float]) -> Iterator[tuple[float, Cubic]]:
+        """Yield each time in ``begins`` (s) with the coefficients of the table's cubic in the time since
+        then."""
+        if self.table is None:
+            yield from ((begin, ZEROS) for begin in begins)
+            return
+        from scipy.interpolate import CubicSpline  # only scenes with tables need it
+
+        times, values = zip(*self.table, strict=True)
+        spline = CubicSpline(times, values)
+        rows = np.clip(np.searchsorted(times, begins, side="right") - 1, 0, len(times) - 2)
+        for begin, k in zip(begins, rows.tolist(), strict=True):
+            a, b, c, d = spline.c[::-1, k].tolist()
+            s = begin - times[k]
+            yield begin, (a + s * (b + s * (c + s * d)), b + s * (2 * c + 3 * s * d), c + 3 * s * d, d)
+
+    def values(self, times: np.ndarray) -> np.ndarray:
+        """Return the values (k,) at times (k,) in s; at a time of switching, the value of the piece that
+        begins."""
+        pieces = self.pieces()
+        k = np.searchsorted([piece.begin for piece in pieces[1:]], times, side="right")
+        begin, part, cubic = (np.array(column)[k] for column in zip(*pieces, strict=True))
+        smooth = np.polynomial.polynomial.polyval(times, np.array(self.coefficients))
+        if self.sine is not None:
+            smooth = smooth + self.sine.amplitude * np.sin(self.sine.frequency * times + self.sine.phase)
+        powers = (times - begin)[:, None] ** np.arange(4)
+        return np.asarray(part * smooth + (cubic * powers).sum(axis=1))
+
+    @property
+    def is_constant(self) -> bool:
+        """True if the value never changes."""
+        still = self.sine is None or self.sine.amplitude == 0.0
+        return still and not any(self.coefficients[1:]) and self.table is None and len(self.pieces()) == 1
+
+
+class Factor(TimeFunction):
+    """A function of time that multiplies a load; the function is 1 if only times of switching are given.
+
+    The load acts from ``start`` (s) until before ``stop`` (s).
+    """
+
+    polynomial: Reals | None = None
+    start: NotNegative = 0.0
+    stop: Positive | None = None
+
+    @field_validator("stop")
+    @classmethod
+    def _stop_is_later(cls, stop: float | None, info: Any) -> float | None:
+        if stop is not None and stop <= info.data.get("start", 0.0):
+            raise ValueError(f"must be later than start, {info.data['start']:g} s, got {stop:g}")
+        return stop
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        if self.polynomial is not None:
+            return self.polynomial
+        return (1.0,) if self.sine is None and self.table is None else (0.0,)
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        return self.start, np.inf if self.stop is None else self.stop

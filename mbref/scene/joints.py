@@ -1,0 +1,280 @@
+"""Joints and couplings as data: the fields of every joint type, and its facts, from which all tables of joint
+types follow."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+
+from pydantic import Discriminator, field_validator
+
+from mbref.scene.fields import (
+    LengthOrAngle,
+    Name,
+    NotNegative,
+    Pair,
+    PointPair,
+    PointValue,
+    Real,
+    SceneEntry,
+    VectorPair,
+    VectorValue,
+    checked_length,
+    direction,
+)
+
+X, Y, Z = 0, 1, 2
+SKEW = 0.05  # largest cosine between the axes of a universal joint that counts as a rounded right angle
+RIGHT_ANGLE = 1e-15  # largest cosine between axes that are perpendicular up to rounding
+Coordinate = Literal["angle", "displacement"]
+CoordinatePair = tuple[Coordinate, Coordinate]
+ANGLE: Coordinate = "angle"
+DISPLACEMENT: Coordinate = "displacement"
+Condition = Literal["perpendicular axes", "constant distance"]
+
+
+@dataclass(frozen=True)
+class JointFacts:
+    """Relative motion that a joint type forbids, and the drivers and loads that can act on the remaining
+    motion.
+
+    ``forbidden_translations`` and ``forbidden_rotations`` are components (0, 1, 2) of the second body's
+    motion relative to the first, in the joint's frame on the first body; its third axis is along the joint's
+    axis.  ``condition`` is one further equation: the axes of both bodies stay perpendicular, or the anchors
+    keep their distance.  ``driven`` is the coordinate a driver prescribes: the angle about or the
+    displacement along the axis, None for a joint that cannot be driven.  ``loaded`` are the coordinates along
+    which springs, forces and torques of the joint can act.
+    """
+
+    forbidden_translations: tuple[int, ...] = ()
+    forbidden_rotations: tuple[int, ...] = ()
+    condition: Condition | None = None
+    driven: Coordinate | None = None
+    loaded: tuple[Coordinate, ...] = ()
+
+    @property
+    def rows(self) -> int:
+        """Number of constraint rows without a driver."""
+        return len(self.forbidden_translations) + len(self.forbidden_rotations) + bool(self.condition)
+
+    @property
+    def free_translations(self) -> int:
+        """Number of free relative translations."""
+        return 3 - len(self.forbidden_translations) - (self.condition == "constant distance")
+
+    @property
+    def free_rotations(self) -> int:
+        """Number of free relative rotations."""
+        return 3 - len(self.forbidden_rotations) - (self.condition == "perpendicular axes")
+
+    @property
+    def turns(self) -> bool:
+        """True if the bodies can turn relative to each other about the joint's axis only."""
+        return self.forbidden_rotations == (X, Y)
+
+    @property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Joint coordinates that can be coupled: the angle about the axis, the displacement along it."""
+        angle = (ANGLE,) if self.turns else ()
+        return angle + ((DISPLACEMENT,) if self.forbidden_translations == (X, Y) else ())
+
+
+class JointEntry(SceneEntry):
+    """Fields and facts that all joints have."""
+
+    facts: ClassVar[JointFacts]
+    name: Name
+    bodies: Pair
+
+    @classmethod
+    def at(cls, name: str, bodies: tuple[str, str], **places: Any) -> Self:
+        """Return a joint of this type with the ``places`` (anchor, anchors, axis, axes) that the type
+        needs."""
+        return cls(name=name, bodies=bodies, **{k: v for k, v in places.items() if k in cls.model_fields})
+
+    @property
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
+        """Anchors on the first and on the second body, world at t = 0 (m)."""
+        raise NotImplementedError
+
+    @property
+    def directions(self) -> tuple[VectorValue, ...]:
+        """Axes of the joint, world at t = 0, of any length: no axis, one axis of both bodies, or one axis of
+        each body."""
+        return ()
+
+    @property
+    def reflected_inertia(self) -> float:
+        """The ``armature`` of the driven coordinate, kg m² or kg; 0 for joints without this field."""
+        return getattr(self, "armature", 0.0)
+
+
+class _AnchorJoint(JointEntry):
+    anchor: PointValue
+
+    @property
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
+        return self.anchor, self.anchor
+
+
+class _AxisJoint(_AnchorJoint):
+    axis: VectorValue
+
+    _axis = field_validator("axis")(direction)
+
+    @property
+    def directions(self) -> tuple[VectorValue, ...]:
+        return (self.axis,)
+
+
+class _DrivenJoint(_AxisJoint):
+    armature: NotNegative = 0.0  # kg m² or kg, of the driven coordinate q: the kinetic energy ½ armature q'²
+
+
+class Fixed(_AnchorJoint):
+    """Joint that forbids all relative motion."""
+
+    facts = JointFacts(forbidden_translations=(X, Y, Z), forbidden_rotations=(X, Y, Z))
+    type: Literal["fixed"] = "fixed"
+
+
+class Revolute(_DrivenJoint):
+    """Rotation about ``axis`` through ``anchor``; ``armature`` is the reflected inertia of a rotor."""
+
+    facts = JointFacts((X, Y, Z), (X, Y), driven="angle", loaded=(ANGLE,))
+    type: Literal["revolute"] = "revolute"
+
+
+class Universal(_AnchorJoint):
+    """Coincident ``anchor``; ``axes`` (first on the first body, second on the second) stay perpendicular."""
+
+    facts = JointFacts((X, Y, Z), condition="perpendicular axes")
+    type: Literal["universal"] = "universal"
+    axes: VectorPair
+
+    @field_validator("axes")
+    @classmethod
+    def _axes_are_perpendicular(cls, axes: tuple[VectorValue, VectorValue]) -> tuple[VectorValue, ...]:
+        """Return the first axis, and the part of the second that is perpendicular to it."""
+        lengths = [math.hypot(*direction(axis)) for axis in axes]
+        cosine = sum(a / lengths[0] * (b / lengths[1]) for a, b in zip(*axes, strict=True))
+        if abs(cosine) > SKEW:
+            angle = math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
+            raise ValueError(f"must be perpendicular, but enclose {angle:.3g} degrees")
+        if abs(cosine) <= RIGHT_ANGLE:
+            return axes
+        first, second = axes
+        along = cosine * lengths[1] / lengths[0]
+        return first, (
+            second[0] - along * first[0],
+            second[1] - along * first[1],
+            second[2] - along * first[2],
+        )
+
+    @property
+    def directions(self) -> tuple[VectorValue, ...]:
+        return self.axes
+
+
+class Spherical(_AnchorJoint):
+    """Joint with coincident ``anchor`` and free rotation."""
+
+    facts = JointFacts(forbidden_translations=(X, Y, Z))
+    type: Literal["spherical"] = "spherical"
+
+
+class Translational(_DrivenJoint):
+    """Displacement along ``axis``, no rotation; ``armature`` is the reflected mass of a motor."""
+
+    facts = JointFacts((X, Y), (X, Y, Z), driven="displacement", loaded=(DISPLACEMENT,))
+    type: Literal["translational"] = "translational"
+
+
+class Cylindrical(_DrivenJoint):
+    """Displacement along and rotation about ``axis``; ``armature`` is of the rotation."""
+
+    facts = JointFacts((X, Y), (X, Y), driven="angle", loaded=(ANGLE, DISPLACEMENT))
+    type: Literal["cylindrical"] = "cylindrical"
+
+
+class Planar(_AxisJoint):
+    """Displacement in the plane through ``anchor`` with normal ``axis``, and rotation about the normal."""
+
+    facts = JointFacts(forbidden_translations=(Z,), forbidden_rotations=(X, Y))
+    type: Literal["planar"] = "planar"
+
+
+class Inline(_AxisJoint):
+    """A point of the second body, ``anchor``, stays on the line along ``axis`` of the first body."""
+
+    facts = JointFacts(forbidden_translations=(X, Y))
+    type: Literal["inline"] = "inline"
+
+
+class Distance(JointEntry):
+    """Constant distance between two ``anchors`` (first on the first body, second on the second)."""
+
+    facts = JointFacts(condition="constant distance")
+    type: Literal["distance"] = "distance"
+    anchors: PointPair
+
+    @field_validator("anchors")
+    @classmethod
+    def _anchors_are_apart(cls, anchors: tuple[VectorValue, VectorValue]) -> tuple[VectorValue, VectorValue]:
+        if math.dist(*anchors) == 0:
+            raise ValueError("must be two different points (for coincident points use a spherical joint)")
+        return anchors
+
+    @property
+    def anchor_pair(self) -> tuple[VectorValue, VectorValue]:
+        return self.anchors
+
+
+Joint = Annotated[
+    Fixed | Revolute | Universal | Spherical | Translational | Cylindrical | Planar | Inline | Distance,
+    Discriminator("type"),
+]
+JOINT_TYPES: dict[str, type[Joint]] = {
+    joint.model_fields["type"].default: joint for joint in get_args(get_args(Joint)[0])
+}
+
+
+class Coupling(SceneEntry):
+    """q₂ = offset + ratio · q₁ of two joint coordinates: gears, racks, belts, screws, mimic joints.
+
+    A coordinate is the angle about a joint's axis (rad, full turns counted) or the displacement along it (m),
+    of the second body relative to the first. Both coordinates are zero at the poses that the scene gives;
+    with an ``offset`` the motion starts at other poses (see ``Scene.assembled``). ``coordinates`` names the
+    coordinate of each joint. The default is the only coordinate of the joint, or the angle of a cylindrical
+    joint; for one joint named twice, its angle and its displacement.
+    """
+
+    name: Name
+    joints: Pair
+    ratio: Real  # rad/rad, m/rad, rad/m or m/m
+    offset: LengthOrAngle = 0.0  # rad or m, of the second coordinate
+    coordinates: CoordinatePair | None = None
+
+    @field_validator("ratio")
+    @classmethod
+    def _ratio_is_not_zero(cls, ratio: float) -> float:
+        if ratio == 0.0:
+            raise ValueError("must not be 0, which would lock the second joint")
+        checked_length(abs(ratio))
+        return ratio
+
+    def pairs(self, joints: tuple[Joint, Joint]) -> tuple[tuple[Joint, Coordinate], ...]:
+        """Return both joints, each with its coupled coordinate."""
+        facts = joints[0].facts, joints[1].facts
+        chosen = self.coordinates or default_coordinates(facts, self.joints[0] == self.joints[1])
+        return tuple(zip(joints, chosen, strict=True))
+
+
+def default_coordinates(facts: tuple[JointFacts, JointFacts], of_one: bool) -> CoordinatePair:
+    """Return the default coordinates of a coupling of two joints, or of one joint named twice
+    (``of_one``)."""
+    if of_one:
+        return ANGLE, DISPLACEMENT
+    first, second = (each.driven or (*each.coordinates, ANGLE)[0] for each in facts)
+    return first, second

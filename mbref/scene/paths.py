@@ -1,0 +1,65 @@
+"""Paths to the fields of a scene, such as ``body[rod].mass`` or ``joint[0].anchor[1]``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from mbref.scene.fields import meant
+from mbref.scene.validation import SceneError
+
+PATH_STEP = re.compile(r"\.?([A-Za-z_]\w*)|\[([^\]]+)\]")
+
+
+def replaced_at(fields: Mapping[str, Any], path: str, change: Callable[[Any], Any]) -> dict[str, Any]:
+    """Return the fields of a scene with the value at a path changed; tables along the path become
+    dictionaries.
+
+    An entry is given by its index or its name, a driver by the name of its joint. Raises SceneError if the
+    path does not exist.
+    """
+    first, *rest = _steps(fields, path)
+    return {**fields, first: _replaced(fields[first], rest, change, path)}
+
+
+def _steps(fields: Mapping[str, Any], path: str) -> list[str]:
+    """Return the fields and entries along a path."""
+    found = [name or entry for name, entry in PATH_STEP.findall(path)]
+    if PATH_STEP.sub("", path) or not found or found[0] not in fields:
+        raise SceneError([f"{path}: is not a path of a scene, such as body[0].mass or joint[B].anchor[0]"])
+    return found
+
+
+def _replaced(value: Any, steps: Sequence[str], change: Callable[[Any], Any], path: str) -> Any:
+    if not steps:
+        return change(value)
+    step, rest = steps[0], steps[1:]
+    if isinstance(value, tuple):
+        place = _place(value, step, path)
+        return tuple(_replaced(v, rest, change, path) if i == place else v for i, v in enumerate(value))
+    fields = _fields_of(value)
+    if step not in fields:
+        raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, fields)}"])
+    return {**fields, step: _replaced(fields[step], rest, change, path)}
+
+
+def _fields_of(value: Any) -> Mapping[str, Any]:
+    """Return the fields of an entry; an entry that was changed before is a dictionary, and a number has no
+    fields."""
+    if isinstance(value, dict):
+        return value
+    return {field: getattr(value, field) for field in getattr(type(value), "model_fields", {})}
+
+
+def _place(entries: tuple[Any, ...], step: str, path: str) -> int:
+    """Return the index for a step of a path: a number, or the name of the entry (for a driver its joint's
+    name)."""
+    tables = map(_fields_of, entries)
+    names = [table.get("name", table.get("joint")) for table in tables]
+    if step in names:
+        return names.index(step)
+    if step.isdigit() and int(step) < len(entries):
+        return int(step)
+    named = [name for name in names if isinstance(name, str)]
+    raise SceneError([f"{path}: the scene has no {step!r} there{meant(step, named)}"])

@@ -1,0 +1,249 @@
+"""Scene: a mechanism as validated, frozen data, with its file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from mbref.files import write
+from mbref.scene.bodies import Body, Driver
+from mbref.scene.fields import Name, Positive, SceneEntry, VectorValue
+from mbref.scene.functions import Factor, Sine
+from mbref.scene.joints import Coordinate, Coupling, Joint
+from mbref.scene.loads import Load
+from mbref.scene.paths import replaced_at
+from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines
+from mbref.scene.validation import GROUND, SceneError, field_faults, named_paths, reference_faults
+from mbref.scene_services import SERVICES, Counts
+
+
+class Scene(SceneEntry):
+    """A mechanism: ``body``, ``joint``, ``coupling``, ``driver`` and ``load`` tuples, gravity and end time.
+
+    ``ground = "body"`` models the ground as a body with six constraint rows, as the paper counts; the default
+    ``"frame"`` models no ground body.  Raises SceneError with every fault found.
+
+    Attributes
+    ----------
+    name : str
+        Name of the scene.
+    gravity : tuple of 3 float
+        Acceleration of gravity, m/s², world frame.
+    duration : float
+        End time of the motion, s.
+    ground : {"frame", "body"}
+        Whether the ground is a frame or a body.
+    body : tuple of Body
+        Rigid bodies, with poses and velocities at t = 0.
+    joint : tuple of Joint
+        Joints between two bodies, or a body and ``"ground"``.
+    coupling : tuple of Coupling
+        Linear relations of two joint coordinates.
+    driver : tuple of Driver
+        Prescribed motions of joints.
+    load : tuple of Load
+        Forces, moments, springs and dampers.
+    """
+
+    name: Name
+    gravity: VectorValue = (0.0, 0.0, 0.0)
+    duration: Positive = 1.0
+    ground: Literal["frame", "body"] = "frame"
+    body: Annotated[tuple[Body, ...], Field(min_length=1)]
+    joint: tuple[Joint, ...] = ()
+    coupling: tuple[Coupling, ...] = ()
+    driver: tuple[Driver, ...] = ()
+    load: tuple[Load, ...] = ()
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _collect_every_fault(cls, data: Any, handler: Any) -> Scene:
+        faults: dict[str, str] = {}
+        scene: Scene | None = None
+        try:
+            scene = handler(data)
+        except ValidationError as error:
+            for path, message in field_faults(error, FIELDS_OF_TABLES):
+                faults.setdefault(path, message)
+        if isinstance(data, Mapping):
+            for path, message in reference_faults(data):
+                faults.setdefault(path, message)
+        if faults or scene is None:
+            raise SceneError(list(named_paths(data if isinstance(data, Mapping) else {}, faults)))
+        return scene
+
+    def body_index(self, name: str) -> int:
+        """Return the index of a body in ``body``.
+
+        Parameters
+        ----------
+        name : str
+            Name of the body, or ``"ground"``.
+
+        Returns
+        -------
+        int
+            The index from 0; -1 for the ground.
+
+        Raises
+        ------
+        ValueError
+            If the scene has no such body.
+        """
+        return -1 if name == GROUND else [b.name for b in self.body].index(name)
+
+    def joint_named(self, name: str) -> Joint:
+        """Return the joint of a name.
+
+        Parameters
+        ----------
+        name : str
+            Name of the joint.
+
+        Raises
+        ------
+        KeyError
+            If the scene has no such joint.
+        """
+        for joint in self.joint:
+            if joint.name == name:
+                return joint
+        raise KeyError(name)
+
+    def coupled(self, coupling: Coupling) -> tuple[tuple[Joint, Coordinate], ...]:
+        """Return both joints of a coupling, each with its coupled coordinate.
+
+        Parameters
+        ----------
+        coupling : Coupling
+            A coupling of this scene.
+
+        Returns
+        -------
+        tuple of (Joint, str)
+            Two pairs of a joint and ``"angle"`` (rad) or ``"displacement"`` (m).
+        """
+        first, second = map(self.joint_named, coupling.joints)
+        return coupling.pairs((first, second))
+
+    def has_mass(self) -> bool:
+        """Return whether every body has mass and inertia, as a dynamic analysis needs."""
+        return all(body.mass is not None for body in self.body)
+
+    def assembled(self) -> Scene:
+        """Return the scene at the poses at which its motion starts: they obey the offsets of its couplings.
+
+        The bodies move by Newton steps of least mass-weighted displacement until joints, drivers and
+        couplings hold, and carry joints and points of loads. The result has no offsets, and its joint
+        coordinates count from the new poses. Velocities, in world axes, are unchanged. A scene without
+        offsets is returned as it is.
+
+        Raises
+        ------
+        SceneError
+            If no pose obeys an offset; the message names the coupling.
+        """
+        return SERVICES["assembled"](self) if any(c.offset for c in self.coupling) else self
+
+    def angles_at_start(self) -> dict[str, float]:
+        """Return the angles of joints, rad, between the given poses and the poses of ``assembled``.
+
+        Full turns are counted. The result has every joint that turns about one axis; without offsets all
+        angles are zero.
+
+        Raises
+        ------
+        SceneError
+            If no pose obeys an offset; the message names the coupling.
+        """
+        return SERVICES["angles_at_start"](self)
+
+    def counts(self) -> Counts:
+        """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0.
+
+        Raises
+        ------
+        SceneError
+            If the initial positions contradict the joints.
+        """
+        return SERVICES["counts"](self)
+
+    def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
+        """Return a validated copy with some top-level fields replaced, or with another value at a path.
+
+        ``scene.with_(duration=2.0)``, ``scene.with_("body[slider].mass", 2.0)``.
+
+        Parameters
+        ----------
+        path : str, optional
+            Path of a number or another value, such as ``"joint[A].anchor[0]"``.
+        value : Any
+            The new value at the path, in SI units, or with a unit (``"300 mm"``).
+        **changes : Any
+            New values of top-level fields.
+
+        Raises
+        ------
+        SceneError
+            If the path does not exist or the copy is no valid scene.
+        """
+        data = {k: getattr(self, k) for k in type(self).model_fields}
+        if path is not None:
+            data = replaced_at(data, path, lambda _: value)
+        return Scene(**{**data, **changes})
+
+    def _repr_html_(self) -> str:
+        return SERVICES["still"](self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the scene as the nested tables of its file; fields with default values are left out.
+
+        Returns
+        -------
+        dict
+            Tables, lists, numbers (SI) and text.
+        """
+        data = self.model_dump(exclude_none=True, exclude_defaults=True)
+        for key in ("joint", "load"):
+            for item, source in zip(data.get(key, ()), getattr(self, key), strict=True):
+                item["type"] = source.type
+        lists: dict[str, Any] = as_lists(data)
+        return lists
+
+    def save(self, path: str | Path) -> None:
+        """Write the scene as TOML; ``Scene.from_file`` returns an equal scene.
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+        """
+        write(path, scene_text(self.to_dict()))
+
+    @staticmethod
+    def from_file(path: str | Path) -> Scene:
+        """Return the scene in a scene file (TOML, UTF-8).
+
+        Parameters
+        ----------
+        path : str or path
+            The file.
+
+        Raises
+        ------
+        SceneError
+            If the file cannot be read or is faulty. The faults name the file, or each faulty field and line.
+        """
+        text, data = read_toml(path)
+        try:
+            return Scene(**data)
+        except SceneError as error:
+            raise SceneError(with_lines(text, error.faults)) from None
+
+
+FIELDS_OF_TABLES = {"": tuple(Scene.model_fields)} | {
+    table.__name__.lower(): tuple(table.model_fields) for table in (Body, Coupling, Driver, Sine, Factor)
+}

@@ -1,0 +1,66 @@
+"""Properties of a scene on which the choice of a method depends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from mbref.rotations import Vector3
+from mbref.scene.fields import COINCIDENT
+from mbref.scene.loads import Spring
+from mbref.scene.validation import GROUND
+
+if TYPE_CHECKING:
+    from mbref.scene.scene import Scene
+
+SAME_DIRECTION = 1e-12  # 1 - cosine of the angle of axes that count as parallel
+
+
+def has_massless(scene: Scene) -> bool:
+    """Return whether a body has mass or inertia of zero, so that M has no inverse."""
+    return any(body.mass == 0.0 or not np.any(body.inertia) for body in scene.body if body.mass is not None)
+
+
+def orientations(scene: Scene) -> int:
+    """Return the number of different orientations of bodies: joints without rotation make two of them
+    equal."""
+    same = {body.name: body.name for body in scene.body} | {GROUND: GROUND}
+
+    def first(name: str) -> str:
+        while same[name] != name:
+            name = same[name]
+        return name
+
+    for joint in scene.joint:
+        if not joint.facts.free_rotations:
+            one, other = map(first, joint.bodies)
+            same[other] = one
+    return len({first(body.name) for body in scene.body} - {first(GROUND)})
+
+
+def has_parallel_axes(scene: Scene) -> bool:
+    """Return whether all axes about which joints turn are parallel."""
+    axes = [joint.directions[0] for joint in scene.joint if joint.facts.turns]
+    if not axes:
+        return False
+    unit = np.array(axes) / np.linalg.norm(axes, axis=1)[:, None]
+    return bool((np.abs(unit @ unit[0]) > 1.0 - SAME_DIRECTION).all())
+
+
+def bushings(scene: Scene) -> list[int]:
+    """Return the numbers of the damped springs whose ends coincide at the start.
+
+    The direction of the damping force is not defined there, so that `taylor` has no series of it.
+    """
+    return [
+        k
+        for k, load in enumerate(scene.load)
+        if isinstance(load, Spring) and load.damping > 0.0 and _coincide(*load.points)
+    ]
+
+
+def _coincide(first: Vector3, second: Vector3) -> bool:
+    """Return whether two points are equal up to rounding of their coordinates."""
+    size = max(map(abs, (*first, *second)))
+    return max(abs(a - b) for a, b in zip(first, second, strict=True)) <= COINCIDENT * size

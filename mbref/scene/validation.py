@@ -1,0 +1,323 @@
+"""Faults of a scene: one message for each, under the path of the field."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, get_args
+
+import numpy as np
+from pydantic import ValidationError
+
+from mbref.printable import printable
+from mbref.scene.fields import checked_length, checked_size, field_of, is_some, meant, shown
+from mbref.scene.function_faults import Faults, factor_faults, table_faults
+from mbref.scene.joints import JOINT_TYPES, Coordinate, default_coordinates
+from mbref.scene.loads import LOAD_TYPES, JointLoad
+from mbref.scene.units import dimension_of
+
+GROUND = "ground"
+RESERVED = (GROUND, "the fixed frame")  # names that no body can have
+DRIVABLE = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.driven)
+LOADED = {  # load type → joint types along whose coordinate it can act
+    kind: tuple(name for name, joint in JOINT_TYPES.items() if load.coordinate in joint.facts.loaded)
+    for kind, load in LOAD_TYPES.items()
+    if issubclass(load, JointLoad)
+}
+COUPLED = tuple(name for name, joint in JOINT_TYPES.items() if joint.facts.coordinates)
+COORDINATES = get_args(Coordinate)
+DIMENSIONS = {"angle": "angle", "displacement": "length"}  # coordinate → dimension of its unit
+ACTS_ON = {name: load.acts_on for name, load in LOAD_TYPES.items()}
+NUMBERS = {  # field → content of its list; all other lists contain three numbers
+    "orientation": "four numbers (w, x, y, z), for an angle φ about z cos(φ/2), 0, 0, sin(φ/2)",
+    "polynomial": "numbers, such as [0.0, 6.0]",
+    "table": "rows of time and value, such as [[0.0, 0.0], [0.5, 1.0], [1.0, 2.0], [1.5, 1.0]]",
+    "bodies": "two names of bodies",
+    "anchors": "two points of three numbers each",
+    "axes": "two axes of three numbers each",
+    "points": "two points of three numbers each",
+    **{key: f"entries [[{key}]]" for key in ("body", "joint", "coupling", "driver", "load")},
+    "joints": "two names of joints",
+    "coordinates": 'two of "angle" and "displacement"',
+}
+INERTIA_TOLERANCE = 1e-9  # relative, of the triangle inequality: equality holds for thin rods
+
+
+class SceneError(Exception):
+    """Error: a scene cannot be used; ``faults`` has one ``path: message`` for each fault."""
+
+    def __init__(self, faults: Sequence[str]):
+        self.faults = list(faults)
+        super().__init__("\n".join(self.faults))
+
+    def __reduce__(self) -> tuple[type[SceneError], tuple[list[str]]]:
+        return type(self), (self.faults,)  # allows the error to be pickled
+
+
+def checked_inertia(value: Any) -> tuple[Any, ...]:
+    """Return three principal moments or a symmetric 3x3 as tuples; raises ValueError for a faulty value."""
+    try:
+        array = np.array(value, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError("must be three numbers or a 3x3 matrix") from None
+    if array.shape not in ((3,), (3, 3)):
+        raise ValueError(f"must be three numbers or a 3x3 matrix, got {shown(value)}")
+    if not np.isfinite(array).all():
+        raise ValueError("must be finite")
+    checked_size(float(abs(array).max()))
+    matrix = np.diag(array) if array.ndim == 1 else array
+    tolerance = INERTIA_TOLERANCE * abs(matrix).max()
+    if abs(matrix - matrix.T).max() > tolerance:
+        raise ValueError("must be symmetric")
+    moments = np.linalg.eigvalsh(matrix)
+    for moment in moments[moments > 0]:
+        checked_length(float(moment))
+    if moments[0] < -tolerance:
+        raise ValueError(f"must have no negative principal moment, got {moments[0]:.6g}")
+    if moments[2] > moments[0] + moments[1] + tolerance:
+        raise ValueError(
+            f"violates the triangle inequality: {moments[2]:.6g} > {moments[0]:.6g} + {moments[1]:.6g}; "
+            "a flat body across z has [a, b, a + b]"
+        )
+    return tuple(array.tolist()) if array.ndim == 1 else tuple(map(tuple, array.tolist()))
+
+
+def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) -> Faults:
+    """Yield (path, message) for every fault that pydantic found, in the words of scene files. ``tables`` has
+    the names of the fields by table; names of fields of joints and loads are known here."""
+    for fault in error.errors(include_url=False):
+        kind, got, limit = fault["type"], shown(fault["input"]), fault.get("ctx", {})
+        expected = str(limit.get("expected_tags"))
+        alike = meant(str(limit.get("tag")), re.findall(r"\w+", expected))
+        tags = f"{expected}, got {shown(limit.get('tag'))}{alike}"
+        messages = {
+            "missing": "is required",
+            "extra_forbidden": f"is not a known field{_meant_field(fault['loc'], tables)}",
+            "greater_than": f"must be positive, got {got}",
+            "greater_than_equal": f"must not be negative, got {got}",
+            "finite_number": f"must be finite, got {got}",
+            "float_type": f"must be a number, got {got}",
+            "string_type": f"must be a string, got {got}",
+            "string_too_short": "must not be empty",
+            "too_short": "must not be empty",
+            "tuple_type": _must_hold(fault["loc"], got),
+            "too_long": _must_hold(fault["loc"], got),
+            "union_tag_not_found": "is required",
+            "union_tag_invalid": f"must be one of {tags}",
+            "literal_error": f"must be {limit.get('expected')}, got {got}",
+            "model_type": "must be a table",
+            "model_attributes_type": "must be a table",
+            "value_error": str(limit.get("error", "")),
+        }
+        default = f"{fault['msg'][0].lower()}{fault['msg'][1:]}, got {got}"
+        if kind == "too_short" and fault["input"]:
+            continue  # the entries exist, but faulty ones were left out
+        if kind == "missing" and isinstance(fault["loc"][-1], int):  # the list is too short
+            yield _path(fault["loc"][:-1]), _must_hold(fault["loc"][:-1], got)
+            continue
+        path = _path(fault["loc"]) + (".type" if kind.startswith("union_tag") else "")
+        yield path, messages.get(kind, default)
+
+
+def _must_hold(location: Sequence[str | int], got: str) -> str:
+    """Return the message for a list of the wrong length, or a value that is no list."""
+    field = location[-1] if location else ""
+    if isinstance(field, int) and location[-2:-1] == ("table",):
+        return f"must be a time and a value, got {got}"
+    return f"must be {NUMBERS.get(str(field), 'three numbers')}, got {got}"
+
+
+def _meant_field(location: Sequence[str | int], tables: Mapping[str, Sequence[str]]) -> str:
+    """Return the suggestion for an unknown field at a location such as ("joint", 0, "revolute", "axsi")."""
+    key, above = str(location[-1]), [part for part in location[:-1] if isinstance(part, str)]
+    types: dict[str, Any] = {**JOINT_TYPES, **LOAD_TYPES}
+    table = above[-1] if above else ""
+    known = types[table].model_fields if table in types else tables.get(table, ())
+    return meant(key, known) or f"; known: {', '.join(known)}"
+
+
+def named_paths(data: Mapping[str, Any], faults: Mapping[str, str]) -> Iterator[str]:
+    """Return ``path: message`` for every fault, with a unique name as index: body[rod].mass."""
+    for path, message in faults.items():
+        match = re.match(r"(body|joint|coupling|driver)\[(\d+)\](?=\.)", path)
+        if match and (name := _own_name(data, match[1], int(match[2]))):
+            yield f"{match[1]}[{name}]{path[match.end() :]}: {message}"
+        else:
+            yield f"{path}: {message}"
+
+
+def _own_name(data: Mapping[str, Any], key: str, place: int) -> str:
+    """Return the name of an entry if no other entry has it and a path can contain it; otherwise an empty
+    text."""
+    names = [_text(entry, "joint" if key == "driver" else "name") for entry in _entries(data, key)]
+    name = names[place] if place < len(names) else ""
+    fit = (
+        name
+        and names.count(name) == 1
+        and not name.isdigit()
+        and not set(name) & set("[]")
+        and len(name) < 80
+        and name.isprintable()
+    )
+    return name if fit else ""
+
+
+def _path(location: Sequence[str | int]) -> str:
+    """Return the path body[2].mass of a location, without the tag that a union of joint or load types
+    adds."""
+    parts = list(location)
+    if len(parts) > 2 and parts[0] in ("joint", "load") and isinstance(parts[2], str):
+        del parts[2]
+    text = ""
+    for part in parts:
+        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+    return printable(text) or "scene"
+
+
+def _entries(data: Mapping[str, Any], key: str) -> list[Any]:
+    value = data.get(key, ())
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+def _text(entry: Any, key: str) -> str:
+    """Return a text of an entry, empty if it is missing."""
+    return found if isinstance(found := field_of(entry, key), str) else ""
+
+
+def _names(entries: Sequence[Any]) -> list[str]:
+    return [_text(entry, "name") for entry in entries]
+
+
+def reference_faults(data: Mapping[str, Any]) -> Faults:
+    """Yield faults between entries: duplicate names, unknown bodies and joints, drivers of the wrong joint.
+    The arguments are raw tables, so that these faults are found together with the faults of single fields."""
+    bodies, joints = _entries(data, "body"), _entries(data, "joint")
+    yield from _duplicates("body", _names(bodies), reserved=RESERVED)
+    yield from _duplicates("joint", _names(joints), (GROUND,) if data.get("ground") == "body" else ())
+    for i, body in enumerate(bodies):
+        mass, inertia = field_of(body, "mass"), field_of(body, "inertia")
+        if (mass is None) != (inertia is None):
+            missing = "inertia" if inertia is None else "mass"
+            yield (
+                f"body[{i}].{missing}",
+                "is missing; give mass and inertia, or neither (kinematics)",
+            )
+        elif mass == 0 and is_some(inertia):
+            yield f"body[{i}].mass", "is 0, but the inertia is not; a massless link has neither"
+    known = {*_names(bodies), GROUND}
+    for i, joint in enumerate(joints):
+        yield from _pair_faults(f"joint[{i}].bodies", field_of(joint, "bodies"), known)
+    types = {_text(joint, "name"): _text(joint, "type") for joint in joints}
+    yield from _coupling_faults(data, types)
+    yield from _driver_faults(data, types)
+    for i, load in enumerate(_entries(data, "load")):
+        acts_on = ACTS_ON.get(_text(load, "type"))
+        if acts_on == "body":
+            name = field_of(load, "body")
+            if name == GROUND:
+                yield f"load[{i}].body", "a load cannot act on the ground"
+            elif isinstance(name, str) and name not in known:
+                yield f"load[{i}].body", _unknown("body", name, known - {GROUND})
+        elif acts_on == "bodies":
+            yield from _pair_faults(f"load[{i}].bodies", field_of(load, "bodies"), known)
+        elif acts_on == "joint":
+            kind = _text(load, "type")
+            yield from _joint_faults(
+                f"load[{i}].joint", field_of(load, "joint"), types, LOADED[kind], f"carry a {kind}"
+            )
+        yield from factor_faults(f"load[{i}].factor", field_of(load, "factor"), data)
+
+
+def _coupling_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
+    """Yield couplings with the name of another entry, of unknown joints, or of coordinates that a joint
+    lacks."""
+    couplings = _entries(data, "coupling")
+    yield from _duplicates("coupling", _names(couplings))
+    for i, coupling in enumerate(couplings):
+        if (own := _text(coupling, "name")) and own in types:
+            yield f"coupling[{i}].name", f"{own!r} is already the name of a joint"
+        names = field_of(coupling, "joints")
+        if not isinstance(names, list | tuple) or len(names) != 2:
+            continue  # already reported as a fault of the field
+        path = f"coupling[{i}].joints"
+        for k, name in enumerate(names):
+            yield from _joint_faults(f"{path}[{k}]", name, types, COUPLED, "be coupled")
+        if all(isinstance(name, str) and types.get(name) in COUPLED for name in names):
+            yield from _coordinate_faults(path, coupling, names, types)
+
+
+def _coordinate_faults(path: str, coupling: Any, names: Sequence[str], types: Mapping[str, str]) -> Faults:
+    """Yield coupled coordinates that joints of these types lack, or that are equal."""
+    first, second = (JOINT_TYPES[types[name]].facts for name in names)
+    asked = field_of(coupling, "coordinates")
+    given = isinstance(asked, list | tuple) and len(asked) == 2
+    chosen = asked if given else default_coordinates((first, second), names[0] == names[1])
+    for name, facts, coordinate in zip(names, (first, second), chosen, strict=True):
+        if coordinate in COORDINATES and coordinate not in facts.coordinates:
+            yield path, f"{name!r} is {types[name]}, which has no {coordinate} to be coupled"
+            return
+    if names[0] == names[1] and chosen[0] == chosen[1]:
+        yield path, f"must be two different coordinates, got the {chosen[0]} of {names[0]!r} twice"
+    offset = field_of(coupling, "offset")
+    if dimension_of(offset) not in (None, DIMENSIONS.get(chosen[1], dimension_of(offset))):
+        yield f"{path.removesuffix('joints')}offset", f"is of the {chosen[1]} of {names[1]!r}, got {offset!r}"
+
+
+def _driver_faults(data: Mapping[str, Any], types: Mapping[str, Any]) -> Faults:
+    """Yield drivers of unknown or wrong joints, and second drivers of a joint."""
+    driven: set[str] = set()
+    for i, driver in enumerate(_entries(data, "driver")):
+        name = field_of(driver, "joint")
+        yield from _joint_faults(f"driver[{i}].joint", name, types, DRIVABLE, "be driven")
+        if isinstance(name, str):
+            if name in driven:
+                yield f"driver[{i}].joint", f"{name!r} already has a driver"
+            driven.add(name)
+            yield from _unit_faults(f"driver[{i}]", driver, types.get(name))
+        yield from table_faults(f"driver[{i}].table", driver, data, 0.0, math.inf)
+
+
+def _unit_faults(path: str, driver: Any, joint: Any) -> Faults:
+    """Yield faults of units that do not fit the coordinate that a driver prescribes."""
+    driven = JOINT_TYPES[joint].facts.driven if joint in JOINT_TYPES else None
+    needed = DIMENSIONS.get(str(driven))
+    terms, sine = field_of(driver, "polynomial"), field_of(field_of(driver, "sine"), "amplitude")
+    found = {f"polynomial[{k}]": c for k, c in enumerate(terms if isinstance(terms, list | tuple) else ())}
+    for field, value in (found | {"sine.amplitude": sine}).items():
+        if needed and dimension_of(value) not in (None, needed):
+            text = f"prescribes the {driven} of a {joint} joint, a unit of {needed}, got {value!r}"
+            yield f"{path}.{field}", text
+
+
+def _duplicates(key: str, names: Sequence[str], reserved: Sequence[str] = ()) -> Faults:
+    first: dict[str, int] = {}
+    for i, name in enumerate(names):
+        if name in reserved:
+            yield f"{key}[{i}].name", f"{name!r} is reserved for the fixed frame"
+        elif name and first.setdefault(name, i) != i:
+            yield f"{key}[{i}].name", f"{name!r} is already the name of {key}[{first[name]}]"
+
+
+def _unknown(what: str, name: str, known: Sequence[str] | set[str]) -> str:
+    sentence = ", ".join(sorted(filter(None, known))) or "none"
+    return f"unknown {what} {name!r}; known: {sentence}{meant(name, known)}"
+
+
+def _pair_faults(path: str, pair: Any, known: set[str]) -> Faults:
+    if not isinstance(pair, list | tuple) or len(pair) != 2:
+        return  # already reported as a fault of the field
+    for k, name in enumerate(pair):
+        if isinstance(name, str) and name and name not in known:
+            yield f"{path}[{k}]", _unknown("body", name, known)
+    if pair[0] == pair[1]:
+        yield path, f"must be two different bodies, got {pair[0]!r} twice"
+
+
+def _joint_faults(path: str, name: Any, types: Mapping[str, Any], able: Sequence[str], what: str) -> Faults:
+    if not isinstance(name, str) or not name:
+        return  # already reported as a fault of the field
+    if name not in types:
+        yield path, _unknown("joint", name, list(types))
+    elif types[name] in JOINT_TYPES and types[name] not in able:
+        yield path, f"{name!r} is {types[name]}; only {', '.join(able)} joints can {what}"
