@@ -22,7 +22,9 @@ from mbref.kernels.layout import MEMORY, OK
 from mbref.method import Method
 from mbref.scene import Scene
 from mbref.scenes import SCENES
-from mbref.stepping.run import Limits, Run
+from mbref.simulation.start_run import start_run
+from mbref.stepping.limits import Limits
+from mbref.stepping.run import Run
 
 SCENE_NAMES = ("spatial_slider_crank", "planar_slider_crank", "four_bar", "five_bar")
 CALLS, REPEATS = 2000, 15
@@ -67,7 +69,7 @@ def _formulations(scene: Scene) -> Iterator[tuple[str, Callable[[], float]]]:
     """Return the time of the accelerations by every formulation without stabilisation; NaN if a formulation
     fails."""
     for formulation in FORMULATIONS:
-        run = Run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
+        run = start_run(scene, Method.parse(f"{formulation}+none"), np.array([1.0]), Limits())
         yield formulation, functools.partial(_timed, run)
 
 

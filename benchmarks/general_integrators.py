@@ -23,7 +23,8 @@ from mbref.kernels.layout import MEMORY
 from mbref.method import Method
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import Scene
-from mbref.stepping.run import Limits, Run
+from mbref.simulation.start_run import start_run
+from mbref.stepping.limits import Limits
 
 for kind in ("WARNING", "ERROR"):  # of SUNDIALS: a run that fails says so itself
     os.environ.setdefault(f"SUNLOGGER_{kind}_FILENAME", os.devnull)
@@ -54,7 +55,7 @@ class RightHandSide:
     """
 
     def __init__(self, scene: Scene, times: np.ndarray):
-        self.run = run = Run(scene, Method.parse(METHOD), times, Limits())
+        self.run = run = start_run(scene, Method.parse(METHOD), times, Limits())
         self.size, self.counts = int(run.memory.loop.clock.y_size), run.memory.equations.system.counts
         self.start = run.memory.loop.y[: self.size].copy()
         self.deadline = math.inf
@@ -69,15 +70,15 @@ class RightHandSide:
 
     def motion(self, times: np.ndarray, states: np.ndarray) -> dict[str, np.ndarray]:
         """Return poses, velocities and accelerations of the states (k, n), by the names of a Trajectory."""
-        nb, n = self.run.model.nb, 6 * self.run.model.nb
-        accelerations = np.zeros((len(states), n))
-        for k, (t, y) in enumerate(zip(times, states, strict=True)):
+        nb, state, system = self.run.model.nb, self.run.memory.state, self.run.memory.equations.system
+        found = []
+        for t, y in zip(times, states, strict=True):
             self(t, y)
-            accelerations[k] = self.run.memory.equations.system.acceleration
-        q = states[:, : 7 * nb].reshape(-1, nb, 7).copy()
+            found.append(np.concatenate([state.coordinates, state.velocities, system.acceleration]))
+        q, *rates = np.split(np.reshape(found, (-1, 19 * nb)), [7 * nb, 13 * nb], axis=1)
+        q = q.reshape(-1, nb, 7)
         q[..., 3:] /= np.linalg.norm(q[..., 3:], axis=-1, keepdims=True)
-        rates = (a.reshape(-1, nb, 6) for a in (states[:, 7 * nb :], accelerations))
-        return self.run.model.motion(q, *rates)
+        return self.run.model.motion(q, *(rate.reshape(-1, nb, 6) for rate in rates))
 
 
 class GeneralIntegrator(Engine):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -31,7 +32,10 @@ def _table() -> Iterator[str]:
 
 
 def _measured(found: Finding) -> str:
-    return "the process ends" if found.crashes else f"{found.measured:.3g} {found.unit}".strip()
+    if found.crashes:
+        return "the process ends"
+    number = f"more than {found.wrong_above:.3g}" if math.isnan(found.measured) else f"{found.measured:.3g}"
+    return f"{number} {found.unit}".strip()
 
 
 def _entry(found: Finding) -> Iterator[str]:

@@ -63,8 +63,8 @@ class Finding:
     source.
 
     The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``.
-    ``measured`` was the number at ``version`` of ``package``. If ``crashes`` is set, the engine's process
-    ended at that version, and no proof is stored.
+    ``measured`` was the number at ``version`` of ``package``; without it, rounding decides the number. If
+    ``crashes`` is set, the engine's process ended at that version, and no proof is stored.
     """
 
     name: str
