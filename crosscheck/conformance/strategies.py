@@ -165,7 +165,7 @@ def _two_hinges(draw: st.DrawFn, bodies: Sequence[Body], joints: Sequence[Joint]
     if not hinges:
         return [joints[-1].model_copy(update={"name": "R"})]  # a duplicate joint is redundant
     hinge = draw(st.sampled_from(hinges))
-    axis = np.array(hinge.axis) / np.linalg.norm(hinge.axis)
+    axis = rotations.unit(hinge.axis)
     kind = draw(st.sampled_from((Revolute, Cylindrical)))
     return [kind(name="R", bodies=hinge.bodies, anchor=np.array(hinge.anchor) + 0.4 * axis, axis=axis)]
 

@@ -207,7 +207,7 @@ def _rates_about(scene: Scene, orientation: np.ndarray, spin: np.ndarray) -> np.
     for load in turning_loads(scene):
         joint = scene.joint_named(load.joint)
         first, second = (scene.body_index(name) for name in joint.bodies)
-        axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+        axis = rotations.unit(joint.directions[0])
         if first >= 0:
             start = rotations.conjugate(np.array(scene.body[first].orientation))
             axis = rotations.rotate(rotations.multiply(orientation[first], start), axis)

@@ -108,7 +108,7 @@ def _torsion_spring(
     scene: Scene, load: TorsionSpring, motion: Motion, axis: np.ndarray, force: np.ndarray, moment: np.ndarray
 ) -> None:
     joint = scene.joint_named(load.joint)
-    along = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    along = rotations.unit(joint.directions[0])
     bodies = [scene.body_index(name) for name in joint.bodies]
     sign = np.round(along @ axis)
     turn, about = sign * motion.turn, sign * axis

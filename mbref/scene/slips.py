@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from mbref import rotations
 from mbref.scene.fields import COINCIDENT
 from mbref.scene.scene import Scene
 from mbref.scene.validation import GROUND
@@ -112,7 +113,9 @@ def _gravity(scene: Scene) -> Iterator[str]:
 
 def _axes(scene: Scene) -> Iterator[str]:
     """Yield hinges in loops with axes in the plane of a mechanism, if most hinges have axes normal to it."""
-    hinges = [(joint.name, _unit(joint.directions[0])) for joint in scene.joint if joint.type == "revolute"]
+    hinges = [
+        (joint.name, rotations.unit(joint.directions[0])) for joint in scene.joint if joint.type == "revolute"
+    ]
     for normal in [axis for _, axis in hinges[:2]]:
         turned = [abs(float(axis @ normal)) for _, axis in hinges]
         across, inside = (sum(map(test, turned)) for test in (_is_one, _is_zero))
@@ -145,10 +148,6 @@ def _is_flat(scene: Scene, normal: np.ndarray) -> bool:
     """Return whether anchors and centres of mass lie in one plane normal to a direction."""
     heights = np.array(_points(scene)) @ normal
     return float(np.ptp(heights)) <= FLAT_MECHANISM * _size(scene)
-
-
-def _unit(axis: tuple[float, float, float]) -> np.ndarray:
-    return np.array(axis) / math.hypot(*axis)
 
 
 def _no_joints(scene: Scene) -> Iterator[str]:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.integrate
 
 from crosscheck.engine import Engine, Setting, engine
 from crosscheck.engines.shared.compiled import dop853
@@ -365,12 +364,3 @@ def test_pinocchios_compiled_families_move_every_joint_as_those_in_python(
     plain = simulate("pinocchio", scene, 6, python, **options)
     assert compiled.outcome is plain.outcome is Outcome.COMPLETED, compiled.message
     assert apart(compiled, plain) < MARGIN * APART, f"apart by {apart(compiled, plain):.1e}"
-
-
-@pytest.mark.parametrize(
-    ("ours", "theirs"), [("A", "A"), ("B", "B"), ("C", "C"), ("ERROR3", "E3"), ("ERROR5", "E5")]
-)
-def test_coefficients_of_dop853_equal_scipys(ours, theirs):
-    """SciPy's tables have further rows for interpolation."""
-    found, expected = getattr(dop853, ours), getattr(scipy.integrate.DOP853, theirs)
-    assert np.array_equal(found, expected[tuple(slice(0, size) for size in found.shape)])

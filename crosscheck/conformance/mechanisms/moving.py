@@ -133,7 +133,7 @@ def wound_spring() -> Scene:
     """Return a body that makes several turns about an inclined hinge, against a torsion spring and its
     weight."""
     hinge = JOINTS["revolute"]
-    axis = np.array(hinge.directions[0]) / np.linalg.norm(hinge.directions[0])
+    axis = rotations.unit(hinge.directions[0])
     swing = np.cross(40.0 * axis, BODY.position)  # the hinge goes through the origin
     body = replaced(BODY, angular_velocity=40.0 * axis, velocity=swing)
     spring = TorsionSpring(joint="J", stiffness=0.4, damping=0.01, natural_angle=0.4)

@@ -14,8 +14,8 @@ import numpy as np
 
 from crosscheck.engine import Cannot, Owner, Setting
 from crosscheck.engines.bullet.model import STRONGEST, Mechanism
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.shared.pieces import EVERYTHING
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene

@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from crosscheck.engines.shared.fixed_steps import held_points
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.pieces import Piece, pieces
 from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import Coupling, Scene
 
 NEGLIGIBLE = 1e-12  # mass of auxiliary bodies in chains of joints / mass of the links

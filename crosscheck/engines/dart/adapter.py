@@ -16,8 +16,8 @@ from crosscheck.engine import Setting
 from crosscheck.engines.dart.model import Mechanism
 from crosscheck.engines.shared import terms
 from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.shared.pieces import EVERYTHING
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.scene import Scene
 

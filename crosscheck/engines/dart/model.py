@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.shared.fixed_steps import held_points
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.joint_coordinates import joint_coordinates, rotation_vector
 from crosscheck.engines.shared.pieces import Piece, assembled
 from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.shared.terms import Terms
 from crosscheck.engines.shared.tree_reactions import LinkMotion
+from mbref.rotations import unit
 from mbref.scene import Scene
 
 NEGLIGIBLE = 1e-24  # mass of auxiliary bodies in chains of joints / mass of the links
@@ -77,7 +77,7 @@ class Mechanism:
         if closure.kind == "point" or as_balls:
             points = held_points(self.scene, closure)
             return [constraint.BallJointConstraint(*pair, point) for point in points]
-        axis = unit(np.array(self.scene.joint[closure.joint].directions[0]))
+        axis = unit(self.scene.joint[closure.joint].directions[0])
         return [constraint.RevoluteJointConstraint(*pair, anchor, *[axis] * len(pair))]
 
     def terms(self, q: np.ndarray, v: np.ndarray) -> Terms:

@@ -15,8 +15,8 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.engines.drake.model import Mechanism
 from crosscheck.engines.shared import terms
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.own_steps import STEP, SteppingEngine, World
-from crosscheck.engines.shared.pieces import EVERYTHING
 from crosscheck.engines.shared.sampling import Failed
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from mbref.motions.trajectory import Outcome

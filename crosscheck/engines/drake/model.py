@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.shared.fixed_steps import held_points
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.joint_coordinates import joint_coordinates
 from crosscheck.engines.shared.pieces import Piece, assembled
@@ -19,6 +18,7 @@ from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, SLIDE, TUR
 from crosscheck.engines.shared.terms import Terms
 from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import Scene
 
 NEGLIGIBLE = 1e-24  # mass of auxiliary bodies in chains of joints / mass of the links

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.engine import Supports
-from crosscheck.engines.shared.geometry import joint_frame as frame_along
-from crosscheck.engines.shared.geometry import unit
-from crosscheck.refusals import FACTOR
-from mbref.scene import LOAD_TYPES, Joint
+from crosscheck.engines.shared.everything import EVERYTHING
+from crosscheck.engines.shared.geometry import joint_frame
+from mbref.rotations import unit
+from mbref.scene import Joint
 
 X, Y, Z = 0, 1, 2
 LOCAL = {"ForceLocal": 3, "TorqueLocal": 3}
@@ -46,15 +45,7 @@ JOINTS = {
     "inline": Item("ObjectJointGeneric", (1, 1, 0, 0, 0, 0), torques=(None, None, None)),
     "distance": Item("ObjectConnectorDistance", outputs={"Force": 1}),
 }
-SUPPORTS = Supports(
-    joints=tuple(JOINTS),
-    drivers=("angle", "displacement"),
-    loads=tuple(LOAD_TYPES),
-    over_time=(FACTOR,),
-    couplings=("angle", "displacement"),
-    armatures=("angle", "displacement"),
-    massless_links=True,
-)
+SUPPORTS = replace(EVERYTHING, joints=tuple(JOINTS), massless_links=True)
 
 
 def marker_frame(joint: Joint) -> np.ndarray:
@@ -67,4 +58,4 @@ def marker_frame(joint: Joint) -> np.ndarray:
     if len(joint.directions) == 2:
         x, y = (unit(axis) for axis in joint.directions)
         return np.column_stack([x, y, np.cross(x, y)])
-    return np.roll(frame_along(joint.directions[0]), JOINTS[joint.type].along - Z, axis=1)
+    return np.roll(joint_frame(joint.directions[0]), JOINTS[joint.type].along - Z, axis=1)

@@ -15,10 +15,10 @@ import numpy as np
 
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
 from crosscheck.engines.shared.driver_motion import motion, moving
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.judge.constraints import initial_poses, initial_twists
 from crosscheck.judge.joint_coordinates import coordinate_jacobian
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import GROUND, Coupling, Driver, Joint, Load, Scene
 
 SENSED = ("Coordinates", "Coordinates_t", "Coordinates_tt")

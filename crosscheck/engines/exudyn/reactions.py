@@ -10,8 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engines.exudyn.joints import JOINTS, marker_frame
-from crosscheck.engines.shared.geometry import unit
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import GROUND, Joint, Scene
 
 

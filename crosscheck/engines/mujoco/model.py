@@ -8,13 +8,13 @@ simplify the model.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Supports
 from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
@@ -28,27 +28,9 @@ from crosscheck.engines.shared.spanning_tree import (
 )
 from crosscheck.refusals import FACTOR, TABLE
 from mbref import rotations
-from mbref.scene import LOAD_TYPES, Coupling, Driver, Factor, Force, JointLoad, Moment, Scene, Spring
+from mbref.scene import JOINT_TYPES, Coupling, Driver, Factor, Force, JointLoad, Moment, Scene, Spring
 
-SUPPORTS = Supports(
-    joints=(
-        "fixed",
-        "revolute",
-        "universal",
-        "spherical",
-        "translational",
-        "cylindrical",
-        "planar",
-        "inline",
-        "distance",
-    ),
-    drivers=("angle", "displacement"),
-    loads=tuple(LOAD_TYPES),
-    couplings=("angle", "displacement"),
-    armatures=("angle", "displacement"),
-    over_time=(TABLE, FACTOR),
-    massless_links=True,
-)
+SUPPORTS = replace(EVERYTHING, joints=tuple(JOINT_TYPES), over_time=(TABLE, FACTOR), massless_links=True)
 COUPLING = "coupling "  # prefix of the names of equalities that are couplings
 UNIT = (1.0, 0.0, 0.0, 0.0)
 # placeholder moments, centre and axes during compilation

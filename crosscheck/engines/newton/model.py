@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
 from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
@@ -28,7 +27,7 @@ from crosscheck.engines.shared.spanning_tree import (
 )
 from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref import rotations
-from mbref.rotations import cross
+from mbref.rotations import cross, unit
 from mbref.scene import Scene
 
 
@@ -87,7 +86,7 @@ class Mechanism:
             chain = (Mobility(BALL_JOINT, np.zeros(3)),)
         elif closure.kind != "weld":
             joint = self.scene.joint[closure.joint]
-            axes = np.array([unit(np.array(axis)) for axis in joint.directions]).reshape(-1, 3)
+            axes = np.array([unit(axis) for axis in joint.directions]).reshape(-1, 3)
             backward = links[1] == GROUND_LINK  # the child of a joint of Newton is a link
             chain = mobilities(joint.facts, -axes[::-1] if backward else axes)
         pair = links if links[1] != GROUND_LINK else links[::-1]

@@ -7,13 +7,13 @@ factorisation is wrong without a message.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Supports
 from crosscheck.engines.shared.driver_motion import motion
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.initial_velocities import initial_rates, twist_maps
 from crosscheck.engines.shared.spanning_tree import (
     BALL_JOINT,
@@ -27,26 +27,11 @@ from crosscheck.engines.shared.spanning_tree import (
     Tree,
     spanning_tree,
 )
-from mbref.scene import LOAD_TYPES, Force, JointLoad, Moment, Scene, Spring
+from mbref.scene import Force, JointLoad, Moment, Scene, Spring
 from mbref.scene.loads import Action
 
-SUPPORTS = Supports(
-    joints=(
-        "fixed",
-        "revolute",
-        "universal",
-        "spherical",
-        "translational",
-        "cylindrical",
-        "planar",
-        "distance",
-    ),
-    drivers=("angle", "displacement"),
-    loads=tuple(LOAD_TYPES),
-    couplings=("angle", "displacement"),  # refused by the engine with a reason
-    armatures=("angle", "displacement"),
-    massless_links=True,
-)
+# the engine refuses couplings with a reason
+SUPPORTS = replace(EVERYTHING, over_time=(), massless_links=True)
 # kg m² or kg; armature of a driven coordinate, so large that only its own torque moves it
 DRIVEN_ARMATURE = 1e18
 

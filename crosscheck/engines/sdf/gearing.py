@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from mbref import rotations
 from mbref.scene import Coupling, Joint, SceneError
 
 PARALLEL = 1e-6  # length of the cross product of unit axes that counts as rounding
@@ -35,7 +36,7 @@ def _hinge(
     for joint in joints:
         if joint.type != "revolute" or set(joint.bodies) != {reference, link}:
             continue
-        own = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+        own = rotations.unit(joint.directions[0])
         if np.linalg.norm(own - (own @ axis) * axis) <= PARALLEL:
             sense = 1 if own @ axis > 0 else -1
             return joint, sense if joint.bodies[0] == reference else -sense

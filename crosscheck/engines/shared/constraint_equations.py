@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.engines.shared.driver_motion import motion
-from crosscheck.engines.shared.geometry import cross_matrix, in_body, joint_frame, point_in_body, unit
+from crosscheck.engines.shared.geometry import cross_matrix, in_body, joint_frame, point_in_body
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import Driver, Joint, Scene
 
 O = np.zeros(3)

@@ -17,6 +17,7 @@ from crosscheck.engines.shared.tree_reactions import LinkMotion, applied, sample
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.time_functions import ends
 from mbref.motions.trajectory import Outcome, Trajectory
+from mbref.rotations import unit
 from mbref.scene import Moment, Scene
 
 ANGLES = (0.15, 0.05, 0.015, 0.005, 0.0015)  # rad; rotation in a step, for each setting
@@ -147,6 +148,5 @@ def held_points(scene: Scene, closure: Closure) -> Sequence[np.ndarray]:
     arm = ARM * scene_length(scene)
     if closure.kind == "weld":
         return [closure.anchor + arm * e for e in np.eye(3)]
-    axis = np.array(scene.joint[closure.joint].directions[0])
-    along = arm * axis / np.linalg.norm(axis)
+    along = arm * unit(scene.joint[closure.joint].directions[0])
     return [closure.anchor - along, closure.anchor + along]

@@ -7,12 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import GROUND, Scene
-
-
-def unit(vector: np.ndarray | Sequence[float]) -> np.ndarray:
-    """Return v / |v|."""
-    return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
 
 
 def cross_matrix(v: np.ndarray) -> np.ndarray:

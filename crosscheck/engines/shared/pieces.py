@@ -12,19 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engine import Supports
 from crosscheck.engines.shared.spanning_tree import GROUND_LINK, Mobility, Tree
-from crosscheck.refusals import FACTOR
-from mbref.scene import JOINT_TYPES, LOAD_TYPES
 
-EVERYTHING = Supports(
-    joints=tuple(kind for kind in JOINT_TYPES if kind != "inline"),
-    drivers=("angle", "displacement"),
-    loads=tuple(LOAD_TYPES),
-    couplings=("angle", "displacement"),
-    armatures=("angle", "displacement"),
-    over_time=(FACTOR,),
-)
 O = np.zeros(3)
 
 

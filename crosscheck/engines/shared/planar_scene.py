@@ -12,10 +12,10 @@ import functools
 
 import numpy as np
 
-from crosscheck.engines.shared.geometry import unit
 from crosscheck.engines.shared.initial_velocities import RANK_TOLERANCE
 from crosscheck.engines.shared.spanning_tree import spanning_tree
 from crosscheck.judge.constraints import initial_poses, initial_twists, jacobian
+from mbref.rotations import unit
 from mbref.scene import (
     Fixed,
     Joint,
@@ -41,7 +41,7 @@ def planar_scene(scene: Scene) -> Scene:
 def _hinged_scene(scene: Scene) -> Scene | None:
     """Return the scene with hinges; None if the given scene has as few coordinates."""
     normals = [joint.directions[0] for joint in scene.joint if isinstance(joint, Revolute)]
-    if not normals or not _starts_within(scene, normal := unit(np.array(normals[0]))):
+    if not normals or not _starts_within(scene, normal := unit(normals[0])):
         return None
     found = [scene]
     for kept in ((Spherical,), ()):  # a cut spherical joint closes a loop by a point without replacement
@@ -62,7 +62,7 @@ def _starts_within(scene: Scene, normal: np.ndarray) -> bool:
 
 def _hinged(joint: Joint, normal: np.ndarray) -> Joint | None:
     """Return the joint reduced to its freedom in the plane; None if this freedom is unknown."""
-    axes = [unit(np.array(axis)) for axis in joint.directions]
+    axes = [unit(axis) for axis in joint.directions]
     across = [bool(np.linalg.norm(np.cross(axis, normal)) < PARALLEL) for axis in axes]
     along = [bool(abs(axis @ normal) < PARALLEL) for axis in axes]
 

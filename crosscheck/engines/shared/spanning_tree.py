@@ -21,8 +21,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.engines.shared.geometry import cross_matrix, joint_frame, unit
+from crosscheck.engines.shared.geometry import cross_matrix, joint_frame
 from mbref import rotations
+from mbref.rotations import unit
 from mbref.scene import Body, Coupling, Distance, Driver, Joint, JointFacts, JointLoad, Scene, Spherical
 from mbref.scene.joints import DISPLACEMENT, Coordinate
 

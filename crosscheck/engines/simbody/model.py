@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Supports
-from crosscheck.engines.shared.geometry import joint_frame, unit
+from crosscheck.engines.shared.geometry import joint_frame
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.spanning_tree import FREE, GROUND_LINK, Closure, Link, spanning_tree
+from mbref.rotations import unit
 from mbref.scene import Coupling, Driver, Force, Moment, Scene, Spring, TorsionSpring
 
 JOINTS = {  # joint type → OpenSim's joint, and its coordinates in the tree's order

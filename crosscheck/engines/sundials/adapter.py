@@ -19,6 +19,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from crosscheck.engine import Cannot, Engine, Setting, Supports
+from crosscheck.engines.shared.everything import EVERYTHING
 from crosscheck.engines.shared.fixed_steps import simulated
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.sundials.ida import Run
@@ -38,18 +39,7 @@ class Sundials(Engine):
     modules = ("sksundae.ida",)
     families, options = FAMILIES, {"rtol": "relative tolerance"}
     supports = Supports(
-        joints=(
-            "fixed",
-            "revolute",
-            "universal",
-            "spherical",
-            "translational",
-            "cylindrical",
-            "planar",
-            "distance",
-        ),
-        drivers=("angle", "displacement"),
-        loads=("moment", "force", "spring", "torsion_spring"),
+        EVERYTHING.joints, EVERYTHING.drivers, ("moment", "force", "spring", "torsion_spring")
     )
 
     def refuses(self, scene: Scene) -> Cannot | None:

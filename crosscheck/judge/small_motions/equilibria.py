@@ -66,7 +66,10 @@ class Steady:
 
     @property
     def stability(self) -> str:
-        """``stable``, ``unstable`` or ``indifferent``, by the real parts that exceed their bounds."""
+        """``stable``, ``unstable`` or ``indifferent``, by the real parts that exceed their bounds.
+
+        mbref has a rule of its own (`mbref.Equilibrium.stability`), which this one judges.
+        """
         if (self.eigenvalues.real > self.bounds).any():
             return "unstable"
         return "indifferent" if (np.abs(self.eigenvalues) <= self.bounds).any() else "stable"

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.judge.joint_residuals import joint_frames
+from mbref import rotations
 from mbref.scene import GROUND, Scene, SceneError
 
 PARALLEL = 1e-12  # sine of the angle between gravity and the driver's axis
@@ -62,7 +63,7 @@ def turning(scene: Scene) -> Turning:
             ]
         )
     sign = 1.0 if joint.bodies[0] == GROUND else -1.0
-    axis = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    axis = rotations.unit(joint.directions[0])
     if np.linalg.norm(np.cross(scene.gravity, axis)) > PARALLEL * np.linalg.norm(scene.gravity):
         raise SceneError([f"driver[{name}]: its axis is not along gravity, so the motion is not steady"])
     return Turning(sign * float(rates[0]) * axis, np.array(joint.anchor_pair[0]))

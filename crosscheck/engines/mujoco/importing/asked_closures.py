@@ -11,7 +11,7 @@ import numpy as np
 
 from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame, of_site
 from crosscheck.engines.mujoco.importing.groups import WORLD, Groups
-from crosscheck.engines.mujoco.importing.urdf import along
+from crosscheck.engines.shared.geometry import joint_frame
 from mbref.scene import GROUND, SceneError
 
 AXES = dict(zip("xyz", np.eye(3), strict=True))
@@ -73,7 +73,7 @@ def _closure(first: str, second: str, kind: str, axis: str, frames: Frames) -> C
         raise SceneError([f"--close {name}: type {kind!r} is none of {', '.join((*TYPES, *SHORT))}"])
     if axis not in AXES:
         raise SceneError([f"--close {name}: axis {axis!r} is none of x, y, z (of both frames)"])
-    turn = along(AXES[axis])
+    turn = joint_frame(AXES[axis])
     ends = [frames.find(end) for end in (first, second)]
     a, b = (Frame(end.body, end.origin, end.axes @ turn) for end in ends)
     return Closure(name, TYPES[kind], (a, b))

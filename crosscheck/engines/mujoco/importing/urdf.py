@@ -17,6 +17,7 @@ from crosscheck.engines.mujoco.importing.closures import TYPES, Closure, Frame
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.engines.mujoco.importing.posing import JointRow
 from crosscheck.engines.shared import xml_files
+from crosscheck.engines.shared.geometry import joint_frame
 from mbref.scene import SceneError
 
 KNOWN = {  # outer elements → inner elements that are read, or that change no motion
@@ -165,7 +166,7 @@ def _constraint(element: ET.Element, body_of: BodyOf) -> Closure:
         axis = element.find(f"{side}_axis")
         axis = element.find("axis") if axis is None else axis
         turn = _roll_pitch_yaw(_numbers(origin, "rpy", (0.0, 0.0, 0.0)))
-        turn = turn @ along(_numbers(axis, "xyz", (1.0, 0.0, 0.0)))
+        turn = turn @ joint_frame(_numbers(axis, "xyz", (1.0, 0.0, 0.0)))
         frames.append(Frame(body_of(str(link.get("link"))), _numbers(origin, "xyz", (0.0, 0.0, 0.0)), turn))
     return Closure(name, TYPES[kind], (frames[0], frames[1]))
 
@@ -184,17 +185,9 @@ def _predecessor_loops(root: ET.Element, body_of: BodyOf, data: Any) -> Iterator
             raise SceneError([f"loop {name!r}: type {kind!r} is none of {', '.join(TYPES)}"])
         first, second = (_end(loop, side, body_of, name) for side in ("predecessor", "successor"))
         axis = first.axes @ _numbers(loop.find("axis"), "xyz", (1.0, 0.0, 0.0))
-        first = Frame(first.body, first.origin, along(axis))
+        first = Frame(first.body, first.origin, joint_frame(axis))
         turn = data.xmat[second.body].reshape(3, 3).T @ first.turn(data)
         yield Closure(name, TYPES[kind], (first, Frame(second.body, second.origin, turn)))
-
-
-def along(axis: np.ndarray) -> np.ndarray:
-    """Return the axes (3, 3) of a frame whose z is along an axis."""
-    z = axis / np.linalg.norm(axis)
-    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
 
 
 def _end(loop: ET.Element, side: str, body_of: BodyOf, name: str) -> Frame:

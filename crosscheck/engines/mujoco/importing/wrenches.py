@@ -67,7 +67,7 @@ def _turning(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
     joint = scene.joint_named(load.joint)
     bodies = [scene.body_index(name) for name in joint.bodies]
     turns = [np.eye(3) if b < 0 else _turn(scene, pose, b) for b in bodies]
-    start = np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    start = rotations.unit(joint.directions[0])
     axis = turns[0] @ start
     q = rotations.from_matrix(turns[0].T @ turns[1])
     angle = 2 * np.arctan2(q[1:] @ start, q[0])
@@ -86,7 +86,7 @@ def _sliding(scene: Scene, load: Any, pose: Any, motion: np.ndarray) -> list[tup
     joint = scene.joint_named(load.joint)
     bodies = [scene.body_index(name) for name in joint.bodies]
     turn = np.eye(3) if bodies[0] < 0 else _turn(scene, pose, bodies[0])
-    axis = turn @ np.array(joint.directions[0]) / np.linalg.norm(joint.directions[0])
+    axis = turn @ rotations.unit(joint.directions[0])
     places, rates = _points(scene, pose, motion, bodies, joint.anchor_pair)
     apart, spin = places[1] - places[0], np.zeros(3) if bodies[0] < 0 else motion[bodies[0], 3:]
     rate = axis @ (rates[1] - rates[0]) + np.cross(spin, axis) @ apart

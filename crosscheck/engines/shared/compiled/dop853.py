@@ -15,13 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+from scipy.integrate import DOP853
 
-from crosscheck.engines.shared.compiled import dop853_coefficients as tableau
 from crosscheck.engines.shared.compiled.calls import rates_of
 
-STAGES = tableau.STAGES
-A = np.array([[*row, *(0.0,) * (STAGES - len(row))] for row in tableau.A])
-B, C, ERROR3, ERROR5 = map(np.array, (tableau.B, tableau.C, tableau.ERROR3, tableau.ERROR5))
+STAGES = DOP853.n_stages
+A = np.ascontiguousarray(DOP853.A)
+B, C, ERROR3, ERROR5 = (array[:STAGES].copy() for array in (DOP853.B, DOP853.C, DOP853.E3, DOP853.E5))
 
 SAFETY, SHRINK, GROW, RETRY = 0.8, 0.2, 100.0, 0.25
 ORDER = 8
