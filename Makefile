@@ -111,8 +111,8 @@ KINDS := bennett 'slider_crank_chain[4]' planar_slider_crank_equal flyball_gover
 
 kinds: $(VENV)/ready ## the page on choosing an engine, with its records, anew, into docs/ and reports/kinds/
 	rm -rf build/kinds && $(BIN)/crosscheck report --quick $(KINDS) --out build/kinds
-	$(BIN)/python -m reports.which_engine --keep build/kinds
-	$(BIN)/python -m reports.which_engine docs/which-engine.md
+	$(KEEP) --beside build/kinds reports/kinds
+	$(BIN)/python -m reports.pages which-engine
 
 LADDERS := build/stability
 
@@ -128,13 +128,9 @@ docs: $(VENV)/ready ## every page, schema and report that is made from code and 
 	mkdir -p build && $(BIN)/mbref schema > build/scene.schema.json && mv build/scene.schema.json mbref/templates/
 	$(BIN)/python docs/method_pages.py
 	$(BIN)/python -m tests.thresholds docs/internals/thresholds.md
-	$(BIN)/python -m tests.zoo.table docs/conformance.md
+	$(BIN)/python -m tests.zoo.table docs/results/conformance.md
 	$(BIN)/python -m crosscheck.cli.support docs/engines.md
-	$(BIN)/python -m crosscheck.findings.document docs/findings.md
-	$(BIN)/python -m reports.which_engine docs/which-engine.md
-	$(BIN)/crosscheck closed-loops --force --page docs/closed-loops.md
-	$(BIN)/crosscheck convergence --force --page docs/convergence.md
-	$(BIN)/crosscheck modes --force --page docs/small-motions.md
+	$(BIN)/python -m reports.pages
 	$(BIN)/crosscheck report --render reports/reference
 	$(BIN)/crosscheck report --section stability --render reports/stability
 	$(BIN)/crosscheck report --section paper --render $(PAPER)

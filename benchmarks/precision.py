@@ -1,9 +1,9 @@
 """Single against double precision: ``python benchmarks/precision.py [HEADING …]`` for MJX and MuJoCo Warp.
 
-Closed loops of `docs/closed-loops.md` move by RK4 with the stiffest documented closures, from 0 to END s. The
-table has the largest error of MJX in double and in single precision and their difference, and the error of
-MuJoCo in C and of MuJoCo Warp, which computes in single precision, and their difference. Code is compiled
-first, for minutes. Everything runs on the processor.
+Closed loops of `docs/results/closed-loops.md` move by RK4 with the stiffest documented closures, from 0 to
+END s. The table has the largest error of MJX in double and in single precision and their difference, and the
+error of MuJoCo in C and of MuJoCo Warp, which computes in single precision, and their difference. Code is
+compiled first, for minutes. Everything runs on the processor.
 """
 
 import argparse

@@ -67,6 +67,30 @@ class Linked(str):
         return made
 
 
+class Marked(str):
+    """A table cell in Markdown, of pages of the documentation only."""
+
+
+class Within(Linked):
+    """A table cell that links to a place that the page has in Markdown too: a Fold or a heading."""
+
+
+@dataclass(frozen=True)
+class Prose:
+    """Prose in Markdown, of pages of the documentation only."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Fold:
+    """Blocks that the page shows on demand, below their ``summary``; ``place`` is the id in the page."""
+
+    summary: str
+    place: str
+    blocks: Sequence[Block]
+
+
 @dataclass(frozen=True)
 class Opening:
     """The top of the page: a headline, sentences with the question that each answers, and an animated
@@ -173,9 +197,24 @@ class Record:
 
 @dataclass(frozen=True)
 class Listing:
-    """Lines printed unchanged in a fixed-width font."""
+    """Lines printed unchanged in a fixed-width font; ``kind`` names their language in Markdown."""
 
     text: str
+    kind: str = ""
 
 
-Block = Heading | Text | Table | Figure | Listing | Opening | Moving | HeatMap | Matrix | Plot | Record
+Block = (
+    Heading
+    | Text
+    | Prose
+    | Table
+    | Figure
+    | Listing
+    | Fold
+    | Opening
+    | Moving
+    | HeatMap
+    | Matrix
+    | Plot
+    | Record
+)

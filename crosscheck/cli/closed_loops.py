@@ -12,12 +12,12 @@ from rich.table import Table
 from rich.text import Text
 
 from crosscheck.cli import request
+from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, console, notice
-from crosscheck.closed_loops import document, records
+from crosscheck.closed_loops import records
 from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
 from crosscheck.study.progress import shown as progress_of
 from crosscheck.study.store import read_runs
-from mbref.files import write
 
 LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
 
@@ -28,9 +28,8 @@ def closed_loops(arguments: argparse.Namespace) -> int:
     if arguments.run:
         _measure(arguments, path)
     found = read_runs(path)
-    if arguments.page:
-        write(arguments.page, document.page(found))
-        notice(f"written: {arguments.page}")
+    if status := write_page("closed-loops", path, arguments.page):
+        return status
     for is_best in (True, False):
         console().print(_table(matrix(found), is_best))
     _legend(console())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Mapping, Sequence
-from importlib.util import find_spec
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
@@ -15,6 +14,7 @@ from crosscheck.cli.convergence import convergence
 from crosscheck.cli.judging import judge, write_reference
 from crosscheck.cli.modes import modes
 from crosscheck.cli.parser import parser
+from crosscheck.cli.rendering import rendered
 from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import (
     COMPLETED,
@@ -28,14 +28,11 @@ from crosscheck.cli.running import (
     standard_output_kept,
     studied,
 )
-from crosscheck.processes.program import run_program
 from crosscheck.study.grid import Record, key
 from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
 from mbref.command_line import status_of
 from mbref.motions.trajectory import Outcome
-
-KILLED = 128  # plus the number of the signal that ended a program
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -121,21 +118,11 @@ def _findings(arguments: argparse.Namespace) -> int:
 
 
 def _report(arguments: argparse.Namespace) -> int:
-    return _rendered(_report_options(arguments))
+    return rendered(_report_options(arguments))
 
 
 def _paper(arguments: argparse.Namespace) -> int:
-    return _rendered(["--section", "paper", "--depth", arguments.depth, *_folder(arguments)])
-
-
-def _rendered(options: Sequence[str]) -> int:
-    """Run `reports` as a program: a part of this package in a wheel, a folder in a checkout.
-
-    This package must not import `reports`, which depends on it.
-    """
-    inside = "crosscheck.reports"
-    status = run_program(inside if find_spec(inside) else "reports", options)
-    return status if status >= 0 else KILLED - status
+    return rendered(["--section", "paper", "--depth", arguments.depth, *_folder(arguments)])
 
 
 def _report_options(arguments: argparse.Namespace) -> list[str]:

@@ -10,11 +10,11 @@ from rich.box import SIMPLE
 from rich.table import Table
 
 from crosscheck.cli import request
+from crosscheck.cli.rendering import write_page
 from crosscheck.cli.running import COMPLETED, console, notice
-from crosscheck.convergence import document, ladders
+from crosscheck.convergence import ladders, orders
 from crosscheck.study.grid import Record
 from crosscheck.study.store import read_runs
-from mbref.files import write
 
 
 def convergence(arguments: argparse.Namespace) -> int:
@@ -23,9 +23,8 @@ def convergence(arguments: argparse.Namespace) -> int:
     if arguments.run:
         ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
     found = read_runs(path)
-    if arguments.page:
-        write(arguments.page, document.page(found))
-        notice(f"written: {arguments.page}")
+    if status := write_page("convergence", path, arguments.page):
+        return status
     console().print(_table(found))
     return COMPLETED
 
@@ -33,6 +32,6 @@ def convergence(arguments: argparse.Namespace) -> int:
 def _table(records: Sequence[Record]) -> Table:
     headings = [mechanism.heading for mechanism in ladders.MECHANISMS]
     table = Table("engine, family", *headings, title="least errors, and orders in parentheses", box=SIMPLE)
-    for row, found in document.table(records).items():
-        table.add_row(row.name, *map(document.cell, found.values()))
+    for row, found in orders.table(records).items():
+        table.add_row(row.name, *map(orders.cell, found.values()))
     return table

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from pathlib import Path
 
 import pytest
 
-from crosscheck.convergence import document
-from crosscheck.convergence.document import cell, order
-from crosscheck.convergence.ladders import FILE, MECHANISMS, ROWS, VAIN, climb, in_vain, ladder
+from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, climb, in_vain, ladder
+from crosscheck.convergence.orders import cell, order
 from crosscheck.study.grid import Case
-from crosscheck.study.store import read_runs
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "convergence.md"
 
 
 def run(step: float, error: float, seconds: float = 0.1, outcome: str = "COMPLETED", **changes) -> dict:
@@ -91,9 +86,3 @@ def test_a_ladder_ends_where_finer_runs_are_vain_or_would_take_too_long() -> Non
     assert in_vain(found) == VAIN and len(found) < len(cases)
     slow = climb(cases, lambda case: fourth(case) | {"cost": {"seconds": 1.5, "steps": 10}})
     assert len(slow) == 1
-
-
-def test_committed_page_follows_from_the_committed_records() -> None:
-    assert DOCUMENT.read_text() == document.page(read_runs(FILE)), (
-        "docs/convergence.md is stale: crosscheck convergence --page docs/convergence.md renews it"
-    )

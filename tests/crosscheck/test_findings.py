@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,17 +11,8 @@ import pytest
 from crosscheck.cli.commands import main
 from crosscheck.cli.findings import chosen
 from crosscheck.cli.request import RequestError
-from crosscheck.findings.document import page
 from crosscheck.findings.finding import FOLDER, Finding, Status, findings
 from mbref.scene import Scene
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "findings.md"
-
-
-def test_committed_page_follows_from_the_stored_findings() -> None:
-    assert DOCUMENT.read_text() == page(), (
-        "docs/findings.md is stale: python -m crosscheck.findings.document docs/findings.md renews it"
-    )
 
 
 def test_every_finding_has_sentences_and_a_violation_measured_by_one_proof() -> None:

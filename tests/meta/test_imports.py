@@ -58,14 +58,15 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["__main__"],
     ),
     "reports": (
-        ["blocks"],
+        ["blocks", "markdown"],
         ["runs"],
         ["places", "engine_looks"],
         ["figures"],
         ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
         ["sections"],
         ["render", "stored"],
-        ["__main__", "keep", "which_engine"],
+        ["pages"],
+        ["__main__", "keep"],
     ),
 }
 

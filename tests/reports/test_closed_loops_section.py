@@ -6,7 +6,7 @@ import pytest
 
 from crosscheck.closed_loops import records
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
-from reports.blocks import Heading, HeatMap, Listing, Table
+from reports.blocks import Fold, HeatMap, Listing, Table
 from reports.sections import closed_loops
 
 FIRST, SECOND = DIFFICULTIES[:2]
@@ -83,15 +83,15 @@ def test_default_rows_are_the_engines_with_a_run_of_defaults(section):
 
 
 def test_each_engine_s_runs_are_listed_with_one_command_a_mechanism(section):
-    place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "mujoco")
-    table, text, commands = section[place + 1 : place + 4]
-    assert isinstance(table, Table) and table.caption == "Version mujoco 1."
+    folds = {block.summary: block.blocks for block in section if isinstance(block, Fold)}
+    table, text, commands = folds["mujoco mujoco 1"]
+    assert isinstance(table, Table)
     assert [row[:2] for row in table.rows] == [(FIRST.heading, "≈ 1e-07"), (FIRST.heading, "✗ 0.5")]
     assert table.rows[0][2].startswith("tuned (step 0.001): largest error 1e-07, 0.5 s")
     assert text.text.startswith("Commands of the best runs")
     assert isinstance(commands, Listing) and "--engine mujoco" in commands.text
     assert len(commands.text.splitlines()) == 1 and "tuned" in commands.text
-    place = next(k for k, b in enumerate(section) if isinstance(b, Heading) and b.text == "pinocchio")
-    rows = section[place + 1].rows
+    table, _, commands = folds["pinocchio pinocchio 1"]
+    rows = table.rows
     assert rows[0][2] == "refused: no hinge (missing in the engine)" and len(rows) == 2
-    assert len(section[place + 3].text.splitlines()) == 1, "a refusal has a command"
+    assert len(commands.text.splitlines()) == 1, "a refusal has a command"

@@ -3,41 +3,34 @@
 from __future__ import annotations
 
 import zipfile
-from pathlib import Path
 
 import pytest
 
+from reports.keep import keep
+from reports.markdown import markdown
+from reports.pages.which_engine import FOLDERS, KINDS, REPORTS, blocks, judged
 from reports.stored import groups
-from reports.which_engine import FOLDERS, KINDS, judged, keep, page
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "which-engine.md"
-
-
-def test_page_which_engine_is_rendered_from_the_records():
-    assert DOCUMENT.read_text() == page(), (
-        "docs/which-engine.md is stale: python -m reports.which_engine docs/which-engine.md renews it"
-    )
 
 
 def test_every_scene_of_the_page_has_records():
-    known = {group.scene.name for folder in FOLDERS for group in groups(folder)}
+    known = {group.scene.name for name in FOLDERS for group in groups(REPORTS / name)}
     assert known >= {name for kind in KINDS for name in kind.scenes}
 
 
 @pytest.fixture
 def folder(tmp_path):
     """A folder with the records of one scene: the plane slider-crank of the reference report."""
-    keep([group for group in groups(FOLDERS[0]) if group.scene.name == "planar_slider_crank"], tmp_path)
-    zipfile.ZipFile(tmp_path / "records.zip").extractall(tmp_path)
-    (tmp_path / "records.zip").unlink()
-    return tmp_path
+    found, place = groups(REPORTS / "reference"), tmp_path / "reference"
+    keep([group for group in found if group.scene.name == "planar_slider_crank"], tmp_path)
+    zipfile.ZipFile(tmp_path / "records.zip").extractall(place)
+    return place
 
 
 def test_records_stored_without_motions_give_the_same_cheapest_runs(folder):
     """The cheapest run of each engine within 1e-6 on the planar slider-crank: without the samples
     (``bodies``) it is the one of the whole records."""
     (stored,) = groups(folder)
-    whole = next(group for group in groups(FOLDERS[0]) if group.scene.name == stored.scene.name)
+    whole = next(group for group in groups(REPORTS / "reference") if group.scene.name == stored.scene.name)
     assert "bodies" not in stored.runs[0].record and len(stored.runs) == len(whole.runs)
     found, expected = (group.cheapest(1e-6) for group in map(judged, (stored, whole)))
     assert {e: r["key"] for e, r in found.items()} == {e: r["key"] for e, r in expected.items()}
@@ -51,7 +44,8 @@ def test_page_says_none_for_an_engine_whose_runs_all_failed(folder):
         for line in text.splitlines()
     ]
     (folder / "records.jsonl").write_text("\n".join(lines) + "\n")
-    row = next(line for line in page([folder]).splitlines() if line.startswith("| MuJoCo | "))
+    text = markdown(blocks(folder.parent))
+    row = next(line for line in text.splitlines() if line.startswith("| MuJoCo | "))
     assert row.startswith("| MuJoCo | none | – | – | ") and "step failed" in row
 
 

@@ -1,5 +1,5 @@
 """The table of checks and the defects that prove them, written by ``python -m tests.zoo.table
-docs/conformance.md``, and the same as data for reports."""
+docs/results/conformance.md``, and the same as data for reports."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
 HEAD = f"""# Conformance checks
 
 This page lists the checks of the conformance suite, for readers of a verdict by
-`crosscheck verify ENGINE`. [Verify your engine](verify-your-engine.md) explains how to run it. A check
+`crosscheck verify ENGINE`. [Verify your engine](../verify-your-engine.md) explains how to run it. A check
 passes, fails, or does not apply, with a reason. The number of a check increases when the check changes, so
 that verdicts of different versions are never compared.
 
 Each check has been tested with defects: {len(DEFECTS)} changes of one line, planted one at a time in
 `examples/spatial_engine` (`tests/zoo/defects.toml`). With a defect the check in its row fails on the scene in
 its row, and passes without it (`pytest -m "slow or not slow" tests/zoo`). This page is written by
-`python -m tests.zoo.table docs/conformance.md`.
+`python -m tests.zoo.table docs/results/conformance.md`.
 """
 
 
@@ -51,7 +51,7 @@ def _defects() -> Iterator[str]:
 def data() -> str:
     """The defects, each with the scene and the check that detects it, as TOML."""
     lines = ("[[defect]]", "about = {about!r}", "scene = {scene!r}", "check = {check!r}", "")
-    head = "# Written by `python -m tests.zoo.table docs/conformance.md`.\n\n"
+    head = "# Written by `python -m tests.zoo.table docs/results/conformance.md`.\n\n"
     told = (line.format(**defect._asdict()) for defect in DEFECTS.values() for line in lines)
     return head + "\n".join(told)
 

@@ -61,8 +61,8 @@ def test_sound_engine_passes_the_whole_suite():
 
 
 def test_page_and_data_of_checks_are_what_their_command_writes():
-    """docs/conformance.md and the data for reports, by python -m tests.zoo.table."""
-    path = Path(__file__).parents[2] / "docs" / "conformance.md"
-    assert path.read_text() == page(), "python -m tests.zoo.table docs/conformance.md renews it"
+    """docs/results/conformance.md and the data for reports, by python -m tests.zoo.table."""
+    path = Path(__file__).parents[2] / "docs" / "results" / "conformance.md"
+    assert path.read_text() == page(), "python -m tests.zoo.table docs/results/conformance.md renews it"
     assert FOR_REPORTS.read_text() == data(), "the same command renews it"
     assert set(tomllib.loads(data())["defect"][0]) == {"about", "scene", "check"}

@@ -1,15 +1,9 @@
-"""The page "Which engine, which settings, for my mechanism?", from committed records.
-
-``python -m reports.which_engine docs/which-engine.md`` writes it anew, without a path it prints the page.
-``python -m reports.which_engine --keep REPORT`` keeps the records of a report as records of further kinds,
-beside the stored records of other scenes. `make kinds` does both.
-"""
+"""The page "Which engine, which settings, for my mechanism?", from committed records."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from crosscheck.cli.tables import own_code
@@ -17,25 +11,21 @@ from crosscheck.findings.finding import findings
 from crosscheck.study.grades import Grade, Judged
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error_text, is_completed
-from crosscheck.study.store import MOTION, pack
 from crosscheck.study.words.speed import LEVEL, SAID, title
-from mbref.command_line import Parser
-from mbref.files import file_name
 from mbref.motions.trajectory import Outcome
-from mbref.records import rewrite
 
-from .runs import SceneRuns, duration, plain
-from .stored import groups, verified
+from ..blocks import Block, Fold, Heading, Listing, Marked, Prose, Table, Within
+from ..runs import SceneRuns, duration, plain
+from ..stored import groups, verified
 
-HERE = Path(__file__).parent
-KINDS_FOLDER = HERE / "kinds"
-FOLDERS = (HERE / "reference", KINDS_FOLDER)  # of committed records
-HEAD = f"""# Which engine, which settings, for my mechanism?
-
+REPORTS = Path(__file__).parents[1]
+FOLDERS = ("reference", "kinds")  # of committed records
+TITLE = "Which engine, which settings, for my mechanism?"
+HEAD = f"""
 This page answers by kind of mechanism: which engines reach an error of {SAID}, at which settings, in which
 time, and what the engines' own defaults do. Use it to choose a first engine and first settings. Every answer
 is read from committed records of runs (`reports/reference`, `reports/kinds`), by
-`python -m reports.which_engine docs/which-engine.md`.
+`python -m reports.pages which-engine`.
 
 For numbers of your own mechanism, on your machine, type
 
@@ -47,10 +37,14 @@ crosscheck tune mujoco my.toml     # the cheapest settings of one engine
 
 Times are CPU time of stepping, of one machine; compare them within a table only. `crosscheck list settings`
 explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
-crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the
-errors of more engines on more kinds (long runs, couplings). [Compare engines](compare.md#verdicts) explains
-errors and grades, and the [support table](engines.md#support) has the joints and loads of each engine.
+crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the errors of more
+engines on more kinds (long runs, couplings). [Compare engines](../compare.md#verdicts) explains errors and
+grades, and the [support table](../engines.md#support) has the joints and loads of each engine.
 """
+CHECKS = """Checks of the [conformance suite](../verify-your-engine.md), and defects that a script shows:"""
+RUNS = """`crosscheck verify ENGINE` runs the checks, `crosscheck findings --recheck` the scripts."""
+SHARED = """`mbref ensemble` runs variants on every core and shares what they have in common
+([Many runs at once](../methods.md#many-runs-at-once))."""
 
 
 class Kind(NamedTuple):
@@ -105,16 +99,19 @@ KINDS = (
 )
 
 
-def page(folders: Sequence[Path] = FOLDERS) -> str:
-    """Return the page in Markdown."""
-    known = {g.scene.name: g for folder in folders if folder.is_dir() for g in groups(folder)}
+def blocks(records: Path = REPORTS) -> list[Block]:
+    """Return the page of the folders of committed reports."""
+    folders = [folder for name in FOLDERS if (folder := records / name).is_dir()]
+    known = {g.scene.name: g for folder in folders for g in groups(folder)}
     kinds = [(kind, [known[name] for name in kind.scenes if name in known]) for kind in KINDS]
     kinds = [(kind, found) for kind, found in kinds if found]
-    parts = [HEAD, *_in_short(kinds)]
-    for kind, found in kinds:
-        parts += _section(kind, found)
-    parts += [*_many(known["planar_slider_crank"]), *_failures(folders[0])]
-    return "\n".join(parts) + "\n"
+    return [
+        Prose(HEAD),
+        *_in_short(kinds),
+        *(block for kind, found in kinds for block in _section(kind, found)),
+        *_many(known["planar_slider_crank"]),
+        *_failures(folders[0]),
+    ]
 
 
 def judged(group: SceneRuns) -> Judged:
@@ -124,16 +121,15 @@ def judged(group: SceneRuns) -> Judged:
     return Judged(group.scene, group.truth, [run.record for run in group.runs])
 
 
-def _in_short(kinds: Sequence[tuple[Kind, Sequence[SceneRuns]]]) -> Iterator[str]:
-    yield "## In short\n"
-    yield f"| mechanism | fastest within {SAID} | next engine | defaults that end wrong or fail |"
-    yield "|---|---|---|---|"
+def _in_short(kinds: Sequence[tuple[Kind, Sequence[SceneRuns]]]) -> list[Block]:
+    rows = []
     for kind, found in kinds:
         group = judged(found[0])
         first, second = (*_fastest(group), None, None)[:2]
-        anchor = kind.title.lower().replace(" ", "-")
-        yield f"| [{kind.title}](#{anchor}) | {_named(first)} | {_named(second)} | {_bad_defaults(group)} |"
-    yield ""
+        name = Within(kind.title, f"#{kind.title.lower().replace(' ', '-')}")
+        rows.append((name, _named(first), _named(second), _bad_defaults(group)))
+    header = ("mechanism", f"fastest within {SAID}", "next engine", "defaults that end wrong or fail")
+    return [Heading("In short", 2), Table("The first scene of each kind.", header, rows)]
 
 
 def _fastest(group: Judged) -> list[Record]:
@@ -166,32 +162,29 @@ def _failed(record: Record) -> str:
     return ended(record) + limit
 
 
-def _section(kind: Kind, found: Sequence[SceneRuns]) -> Iterator[str]:
-    yield f"## {kind.title}\n"
-    yield f"{kind.about}\n"
-    for runs in found:
-        yield from _answers(judged(runs))
+def _section(kind: Kind, found: Sequence[SceneRuns]) -> list[Block]:
+    answers = (block for runs in found for block in _answers(judged(runs)))
+    return [Heading(kind.title, 2), Prose(kind.about), *answers]
 
 
-def _answers(group: Judged) -> Iterator[str]:
-    """Yield the table of a scene, its command and the engines' own lines."""
+def _answers(group: Judged) -> list[Block]:
+    """Return the table of a scene, its command and the engines' own lines."""
     name, counts = group.scene.name, group.scene.counts()
-    yield (
+    caption = (
         f"`{name}` over {_end_time(group):g} s: {_count(len(group.scene.body), 'body', 'bodies')}, "
         f"{_count(counts.degrees_of_freedom, 'degree', 'degrees')} of freedom, "
         f"{_count(counts.redundant, 'redundant row', 'redundant rows')}. "
-        f"`crosscheck compare '{name}'` repeats these runs.{_known(group)}\n"
+        f"`crosscheck compare '{name}'` repeats these runs.{_known(group)}"
     )
-    yield f"| engine | fastest run within {SAID} | time | error | least error | library defaults |"
-    yield "|---|---|--:|--:|--:|---|"
+    header = ("engine", f"fastest run within {SAID}", "time", "error", "least error", "library defaults")
     cheapest, defaults = group.cheapest(LEVEL), group.defaults()
-    order = [r["engine"] for r in _fastest(group)]
+    order, rows = [r["engine"] for r in _fastest(group)], []
     for engine, best in sorted(group.best().items(), key=lambda item: _place(order, item[0])):
         record = cheapest.get(engine)
         cells = ("none", "–", "–") if record is None else _run_cells(record)
         default = _default(defaults[engine]) if engine in defaults else "no such settings"
-        yield f"| {title(engine)} | {' | '.join(cells)} | {_least(best)} | {default} |"
-    yield from _lines(group)
+        rows.append((title(engine), *cells, _least(best), default))
+    return [Table(caption, header, rows, frozenset({2, 3, 4})), *_lines(group)]
 
 
 def _known(group: Judged) -> str:
@@ -228,55 +221,53 @@ def _default(record: Record) -> str:
     return _end(record) if is_completed(record) else f"no run completes: {_failed(record)}"
 
 
-def _lines(group: Judged) -> Iterator[str]:
-    """Yield each engine's own code or XML of its settings, to be copied."""
+def _lines(group: Judged) -> list[Block]:
+    """Return each engine's own code or XML of its settings, to be copied."""
     found = group.within(LEVEL, lambda record: bool(own_code(group.scene, record)))
-    if found:
-        best = f"the fastest run with an error within {SAID}, otherwise the most accurate run"
-        yield f"\nLines to copy, for settings that the engine itself has: {best}.\n"
-        yield "```text"
-        for engine, record in found.items():
-            yield f"{title(engine)}, error {error_text(record)}: {own_code(group.scene, record)}"
-        yield "```"
-    yield ""
+    if not found:
+        return []
+    lines = (
+        f"{title(engine)}, error {error_text(record)}: {own_code(group.scene, record)}"
+        for engine, record in found.items()
+    )
+    best = f"the fastest run with an error within {SAID}, otherwise the most accurate run"
+    summary = f"Lines to copy, for settings that the engine itself has: {best}."
+    return [Fold(summary, f"{group.scene.name}-lines", [Listing("\n".join(lines), "text")])]
 
 
-def _many(group: SceneRuns) -> Iterator[str]:
-    """Yield the cost of one variant among many: construction of the model and steps."""
-    yield "## Many variants at once\n"
-    yield (
+def _many(group: SceneRuns) -> list[Block]:
+    """Return the cost of one variant among many: construction of the model and steps."""
+    caption = (
         "If each of many runs has other numbers, the engine's model is built anew for each, so that "
         "construction counts as well as stepping. One run of "
-        f"`{group.scene.name}`, the fastest of each engine within {SAID}:\n"
+        f"`{group.scene.name}`, the fastest of each engine within {SAID}:"
     )
-    yield "| engine | construction | stepping | both |"
-    yield "|---|--:|--:|--:|"
+    rows = []
     for record in sorted(judged(group).cheapest(LEVEL).values(), key=_whole):
         build, steps = record["cost"]["build_seconds"], record["cost"]["seconds"]
-        times = " | ".join(map(duration, (build, steps, build + steps)))
-        yield f"| {title(record['engine'])}, `{record['family']}` | {times} |"
-    yield "\n`mbref ensemble` runs variants on every core and shares what they have in common"
-    yield "([Many runs at once](methods.md#many-runs-at-once)).\n"
+        name = f"{title(record['engine'])}, `{record['family']}`"
+        rows.append((name, *map(duration, (build, steps, build + steps))))
+    table = Table(caption, ("engine", "construction", "stepping", "both"), rows, frozenset({1, 2, 3}))
+    return [Heading("Many variants at once", 2), table, Prose(SHARED)]
 
 
 def _whole(record: Record) -> float:
     return float(record["cost"]["build_seconds"] + record["cost"]["seconds"])
 
 
-def _failures(folder: Path) -> Iterator[str]:
-    """Yield the failed checks of the conformance suite and the findings, by engine."""
-    yield "## What each engine fails at\n"
-    yield "Checks of the [conformance suite](verify-your-engine.md), and defects that a script shows:\n"
-    yield "| engine | checks that fail | of | findings |"
-    yield "|---|--:|--:|---|"
+def _failures(folder: Path) -> list[Block]:
+    """Return the failed checks of the conformance suite and the findings, by engine."""
     known: dict[str, list[str]] = {}
     for found in findings():
         known.setdefault(found.engine, []).append(f"[{found.name}](findings.md#{found.name})")
-    for name, failed, count in _checks(folder):
-        yield f"| {title(name)} | {failed} | {count} | {', '.join(known.pop(name, [])) or 'none'} |"
-    for name, links in known.items():
-        yield f"| {title(name)} | – | – | {', '.join(links)} |"
-    yield "\n`crosscheck verify ENGINE` runs the checks, `crosscheck findings --recheck` the scripts."
+    failed = {name: (str(failed), str(count)) for name, failed, count in _checks(folder)}
+    rows = [
+        (title(name), *failed.get(name, ("–", "–")), Marked(", ".join(known.get(name, [])) or "none"))
+        for name in dict.fromkeys([*failed, *known])
+    ]
+    header = ("engine", "checks that fail", "of", "findings")
+    table = Table("Failed checks and findings by engine.", header, rows, frozenset({1, 2}))
+    return [Heading("What each engine fails at", 2), Prose(CHECKS), table, Prose(RUNS)]
 
 
 def _checks(folder: Path) -> Iterator[tuple[str, int, int]]:
@@ -285,29 +276,3 @@ def _checks(folder: Path) -> Iterator[tuple[str, int, int]]:
         states = [verdict["status"] for verdict in document.get("verdicts", ())]
         if applied := [state for state in states if state in ("pass", "fail")]:
             yield document["engine"], applied.count("fail"), len(applied)
-
-
-def keep(found: Sequence[SceneRuns], folder: Path) -> None:
-    """Pack scenes, truths, and the records of runs without their motions into a folder."""
-    with TemporaryDirectory() as place:
-        (Path(place) / "scenes").mkdir()
-        for group in found:
-            group.scene.save(Path(place) / "scenes" / f"{file_name(group.scene.name)}.toml")
-        rewrite(Path(place) / "records.jsonl", [run.record for group in found for run in group.runs])
-        rewrite(Path(place) / "truths.jsonl", [group.truth for group in found if group.truth])
-        pack(Path(place), folder, MOTION)
-
-
-if __name__ == "__main__":
-    parser = Parser(description=__doc__)
-    parser.add_argument("page", nargs="?", type=Path, help="default: print the page")
-    parser.add_argument("--keep", type=Path, metavar="REPORT", help="keep the records of this report")
-    options = parser.parse_args()
-    if options.keep:
-        new = groups(options.keep)
-        names = {group.scene.name for group in new}
-        keep([*new, *(old for old in groups(KINDS_FOLDER) if old.scene.name not in names)], KINDS_FOLDER)
-    elif options.page:
-        options.page.write_text(page())
-    else:
-        print(page(), end="")

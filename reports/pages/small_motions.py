@@ -1,14 +1,18 @@
-"""Small motions of engines as a page of the documentation, from stored records."""
+"""The page on small motions of engines."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 
 from crosscheck.small_motions.mechanisms import MECHANISMS
-from crosscheck.small_motions.records import Record
+from crosscheck.small_motions.records import FILE, Record, read
+from crosscheck.small_motions.sentences import heading, method, search, size, written
 
-HEAD = """# Small motions in engines
+from ..blocks import Block, Fold, Heading, Prose, Table
 
+TITLE = "Small motions in engines"
+HEAD = """
 This page helps to decide which eigenvalues to trust. It compares eigenvalues of small motions about
 equilibria and steady motions with closed forms. The eigenvalues are of the judge, of `mbref modes`, of the
 functions with which engines linearise, and of the engines' accelerations, by differences that crosscheck
@@ -17,7 +21,7 @@ takes. An error is the largest one over all eigenvalues and poses, relative to t
 ```sh
 crosscheck modes my.toml                                  # a mechanism of your own
 crosscheck modes                                          # this table, from stored records
-crosscheck modes --run --force --page docs/small-motions.md  # measure again, and write this page
+crosscheck modes --run --force --page docs/results/small-motions.md  # measure again, and write this page
 ```
 """
 NOTES = """## How to read it
@@ -25,7 +29,7 @@ NOTES = """## How to read it
 - **judge**: Lagrange multipliers and joint coordinates of a spanning tree in long doubles,
   `crosscheck/judge/small_motions`. Nothing of mbref's equations is called. It searches equilibria by damped
   Newton steps, from poses along the constraints and from random poses, also of other assemblies.
-- **mbref modes**: natural frequencies and damping of [`mbref modes`](equilibrium.md), by differences of
+- **mbref modes**: natural frequencies and damping of [`mbref modes`](../equilibrium.md), by differences of
   accelerations along the tangent. The search of `mbref equilibrium` follows the constraints from the scene's
   pose. So it may miss poses of other assemblies; the list of mechanisms says which.
 - **ComputeODE2Eigenvalues** (Exudyn): projects mass, damping and stiffness into the null space of the
@@ -41,6 +45,7 @@ NOTES = """## How to read it
   accelerations at displaced poses give about 1e-11.
 - Functions that linearise are not asked about steady motions.
 """
+FOUR_BAR_NAME = "spring_four_bar"
 FOUR_BAR = """## The four-bar with a diagonal spring
 
 The IFToMM benchmark "Fourbar linkage with diagonal spring" prints the angle of its equilibrium, 2.23433101898
@@ -51,30 +56,36 @@ evaluates it with 30 digits (`tests/crosscheck/test_small_motions.py`).
 """
 
 
-def page(records: Sequence[Record]) -> str:
-    """Return the page in Markdown."""
-    parts = [HEAD, *_table(records), "", *_refusals(records), "", NOTES, "## The mechanisms\n"]
-    for mechanism in MECHANISMS:
-        parts += [f"**{mechanism.name}**: {mechanism.about}.\n"]
-        parts += [_pose(record) for record in records if record["scene"] == mechanism.name]
-        parts += [""]
-    return "\n".join([*parts, FOUR_BAR])
+def blocks(records: Path = FILE) -> list[Block]:
+    """Return the page of the records in a file."""
+    found = read(records)
+    about = {mechanism.name: mechanism.about for mechanism in MECHANISMS}
+    scenes = dict.fromkeys(record["scene"] for record in found)
+    return [
+        Prose(HEAD),
+        _table(found, list(scenes)),
+        Prose("\n".join(_refusals(found))),
+        Prose(NOTES),
+        Heading("The mechanisms", 2),
+        *(Fold(f"{name}: {about.get(name, '')}", name, [Prose(_poses(found, name))]) for name in scenes),
+        *([Prose(FOUR_BAR)] if FOUR_BAR_NAME in scenes else []),
+    ]
 
 
-def _table(records: Sequence[Record]) -> Iterator[str]:
-    """Yield the table of the largest error of each method over the poses of each mechanism."""
+def _table(records: Sequence[Record], scenes: Sequence[str]) -> Table:
+    """Return the table of the largest error of each method over the poses of each mechanism."""
     cells: dict[str, dict[str, list[float | None]]] = {}
     for record in records:
         errors = {"judge": record["error"], "mbref modes": record["mbref_error"]}
-        errors |= {_method(each): each["error"] for each in record["results"] if each["way"]}
+        errors |= {method(each): each["error"] for each in record["results"] if each["way"]}
         for name, value in errors.items():
             cells.setdefault(name, {}).setdefault(record["scene"], []).append(value)
-    yield "| method | " + " | ".join(mechanism.name for mechanism in MECHANISMS) + " |"
-    yield "| --- |" + " --: |" * len(MECHANISMS)
-    first = ["judge", "mbref modes"]
-    for name in [*first, *sorted(set(cells) - set(first))]:
-        row = cells[name]
-        yield f"| {name} | " + " | ".join(_largest(row.get(m.name, [])) for m in MECHANISMS) + " |"
+    first = [name for name in ("judge", "mbref modes") if name in cells]
+    rows = [
+        (name, *(_largest(cells[name].get(scene, [])) for scene in scenes))
+        for name in [*first, *sorted(set(cells) - set(first))]
+    ]
+    return Table("Largest errors.", ("method", *scenes), rows, frozenset(range(1, 1 + len(scenes))))
 
 
 def _largest(values: Sequence[float | None]) -> str:
@@ -93,54 +104,10 @@ def _refusals(records: Sequence[Record]) -> Iterator[str]:
     yield from (f"- {name} without {scene}: {reason}." for scene, name, reason in sorted(found))
 
 
+def _poses(records: Sequence[Record], scene: str) -> str:
+    return "\n".join(_pose(record) for record in records if record["scene"] == scene)
+
+
 def _pose(record: Record) -> str:
     listed = ", ".join(written(*s) for s in record["eigenvalues"])
     return f"- {heading(record)}: s = {listed} 1/s. {search(record)}"
-
-
-def _method(result: Record) -> str:
-    return f"{result['engine']} {result['version']}, {result['way']}"
-
-
-def heading(record: Record) -> str:
-    """Return the kind of a pose and its stability."""
-    kind = f"Steady motion at {record['rate']:g} rad/s" if record["rate"] else "Equilibrium"
-    return f"{kind}, {record['stability']}"
-
-
-def search(record: Record) -> str:
-    """Return a sentence on mbref's own search."""
-    if record["mbref_distance"] is None:
-        return "The search of `mbref equilibrium` does not find this pose."
-    apart = size(record["mbref_distance"])
-    return f"`mbref equilibrium` finds this pose, {apart} lengths or rad from the judge's."
-
-
-def rows(record: Record) -> Iterator[tuple[str, str]]:
-    """Yield each method and its error, the judge first."""
-    if record["error"] is None:
-        yield "judge (reference)", f"± {record['uncertainty']:.0e}"
-    else:
-        yield "judge", size(record["error"])
-    if record["mbref_error"] is not None:
-        yield "mbref modes", size(record["mbref_error"])
-    for each in record["results"]:
-        yield (
-            _method(each).removesuffix(", "),
-            each["reason"] if each["error"] is None else size(each["error"]),
-        )
-
-
-def size(value: float) -> str:
-    """Return an error with one digit; less than rounding as a bound."""
-    return "< 1e-15" if value < 1e-15 else f"{value:.0e}"
-
-
-def written(real: float, imaginary: float) -> str:
-    """Return a complex number with ten digits, without parts of rounding size."""
-    scale = 1e-12 * max(abs(real), abs(imaginary))
-    real, imaginary = (0.0 if abs(x) <= scale else x for x in (real, imaginary))
-    if imaginary == 0.0:
-        return f"{real:.10g}"
-    text = f"{imaginary:+.10g} i"
-    return f"{real:.10g} {text[0]} {text[1:]}" if real else text

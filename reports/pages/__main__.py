@@ -1,0 +1,47 @@
+"""`python -m reports.pages [NAME …]`: write pages of the documentation from stored records.
+
+Without names it writes all pages into docs/results of the checkout.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from pathlib import Path
+
+from mbref.command_line import Parser, status_of
+from mbref.files import write
+
+from ..markdown import markdown
+
+NAMES = ("which-engine", "closed-loops", "convergence", "small-motions", "findings")
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+
+
+def text(name: str, records: Path | None = None) -> str:
+    """Return a page in Markdown, of a file of records or, by default, of the stored records."""
+    page = import_module(f"{__package__}.{name.replace('-', '_')}")
+    return markdown(page.blocks(*([] if records is None else [records])), page.TITLE)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Write pages; returns 0, or 2 for bad input."""
+    return status_of(lambda: _write(argv))
+
+
+def _write(argv: Sequence[str] | None) -> int:
+    parser = Parser(description=__doc__)
+    parser.add_argument("name", nargs="*", metavar="NAME", choices=[[], *NAMES], help=", ".join(NAMES))
+    parser.add_argument("--records", type=Path, metavar="FILE", help="default: the stored records")
+    parser.add_argument("--out", type=Path, metavar="FILE", help="default: docs/results/NAME.md")
+    options = parser.parse_args(argv)
+    for name in options.name or NAMES:
+        path = options.out or RESULTS / f"{name}.md"
+        write(path, text(name, options.records))
+        print(f"written: {path}", file=sys.stderr)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,42 @@
+"""The page on findings in other engines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from crosscheck.findings.finding import FOLDER, Finding, findings
+
+from ..blocks import Block, Fold, Heading, Listing, Prose, Table, Within
+
+TITLE = "Findings"
+HEAD = """
+What crosscheck found in other engines, each with a proof that runs again: `crosscheck findings` lists them,
+and `crosscheck findings --recheck` asks the installed versions which of them are still there. Scripts need
+the engine alone. An error that ends the process is described in words, without a proof. Made by
+`python -m reports.pages findings` from `crosscheck/findings/findings.toml`.
+"""
+
+
+def blocks(records: Path = FOLDER) -> list[Block]:
+    """Return the page of the stored findings."""
+    rows = [(Within(f.name, f"#{f.name}"), f.engine, f.version, _measured(f)) for f in findings()]
+    table = Table("Findings by engine.", ("finding", "engine", "version", "measured"), rows)
+    return [Prose(HEAD), table, *(block for found in findings() for block in _entry(found))]
+
+
+def _measured(found: Finding) -> str:
+    return "the process ends" if found.crashes else f"{found.measured:.3g} {found.unit}".strip()
+
+
+def _entry(found: Finding) -> list[Block]:
+    said = (f"{found.package} {found.version}. {found.does}", f"Right is: {found.right}", found.cause)
+    told: list[Block] = [Heading(found.name, 2), Prose("\n\n".join(said))]
+    if found.crashes:
+        return told
+    if found.script:
+        proof: list[Block] = [Listing(found.script.strip(), "python")]
+    else:
+        options = ", ".join(f"{name} {value:g}" for name, value in found.options.items())
+        words = f"Scene `{found.scene}` at the setting `{found.family}` ({options}):"
+        proof = [Prose(words), Listing((FOLDER / found.scene).read_text().strip(), "toml")]
+    return [*told, Fold("Proof", f"{found.name}-proof", [*proof, Prose(f"`{found.command()}`")])]

@@ -1,0 +1,48 @@
+"""Pages of the documentation that are made from records: they follow from the stored records and the links
+within each lead to places of the page."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from crosscheck.cli import main as crosscheck
+from crosscheck.closed_loops.records import FILE
+from mbref.records import looked_at, rewrite
+from reports.pages.__main__ import NAMES, text
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def page(request) -> tuple[str, str]:
+    return request.param, text(request.param)
+
+
+def test_committed_page_follows_from_the_stored_records(page):
+    name, made = page
+    assert (RESULTS / f"{name}.md").read_text() == made, f"python -m reports.pages {name} renews it"
+
+
+def test_links_within_a_page_lead_to_its_headings_and_folded_runs(page):
+    _, made = page
+    headings = {text.lower().replace(" ", "-") for text in re.findall(r"^## (.+)$", made, re.M)}
+    places = headings | set(re.findall(r' id="(.+?)"', made))
+    links = set(re.findall(r"\]\(#(.+?)\)", made))
+    assert links <= places, links - places
+
+
+def test_every_page_but_the_guide_shows_at_most_a_fifth_of_its_runs_unfolded(page):
+    name, made = page
+    open_text = re.sub(r"<details.*?</details>", "", made, flags=re.S)
+    assert made.count("<details") == made.count("</details>") > 0
+    assert name in ("which-engine", "small-motions", "findings") or len(open_text) < 0.2 * len(made)
+
+
+def test_command_writes_the_page_of_the_records_that_it_is_given(tmp_path):
+    records, out = tmp_path / "few.jsonl", tmp_path / "page.md"
+    rewrite(records, [r for r in looked_at(FILE).values() if r["engine"] == "mbref"])
+    assert crosscheck(["closed-loops", "--records", str(records), "--page", str(out)]) == 0
+    assert out.read_text() == text("closed-loops", records) and "(#drake)" not in out.read_text()
