@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 from crosscheck.findings.finding import FOLDER, Finding, findings
@@ -25,7 +26,10 @@ def blocks(records: Path = FOLDER) -> list[Block]:
 
 
 def _measured(found: Finding) -> str:
-    return "the process ends" if found.crashes else f"{found.measured:.3g} {found.unit}".strip()
+    if found.crashes:
+        return "the process ends"
+    number = f"more than {found.wrong_above:.3g}" if math.isnan(found.measured) else f"{found.measured:.3g}"
+    return f"{number} {found.unit}".strip()
 
 
 def _entry(found: Finding) -> list[Block]:
