@@ -34,43 +34,43 @@ MECHANISMS = (
 )
 
 
-def agree(scene, method=ORDER_16, rtol=1e-11):
-    """Return whether runs by generated code and general kernels agree to 1e-11 of the mechanism's length."""
+def gap(scene, method=ORDER_16, rtol=1e-11):
+    """Return the largest difference of positions over 0.02 s by generated code and by the general kernels,
+    over the mechanism's length. Both runs must complete."""
     times = [0.0, 0.01, 0.02]
     generic, own = (
         simulate(scene, method, times, Limits(rtol=rtol, code=code)) for code in ("generic", "generated")
     )
     assert generic.outcome == own.outcome == Outcome.COMPLETED, own.message
-    return np.abs(generic.position - own.position).max() <= 1e-11 * scene_length(scene)
+    return np.abs(generic.position - own.position).max() / scene_length(scene)
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
-def test_generated_code_and_general_kernels_agree(name):
-    assert agree(SCENES[name]())
+def test_generated_code_moves_built_in_scenes_as_the_general_kernels(name):
+    """By taylor of order 16; the general kernels serve every scene and are tested against closed forms."""
+    assert gap(SCENES[name]()) <= 1e-11
 
 
 @pytest.mark.parametrize(
     ("name", "joint"),
     (("planar_slider_crank", "A"), ("planar_slider_crank", "B"), ("bennett", "R1"), ("bricard", "P0")),
 )
-def test_generated_code_and_general_kernels_agree_of_driven_mechanisms(name, joint):
-    """A driver from rest, 3 t² rad."""
+def test_generated_code_moves_driven_mechanisms_as_the_general_kernels(name, joint):
+    """A driver turns the joint from rest by 3 t² rad."""
     scene = SCENES[name]()
     at_rest = (
         b.model_copy(update={"velocity": (0.0, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.0)})
         for b in scene.body
     )
     driver = Driver(joint=joint, polynomial=(0.0, 0.0, 3.0))
-    scene = scene.with_(body=tuple(at_rest), driver=(driver,))
-    assert agree(scene)
+    assert gap(scene.with_(body=tuple(at_rest), driver=(driver,))) <= 1e-11
 
 
 @pytest.mark.parametrize("seed", (3, 11, 17, 21))
-def test_generated_code_and_general_kernels_agree_of_random_mechanisms(seed):
-    """Springs are left out."""
+def test_generated_code_moves_random_mechanisms_without_springs_as_the_general_kernels(seed):
     scene = random_mechanism(seed)
-    scene = scene.with_(load=tuple(load for load in scene.load if not hasattr(load, "stiffness")))
-    assert agree(scene)
+    loads = tuple(load for load in scene.load if not hasattr(load, "stiffness"))
+    assert gap(scene.with_(load=loads)) <= 1e-11
 
 
 @pytest.mark.parametrize("name", ("bricard", "bennett"))
@@ -91,7 +91,8 @@ def test_generated_code_follows_a_motion_that_turns_back(name):
     "name", (*MECHANISMS[:4], "four_bar", "planar_slider_crank_equal", "four_bar_gravity")
 )
 def test_runs_by_generated_code_and_general_kernels_agree_in_poses_reactions_and_steps(name):
-    """Steps may differ by one a crossing, behind which rounding decides on their length, or by 5 %."""
+    """Numbers of steps may differ by 5 %, or by one a crossing, because rounding decides on the step after
+    it."""
     times = np.linspace(0.0, 0.2, 5)
     generic, own = (
         simulate(SCENES[name](), ORDER_16, times, Limits(rtol=1e-11, code=code))
@@ -111,8 +112,9 @@ def _reactions(one, other):
 
 
 @pytest.mark.parametrize("order", (4, 5, 12, 13, 30))
-def test_generated_code_and_general_kernels_agree_at_every_order(order):
-    assert agree(SCENES["spatial_slider_crank_gravity"](), Method.parse(f"taylor[order={order}]"), rtol=1e-5)
+def test_generated_code_of_low_and_high_orders_moves_as_the_general_kernels(order):
+    scene = SCENES["spatial_slider_crank_gravity"]()
+    assert gap(scene, Method.parse(f"taylor[order={order}]"), rtol=1e-5) <= 1e-11
 
 
 WITHOUT = """

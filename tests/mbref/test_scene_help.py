@@ -14,7 +14,7 @@ from mbref.cli import main
 from mbref.cli.output import Lines
 from mbref.cli.scene_files import schema, template
 from mbref.motions.motion import Motion
-from mbref.scene import Driver, Scene, SceneError
+from mbref.scene import Driver, Revolute, Scene, SceneError
 from mbref.scene.slips import probable_slips
 from mbref.scenes import SCENES, find_scene
 
@@ -138,26 +138,36 @@ def test_no_scene_of_the_examples_has_a_probable_slip(path):
     assert probable_slips(Scene.from_file(path)) == []
 
 
-def test_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip():
-    """Two hinges across the plane and one in it; as many in it as across are a spatial mechanism."""
+def with_hinges(*axes, height: float = 0.0) -> Scene:
+    """Return the slider-crank in the plane z = 0, whose hinges A and B are normal to it, with hinges between
+    rod and slider of the given axes, at a height above the plane (m)."""
     scene = find_scene("planar_slider_crank")
-    hinge = {
-        "name": "T",
-        "type": "revolute",
-        "bodies": ["rod", "slider"],
-        "anchor": scene.joint[2].anchor_pair[0],
-    }
+    x, y, _ = scene.joint_named("C").anchor
+    further = [
+        Revolute(name=f"T{k}", bodies=("rod", "slider"), anchor=(x, y, height), axis=axis)
+        for k, axis in enumerate(axes)
+    ]
+    return scene.with_(joint=(*scene.joint, *further))
 
-    def with_axis(axis, height=0.0):
-        anchor = (*hinge["anchor"][:2], height)
-        return scene.with_(joint=[*scene.joint, {**hinge, "axis": axis, "anchor": anchor}])
 
-    says = ["joint[T].axis: lies in the plane of the mechanism; other axes are across it"]
-    assert probable_slips(with_axis((1.0, 2.0, 0.0))) == says
-    for spatial in (with_axis((0.0, 0.0, 1.0)), with_axis((1.0, 0.0, 1.0)), with_axis((1.0, 0.0, 0.0), 0.1)):
-        assert probable_slips(spatial) == []
-    first = with_axis((1.0, 0.0, 0.0)).with_("joint[A].axis", (1.0, 0.0, 0.0))
-    assert probable_slips(first) == [], "one axis across the plane and two in it"
+def test_single_hinge_axis_in_the_plane_of_a_planar_mechanism_is_a_probable_slip():
+    assert probable_slips(with_hinges((1.0, 2.0, 0.0))) == [
+        "joint[T0].axis: lies in the plane of the mechanism; other axes are across it"
+    ]
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        pytest.param(with_hinges((0.0, 0.0, 1.0)), id="no axis in the plane"),
+        pytest.param(with_hinges((1.0, 0.0, 1.0)), id="an axis at 45 degrees to the plane"),
+        pytest.param(with_hinges((1.0, 0.0, 0.0), height=0.1), id="joints in no common plane"),
+        pytest.param(with_hinges((1.0, 0.0, 0.0), (1.0, 2.0, 0.0)), id="two axes normal to it, two in it"),
+        pytest.param(with_hinges(*[(1.0, 0.0, 0.0)] * 3), id="two axes normal to it, three in it"),
+    ],
+)
+def test_hinge_axis_is_no_slip_without_a_plane_that_most_hinges_are_normal_to(scene):
+    assert probable_slips(scene) == []
 
 
 @pytest.mark.parametrize(("rate", "told"), [(100.1, 1), (99.9, 0), (-100.1, 1)])

@@ -196,14 +196,15 @@ def test_scenes_have_one_shape_if_they_differ_in_numbers_alone():
 
 
 def test_ensemble_raises_the_faults_of_its_first_faulty_scene():
+    """In scene 1 the rod must not turn about an axis in its plane; in scene 3, the crank."""
     scenes = list(variants(CRANK, [MASS], 4))
-    scenes[2] = (
-        scenes[2]
-        .with_("joint[B].axis", (1.0, 0.0, 0.3))
-        .with_("body[crank].angular_velocity", (5.0, 0.0, 0.0))
-    )
+    for place, body in ((1, "rod"), (3, "crank")):
+        scenes[place] = scenes[place].with_(f"body[{body}].angular_velocity", (5.0, 0.0, 0.0))
+    alone = []
+    for place in (1, 3):
+        with pytest.raises(SceneError) as caught:
+            simulate(scenes[place], METHOD, TIMES, LIMITS)
+        alone.append(caught.value.faults)
     with pytest.raises(SceneError) as together:
         simulate_all(scenes, METHOD, TIMES, LIMITS)
-    with pytest.raises(SceneError) as alone:
-        simulate(scenes[2], METHOD, TIMES, LIMITS)
-    assert together.value.faults == alone.value.faults
+    assert together.value.faults == alone[0] != alone[1]

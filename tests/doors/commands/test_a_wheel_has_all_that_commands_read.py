@@ -12,6 +12,7 @@ import sysconfig
 import tarfile
 import zipfile
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -129,31 +130,51 @@ def test_a_source_archive_has_documents_and_no_tests(built):
 
 
 @pytest.mark.slow
-def test_each_command_of_a_wheel_runs_in_another_folder(built, tmp_path):
-    for program, made in (("mbref", mbref_parser()), ("crosscheck", crosscheck_parser())):
-        known = re.findall(r"^    ([a-z][a-z-]+)( |$)", made.format_help(), flags=re.M)
-        assert {words[0] for words in COMMANDS[program]} == {name for name, _ in known}, "one of each"
-    here, environment = tmp_path / "here", tmp_path / "environment"
-    here.mkdir()
+@pytest.mark.parametrize(("program", "parser"), [("mbref", mbref_parser), ("crosscheck", crosscheck_parser)])
+def test_list_of_commands_to_run_has_each_command_of_a_program(program, parser):
+    known = re.findall(r"^    ([a-z][a-z-]+)(?: |$)", parser().format_help(), flags=re.M)
+    assert {words[0] for words in COMMANDS[program]} == set(known)
+
+
+class Installed(NamedTuple):
+    """Commands that ran one after another in a process of an environment with the wheel alone."""
+
+    folder: Path  # the working folder
+    ends: list  # of each command: program, words, exit status or "traceback", standard error
+    modules: list[str]  # files of the modules that the process loaded
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory) -> Installed:
+    """Install the wheel into a new environment and run COMMANDS in an empty folder."""
+    environment, folder = tmp_path_factory.mktemp("environment"), tmp_path_factory.mktemp("folder")
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(environment)], check=True)
     (packages,) = environment.glob("lib/python*/site-packages")
     (wheel,) = built.glob("*.whl")
     zipfile.ZipFile(wheel).extractall(packages)
     (packages / "libraries.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
-    shutil.copytree(
-        ROOT / "reports" / "reference", here / "report", ignore=shutil.ignore_patterns("*.md", "*.png")
-    )
-    (here / "model.xml").write_text(MODEL)
-    (here / "runner.py").write_text(RUNNER)
+    no_pages = shutil.ignore_patterns("*.md", "*.png")
+    shutil.copytree(ROOT / "reports" / "reference", folder / "report", ignore=no_pages)
+    (folder / "model.xml").write_text(MODEL)
+    (folder / "runner.py").write_text(RUNNER)
     commands = [(program, *words) for program, rows in COMMANDS.items() for words in rows]
-    (here / "commands.json").write_text(json.dumps(commands))
-    python = environment / "bin" / "python"
-    variables = {**os.environ, "NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    done = subprocess.run(
-        [str(python), "-I", "runner.py"], cwd=here, env=variables, capture_output=True, text=True, check=False
-    )
+    (folder / "commands.json").write_text(json.dumps(commands))
+    variables = {**os.environ, "NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(environment / "cache")}
+    python = [str(environment / "bin" / "python"), "-I", "runner.py"]
+    done = subprocess.run(python, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
-    found, files = json.loads((here / "found.json").read_text())
-    assert not [row for row in found if row[2] not in (0, 1) or "Traceback" in row[3]]
-    assert not [name for name in files if name.startswith((str(ROOT / "mbref"), str(ROOT / "reports")))]
-    assert (here / "report" / "report.md").is_file()
+    return Installed(folder, *json.loads((folder / "found.json").read_text()))
+
+
+@pytest.mark.slow
+def test_each_command_of_a_wheel_ends_without_traceback(installed):
+    """Status 1 is a finding, such as a wrong motion; status 2 would be a file that the wheel lacks."""
+    assert len(installed.ends) == sum(map(len, COMMANDS.values()))
+    assert not [end for end in installed.ends if end[2] not in (0, 1) or "Traceback" in end[3]]
+    assert (installed.folder / "report" / "report.md").is_file()
+
+
+@pytest.mark.slow
+def test_commands_of_a_wheel_load_no_module_of_the_checkout(installed):
+    folders = tuple(str(ROOT / name) for name in ("mbref", "crosscheck", "reports"))
+    assert not [name for name in installed.modules if name.startswith(folders)]

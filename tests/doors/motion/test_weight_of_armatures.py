@@ -34,7 +34,7 @@ def slide(gravity=GRAVITIES[2], axis=AXES[2], **changes) -> Scene:
 
 
 def fallen(scene: Scene) -> np.ndarray:
-    """Return the displacement ½ m (g·a) / (m + I) t² along the guide."""
+    """Return the displacement s = ½ m (g·a) / (m + I) t² along the guide a: from (m + I) s'' = m (g·a)."""
     pull = MASS * np.dot(scene.gravity, scene.joint[0].axis)
     return pull / (MASS + ARMATURE) * TIMES**2 / 2
 
@@ -45,30 +45,33 @@ def off(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_slide_with_armature_falls_as_its_closed_form_by_every_method(method):
+def test_armature_of_a_slide_resists_its_fall_and_has_no_weight_by_every_method(method):
+    """The displacement is s = ½ m (g·a) / (m + I) t², of a mass m with armature I on a guide a."""
     scene = slide()
     motion = simulate(scene, method, TIMES)
     assert motion.outcome.name == "COMPLETED", motion.message
     assert off(motion.joint("G").displacement, fallen(scene)) < 100 * ROUNDING
-    assert off(motion.energy, motion.energy[0]) < 1000 * ROUNDING
 
 
 @pytest.mark.parametrize("ground", ["frame", "body"])
 @pytest.mark.parametrize("axis", AXES)
 @pytest.mark.parametrize("gravity", GRAVITIES)
-def test_slide_with_armature_falls_as_its_closed_form_in_every_direction(gravity, axis, ground):
+def test_armature_of_a_slide_has_no_weight_in_any_direction_of_guide_and_gravity(gravity, axis, ground):
+    """The displacement is s = ½ m (g·a) / (m + I) t²."""
     scene = slide(gravity, axis, ground=ground)
     assert off(simulate(scene, times=TIMES).joint("G").displacement, fallen(scene)) < 10 * ROUNDING
 
 
 @pytest.mark.skipif(numba.config.DISABLE_JIT, reason="code is generated where kernels are compiled")
-def test_slide_with_armature_falls_as_its_closed_form_by_generated_code():
+def test_armature_of_a_slide_has_no_weight_in_generated_code():
+    """The displacement is s = ½ m (g·a) / (m + I) t²."""
     scene = slide()
     motion = simulate(scene, "taylor", TIMES, Limits(code="generated"))
     assert off(motion.joint("G").displacement, fallen(scene)) < 10 * ROUNDING
 
 
 def test_slides_with_armature_of_a_batch_fall_by_their_own_gravity():
+    """The displacement is s = ½ m (g·a) / (m + I) t² with each scene's g."""
     scenes = [slide(gravity) for gravity in GRAVITIES for _ in range(2)]
     with ThreadPoolExecutor(1) as pool:
         found = dict(ensemble(scenes, TIMES, executor=pool))
