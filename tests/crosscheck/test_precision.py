@@ -49,6 +49,7 @@ def test_noise_of_velocities_in_single_precision_is_measured(bench):
 
 
 def test_quaternions_of_alternating_sign_are_no_noise(bench):
+    """q and -q are one orientation: samples may alternate between them. The noise is the exact run's."""
     signs = np.resize([1.0, -1.0], (len(bench.close.times), 1, 1))
     run = replace(bench.close, orientation=bench.close.orientation * signs)
     assert grain(bench.scene, run)[0] < 1e-14

@@ -33,7 +33,12 @@ def test_random_mechanisms_have_springs_of_both_kinds_and_odd_seeds_drivers_of_b
 
 
 def test_floating_mechanisms_have_no_joint_to_the_ground():
-    assert not any(GROUND in joint.bodies for joint in random_scenes.floating(3).joint)
+    """Each seed draws at least as many joints as bodies, of which some are at the ground without floating."""
+    for seed in range(5):
+        grounded, floating = random_scenes.random_mechanism(seed), random_scenes.floating(seed)
+        assert any(GROUND in joint.bodies for joint in grounded.joint)
+        assert len(floating.joint) == len(grounded.joint)
+        assert not any(GROUND in joint.bodies for joint in floating.joint)
 
 
 @pytest.mark.parametrize("seed", [1001, 1005])

@@ -137,7 +137,7 @@ def test_every_cell_of_the_paper_is_marked_in_a_table(blocks):
 
 
 def test_paper_section_without_studies_lacks_only_their_headings(records, blocks):
-    """The table of changed cells has the rows of the whole section, with shorter causes in its last column."""
+    """The rows of its table of changed cells are those of the whole section, except for their causes."""
     needed = runs.cases() | runs.timed()
     some = {label: record for label, record in records.items() if label in needed}
     found = paper.render(some, ILLUSTRATION)

@@ -43,7 +43,7 @@ COMMANDS = {
     ],
     "crosscheck": [
         ("list", "engines"),
-        ("run", "four_bar_gravity", "--engine", "mbref", "--method", "lm1", *SHORT),
+        ("run", "four_bar_gravity", "--engine", "mbref", "--method", "alf", *SHORT),
         ("compare", "four_bar_gravity", "--engine", "exudyn", "--samples", "3", "--duration", "0.01"),
         ("tune", "--help"),
         ("verify", "--help"),
@@ -159,7 +159,8 @@ def installed(built, tmp_path_factory) -> Installed:
     (folder / "runner.py").write_text(RUNNER)
     commands = [(program, *words) for program, rows in COMMANDS.items() for words in rows]
     (folder / "commands.json").write_text(json.dumps(commands))
-    variables = {**os.environ, "NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(environment / "cache")}
+    outside = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    variables = {**outside, "NUMBA_DISABLE_JIT": "1", "XDG_CACHE_HOME": str(environment / "cache")}
     python = [str(environment / "bin" / "python"), "-I", "runner.py"]
     done = subprocess.run(python, cwd=folder, env=variables, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
@@ -167,10 +168,9 @@ def installed(built, tmp_path_factory) -> Installed:
 
 
 @pytest.mark.slow
-def test_each_command_of_a_wheel_ends_without_traceback(installed):
-    """Status 1 is a finding, such as a wrong motion; status 2 would be a file that the wheel lacks."""
+def test_each_command_of_a_wheel_ends_with_status_0(installed):
     assert len(installed.ends) == sum(map(len, COMMANDS.values()))
-    assert not [end for end in installed.ends if end[2] not in (0, 1) or "Traceback" in end[3]]
+    assert not [end for end in installed.ends if end[2] != 0 or "Traceback" in end[3]]
     assert (installed.folder / "report" / "report.md").is_file()
 
 
