@@ -21,6 +21,8 @@ OPTIONS = {
     "close.urdf": ImportOptions(close=["fb=fc"]),
     "close_revolute.urdf": ImportOptions(close=["fb=fc:revolute:y"]),
     "close_unknown.urdf": ImportOptions(close=["fb=fd"]),
+    "gripper_2f.xml": ImportOptions(without=frozenset({"limits"})),  # they act at the start
+    "gripper_coupled_by_springs.xml": ImportOptions(without=frozenset({"motors"})),  # one acts on a tendon
     "hold_floating.urdf": ImportOptions(hold=["base"]),
 }
 REFUSED = {
