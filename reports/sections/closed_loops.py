@@ -30,12 +30,13 @@ BEST = (
     "be more accurate on redundant loops and near singular positions; "
     "`crosscheck tune ENGINE SCENE --error 1e-6` finds it."
 )
+FAMILIES = "Rows are families of settings."
 RUNS = "The best run of each family of settings, or the reason of a refusal."
 COMMANDS = "Commands of the best runs, from the root of the checkout:"
 DEFAULTS = "Solver parameters as the library has them, with a fine step."
-SEVERAL = {  # engines whose families of settings are solvers of their own: the caption, and a remark
+SEVERAL = {  # engines whose families of settings are solvers of their own: the summary, and a remark
     "newton": (
-        "Newton's solvers (families of settings of `newton`), each by its best run.",
+        "Newton's solvers, each by its best run",
         "On Bennett's linkage over 1 s a finer step does not help `lox`: a fifth of its steps do not "
         "converge, and it magnifies roundings of single precision a thousandfold (finding "
         "`newton-lox-finer-steps`).",
@@ -53,13 +54,13 @@ def overview(records: Sequence[Record]) -> list[Block]:
     """Return the legend and the tables of engines and mechanisms."""
     cells = matrix(records)
     missing = [name for name in engine_names() if name not in cells]
-    several = ((cells[name], *said) for name, said in SEVERAL.items() if name in cells)
+    several = (_by_family(name, cells[name], *said) for name, said in SEVERAL.items() if name in cells)
     return [
         Table("How to read a cell.", ("Sign", "Meaning"), list(LEGEND.items())),
         _map(cells, BEST, Cell.best),
         *([Text(f"Engines that were not measured: {', '.join(missing)}.")] if missing else []),
         _map(cells, DEFAULTS, Cell.defaults, only_runs=True),
-        *(block for row, caption, remark in several for block in (_by_family(row, caption), Text(remark))),
+        *several,
     ]
 
 
@@ -89,13 +90,14 @@ def _map(
     return HeatMap(caption, "engine", [column.heading for column in DIFFICULTIES], rows)
 
 
-def _by_family(row: Mapping[str, Cell], caption: str) -> HeatMap:
-    """Return a table of an engine's families of settings, each by its best run."""
+def _by_family(name: str, row: Mapping[str, Cell], summary: str, remark: str) -> Fold:
+    """Return the folded table of an engine's families of settings, each by its best run."""
     rows = {
         family: [_shown(cell, _of(cell, family)) for cell in row.values()]
         for family in dict.fromkeys(name for cell in row.values() for name in cell.families())
     }
-    return HeatMap(caption, "family", [column.heading for column in DIFFICULTIES], rows)
+    found = HeatMap(FAMILIES, "family", [column.heading for column in DIFFICULTIES], rows)
+    return Fold(summary, f"{_place(name)}-solvers", [found, Text(remark)])
 
 
 def _of(cell: Cell, family: str) -> Record | None:
