@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from crosscheck.engine import Setting
 from crosscheck.processes.answer import MalformedAnswer, well_formed
 from crosscheck.study.grid import Case, study
+from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Body, Scene
 from tests.helpers.fake_engines import DAMAGES, FAKE, FAKES, MALFORMED, SCALARS
 
@@ -53,6 +55,11 @@ def test_a_failed_run_may_answer_with_the_first_samples_alone():
     """Two of the three requested times; a completed run with two is malformed (``few samples``)."""
     good = FAKE.run(SCENE, TIMES[:2], Setting("a", {"outcome": "STEP_FAILED"}))
     assert well_formed(good, SCENE, TIMES).times.tolist() == [0.0, 0.1]
+
+
+def test_a_completed_run_shorter_than_a_tick_of_the_clock_is_an_answer():
+    good = FAKE.run(SCENE, TIMES, Setting("a"))
+    assert well_formed(replace(good, cost=Cost(seconds=0.0)), SCENE, TIMES).outcome is Outcome.COMPLETED
 
 
 def test_numbers_of_numpy_in_an_answer_become_floats_and_ints():

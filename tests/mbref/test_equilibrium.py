@@ -11,21 +11,9 @@ from scipy.optimize import brentq
 
 from mbref import Scene, SceneError, equilibria, find_scene, motion_of_mode
 from mbref.cli.commands import main
+from tests.helpers.statics import DOWN, ORIGIN, G, hinge, pendulum, rod
 
-MASS, INERTIA, ARM, G = 2.0, 0.3, 0.7, 9.81
-GRAVITY = (0.0, -G, 0.0)
-
-
-def pendulum(gravity=GRAVITY, load=()) -> Scene:
-    rod = {"name": "rod", "mass": MASS, "inertia": [INERTIA] * 3, "position": [ARM, 0.0, 0.0]}
-    hinge = {
-        "name": "A",
-        "type": "revolute",
-        "bodies": ["ground", "rod"],
-        "anchor": [0.0] * 3,
-        "axis": [0.0, 0.0, 1.0],
-    }
-    return Scene(name="pendulum", gravity=gravity, body=[rod], joint=[hinge], load=load)
+MASS, INERTIA, ARM = 2.0, 0.3, 0.7  # of the pendulum
 
 
 def by_sign(eigenvalues):
@@ -47,8 +35,8 @@ def test_a_pendulum_is_stable_below_and_unstable_above_its_hinge():
 def test_armature_lowers_the_frequency_of_a_pendulum():
     """s² = -m g l / (J + m l² + I) with an armature I."""
     scene = pendulum()
-    hinge = scene.joint[0].model_copy(update={"armature": 0.5})
-    [below] = [e for e in equilibria(scene.with_(joint=[hinge]), starts=6) if e.stability == "stable"]
+    joint = scene.joint[0].model_copy(update={"armature": 0.5})
+    [below] = [e for e in equilibria(scene.with_(joint=[joint]), starts=6) if e.stability == "stable"]
     square = MASS * G * ARM / (INERTIA + MASS * ARM**2 + 0.5)
     assert np.allclose(below.eigenvalues**2, -square, rtol=1e-11)
 
@@ -56,7 +44,7 @@ def test_armature_lowers_the_frequency_of_a_pendulum():
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     """J s² + c s + k = 0 about the natural angle; the scene of the equilibrium has the natural angle 0."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}
-    [each] = equilibria(pendulum((0.0, 0.0, 0.0), [spring]), starts=1)
+    [each] = equilibria(pendulum(gravity=ORIGIN, load=[spring]), starts=1)
     roots = np.roots([INERTIA + MASS * ARM**2, 3.0, 40.0])
     assert np.allclose(by_sign(each.eigenvalues), by_sign(roots), rtol=1e-11)
     assert np.allclose(
@@ -70,17 +58,9 @@ def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
 
 def test_hanging_double_pendulum_has_the_frequencies_of_its_matrices():
     """M = m l² [[4/3, 1/2], [1/2, 1/3]] and K = m g l diag(3/2, 1/2) of two equal slender rods."""
-    rod = {"mass": 1.0, "inertia": [1e-5, 1 / 12, 1 / 12]}
-    bodies = [
-        {**rod, "name": "upper", "position": [0.5, 0.0, 0.0]},
-        {**rod, "name": "lower", "position": [1.5, 0.0, 0.0]},
-    ]
-    hinge = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
-    joints = [
-        {**hinge, "name": "A", "bodies": ["ground", "upper"], "anchor": [0.0] * 3},
-        {**hinge, "name": "B", "bodies": ["upper", "lower"], "anchor": [1.0, 0.0, 0.0]},
-    ]
-    scene = Scene(name="double", gravity=GRAVITY, body=bodies, joint=joints)
+    bodies = [rod("upper", (0.5, 0.0, 0.0), 1.0, 1 / 12), rod("lower", (1.5, 0.0, 0.0), 1.0, 1 / 12)]
+    joints = [hinge("A", ("ground", "upper")), hinge("B", ("upper", "lower"), (1.0, 0.0, 0.0))]
+    scene = Scene(name="double", gravity=DOWN, body=bodies, joint=joints)
     found = equilibria(scene, starts=8)
     [hanging] = [each for each in found if each.stability == "stable"]
     squares = eigvalsh(G * np.diag([1.5, 0.5]), np.array([[4 / 3, 1 / 2], [1 / 2, 1 / 3]]))
@@ -95,13 +75,7 @@ def test_parallelogram_with_a_diagonal_spring_has_the_frequency_of_its_energy():
     links, length = [body.mass for body in scene.body], 0.5
     stiffness, natural = 60.0, 0.4
     ends = [[0.0, 0.0, 0.0], list(scene.joint_named("C").anchor_pair[0])]
-    spring = {
-        "type": "spring",
-        "bodies": ["ground", "coupler"],
-        "points": ends,
-        "stiffness": stiffness,
-        "natural_length": natural,
-    }
+    spring = {"type": "spring", "bodies": ["ground", "coupler"], "points": ends, "stiffness": stiffness}
     weight = G * length * (links[0] / 2 + links[1] + links[2] / 2)
     moment = (
         sum(b.inertia[2] + b.mass * length**2 / 4 for b in (scene.body[0], scene.body[2]))
@@ -117,7 +91,7 @@ def test_parallelogram_with_a_diagonal_spring_has_the_frequency_of_its_energy():
         d, first, _ = stretched(angle)
         return weight * np.cos(angle) + stiffness * (d - natural) * first
 
-    found = equilibria(scene.with_(load=[spring]))
+    found = equilibria(scene.with_(load=[spring | {"natural_length": natural}]))
     angles = [np.arctan2(*np.array(each.scene.body[0].position)[[1, 0]]) for each in found]
     assert {"stable", "unstable"} <= {each.stability for each in found}
     for each, angle in zip(found, angles, strict=True):
@@ -129,7 +103,7 @@ def test_parallelogram_with_a_diagonal_spring_has_the_frequency_of_its_energy():
 
 
 def test_pendulum_without_gravity_is_indifferent():
-    [each] = equilibria(pendulum((0.0, 0.0, 0.0)), starts=4)
+    [each] = equilibria(pendulum(gravity=ORIGIN), starts=4)
     assert each.stability == "indifferent" and len(each.frequencies) == 0
 
 

@@ -10,6 +10,7 @@ from mbref import find_scene, simulate
 from mbref.cli import main
 from mbref.equations.model import Model
 from mbref.input_error import InputError
+from mbref.linear_algebra.symbolic_factorisation import symbolic_factorisation
 from mbref.scene import Body, Revolute, Scene
 
 HUGE = "9" * 20
@@ -44,14 +45,9 @@ def test_chain_of_too_many_loops_is_refused(program, words, chain, tmp_path, mon
 @pytest.mark.parametrize(
     ("command", "option"),
     [
-        ("run", "--samples"),
-        ("plot", "--samples"),
-        ("animate", "--samples"),
-        ("equilibrium", "--starts"),
-        ("modes", "--starts"),
-        ("ensemble", "--count"),
-        ("ensemble", "--workers"),
-        ("ensemble", "--seed"),
+        *[(command, "--samples") for command in ("run", "plot", "animate")],
+        *[(command, "--starts") for command in ("equilibrium", "modes")],
+        *[("ensemble", option) for option in ("--count", "--workers", "--seed")],
     ],
 )
 @pytest.mark.parametrize("number", [HUGE, "9" * 5000, "-1", "1.5"])
@@ -83,6 +79,13 @@ def test_full_matrix_beyond_the_memory_of_the_machine_is_refused_with_its_size()
     one = np.zeros(structure.entry_columns.shape)
     with pytest.raises(InputError, match=r"a full matrix of 19 constraint rows and 18 columns takes .* GB"):
         structure.dense(np.broadcast_to(one, (10**9, *one.shape)))
+
+
+def test_factorisation_of_500_rows_on_one_coordinate_is_refused_before_its_updates_take_2_gigabytes():
+    """Each row depends on each: n (n² - 1) / 6 updates, of which a scene may have 20 million."""
+    row, column = np.arange(500), np.zeros(500, dtype=int)
+    with pytest.raises(InputError, match=r"500 constraint rows share bodies.* has 20833250 updates"):
+        symbolic_factorisation(row, column, row, np.ones(1, dtype=bool))
 
 
 @pytest.mark.slow

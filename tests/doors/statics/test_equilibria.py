@@ -92,6 +92,19 @@ def test_both_equilibria_of_a_pendulum_are_found_beside_springs_of_any_stiffness
     assert np.allclose(slow, np.sqrt(TORQUE / ABOUT_HINGE), rtol=1e-9)
 
 
+@pytest.mark.parametrize("stiffness", [1e4, 1e7])
+def test_two_rods_that_a_spring_of_any_stiffness_straightens_are_found_hanging(stiffness):
+    """The search begins 1 rad from there. A long step bends the spring slightly; if the spring is stiff, the
+    accelerations are then far above gravity, but displacements show that the pose is nearer."""
+    x, y = np.sin(1.0), -np.cos(1.0)
+    bodies = [rod("upper", (x / 2, y / 2, 0.0)), rod("lower", (1.5 * x, 1.5 * y, 0.0))]
+    joints = [hinge("E", ("ground", "upper")), hinge("A", ("upper", "lower"), (x, y, 0.0))]
+    scene = Scene(name="rods", gravity=DOWN, body=bodies, joint=joints, load=[spring(stiffness)])
+    [found] = equilibria(scene, starts=1)
+    assert found.stability == "stable"
+    assert np.allclose(found.scene.body[1].position, (0.0, -1.5, 0.0), atol=1e-9)
+
+
 def test_pendulum_without_spring_has_two_equilibria_whatever_turns_lead_to_them():
     """A hinge without spring that has made a full turn has its old pose; starts reach it both ways."""
     for angle in (0.3, 2.0):
