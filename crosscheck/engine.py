@@ -72,6 +72,9 @@ class Engine(ABC):
         Families whose integrator or extrapolation belongs to crosscheck.
     with_default : collection of str
         Options that a setting may leave out.
+    defaults_of : collection of str
+        Places of default values in the library, which `crosscheck versions` compares: an object or a part of
+        it, such as ``mujoco.MjSpec().option``, or a function with a signature, such as ``module.function``.
     compile_seconds : float
         CPU time, s, by which the time limit of a run is extended, for an engine that compiles code for each
         model within its runs.
@@ -86,6 +89,7 @@ class Engine(ABC):
     integrated_here: Collection[str] = ()
     options: Mapping[str, str] = {}
     with_default: Collection[str] = ()
+    defaults_of: Collection[str] = ()
     compile_seconds: float = 0.0
 
     def version(self) -> str:

@@ -143,6 +143,12 @@ def _diff(arguments: argparse.Namespace) -> int:
     return OTHERWISE if show(console(), arguments.old, arguments.new, arguments.all) else COMPLETED
 
 
+def _versions(arguments: argparse.Namespace) -> int:
+    from crosscheck.cli.versions import versions
+
+    return versions(arguments)
+
+
 COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "list": _list,
     "run": _run,
@@ -156,6 +162,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "report": _report,
     "paper": _paper,
     "diff": _diff,
+    "versions": _versions,
     "certify": certify,
     "judge": judge,
     "reference": write_reference,

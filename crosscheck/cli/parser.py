@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from textwrap import fill
 
+from crosscheck.cli.commands_of_engines import add_diff, add_findings, add_versions
 from crosscheck.cli.commands_of_motions import Commands, add_certify, add_command, add_judge, add_reference
 from crosscheck.cli.listing import TABLES
 from crosscheck.cli.options import (
@@ -42,7 +43,7 @@ EXIT = (
     "`run` gives 1 where a run did not complete; `compare` and `report` give 0 although engines fail, since "
     "failures of engines are results, and `compare` 1 where two engines simulate different "
     "mechanisms. `tune` gives 1 where no setting reaches the error, `verify` where a check fails "
-    "or no scene was run, `diff` where two sets of records differ by more than noise."
+    "or no scene was run, `diff` and `versions` where something differs by more than noise."
 )
 
 
@@ -63,13 +64,14 @@ def parser() -> argparse.ArgumentParser:
         _add_compare,
         _add_tune,
         _add_verify,
-        _add_findings,
+        add_findings,
         _add_closed_loops,
         _add_convergence,
         _add_modes,
         _add_report,
         _add_paper,
-        _add_diff,
+        add_diff,
+        add_versions,
         add_certify,
         add_judge,
         add_reference,
@@ -167,15 +169,6 @@ def _add_verify(commands: Commands) -> None:
     add_limits(parser)
 
 
-def _add_findings(commands: Commands) -> None:
-    about = "violations found in engines, each with a proof; --recheck asks the installed versions"
-    parser = add_command(commands, "findings", about, "crosscheck findings --recheck")
-    parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
-    parser.add_argument(
-        "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
-    )
-
-
 def _add_closed_loops(commands: Commands) -> None:
     about = (
         "show engines on closed-loop mechanisms, each hard in one way, from stored records; "
@@ -257,12 +250,3 @@ def _add_paper(commands: Commands) -> None:
         help="quick: the tables and figures; whole: also the sweeps of settings and every pair of methods",
     )
     add_folder(parser, "paper")
-
-
-def _add_diff(commands: Commands) -> None:
-    example = "crosscheck diff report-before report-after"
-    about = "list what changed beyond noise between two sets of records: versions, settings or machines"
-    parser = add_command(commands, "diff", about, example)
-    parser.add_argument("old", metavar="OLD", help="a records.jsonl, or the folder of a report")
-    parser.add_argument("new", metavar="NEW", help="the same")
-    parser.add_argument("--all", action="store_true", help="also list the runs that did not change")

@@ -89,6 +89,21 @@ def counted(what: str, total: int) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
+def narrated(what: str, total: int) -> Iterator[tuple[Callable[[str], None], Callable[[str], None]]]:
+    """Show progress from 0 to ``total``; yields a function that shows a sentence on the running work, and one
+    that advances by one and names the finished part."""
+    with _display(what, total) as (show, _):
+        done = 0
+
+        def advance(last: str) -> None:
+            nonlocal done
+            done += 1
+            show(done, max(done, total), last)
+
+        yield lambda text: show(done, max(done, total), text), advance
+
+
+@contextmanager
 def shown(what: str, total: int) -> Iterator[Shown]:
     """Show progress from 0 to ``total`` within a ``with`` block; yields the ``progress`` callback of
     ``study``.

@@ -17,6 +17,7 @@ PUBLIC = (
     "version",
     "method",
     "settings",
+    "asked",
     "outcome",
     "message",
     "t_end",

@@ -54,6 +54,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["convergence"],
         ["small_motions"],
         ["paper"],
+        ["versions"],
         ["cli"],
         ["__main__"],
     ),

@@ -32,6 +32,12 @@ from crosscheck.engines.shared.sampling import run_through
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 
+# parts of a new model that have defaults; reading a name of a default class ends the process
+DEFAULTS = (
+    *("option", "compiler", "default.equality.solref", "default.equality.solimp"),
+    *(f"default.joint.{name}" for name in ("armature", "damping", "stiffness", "frictionloss")),
+    *(f"default.joint.{name}" for name in ("solref_limit", "solimp_limit")),
+)
 SCOUT_SAMPLES = 41  # number of samples of the coarse run that measures the scene's fastest rate
 
 
@@ -43,6 +49,7 @@ class MuJoCo(linearised.Linearised, Engine):
     supports = SUPPORTS
     families, options = FAMILIES | original.FAMILIES, OPTIONS | original.OPTIONS
     integrated_here = INTEGRATED_HERE
+    defaults_of = tuple(f"mujoco.MjSpec().{part}" for part in DEFAULTS)
 
     def version(self) -> str:
         """Version of MuJoCo; raises ImportError when it is not installed."""

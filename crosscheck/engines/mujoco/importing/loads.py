@@ -93,10 +93,11 @@ def _unknown(model: Any, j: int, stiff: bool, damped: bool) -> Iterator[Part]:
 
 def _plastic(model: Any) -> Iterator[Part]:
     """Return the springs that yield, without their stiffness in the model."""
-    for k in np.flatnonzero(model.jnt_springyield):
+    joints, tendons = (getattr(model, f"{part}_springyield", ()) for part in ("jnt", "tendon"))  # since 4.0
+    for k in np.flatnonzero(joints):
         yield Part("springs", f"plastic spring of joint {joint_name(model, int(k))}")
         model.jnt_stiffness[k] = 0
-    for k in np.flatnonzero(model.tendon_springyield):
+    for k in np.flatnonzero(tendons):
         yield Part("springs", f"plastic spring of tendon {model.tendon(int(k)).name!r}")
         model.tendon_stiffness[k] = 0
 

@@ -1,0 +1,60 @@
+"""Parsers of the commands for defects and versions of engines: findings, diff and versions."""
+
+from __future__ import annotations
+
+from crosscheck.cli.commands_of_motions import Commands, add_command
+from crosscheck.cli.options import MOST_MECHANISMS, add_duration, add_limits, add_reading
+from mbref.command_line import whole
+
+
+def add_findings(commands: Commands) -> None:
+    """Add the parser of `crosscheck findings`."""
+    about = "violations found in engines, each with a proof; --recheck asks the installed versions"
+    parser = add_command(commands, "findings", about, "crosscheck findings --recheck")
+    parser.add_argument("name", nargs="*", metavar="NAME", help="a finding; default: all")
+    parser.add_argument(
+        "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
+    )
+
+
+def add_diff(commands: Commands) -> None:
+    """Add the parser of `crosscheck diff`."""
+    example = "crosscheck diff report-before report-after"
+    about = "list what changed beyond noise between two sets of records: versions, settings or machines"
+    parser = add_command(commands, "diff", about, example)
+    parser.add_argument("old", metavar="OLD", help="a records.jsonl, or the folder of a report")
+    parser.add_argument("new", metavar="NEW", help="the same")
+    parser.add_argument("--all", action="store_true", help="also list the runs that did not change")
+
+
+def add_versions(commands: Commands) -> None:
+    """Add the parser of `crosscheck versions`."""
+    example = (
+        "crosscheck versions mujoco==3.17.0 mujoco==4.0.0 robot.xml\n"
+        "  crosscheck versions mujoco robot.xml --bisect 3.13.0..4.0.0"
+    )
+    about = (
+        "show what changes beyond noise from one version of an engine's package to another, on your "
+        "mechanism or on the conformance suite: outcomes, accelerations at the start, motions, errors, cost, "
+        "default values of options, and names that the adapter misses. pip installs each version, with "
+        "your settings of indexes, into an environment in the cache folder; nothing else changes. Exit "
+        "status: 0 if nothing changes, 1 if something does, 2 if a version cannot be installed or run"
+    )
+    parser = add_command(commands, "versions", about, example)
+    about = (
+        "two versions PACKAGE==VERSION, or with --bisect a PACKAGE; then scenes: built-in names, .toml, "
+        "MJCF, URDF or SDF files; default: the conformance suite"
+    )
+    parser.add_argument("what", nargs="+", metavar="WHAT", help=about)
+    about = "find the released version whose results differ from the results of OLD"
+    parser.add_argument("--bisect", metavar="OLD..NEW", help=about)
+    parser.add_argument("--suite", action="store_true", help="also run the conformance suite")
+    about = f"also make the checks on N random mechanisms (1 to {MOST_MECHANISMS})"
+    parser.add_argument("--mechanisms", type=whole(1, MOST_MECHANISMS), metavar="N", help=about)
+    about = "the engine, or module:attribute in the package; needed where the package is not a known engine's"
+    parser.add_argument("--engine", metavar="E", help=about)
+    about = "a family of settings; may repeat; default: a few"
+    parser.add_argument("--setting", action="append", metavar="FAMILY", help=about)
+    add_duration(parser)
+    add_limits(parser)
+    add_reading(parser)

@@ -1,0 +1,128 @@
+"""Environments of one version of a package each, in the user's cache folder, and the versions that exist.
+
+An environment is a venv. pip installs the package there, with the user's own settings of package indexes, and
+with the versions of crosscheck's own dependencies that are installed here. crosscheck itself is on its path.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import venv
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+from typing import NamedTuple
+
+from crosscheck.engines.shared.file_cache import cache, hashed
+
+PRODUCT = Path(__file__).parents[2]
+REQUIREMENT = re.compile(r"([A-Za-z0-9][A-Za-z0-9._-]*)==([A-Za-z0-9][A-Za-z0-9.+!_-]*)")
+NAME = re.compile(r"[A-Za-z0-9._-]+")
+RETRIES = 1  # of pip's connections: without a network each one takes seconds
+UNREACHED = ("Retrying (", "ConnectionError", "NewConnectionError", "name resolution")  # words of pip
+REASONS = 3  # largest number of pip's lines in a message
+
+
+class NotInstalled(Exception):
+    """A version that cannot be installed, or a package without versions; the message says the cause."""
+
+
+class Requirement(NamedTuple):
+    """One version of a package."""
+
+    package: str
+    version: str
+
+    def __str__(self) -> str:
+        return f"{self.package}=={self.version}"
+
+
+def requirement(text: str) -> Requirement:
+    """Parse PACKAGE==VERSION; raises ValueError."""
+    if not (found := REQUIREMENT.fullmatch(text)):
+        raise ValueError(f"must be PACKAGE==VERSION, such as mujoco==4.0.0, got {text!r}")
+    return Requirement(found[1], found[2])
+
+
+def environment(wanted: Requirement) -> Path:
+    """Return the Python interpreter of the environment of a version, which is made if it is missing.
+
+    Raises NotInstalled.
+    """
+    pins = _pins()
+    origin = hashed(sys.prefix, sys.version, str(PRODUCT), *pins)
+    place = cache("versions") / f"{wanted.package}-{wanted.version}-{origin[:8]}"
+    if not place.exists():
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=place.parent, prefix="making-") as made:
+            _fill(Path(made) / "venv", wanted, pins)
+            if not place.exists():  # another process may have made it meanwhile
+                (Path(made) / "venv").rename(place)
+    return _python(place)
+
+
+def _python(place: Path) -> Path:
+    return place / "bin" / "python"
+
+
+def _fill(place: Path, wanted: Requirement, pins: Sequence[str]) -> None:
+    """Make a venv with the package. The packages of this environment follow its own on the path."""
+    venv.create(place, symlinks=True)
+    if (own := Path(sys.prefix) / "pip.conf").exists():
+        shutil.copy(own, place)  # pip's settings of this environment
+    constraints = place / "constraints.txt"
+    constraints.write_text("\n".join(pins))
+    _pip("--python", _python(place), "install", "--quiet", "--constraint", constraints, str(wanted))
+    (packages,) = place.glob("lib/python*/site-packages")
+    # .pth files are read in the order of their names: packages' own ones come first
+    (packages / "zz_crosscheck.pth").write_text("\n".join([str(PRODUCT), *filter(None, sys.path)]))
+
+
+def _pins() -> list[str]:
+    """Return requirements with the installed versions of the packages that crosscheck needs."""
+    needed = [text for text in metadata.requires("mbref") or () if ";" not in text]
+    names = [match[0] for text in needed if (match := NAME.match(text))]
+    return [f"{name}=={metadata.version(name)}" for name in names]
+
+
+def released(package: str) -> list[str]:
+    """Return the versions of a package that pip finds for this Python, the oldest first; raises
+    NotInstalled."""
+    printed = _pip("index", "versions", package)
+    found = re.search(r"^Available versions: (.*)$", printed, re.M)
+    if not found:
+        raise NotInstalled(f"{package}: pip lists no versions: {printed.strip()}")
+    return found[1].split(", ")[::-1]
+
+
+def _pip(*words: str | Path) -> str:
+    """Return the text that pip prints; raises NotInstalled with the cause of a failure."""
+    fixed = ("--disable-pip-version-check", "--no-input", f"--retries={RETRIES}")
+    command = [sys.executable, "-m", "pip", *fixed, *map(str, words)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    if done.returncode:
+        raise NotInstalled(f"{words[-1]}: {_cause(done.stderr)}")
+    return done.stdout
+
+
+def _cause(said: str) -> str:
+    """Return the cause of a failure of pip in a sentence."""
+    lines = [line.partition("ERROR: ")[2] for line in said.splitlines() if line.startswith("ERROR: ")]
+    if "No module named pip" in said:
+        return f"pip is missing in this environment: {sys.executable} -m ensurepip"
+    if any(words in said for words in UNREACHED):
+        return "no package index can be reached; `pip config list` shows where pip looks"
+    if known := re.search(r"\(from versions: (.*)\)", said):
+        if known[1] == "none":
+            return "no package index has a package of this name"
+        return f"there is no such version; known: {known[1]}"
+    if "No matching distribution found" in said:
+        return "no package index has a package of this name"
+    if "conflicting dependencies" in said:
+        conflict = re.findall(r"^    (.*)$", said, re.M)
+        return f"it does not install beside crosscheck's own packages: {'; '.join(conflict[:REASONS])}"
+    return f"pip does not install it: {'; '.join(lines[:REASONS]) or said.strip()[-300:]}"

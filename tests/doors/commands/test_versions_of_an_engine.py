@@ -1,0 +1,134 @@
+"""Two versions of an engine's package: changes beyond noise, the release that made them, and refusals."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from crosscheck.cli.commands import main
+from crosscheck.engine import Setting
+from crosscheck.versions.bisection import bisected
+from crosscheck.versions.differences import Found, between
+from crosscheck.versions.environment import NotInstalled, Requirement
+from crosscheck.versions.library import defaults_of, used_names
+from crosscheck.versions.measured import Measured
+from mbref.scene import Body, Scene
+from tests.helpers.wheels import ENGINE, PACKAGE, SOURCE, write_wheel
+
+STONE = Scene(
+    name="stone",
+    gravity=(0.0, 0.0, -9.81),
+    duration=0.2,
+    body=(Body(name="stone", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 1.0, 2.0)),),
+)
+
+
+def versions(folder: Path, *words: str) -> tuple[int, Any, str]:
+    """Return exit status, JSON and messages of the command, which knows the wheels of the folder alone."""
+    own = {"PIP_CONFIG_FILE": os.devnull, "PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(folder)}
+    command = [sys.executable, "-m", "crosscheck", "versions", *words, "--engine", ENGINE, "--json"]
+    places = os.environ | own | {"XDG_CACHE_HOME": str(folder / "cache")}
+    done = subprocess.run(command, env=places, capture_output=True, text=True, check=False)
+    return done.returncode, json.loads(done.stdout or "null"), done.stderr
+
+
+def measured(version: str, factor: float = 1.0, seconds: float = 1.0, card: str = "pass") -> Measured:
+    """Return what a version does on the stone, and one verdict of the suite."""
+    there: dict[str, Any] = {}
+    exec(SOURCE.format(factor=factor, step=0.1, more=""), there)
+    there["Falling"].version = lambda self: version
+    setting = Setting("plain", {"step": 1e-3})
+    run = there["ENGINE"].run(STONE, np.linspace(0.0, 0.2, 3), setting).to_record()
+    run |= {"asked": {"options": setting.options}, "metrics": {}, "cost": {"seconds": seconds}}
+    verdict = {"scene": "pendulum", "card": "energy/1", "status": card, "measured": 0.1, "reason": ""}
+    suite = {"verdicts": [verdict | {"allowed": 1.0}]}
+    documents = [{"scene": "stone", "records": [run]}, suite]
+    return Measured(Requirement(PACKAGE, version), {}, documents, [])
+
+
+@pytest.mark.parametrize(
+    ("changed", "kinds"),
+    [
+        ({}, []),
+        ({"factor": 1.0 + 1e-9, "seconds": 1.5}, []),  # noise
+        ({"factor": 1.5}, [("accelerations", "at the start by 0.33 of the largest; error 0 → 0.5")]),
+        ({"seconds": 3.0}, [("cost", "time 1.00e+00 s → 3.00e+00 s")]),
+        ({"card": "fail"}, [("check", "pass → fail (0.1 → 0.1)")]),
+    ],
+)
+def test_changes_beyond_noise_are_named_by_kind(changed: dict[str, Any], kinds: list[tuple[str, str]]):
+    found = between(measured("1.0"), measured("1.1", **changed), [STONE])
+    assert [(one.kind, one.change) for one in found] == kinds
+
+
+def test_bisection_finds_the_change_past_versions_that_cannot_be_installed():
+    known = [f"1.{k}" for k in range(20)]
+
+    def measure(version: str) -> Measured:
+        if version in ("1.9", "1.10"):
+            raise NotInstalled(version)
+        return measured(version, factor=2.0 if known.index(version) >= 13 else 1.0)
+
+    def changes(old: Measured, new: Measured) -> list[Found]:
+        return between(old, new, [STONE])
+
+    found = bisected(known, measure, changes)
+    assert (found.old, found.new) == ("1.12", "1.13") and set(found.skipped) <= {"1.9", "1.10"}
+    assert found.made <= 8 and bisected(known[:5], measure, changes).new is None
+
+
+@pytest.mark.slow
+def test_changed_gravity_default_and_lost_function_are_found_and_the_release_is_named(tmp_path: Path):
+    STONE.save(tmp_path / "stone.toml")
+    stone = str(tmp_path / "stone.toml")
+    write_wheel(tmp_path, "1.0")
+    write_wheel(tmp_path, "1.1", step=0.2)
+    write_wheel(tmp_path, "1.2", factor=1.5, step=0.2)
+    write_wheel(tmp_path, "1.3", factor=1.5, step=0.2, more="")
+    status, found, said = versions(tmp_path, f"{PACKAGE}==1.0", f"{PACKAGE}==1.3", stone)
+    assert status == 1, said
+    kinds = {change["kind"]: change for change in found["changes"] if change["kind"] != "cost"}
+    assert set(kinds) == {"accelerations", "error", "default", "API"}
+    assert kinds["accelerations"]["change"].endswith("error 0 → 0.5")
+    assert kinds["API"]["place"] == "falling_engine.fall"
+    assert kinds["default"]["change"] == "0.1 → 0.2"
+    status, found, said = versions(tmp_path, PACKAGE, stone, "--bisect", "1.0..1.3")
+    assert status == 1 and (found["old"], found["new"]) == ("1.1", "1.2"), said
+    status, found, said = versions(tmp_path, f"{PACKAGE}==1.0", f"{PACKAGE}==1.4", stone)
+    assert status == 2 and "there is no such version; known: 1.0, 1.1, 1.2, 1.3" in said
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["mujoco"], "must be PACKAGE==VERSION, such as mujoco==4.0.0, got 'mujoco'"),
+        (["mujoco==3.0.0"], "two versions are needed, such as mujoco==3.0.0 mujoco==VERSION"),
+        (["numpy==2.0", "numpy==2.1"], "numpy: not the package of one engine; add --engine E"),
+        (["mujoco==3.0.0", "pin==3.0"], "mujoco and pin: not the package of one engine"),
+        (["mujoco", "--bisect", "4.0.0"], "--bisect: must be OLD..NEW, such as 3.13.0..4.0.0, got '4.0.0'"),
+        (["a==1", "a==2", "--engine", "mujco"], "did you mean 'mujoco'?"),
+    ],
+)
+def test_faulty_requests_are_refused_before_anything_is_installed(
+    words: list[str], says: str, capsys: pytest.CaptureFixture[str]
+):
+    assert main(["versions", *words]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_names_of_a_library_in_an_adapter_are_found_under_their_aliases():
+    source = "import one.two as t\nfrom three import four\nimport json\nt.a.b(json.x)\nfour().c\nself.t.d\n"
+    assert set(used_names(source)) == {"one.two", "three.four", "one.two.a", "one.two.a.b"}
+
+
+def test_defaults_of_signatures_and_objects_are_read_and_missing_ones_named():
+    assert dict(defaults_of("json.dumps"))["json.dumps(skipkeys)"] is False
+    assert dict(defaults_of("decimal.Context().prec")) == {"decimal.Context().prec": 28}
+    assert dict(defaults_of("json.nothing")) == {"json.nothing": "missing"}
