@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from crosscheck.cli.comparison import Comparison
+from reports.pages.which_engine import FOLDERS, judged
 from reports.stored import groups
-from reports.which_engine import FOLDERS, judged
 
 PAGE = Path(__file__).parents[2] / "docs" / "compare.md"
 HEADINGS = re.compile(
