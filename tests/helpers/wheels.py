@@ -6,7 +6,7 @@ import zipfile
 from pathlib import Path
 
 PACKAGE, ENGINE = "falling-engine", "falling_engine:ENGINE"
-SOURCE = '''
+SOURCE = """
 import numpy as np
 
 from crosscheck.engine import Engine, Setting, Trajectory
@@ -46,7 +46,7 @@ class Falling(Engine):
 
 
 ENGINE = Falling()
-'''
+"""
 FALL = "def fall():\n    pass"
 
 
