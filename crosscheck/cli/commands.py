@@ -8,11 +8,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 from crosscheck.cli import listing, request, tables
 from crosscheck.cli.certifying import certify
-from crosscheck.cli.closed_loops import closed_loops
 from crosscheck.cli.comparing import compare, tune
-from crosscheck.cli.convergence import convergence
 from crosscheck.cli.judging import judge, write_reference
-from crosscheck.cli.modes import modes
 from crosscheck.cli.parser import parser
 from crosscheck.cli.rendering import rendered
 from crosscheck.cli.request import RequestError
@@ -28,6 +25,7 @@ from crosscheck.cli.running import (
     standard_output_kept,
     studied,
 )
+from crosscheck.cli.stored_tables import closed_loops, convergence, modes
 from crosscheck.study.grid import Record, key
 from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted

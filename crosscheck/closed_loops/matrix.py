@@ -7,7 +7,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
-from crosscheck.closed_loops.records import REFUSED
 from crosscheck.engine import Owner, engine_names
 from crosscheck.engines.shared.terms import FAMILY as TERMS
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
@@ -16,6 +15,7 @@ from crosscheck.study.grades import DEFAULTS, Grade, grade
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import ended, error, error_bound
 from crosscheck.study.search.least_errors import rank
+from crosscheck.study.store import REFUSED
 from mbref.motions.trajectory import Outcome
 
 SIGNS = {Grade.RIGHT: "✓", Grade.INACCURATE: "≈", Grade.WRONG: "✗", Grade.FAILED: "!", Grade.UNJUDGED: "?"}

@@ -2,43 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, Difficulty
-from crosscheck.engine import engine
 from crosscheck.study.grid import Case, Record, key, study
-from crosscheck.study.origin import made_by
 from crosscheck.study.search.offers import Unable, default_cases
-from crosscheck.study.store import read_runs
+from crosscheck.study.store import REFUSED, read_runs, refusal, short
 from mbref.motions.trajectory import Outcome
 from mbref.records import rewrite
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
 SAMPLES = 21
 TIME_LIMIT = 60.0  # s of CPU time of a run, so that all runs of the table take an hour
-REFUSED = "REFUSED"  # outcome of a record without a run
-KEPT = (
-    "key",
-    "scene",
-    "engine",
-    "version",
-    "family",
-    "settings",
-    "asked",
-    "time_limit",
-    "outcome",
-    "message",
-    "t_end",
-    "metrics",
-    "cost",
-    "commit",
-    "date",
-)
-METRICS = ("error", "error_bound", "violation_position")
 
 
 def cases(
@@ -86,38 +64,17 @@ def measure(
     progress: Callable[[int, int, Record], None] | None = None,
 ) -> None:
     """Run the cases that the file lacks, and store each record as its run ends."""
-    for refusal in unable:
-        _store(_refused(refusal), path)
+    for found in unable:
+        name = f"{found.engine} refuses {found.scene.name}"
+        _store(refusal(name, found.scene.name, found.engine, found.cannot), path)
     known = {record["key"] for record in read_runs(path)}
 
     def store(done: int, total: int, record: Record) -> None:
-        _store(kept(record), path)
+        _store(short(record), path)
         if progress:
             progress(done, total, record)
 
     study([case for case in wanted if key(case) not in known], progress=store)
-
-
-def kept(record: Record) -> Record:
-    """Return a study's record without the motion."""
-    found = {name: record[name] for name in KEPT}
-    metrics = record["metrics"]
-    found["metrics"] = {name: metrics[name] for name in METRICS if math.isfinite(metrics.get(name) or 0.0)}
-    return found
-
-
-def _refused(refusal: Unable) -> Record:
-    name, cannot = refusal.engine, refusal.cannot
-    return {
-        "key": f"{name} refuses {refusal.scene.name}",
-        "scene": refusal.scene.name,
-        "engine": name,
-        "version": engine(name).version(),
-        "outcome": REFUSED,
-        "owner": cannot.owner.value,
-        "message": cannot.reason,
-        **{part: made_by()[part] for part in ("commit", "date")},
-    }
 
 
 def _store(record: Record, path: Path) -> None:

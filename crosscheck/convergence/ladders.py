@@ -11,15 +11,13 @@ from typing import NamedTuple
 import numpy as np
 
 from crosscheck.closed_loops.mechanisms import Difficulty
-from crosscheck.closed_loops.records import REFUSED, kept
 from crosscheck.engine import Cannot, Owner, Setting, engine
 from crosscheck.judge.tolerances import FALSE_SUCCESS
 from crosscheck.processes.pool import end_idle
 from crosscheck.study.grid import Case, Record, key, run_in_turn, study
-from crosscheck.study.origin import made_by
 from crosscheck.study.record_view import ended, error, error_bound, is_completed
 from crosscheck.study.search.offers import default_cases
-from crosscheck.study.store import read_runs
+from crosscheck.study.store import read_runs, refusal, short
 from mbref.records import rewrite
 
 FILE = Path(__file__).parent / "records.jsonl.xz"
@@ -180,30 +178,15 @@ def measure(engines: Sequence[str], path: Path = FILE, report: Callable[[str], N
         for row in (row for row in ROWS if row.engine in engines):
             for mechanism in MECHANISMS:
                 if not climb(ladder(row, mechanism), run, row.time_limit):
-                    refusal = _refusal(row, mechanism)
-                    known[refusal["key"]] = refusal
+                    refused = _refusal(row, mechanism)
+                    known[refused["key"]] = refused
                 rewrite(path, known.values())
     end_idle()
-
-
-def short(record: Record) -> Record:
-    """Return the record of a run without its motion, its settings, and further numbers of its cost."""
-    found = {name: value for name, value in kept(record).items() if name not in ("settings", "commit")}
-    return found | {"cost": {name: record["cost"][name] for name in ("seconds", "steps")}}
 
 
 def _refusal(row: Row, mechanism: Difficulty) -> Record:
     """Return the record of the refusal of a mechanism by an engine or by its family."""
     unserved = Cannot(Owner.ADAPTER, f"the family {row.family} does not serve this mechanism")
     cannot = engine(row.engine).cannot(mechanism.make()) or unserved
-    return {
-        "key": f"{row.name} {mechanism.scene}",
-        "engine": row.engine,
-        "family": row.family,
-        "scene": mechanism.scene,
-        "outcome": REFUSED,
-        "message": cannot.reason,
-        "owner": cannot.owner.value,
-        "version": engine(row.engine).version(),
-        "date": made_by()["date"],
-    }
+    name = f"{row.name} {mechanism.scene}"
+    return refusal(name, mechanism.scene, row.engine, cannot) | {"family": row.family}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from crosscheck.closed_loops.records import REFUSED
 from crosscheck.convergence.ladders import MECHANISMS, ROWS, VAIN, Row, fineness, in_vain, point
 from crosscheck.judge.metrics import order_of_convergence
 from crosscheck.study.grid import Record
 from crosscheck.study.record_view import error, error_bound, is_completed
+from crosscheck.study.store import REFUSED
 
 NEAR = 3.0  # errors up to this multiple of a floor are partly the floor
 

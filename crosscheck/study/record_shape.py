@@ -37,7 +37,7 @@ class _Asked(_Shape):
     times: list[float] | None = None
 
 
-class _Cost(_Shape):
+class Cost(_Shape):
     seconds: float
     steps: int = 0
 
@@ -78,14 +78,14 @@ class Measured(Refused):
     t_end: float
     asked: _Asked
     metrics: dict[str, float | None]
-    cost: _Cost
+    cost: Cost
 
 
 class Run(Ladder):
     """Record of a run (`study.grid.record_of`); its motion may be left out."""
 
     settings: dict[str, Any]
-    cost: _Cost
+    cost: Cost
     machine: dict[str, Any]
     times: list[float]
     seed: int = 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -10,10 +11,14 @@ from tempfile import TemporaryDirectory
 
 from pydantic import BaseModel
 
-from crosscheck.study.record_shape import Measured, Record, Refused, Run, checked
+from crosscheck.engine import Cannot, engine
+from crosscheck.study.origin import made_by
+from crosscheck.study.record_shape import Cost, Measured, Record, Refused, Run, checked
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError, looked_at, strict_json
 
+REFUSED = "REFUSED"  # outcome of a record without a run
+METRICS, ORIGIN = ("error", "error_bound", "violation_position"), ("time_limit", "commit", "date")
 PACK = "records.zip"  # name of the file in which a folder's records and scenes are packed
 PACKED = ("*.jsonl", "*.json", "*.toml")
 MOTION = ("bodies", "reactions", "open_reactions", "angles", "crossings")  # fields of a run's motion
@@ -36,6 +41,30 @@ def read_runs(path: Path) -> list[Record]:
     for record in found:
         checked(path, [record], Measured if record.get("outcome") in Outcome.__members__ else Refused)
     return found
+
+
+def short(record: Record) -> Record:
+    """Return a run's record with the fields that tables read, and with its origin."""
+    metrics, cost = record["metrics"], record["cost"]
+    return {name: record[name] for name in (*Measured.model_fields, *ORIGIN)} | {
+        "metrics": {name: metrics[name] for name in METRICS if math.isfinite(metrics.get(name) or 0.0)},
+        "cost": {name: cost[name] for name in Cost.model_fields},
+    }
+
+
+def refusal(key: str, scene: str, name: str, cannot: Cannot) -> Record:
+    """Return the record of an engine's refusal of a scene."""
+    origin = made_by()
+    return {
+        "key": key,
+        "scene": scene,
+        "engine": name,
+        "version": engine(name).version(),
+        "outcome": REFUSED,
+        "owner": cannot.owner.value,
+        "message": cannot.reason,
+        **{part: origin[part] for part in ("commit", "date")},
+    }
 
 
 @contextmanager

@@ -9,6 +9,7 @@ from crosscheck.closed_loops import records
 from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
 from crosscheck.judge.truth import truth_for
+from crosscheck.study.store import REFUSED
 from mbref.scenes import find_scene
 
 FIRST = DIFFICULTIES[0]
@@ -34,7 +35,7 @@ def run(error: float | None, family: str = "tuned", outcome: str = "COMPLETED", 
 
 def refusal() -> dict:
     """Return the record of MuJoCo's refusal of the first mechanism."""
-    record = run(None, outcome=records.REFUSED, key="mujoco refuses", owner="missing in the engine")
+    record = run(None, outcome=REFUSED, key="mujoco refuses", owner="missing in the engine")
     return {**record, "message": "no hinge"}
 
 

@@ -6,6 +6,7 @@ import pytest
 
 from crosscheck.closed_loops import records
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES
+from crosscheck.study.store import REFUSED
 from reports.blocks import Fold, HeatMap, Listing, Table
 from reports.sections import closed_loops
 
@@ -31,7 +32,7 @@ def run(engine: str, error: float, family: str = "tuned", scene: str = FIRST.sce
 
 
 def refusal(engine: str, scene: str = FIRST.scene) -> dict:
-    found = {"outcome": records.REFUSED, "message": "no hinge", "owner": "missing in the engine"}
+    found = {"outcome": REFUSED, "message": "no hinge", "owner": "missing in the engine"}
     return {**run(engine, 0.0, scene=scene), **found, "metrics": {}}
 
 

@@ -1,0 +1,132 @@
+"""Commands that measure engines and print stored records: closed loops, convergence, small motions."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from crosscheck.cli import request
+from crosscheck.cli.rendering import write_page
+from crosscheck.cli.running import COMPLETED, OTHERWISE, console, notice, print_json
+from crosscheck.cli.scene_request import find_scenes
+from crosscheck.closed_loops import records as closed
+from crosscheck.closed_loops.matrix import LEGEND, Cell, is_run, matrix, shown
+from crosscheck.convergence import ladders, orders
+from crosscheck.engine import all_engines
+from crosscheck.small_motions import records as poses
+from crosscheck.small_motions import sentences
+from crosscheck.study.grid import Record
+from crosscheck.study.progress import shown as progress_of
+from crosscheck.study.store import read_runs
+from mbref.records import rewrite
+
+LOOKS = {"✓": "green", "≈": "yellow", "✗": "bold red", "!": "magenta"}
+# engines whose accelerations at a pose are asked for, if they are installed
+ENGINES = ("mujoco", "pinocchio", "exudyn", "simbody", "dart", "drake")
+
+
+def closed_loops(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print the table of engines and mechanisms."""
+    path = Path(arguments.records)
+    if arguments.run:
+        _measure(arguments, path)
+    if status := write_page("closed-loops", path, arguments.page):
+        return status
+    found = read_runs(path)
+    for is_best in (True, False):
+        console().print(_errors(matrix(found), is_best))
+    _legend(console())
+    return COMPLETED
+
+
+def _measure(arguments: argparse.Namespace, path: Path) -> None:
+    engines = request.find_engines(arguments.engine or ["all"], notice)
+    wanted, unable = closed.cases(engines, arguments.family, path)
+    with progress_of("measuring", len(wanted)) as progress:
+        closed.measure(wanted, unable, path, progress)
+
+
+def _errors(cells: dict[str, dict[str, Cell]], is_best: bool) -> Table:
+    title = "at its best settings" if is_best else "by the library's defaults"
+    headings = next(iter(cells.values()), {})
+    table = Table("engine", *headings, title=title, box=SIMPLE)
+    for name, row in cells.items():
+        found = [cell.best() if is_best else cell.defaults() for cell in row.values()]
+        if is_best or any(map(is_run, found)):
+            texts = [shown(record) for record in found]
+            table.add_row(name, *(Text(text, LOOKS.get(text[:1], "dim")) for text in texts))
+    return table
+
+
+def _legend(out: Console) -> None:
+    for sign, meaning in LEGEND.items():
+        out.print(f"{sign:10} {meaning}", soft_wrap=True)
+
+
+def convergence(arguments: argparse.Namespace) -> int:
+    """Measure engines and write the page if requested, and print the table of errors and orders."""
+    path = Path(arguments.records)
+    if arguments.run:
+        ladders.measure(request.find_engines(arguments.engine or ["all"], notice), path, notice)
+    if status := write_page("convergence", path, arguments.page):
+        return status
+    console().print(_orders(read_runs(path)))
+    return COMPLETED
+
+
+def _orders(runs: Sequence[Record]) -> Table:
+    headings = [mechanism.heading for mechanism in ladders.MECHANISMS]
+    table = Table("engine, family", *headings, title="least errors, and orders in parentheses", box=SIMPLE)
+    for row, found in orders.table(runs).items():
+        table.add_row(row.name, *map(orders.cell, found.values()))
+    return table
+
+
+def modes(arguments: argparse.Namespace) -> int:
+    """Measure a scene, or show the stored records of mechanisms with closed forms."""
+    engines = _engines(arguments.engine)
+    if arguments.scene:
+        (scene,) = find_scenes([arguments.scene], notice=notice)
+        found = poses.measured(scene, engines, starts=arguments.starts, progress=notice)
+    else:
+        if arguments.run:
+            rewrite(poses.FILE, poses.merged(poses.of_mechanisms(engines, notice), poses.read()))
+        found = poses.read()
+    with TemporaryDirectory() as place:
+        path = Path(place) / "records.jsonl"
+        rewrite(path, found)
+        if status := write_page("small-motions", path, arguments.page):
+            return status
+    if arguments.json:
+        print_json([{"poses": found}])
+    else:
+        _show(console(), found)
+    return COMPLETED if found else OTHERWISE
+
+
+def _engines(named: Sequence[str] | None) -> list[str]:
+    if named:
+        return request.find_engines(named, notice)
+    here = all_engines()
+    return [name for name in ENGINES if name in here]
+
+
+def _show(out: Console, found: Sequence[Record]) -> None:
+    if not found:
+        out.print("The judge's search finds no equilibrium and no steady motion; --starts tries more.")
+    for record in found:
+        listed = ", ".join(sentences.written(*s) for s in record["eigenvalues"])
+        out.print(f"{record['scene']}: {sentences.heading(record)}", soft_wrap=True)
+        out.print(f"  s = {listed} 1/s", soft_wrap=True)
+        out.print(f"  {sentences.search(record)}".replace("`", ""), soft_wrap=True)
+        table = Table("method", "error of the eigenvalues", box=SIMPLE)
+        for name, value in sentences.rows(record):
+            table.add_row(name, value)
+        out.print(table)
