@@ -129,7 +129,6 @@ docs: $(VENV)/ready ## every page, schema and report that is made from code and 
 	$(BIN)/python docs/method_pages.py
 	$(BIN)/python -m tests.thresholds docs/internals/thresholds.md
 	$(BIN)/python -m tests.zoo.table docs/results/conformance.md
-	$(BIN)/python -m crosscheck.cli.support docs/engines.md
 	$(BIN)/python -m reports.pages
 	$(BIN)/crosscheck report --render reports/reference
 	$(BIN)/crosscheck report --section stability --render reports/stability

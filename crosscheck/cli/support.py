@@ -1,24 +1,17 @@
-"""Support matrix: which features and scenes each engine can simulate, from the engines' method `cannot`.
-
-``python -m crosscheck.cli.support docs/engines.md`` replaces the matrix in a document. Without a path the
-program prints the matrix.
-"""
+"""Support matrix: which features and scenes each engine can simulate, from the engines' method `cannot`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from crosscheck.conformance.mechanisms.features import feature_scenes, massless_link, undetermined
 from crosscheck.conformance.mechanisms.geared_forms import armature_pendulum, gear_pair, rack, screw
 from crosscheck.engine import BUILT_IN, LARGE, OPTIONAL, Cannot, engine
-from mbref.command_line import Parser
 from mbref.scene import Scene
 from mbref.scenes import SCENES
 
 CAN = "✓"
-BEGIN, END = "<!-- support -->", "<!-- /support -->"
 KNOWN = (*BUILT_IN, *OPTIONAL, *LARGE)  # engines in the support table, installed or not
 Ask = Callable[[str, Scene], Cannot | None]  # function of (engine name, scene) that returns a refusal or None
 
@@ -73,20 +66,6 @@ def of_scenes(engines: Sequence[str], ask: Ask | None = None) -> Support:
     return _support(engines, {name: make() for name, make in SCENES.items()}, ask or _ask)
 
 
-def markdown(engines: Sequence[str]) -> str:
-    """Return the matrix of features and engines as Markdown, between its two markers."""
-    return "\n".join([BEGIN, *_table("feature", of_features(engines)), END]) + "\n"
-
-
-def block_of(text: str) -> str:
-    """Return the matrix between the markers of a document, markers included; raises ValueError if there is
-    none."""
-    start, end = text.find(BEGIN), text.find(END)
-    if not 0 <= start < end:
-        raise ValueError(f"no {BEGIN} … {END}")
-    return text[start : end + len(END)] + "\n"
-
-
 def _ask(name: str, scene: Scene) -> Cannot | None:
     return engine(name).cannot(scene)
 
@@ -96,33 +75,5 @@ def _support(engines: Sequence[str], scenes: Mapping[str, Scene], ask: Ask) -> S
     return Support(tuple(engines), answers)
 
 
-def _table(what: str, support: Support) -> Iterator[str]:
-    notes = support.notes()
-    yield "| " + " | ".join([what, *support.engines]) + " |"
-    yield "|" + "|".join([" --- ", *(" :-: " for _ in support.engines)]) + "|"
-    for name in support.answers:
-        yield "| " + " | ".join([name, *support.row(name, notes)]) + " |"
-    if notes:
-        yield ""
-        yield from (f"{i}. {note}" for i, note in enumerate(notes, 1))
-
-
 def _number(notes: Sequence[str], gap: Cannot) -> int:
     return next(i for i, note in enumerate(notes, 1) if note.split(": ", 1)[1] == str(gap))
-
-
-def refresh(path: str | Path) -> None:
-    """Replace the matrix in a document by the matrix of the installed code; raises ValueError if the document
-    has no markers."""
-    text = Path(path).read_text()
-    Path(path).write_text(text.replace(block_of(text), markdown(KNOWN)))
-
-
-if __name__ == "__main__":
-    parser = Parser(description=__doc__)
-    parser.add_argument("page", nargs="?", type=Path, help="default: print the matrix")
-    path = parser.parse_args().page
-    if path:
-        refresh(path)
-    else:
-        print(markdown(KNOWN), end="")

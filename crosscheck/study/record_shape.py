@@ -38,6 +38,8 @@ class _Asked(_Shape):
 
 
 class Cost(_Shape):
+    """Cost of a run, as tables read it: CPU time (s) and number of steps."""
+
     seconds: float
     steps: int = 0
 

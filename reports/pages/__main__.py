@@ -15,7 +15,7 @@ from mbref.files import write
 
 from ..markdown import markdown
 
-NAMES = ("which-engine", "closed-loops", "convergence", "small-motions", "findings")
+NAMES = ("which-engine", "closed-loops", "convergence", "small-motions", "findings", "support")
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 from crosscheck.findings.finding import FOLDER, Finding, findings
 
@@ -18,7 +17,7 @@ the engine alone. An error that ends the process is described in words, without 
 """
 
 
-def blocks(records: Path = FOLDER) -> list[Block]:
+def blocks() -> list[Block]:
     """Return the page of the stored findings."""
     rows = [(Within(f.name, f"#{f.name}"), f.engine, f.version, _measured(f)) for f in findings()]
     table = Table("Findings by engine.", ("finding", "engine", "version", "measured"), rows)

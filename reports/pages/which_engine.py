@@ -39,7 +39,7 @@ Times are CPU time of stepping, of one machine; compare them within a table only
 explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
 crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the errors of more
 engines on more kinds (long runs, couplings). [Compare engines](../compare.md#verdicts) explains errors and
-grades, and the [support table](../engines.md#support) has the joints and loads of each engine.
+grades, and the [support table](support.md) has the joints and loads of each engine.
 """
 CHECKS = """Checks of the [conformance suite](../verify-your-engine.md), and defects that a script shows:"""
 RUNS = """`crosscheck verify ENGINE` runs the checks, `crosscheck findings --recheck` the scripts."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -24,15 +22,6 @@ from crosscheck.study.words.speed import COMPILED
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Joint, Load, Scene, Universal
 from mbref.scene.validation import DRIVABLE
-
-DOCUMENT = Path(__file__).parents[2] / "docs" / "engines.md"
-
-
-def test_support_matrix_of_the_page_is_up_to_date():
-    block = support.block_of(DOCUMENT.read_text())
-    assert block == support.markdown(support.KNOWN), (
-        "the support matrix is stale: python -m crosscheck.cli.support docs/engines.md renews it"
-    )
 
 
 def test_probes_have_every_type_of_joint_load_and_driver():

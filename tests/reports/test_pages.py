@@ -34,11 +34,11 @@ def test_links_within_a_page_lead_to_its_headings_and_folded_runs(page):
     assert links <= places, links - places
 
 
-def test_every_page_but_the_guide_shows_at_most_a_fifth_of_its_runs_unfolded(page):
+def test_a_page_of_runs_shows_a_fifth_of_its_text_and_folds_the_rest(page):
     name, made = page
-    open_text = re.sub(r"<details.*?</details>", "", made, flags=re.S)
     assert made.count("<details") == made.count("</details>") > 0
-    assert name in ("which-engine", "small-motions", "findings") or len(open_text) < 0.2 * len(made)
+    shown = re.sub(r"<details.*?</details>", "", made, flags=re.S)
+    assert name not in ("closed-loops", "convergence") or len(shown) < 0.2 * len(made)
 
 
 def test_command_writes_the_page_of_the_records_that_it_is_given(tmp_path):
