@@ -19,8 +19,8 @@ check: ## the gate: the README's test command, lint and types, in a fresh clone 
 test: $(VENV)/ready ## the tests, in this checkout
 	$(BIN)/pytest -n 2
 
-lint: $(VENV)/ready ## format, lint, types and the prose of README and docs, in this checkout
-	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/python -m tests.prose
+lint: $(VENV)/ready ## format, lint, types, the prose of README and docs, and the files for the forge, in this checkout
+	$(BIN)/ruff format . && $(BIN)/ruff check . && $(BIN)/mypy && $(BIN)/python -m tests.prose && .ci/forge
 
 order: $(VENV)/ready ## the tests in a random order; it prints the seed (make order SEED=2 repeats one)
 	$(BIN)/pytest -n 2 -p randomly $(and $(filter command line,$(origin SEED)),--randomly-seed=$(SEED))

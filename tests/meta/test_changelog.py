@@ -7,7 +7,8 @@ from pathlib import Path
 
 from mbref import __version__
 
-TEXT = (Path(__file__).parents[2] / "CHANGELOG.md").read_text()
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "CHANGELOG.md").read_text()
 SECTIONS = re.split(r"^## ", TEXT, flags=re.M)[1:]
 MOST, LONGEST = 60, 125  # entries of a version, characters of an entry
 
@@ -17,10 +18,11 @@ def entries(section: str) -> list[str]:
     return [line for line in section.splitlines()[1:] if line and not line.startswith("### ")]
 
 
-def test_newest_released_section_is_the_version_of_the_packages():
+def test_newest_released_section_and_the_citation_are_of_the_version_of_the_packages():
     """A section Unreleased may stand before it."""
     released = SECTIONS[1:] if SECTIONS[0].startswith("Unreleased\n") else SECTIONS
     assert released[0].startswith(f"{__version__}\n"), released[0][:20]
+    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text()
 
 
 def test_section_has_at_most_60_entries_of_one_line_without_timings():

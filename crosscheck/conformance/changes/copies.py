@@ -1,4 +1,4 @@
-"""Functions that return changed copies of scenes, bodies, joints, drivers and loads, or why there is none."""
+"""Changed copies of scenes, bodies, joints, drivers and loads, and the reason if a change does not apply."""
 
 from __future__ import annotations
 
