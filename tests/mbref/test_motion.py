@@ -1,11 +1,9 @@
-"""Motion: bodies and joints by name / closed forms; energies / the judge's; tables, files, notebook."""
+"""Motion: bodies and joints by name / closed forms; energies / the judge's; tables, files."""
 
 from __future__ import annotations
 
-import ast
 import csv
 import dataclasses
-import json
 import sys
 from pathlib import Path
 
@@ -243,21 +241,3 @@ def test_path_changes_one_value_of_a_scene():
 def test_unknown_path_or_faulty_value_is_refused(path, value, says):
     with pytest.raises(SceneError, match=says):
         find_scene("planar_slider_crank").with_(path, value)
-
-
-def test_every_cell_of_the_notebook_runs_and_shows_pictures_and_a_table(capsys):
-    """Every code cell in turn; the value of a cell's last line is what a notebook shows."""
-    cells = json.loads((ROOT / "examples" / "04_first_steps.ipynb").read_text())["cells"]
-    names: dict[str, object] = {}
-    shown = []
-    for cell in cells:
-        if cell["cell_type"] == "code":
-            assert cell["outputs"] == [], "the notebook is committed without outputs"
-            tree = ast.parse("".join(cell["source"]))
-            last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
-            exec(compile(tree, "notebook", "exec"), names)
-            if last:
-                shown.append(eval(compile(ast.Expression(last.value), "notebook", "eval"), names))
-    assert "<svg" in shown[0]._repr_html_() and "<animate" in shown[1]._repr_html_()
-    assert shown[-1].shape == (3, 3)
-    assert "rad behind" in capsys.readouterr().out

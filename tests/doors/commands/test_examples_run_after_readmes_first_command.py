@@ -1,0 +1,134 @@
+"""Examples and the notebook run with the packages of README's first command; their numbers are right."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from importlib import metadata
+from pathlib import Path
+
+import numpy as np
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from tests.crosscheck.measured import MARGIN
+
+ROOT = Path(__file__).parents[3]
+EXAMPLES = ROOT / "examples"
+NOTEBOOK = """
+import ast, json, sys
+names = {}
+for cell in json.load(open(sys.argv[1]))["cells"]:
+    if cell["cell_type"] == "code":
+        assert cell["outputs"] == [], "the notebook is committed without outputs"
+        tree = ast.parse("".join(cell["source"]))
+        last = tree.body.pop() if isinstance(tree.body[-1], ast.Expr) else None
+        exec(compile(tree, "notebook", "exec"), names)
+        if last:
+            shown = eval(compile(ast.Expression(last.value), "notebook", "eval"), names)
+            print(getattr(shown, "_repr_html_", shown.__repr__)())
+"""
+
+
+def needed(name: str, extras: frozenset[str]) -> set[str]:
+    """Return the names of the distributions that pip installs for one with its extras, itself included."""
+    found: dict[str, frozenset[str]] = {}
+    waiting = [(name, extras)]
+    while waiting:
+        one, asked = waiting.pop()
+        if asked <= found.get(one, frozenset()) and one in found:
+            continue
+        found[one] = asked | found.get(one, frozenset())
+        for text in metadata.requires(one) or ():
+            part = Requirement(text)
+            if part.marker is None or any(part.marker.evaluate({"extra": e}) for e in ("", *found[one])):
+                waiting.append((canonicalize_name(part.name), frozenset(part.extras)))
+    return set(found)
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the Python of a new environment with links to these distributions, and no others."""
+    readme = (ROOT / "README.md").read_text()
+    extras = re.search(r"^python3 -m venv .*-e '\.\[([\w,-]+)\]' && .*crosscheck", readme, re.MULTILINE)
+    assert extras, "README's first command installs the packages and writes a report"
+    place = tmp_path_factory.mktemp("environment")
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(place)], check=True)
+    (packages,) = place.glob("lib/python*/site-packages")
+    for name in needed("mbref", frozenset(extras[1].split(","))):
+        distribution = metadata.distribution(name)
+        tops = {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}
+        for top in (top for top in tops if name != "mbref" or top.endswith(".dist-info")):
+            source, target = Path(str(distribution.locate_file(top))), packages / top
+            if source.exists() and not target.exists():
+                target.symlink_to(source)
+    (packages / "checkout.pth").write_text(f"{ROOT}\n")
+    return place / "bin" / "python"
+
+
+def output(python: Path, tmp_path: Path, *words: str | Path) -> str:
+    """Return the output of Python in an empty directory, which stays empty."""
+    run = subprocess.run(
+        [python, *words],
+        cwd=tmp_path,
+        env={name: value for name, value in os.environ.items() if name != "PYTHONPATH"},
+        capture_output=True,
+        text=True,
+        timeout=600,  # s; Pinocchio compiles C++ code
+        check=False,
+    )
+    assert run.returncode == 0, f"{words[-1]}: status {run.returncode}: {run.stderr[-800:]}"
+    assert not list(tmp_path.iterdir()), f"{words[-1]} left {list(tmp_path.iterdir())}"
+    return run.stdout
+
+
+def test_the_environment_has_engines_and_neither_pandas_nor_pytest(python, tmp_path):
+    found = "from importlib.util import find_spec as f; print(*(f(n) is not None for n in {}))"
+    code = found.format(("mujoco", "pinocchio", "exudyn", "matplotlib", "pandas", "pytest", "pip"))
+    assert output(python, tmp_path, "-c", code).split() == ["True"] * 4 + ["False"] * 3
+
+
+def test_every_engine_of_the_first_example_completes_near_the_exact_motion(python, tmp_path):
+    """1.5e-6 (rad, or relative to the scene's length) is the largest error that was measured."""
+    printed = output(python, tmp_path, EXAMPLES / "01_run_and_compare.py")
+    runs = re.findall(r"^(\w+) .* (\w+) +t = (\S+) s, error (\S+)$", printed, re.MULTILINE)
+    assert {engine for engine, *_ in runs} >= {"mbref", "mujoco", "exudyn"}, printed
+    assert {(outcome, float(end)) for _, outcome, end, _ in runs} == {("COMPLETED", 0.01)}, printed
+    assert max(float(error) for *_, error in runs) < MARGIN * 1.5e-6, printed
+
+
+def test_second_example_closes_a_door_by_more_than_forty_degrees(python, tmp_path):
+    """21 angles grow; the mechanism has one redundant constraint row and one degree of freedom."""
+    printed = output(python, tmp_path, EXAMPLES / "02_own_mechanism.py")
+    angles = [float(text) for text in re.findall(r"closed by +(\S+)°", printed)]
+    assert "1 redundant, 1 free" in printed, printed
+    assert len(angles) == 21 and angles == sorted(angles) and angles[-1] > 40, angles
+
+
+@pytest.mark.slow
+def test_deviations_of_the_tolerance_example_agree_with_first_order_theory(python, tmp_path):
+    """Standard deviations of 200 variants have an error of 5 %, and are compared within 30 %."""
+    printed = output(python, tmp_path, EXAMPLES / "03_tolerances.py")
+    rows = re.findall(r"deviation (\S+) m  \(first order: (\S+) m\)", printed)
+    pairs = np.array(rows, dtype=float)[2:]  # too little has moved at the first two times
+    assert len(pairs) == 4, printed
+    assert np.all(abs(pairs[:, 0] / pairs[:, 1] - 1) < 0.3), printed
+
+
+def test_every_cell_of_the_notebook_runs_and_shows_pictures_and_numbers(python, tmp_path):
+    printed = output(python, tmp_path, "-c", NOTEBOOK, EXAMPLES / "04_first_steps.ipynb")
+    assert "<svg" in printed and "<animate" in printed
+    assert re.search(r"the crank with the heavier slider is -?\d+\.\d{3} rad behind", printed)
+    assert "'slider.position.x': array(" in printed
+
+
+def test_example_engines_need_no_further_package(python, tmp_path):
+    folders = [str(EXAMPLES / f"{name}_engine") for name in ("tiny", "spatial")]
+    code = "import tiny_engine, spatial_engine; print(tiny_engine.ENGINE.name, spatial_engine.ENGINE.name)"
+    assert output(python, tmp_path, "-c", f"import sys; sys.path += {folders}; {code}").split() == [
+        "tiny",
+        "spatial",
+    ]
