@@ -21,9 +21,9 @@ from crosscheck.conformance.mechanisms.parts import GRAVITY, bar, hinge
 from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
 from crosscheck.judge.metrics import error_series, exact_motion
 from crosscheck.judge.truth import truth_for
-from mbref import Limits, Scene, simulate
+from mbref import Limits, Scene, simulate, with_error_estimate
 from mbref.command_line import Parser
-from mbref.equations.diagnosis import undriven_freedoms
+from mbref.equations.counts import undriven_freedoms
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Spherical, Spring, Translational
 from mbref.scenes import SCENES, find_scene
@@ -133,7 +133,7 @@ def run(group: str, scene: Scene, chosen: list[tuple[str, float]]) -> Iterator[C
         exact = exact_motion(motion, truth) if motion.times.size else None
         if exact is None or truth is None or len(exact.times) < 2:
             continue
-        estimate = motion.error_estimate
+        estimate = with_error_estimate(motion).error_estimate
         known = len(exact.times)
         true = float(error_series(scene, first(motion, known), exact).max())
         bound = float(np.max(exact.settings.get("bound", truth.accuracy)))

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+import mbref
 from crosscheck.conformance.mechanisms.awkward import AWKWARD, awkward
 from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS
 from crosscheck.conformance.mechanisms.hard import HARD
@@ -108,7 +109,7 @@ def examined(scene: Scene, duration: float, seconds: float, tight: float) -> Lin
         "bodies": len(scene.body),
         "joints": dict(Counter(joint.type for joint in scene.joint)),
         "loads": dict(Counter(load.type for load in scene.load)),
-        "redundant": scene.counts().redundant,
+        "redundant": mbref.counts(scene).redundant,
         "by": [motion.formulation for motion in motions],
         "seconds": [motion.seconds for motion in motions],
         "apart": largest(differences(scene, one, other)),

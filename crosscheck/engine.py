@@ -235,6 +235,17 @@ class Engine(ABC):
             ``cost.seconds`` is the process CPU time of the stepping alone.
         """
 
+    def with_error_estimate(self, run: Trajectory, seconds: float) -> Trajectory:
+        """Return a run of this engine with the engine's own estimate of the error, by default without one.
+
+        Parameters
+        ----------
+        run : Trajectory
+        seconds : float
+            CPU time (s) for the estimate.
+        """
+        return run
+
 
 BUILT_IN = ("mbref", "mujoco", "pinocchio", "exudyn")
 OPTIONAL = ("simbody", "sundials", "ondsel")  # these run by default if their packages are installed

@@ -122,7 +122,7 @@ class Supports:
     def _missing_of_couplings(self, scene: Scene) -> Iterator[str]:
         for coupling in scene.coupling:
             if coupling.offset:
-                yield f"coupling {coupling.name!r} has an offset (scene.assembled() has none)"
+                yield f"coupling {coupling.name!r} has an offset (mbref.assembled(scene) has none)"
             for joint, kind in scene.coupled(coupling):
                 if kind not in self.couplings:
                     yield f"coupling {coupling.name!r} couples the {kind} of joint {joint.name!r}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+import mbref
 from crosscheck.cli.request import find_engines
 from crosscheck.engine import engine
 from crosscheck.judge.metrics import measure
@@ -13,7 +14,7 @@ scene = find_scene("spatial_slider_crank").with_(duration=0.01)
 times = np.linspace(0.0, scene.duration, 11)
 truth = truth_for(scene)
 
-print(f"{scene.name}: {scene.counts()}")
+print(f"{scene.name}: {mbref.counts(scene)}")
 for name in find_engines(None, notice=print):
     simulator = engine(name)
     if cannot := simulator.cannot(scene):

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 
+import mbref
 from mbref import rotations
 from mbref.scene import Scene
 from mbref.simulation.simulate import simulate
 
 scene = Scene.from_file(Path(__file__).with_name("door_closer.toml"))
-counts = scene.counts()
+counts = mbref.counts(scene)
 print(f"{scene.name}: {counts.rows} rows, {counts.redundant} redundant, {counts.degrees_of_freedom} free")
 
 times = np.linspace(0.0, scene.duration, 21)

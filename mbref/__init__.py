@@ -5,53 +5,48 @@ The public names are imported at first access, so that ``import mbref`` takes li
 
 from __future__ import annotations
 
-from functools import partial
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from mbref.scene_services import SERVICES
-
 if TYPE_CHECKING:
+    from mbref.design.diagnosis import Diagnosis, diagnose
     from mbref.design.equilibrium import Equilibrium, equilibria, motion_of_mode
     from mbref.ensembles.ensemble import ensemble
-    from mbref.equations.diagnosis import Diagnosis, counts, diagnose
+    from mbref.equations.counts import counts
+    from mbref.equations.offsets import angles_at_start, assembled
     from mbref.input_error import InputError
     from mbref.method import Method, MethodError
+    from mbref.motions.drawing.picture import still
     from mbref.motions.error_estimate import ErrorEstimate
     from mbref.motions.motion import Motion
     from mbref.motions.trajectory import Cost, Outcome, Trajectory
     from mbref.scene import Scene, SceneError
     from mbref.scene.variation import Variation, variants
     from mbref.scenes import SCENES, find_scene
+    from mbref.simulation.second_run import with_error_estimate
     from mbref.simulation.simulate import Limits, simulate
 
 __version__ = "0.2.0"
 
 _PUBLIC = {  # module → its public names
+    "design.diagnosis": ("Diagnosis", "diagnose"),
     "design.equilibrium": ("Equilibrium", "equilibria", "motion_of_mode"),
     "ensembles.ensemble": ("ensemble",),
-    "equations.diagnosis": ("Diagnosis", "counts", "diagnose"),
+    "equations.counts": ("counts",),
+    "equations.offsets": ("angles_at_start", "assembled"),
     "input_error": ("InputError",),
     "method": ("Method", "MethodError"),
+    "motions.drawing.picture": ("still",),
     "motions.error_estimate": ("ErrorEstimate",),
     "motions.motion": ("Motion",),
     "motions.trajectory": ("Cost", "Outcome", "Trajectory"),
     "scene": ("Scene", "SceneError"),
     "scene.variation": ("Variation", "variants"),
     "scenes": ("SCENES", "find_scene"),
+    "simulation.second_run": ("with_error_estimate",),
     "simulation.simulate": ("Limits", "simulate"),
 }
 _MODULE_OF = {name: f"mbref.{module}" for module, names in _PUBLIC.items() for name in names}
-
-_SERVICES = {  # functions behind methods of Scene and Motion
-    "angles_at_start": "mbref.design.offsets",
-    "assembled": "mbref.design.offsets",
-    "counts": "mbref.equations.diagnosis",
-    "determined_reactions": "mbref.equations.along_trajectory",
-    "estimate_error": "mbref.simulation.second_run",
-    "still": "mbref.motions.drawing.picture",
-    "violations": "mbref.equations.along_trajectory",
-}
 
 __all__ = [
     "SCENES",
@@ -69,6 +64,8 @@ __all__ = [
     "SceneError",
     "Trajectory",
     "Variation",
+    "angles_at_start",
+    "assembled",
     "counts",
     "diagnose",
     "ensemble",
@@ -76,7 +73,9 @@ __all__ = [
     "find_scene",
     "motion_of_mode",
     "simulate",
+    "still",
     "variants",
+    "with_error_estimate",
 ]
 
 
@@ -84,13 +83,6 @@ def __getattr__(name: str) -> Any:
     if name in _MODULE_OF:
         return getattr(import_module(_MODULE_OF[name]), name)
     raise AttributeError(f"module 'mbref' has no attribute {name!r}")
-
-
-def _call(name: str, *given: Any) -> Any:
-    return getattr(import_module(_SERVICES[name]), name)(*given)
-
-
-SERVICES.update({name: partial(_call, name) for name in _SERVICES})
 
 
 def __dir__() -> list[str]:

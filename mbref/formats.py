@@ -214,7 +214,9 @@ def write(scene: Scene, path: str | Path) -> tuple[str, ...]:
     InputError
         If no installed format has this suffix.
     """
-    exported = _found(path, "writes").write(scene.assembled())
+    from mbref.equations.offsets import assembled  # imported here: reading needs no equations
+
+    exported = _found(path, "writes").write(assembled(scene))
     files.write(path, exported.text)
     return exported.left_out
 

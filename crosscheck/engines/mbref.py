@@ -78,7 +78,7 @@ class Mbref(Engine):
         return __version__
 
     def refuses(self, scene: Scene) -> Cannot | None:
-        from mbref.equations.diagnosis import undriven_freedoms
+        from mbref.equations.counts import undriven_freedoms
 
         if not scene.has_mass() and undriven_freedoms(scene) > 0:
             return Cannot(
@@ -100,7 +100,7 @@ class Mbref(Engine):
         return [Setting(family, {"rtol": rtol}) for rtol in TOLERANCES]
 
     def serves(self, scene: Scene, family: str) -> bool:
-        from mbref.equations.diagnosis import undriven_freedoms
+        from mbref.equations.counts import counts, undriven_freedoms
         from mbref.method import bushings
         from mbref.simulation.simulate import why_no_code
 
@@ -114,7 +114,7 @@ class Mbref(Engine):
             return False
         if family.endswith(GENERATED):
             return not why_no_code(scene, method)
-        return scene.counts().redundant == 0 or method.formulation.handles_redundancy
+        return counts(scene).redundant == 0 or method.formulation.handles_redundancy
 
     def has_family(self, family: str) -> bool:
         from mbref.method import MethodError
@@ -154,6 +154,12 @@ class Mbref(Engine):
 
         code = "generated" if setting.family.endswith(GENERATED) else "generic"
         return simulate(scene, _method(setting.family), times, Limits(code=code, **setting.options))
+
+    def with_error_estimate(self, run: Trajectory, seconds: float) -> Trajectory:
+        from mbref.motions.motion import Motion
+        from mbref.simulation.second_run import with_error_estimate
+
+        return with_error_estimate(run, seconds) if isinstance(run, Motion) else run
 
 
 def search(scene: Scene) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:

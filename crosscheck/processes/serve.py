@@ -70,7 +70,7 @@ def run_estimated(
 ) -> Trajectory:
     """Return `run_once` with the engine's own estimate of its error, made within CPU time (s)."""
     run = run_once(engine_name, scene, times, setting)
-    return run.with_error_estimate(seconds) if run.times.size else run
+    return engine(engine_name).with_error_estimate(run, seconds) if run.times.size else run
 
 
 def capabilities(engine_name: str, scene: Scene) -> Capabilities:

@@ -18,7 +18,7 @@ from mbref.scenes import find_scene
 
 if TYPE_CHECKING:
     from mbref.design.along_motion import AlongMotion
-    from mbref.equations.diagnosis import Diagnosis
+    from mbref.design.diagnosis import Diagnosis
 
 LISTED = 5  # largest number of printed singular positions
 
@@ -41,9 +41,9 @@ def add(commands: Any) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> int:
+    from mbref.design.diagnosis import diagnose
     from mbref.design.exchange import exchanges
     from mbref.design.idle_freedoms import idle_freedoms
-    from mbref.equations.diagnosis import diagnose
 
     scene = find_scene(options.scene)
     warn(scene)
@@ -202,10 +202,12 @@ def _swap_lines(swaps: list[dict[str, str]], redundant: bool) -> list[str]:
 def _driver_lines(scene: Scene) -> list[str]:
     """Return a line if the scene has more drivers than degrees of freedom: constraint rows are then redundant
     whatever the joints are. A second line names drivers that contradict each other."""
+    from mbref.equations.counts import counts
     from mbref.equations.driver_conflicts import conflict_of_drivers
+    from mbref.equations.offsets import assembled
 
-    conflict = conflict_of_drivers(scene)
-    freedoms = scene.with_(driver=(), load=()).counts().degrees_of_freedom
+    conflict = conflict_of_drivers(assembled(scene))
+    freedoms = counts(scene.with_(driver=(), load=())).degrees_of_freedom
     sentence = (
         f"  more drivers than degrees of freedom ({len(scene.driver)} and {freedoms}): redundant rows remain"
     )

@@ -17,9 +17,9 @@ from mbref.input_error import InputError
 from mbref.method import short_name
 from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF
-from mbref.motions.trajectory import DRIVER
 from mbref.records import strict_json
 from mbref.scene import Scene
+from mbref.scene.bodies import DRIVER
 
 # CPU seconds of a run below which its error is estimated by default, and limit of the second run
 ESTIMATE_SECONDS = 5.0
@@ -95,8 +95,10 @@ def _estimated(motion: Motion, wanted: str) -> Motion:
     """Return the motion, with its error estimate if the options request an estimate."""
     if wanted == "no":
         return motion
+    from mbref.simulation.second_run import with_error_estimate
+
     with progress_bar("estimating the error", motion.t_end) as progress:
-        return motion.with_error_estimate(ESTIMATE_SECONDS if wanted == "auto" else math.inf, progress)
+        return with_error_estimate(motion, ESTIMATE_SECONDS if wanted == "auto" else math.inf, progress)
 
 
 def _branches(words: list[str]) -> dict[int, int]:
@@ -124,8 +126,8 @@ def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
     out.print(f"{scene.name} by {method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         out.print(trajectory.message)
-    if trajectory.known_estimate is not None:
-        out.print(trajectory.known_estimate.sentence)
+    if trajectory.error_estimate is not None:
+        out.print(trajectory.error_estimate.sentence)
     out.print(
         f"{cost.steps} steps, {cost.rejected} rejected, {cost.rhs} evaluations\n"
         f"{cost.factorisations} factorisations, {cost.newton} Newton iterations\n"

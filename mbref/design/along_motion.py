@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mbref.equations.along_trajectory import poses
 from mbref.equations.branches import MOST_BRANCHED_ROWS as MOST_BRANCHED
 from mbref.equations.branches import second_order
-from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
+from mbref.equations.counts import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.gaps import is_closed
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.model import Model, displaced
+from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
+from mbref.motions.constraints import poses
 from mbref.motions.crossing import Crossing
 from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Outcome
@@ -58,7 +59,7 @@ def along_motion(scene: Scene) -> AlongMotion:
 
     Raises SceneError if the scene cannot be simulated, or has more than 300 rows.
     """
-    model = Model(scene)
+    model = Model(assembled(scene))
     if model.m > MOST_ROWS_ALONG:
         raise SceneError([f"scene: {model.m} constraint rows are too many for singular values at every pose"])
     times = np.linspace(0.0, scene.duration, POSES_ALONG)

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mbref import rotations
-from mbref.design.placed import placed
 from mbref.equations.gaps import is_closed
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.equations.packing import Packs
 from mbref.equations.parts import FRAME
+from mbref.equations.placed import placed
 from mbref.rotations import Vector3
 from mbref.scene import GROUND, Scene, SceneError
 
@@ -65,7 +66,7 @@ def assemble(scene: Scene, lengths: Mapping[tuple[str, str], float]) -> Assemble
     unchanged. Raises SceneError for joints that share no link, or if the loops cannot be closed with these
     lengths.
     """
-    scene = scene.assembled()
+    scene = assembled(scene)
     pairs = {pair: _common_link(scene, *pair) for pair in lengths}
     shifts = _point_displacements(scene, lengths, pairs)
     q = Model(scene).start()

@@ -11,16 +11,17 @@ from mbref import rotations
 from mbref.design.balance import ONE_POSE, Newton, are_one, balanced, starts_from
 from mbref.design.joint_angles import slots, spring_angles
 from mbref.design.linearisation import Tangent, multipliers, unsteady
-from mbref.design.placed import placed_with_springs
 from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.turning import Turning, turning
 from mbref.design.winding import wound
-from mbref.equations.along_trajectory import without_armatures
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
 from mbref.equations.model import Model, displaced
+from mbref.equations.offsets import assembled
+from mbref.equations.placed import placed_with_springs
 from mbref.input_error import InputError
+from mbref.motions.constraints import without_armatures
 from mbref.motions.motion import Motion
 from mbref.scene import Scene, SceneError
 from mbref.scenes import find_scene
@@ -132,7 +133,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
     SceneError
         If a body has no mass, a driver or a load moves otherwise, or the mechanism has no degree of freedom.
     """
-    scene = find_scene(scene).assembled()
+    scene = assembled(find_scene(scene))
     refuse_conflict(scene)
     frame = _frame(scene)
     model = Model(frame.with_armature(scene, 0.0))

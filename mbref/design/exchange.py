@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from mbref.design.along_motion import general_pose
-from mbref.design.placed import placed
-from mbref.equations.along_trajectory import without_armatures
-from mbref.equations.diagnosis import rank_of, scaled_jacobian
+from mbref.equations.counts import rank_of, scaled_jacobian
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
+from mbref.equations.placed import placed
 from mbref.linear_algebra.least_norm import null_space
+from mbref.motions.constraints import without_armatures
 from mbref.scene import JOINT_TYPES, Joint, JointLoad, Scene
 from mbref.stepping.run import NEARLY
 
@@ -42,7 +43,7 @@ def exchanges(scene: Scene, most: int = 6) -> list[Exchange]:
     driver, an armature, a coupling or a torsion spring is exchanged only for a type that can have it, and is
     not removed.
     """
-    scene = scene.assembled()
+    scene = assembled(scene)
     model = Model(without_armatures(scene).with_(driver=(), load=()))
     if not model.m:
         return []

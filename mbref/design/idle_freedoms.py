@@ -8,11 +8,12 @@ import numpy as np
 
 from mbref import rotations
 from mbref.design.along_motion import general_pose
-from mbref.equations.along_trajectory import without_armatures
-from mbref.equations.diagnosis import scaled_jacobian
+from mbref.equations.counts import scaled_jacobian
 from mbref.equations.initial_state import consistent_start
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.linear_algebra.least_norm import null_space
+from mbref.motions.constraints import without_armatures
 from mbref.scene import Scene
 
 FREE = 1e-9  # singular value of a link's columns of unit rows / largest one, below which it moves alone
@@ -27,7 +28,7 @@ def idle_freedoms(scene: Scene) -> list[str]:
     The link is a body, or bodies that fixed joints weld together, with at least two other joints.  Its motion
     satisfies all rows of joints, couplings and drivers at the start and at a general pose.
     """
-    model = Model(without_armatures(scene))
+    model = Model(without_armatures(assembled(scene)))
     if not 0 < model.m <= MOST_LINKED_ROWS:
         return []
     q, general = consistent_start(model).q, general_pose(model)

@@ -17,9 +17,9 @@ import numpy as np
 
 from mbref.ensembles.candidates import Candidates, Parameters, candidates_of
 from mbref.equations.initial_state import LARGE
-from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.model import motion_of
+from mbref.equations.offsets import counted_angles
 from mbref.equations.structure import Structure
 from mbref.kernels.layout import OperationCounts
 from mbref.kernels.memory_pool import SavedNumbers
@@ -82,7 +82,7 @@ class BatchResult(NamedTuple):
                     times=self.times,
                     **poses,
                     **lazy_reactions(scenes[place], self.times, self.coordinates[k], self.multipliers[k]),
-                    angles=angles_by_joint(scenes[place], self.structure, self.angles[k]),
+                    angles=counted_angles(scenes[place], self.structure, self.angles[k]),
                     outcome=OUTCOMES[DONE],
                     t_end=float(self.times[-1]),
                     message=self.messages[k],

@@ -14,6 +14,7 @@ from mbref.equations.driver_conflicts import conflict_of_drivers
 from mbref.equations.evaluation import evaluate_along
 from mbref.equations.initial_state import Alike, Start, consistent_starts
 from mbref.equations.model import Model, Terms
+from mbref.equations.offsets import assembled
 from mbref.equations.packing import Packs
 from mbref.kernels.layout import Equations, Memory
 from mbref.kernels.memory_pool import SavedNumbers, arrays_in
@@ -127,7 +128,7 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     """Return the candidates for a batch of a lead run. A scene may join the batch if its structure equals the
     structure of the run, its start is regular and its drivers do not contradict each other."""
     assert run.reduction is not None
-    packs, decisions = Packs(scenes), run.reduction.decisions
+    packs, decisions = Packs([*map(assembled, scenes)]), run.reduction.decisions
     evaluations = Evaluations(run.model, packs)
     starts, q, v = _starts(run, packs, evaluations)
     part, places, velocities = decisions.states(q, v)
@@ -138,7 +139,7 @@ def candidates_of(run: Run, scenes: Sequence[Scene]) -> Candidates:
     ranks = all_ranks(run.model, terms.blocks[:, 0], packs.data.metric_root, symbolic, tolerance)
     alike = [rank.rank == run.ranks.rank and rank.least >= NEARLY for rank in ranks]
     end = float(run.times[-1])
-    fit = [k for k in starts if agree[k] and alike[k] and conflict_of_drivers(scenes[k], end) is None]
+    fit = [k for k in starts if agree[k] and alike[k] and conflict_of_drivers(packs.scenes[k], end) is None]
     return Candidates(packs, q, v, starts, ranks, fit)
 
 

@@ -53,7 +53,7 @@ class Conflict(NamedTuple):
 def conflict_of_drivers(scene: Scene, until: float | None = None) -> Conflict | None:
     """Return the first contradiction of drivers up to a time (s), by default the scene's duration.
 
-    None if drivers are independent, or agree.
+    The scene is assembled. None if drivers are independent, or agree.
     """
     if len(scene.driver) < 2:
         return None

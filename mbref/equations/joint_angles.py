@@ -11,13 +11,9 @@ from mbref.scene import Scene
 
 
 def angles_by_joint(scene: Scene, structure: Structure, angles: np.ndarray) -> dict[str, np.ndarray]:
-    """Return the angles (k, a) of turning joints in a run, rad, as columns (k,) by joint of the scene.
-
-    Angles of a scene with offsets count from the poses that the scene gives.
-    """
-    start = scene.angles_at_start()
+    """Return the angles (k, a) of turning joints in a run, rad, as columns (k,) by joint of the scene."""
     columns = {place.joint: angles[:, k] for k, place in enumerate(structure.places.turning)}
-    return {j.name: columns[j.name] + start[j.name] for j in scene.joint if j.name in columns}
+    return {j.name: columns[j.name] for j in scene.joint if j.name in columns}
 
 
 def angles_of_pose(model: Model, q: np.ndarray) -> np.ndarray:

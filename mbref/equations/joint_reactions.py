@@ -16,11 +16,12 @@ import numpy as np
 from mbref import rotations
 from mbref.equations.lazy import LazyMapping
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.equations.structure import MOST_KEPT, Structure
 from mbref.equations.units import row_lengths
 from mbref.kernels.scene_layout import COUPLED_ANGLE
-from mbref.motions.trajectory import DRIVER
 from mbref.scene import Scene
+from mbref.scene.bodies import DRIVER
 
 MOST_OPEN_ROWS = 120  # rows; for more, singular values at every sample take longer than the run
 OPEN = 1e-6  # singular value of unit rows / largest one: below it a combination of rows vanishes
@@ -46,14 +47,14 @@ def lazy_reactions(scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: 
 def _reactions(
     scene: Scene, times: np.ndarray, q: np.ndarray, multipliers: np.ndarray
 ) -> dict[str, np.ndarray]:
-    model = Model(scene)
+    model = Model(assembled(scene))
     blocks = model.terms(times, q).blocks
     model.release()
     return reactions(model, q, blocks, multipliers)
 
 
 def _open_dimensions(scene: Scene, times: np.ndarray, q: np.ndarray) -> dict[str, np.ndarray]:
-    model = Model(scene)
+    model = Model(assembled(scene))
     blocks = model.terms(times, q).blocks
     model.release()
     return open_dimensions(model, blocks)

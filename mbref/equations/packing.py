@@ -58,7 +58,8 @@ class Packs:
     bodies of each scene, ``joints`` its joints."""
 
     def __init__(self, scenes: Sequence[Scene]):
-        self.scenes = scenes = [scene.assembled() for scene in scenes]
+        assert not any(c.offset for scene in scenes for c in scene.coupling), "pack assembled scenes"
+        self.scenes = scenes
         self.found: dict[int, dict[Any, Any]] = {}  # by scene: results of functions, see ``Model.once``
         self.kinematic = not scenes[0].has_mass()
         listed = [all_parts(scene) for scene in scenes]

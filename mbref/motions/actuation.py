@@ -8,8 +8,9 @@ import numpy as np
 
 from mbref.motions.driving_forces import driving_forces
 from mbref.motions.joint_motion import along, angular_velocity_of, joint_motion, position_of, velocity_of
-from mbref.motions.trajectory import DRIVER, Trajectory
+from mbref.motions.trajectory import Trajectory
 from mbref.scene import Force, JointLoad, Moment, Scene, SlideSpring, Spring, TorsionSpring
+from mbref.scene.bodies import DRIVER
 from mbref.scene.joints import ANGLE
 from mbref.scene.loads import LoadEntry
 

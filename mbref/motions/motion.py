@@ -3,10 +3,7 @@ pictures follow."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
-from functools import cached_property
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -14,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mbref.motions.actuation import DriverMotion, LoadMotion, driver_motion, largest_force, load_motion
+from mbref.motions.constraints import Violation, determined_reactions, violations
 from mbref.motions.drawing.picture import moving, still
 from mbref.motions.drawing.view import View
 from mbref.motions.energy import kinetic, potential
@@ -23,7 +21,6 @@ from mbref.motions.joint_motion import JointMotion, joint_motion
 from mbref.motions.outputs import all_columns, chosen
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.scene_services import SERVICES, Violation
 
 
 @dataclass(frozen=True, repr=False)
@@ -36,9 +33,12 @@ class Motion(Trajectory):
     ----------
     mechanism : Scene
         The scene that moves.
+    error_estimate : ErrorEstimate or None
+        Estimated global error at the samples, which ``mbref.with_error_estimate`` adds. None before.
     """
 
     mechanism: Scene = field(kw_only=True)
+    error_estimate: ErrorEstimate | None = None
 
     @staticmethod
     def of(scene: Scene, trajectory: Trajectory) -> Motion:
@@ -117,7 +117,7 @@ class Motion(Trajectory):
     @property
     def violation(self) -> Violation:
         """Largest violation of a constraint row at position, velocity and acceleration level."""
-        return SERVICES["violations"](self.mechanism, self)
+        return violations(self.mechanism, self)
 
     @property
     def largest_reaction(self) -> np.ndarray | None:
@@ -129,49 +129,11 @@ class Motion(Trajectory):
         """Components of the reactions that equilibrium determines, by joint, shape (k, 6). An entry is true
         for a component of force (x, y, z) or moment (x, y, z), world axes, that does not depend on how
         redundant constraints share the load: in a plane across z force x, force y and moment z."""
-        return SERVICES["determined_reactions"](self.mechanism, self)
-
-    @cached_property
-    def error_estimate(self) -> ErrorEstimate:
-        """Estimated global error of the motion at its samples, by a second run at a smaller tolerance. The
-        second run is made on first access and takes about twice the time of the motion. Raises InputError if
-        the motion is of another engine than mbref."""
-        return SERVICES["estimate_error"](self)
-
-    def with_error_estimate(
-        self, seconds: float = math.inf, progress: Callable[[float], None] | None = None
-    ) -> Motion:
-        """Return the motion with its error estimate. The estimate's warning, if any, is part of ``message``.
-
-        Parameters
-        ----------
-        seconds : float
-            Limit of CPU time, s, of the motion and of its second run; a longer run has no estimate.
-        progress : callable, optional
-            Called with the time reached (s) between steps of the second run.
-
-        Raises
-        ------
-        InputError
-            If the motion is of another engine than mbref.
-        """
-        estimate = SERVICES["estimate_error"](self, seconds, progress)
-        message = "; ".join(filter(None, (self.message, estimate.warning)))
-        return replace(self, message=message)._keeping(estimate)
-
-    def _keeping(self, estimate: ErrorEstimate) -> Motion:
-        """Return the motion with the given error estimate."""
-        self.__dict__["error_estimate"] = estimate
-        return self
-
-    @property
-    def known_estimate(self) -> ErrorEstimate | None:
-        """Error estimate, or None if no estimate has been made."""
-        return self.__dict__.get("error_estimate")
+        return determined_reactions(self.mechanism, self)
 
     def to_record(self) -> dict[str, Any]:
         """Return the record that ``run --json`` prints; ``error_estimate`` is None if none was made."""
-        estimate = self.known_estimate
+        estimate = self.error_estimate
         return {**super().to_record(), "error_estimate": estimate and estimate.to_record()}
 
     def columns(self, *names: str) -> dict[str, np.ndarray]:
@@ -252,8 +214,7 @@ class Motion(Trajectory):
             If the file cannot be read, or contains no saved motion.
         """
         scene, trajectory, estimate = read_json(path)
-        motion = Motion.of(scene, trajectory)
-        return motion._keeping(estimate) if estimate else motion
+        return replace(Motion.of(scene, trajectory), error_estimate=estimate)
 
     def plot(self, *names: str) -> Any:
         """Plot columns over time, one panel for each quantity.

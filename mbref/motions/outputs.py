@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from mbref.input_error import InputError
-from mbref.motions.trajectory import DRIVER
+from mbref.scene.bodies import DRIVER
 from mbref.scene.fields import meant
 
 Owner = Literal["body", "joint", "driver", "load", "mechanism"]
@@ -25,7 +25,7 @@ PREFIXES: dict[Owner, str] = {  # prefix of a column, by its owner
 EXAMPLES: dict[Owner, str] = {"body": "rod", "joint": "A", "driver": "A", "load": "0", "mechanism": ""}
 MASSES = "the mass and inertia of every body"
 ACCELERATIONS = "accelerations, which the engine does not give"
-SECOND_RUN = "a second run: mbref run without --estimate no, or motion.error_estimate before"
+SECOND_RUN = "a second run: mbref run without --estimate no, or mbref.with_error_estimate before"
 TURNING = "a joint that turns about one axis"
 SLIDING = "a joint that slides along one axis"
 LOAD_ABOUT_AXIS = "a load about a joint's axis"
@@ -166,7 +166,7 @@ def _totals(motion: Any) -> dict[str, np.ndarray | None]:
     levels = {f"{level}_violation": rows for level, rows in motion.violation._asdict().items()}
     energies = ("kinetic_energy", "potential_energy", "energy") if motion.mechanism.has_mass() else ()
     found = {name: getattr(motion, name) for name in energies}
-    estimate = None if motion.known_estimate is None else motion.known_estimate.error
+    estimate = None if motion.error_estimate is None else motion.error_estimate.error
     return {**levels, "largest_reaction": motion.largest_reaction, **found, "error_estimate": estimate}
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import enum
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -11,8 +10,6 @@ from typing import Any
 import numpy as np
 
 from mbref.motions.crossing import Crossing
-
-DRIVER = "driver({})"  # name of the driver of a joint in columns and records
 
 
 class Outcome(enum.Enum):
@@ -193,21 +190,6 @@ class Trajectory:
             key: None if (array := getattr(self, key)) is None else array[:, b] for key in PER_BODY
         }
         return BodyMotion(name, **rows)
-
-    def with_error_estimate(self, seconds: float = math.inf) -> Trajectory:
-        """Return the trajectory with its engine's own estimate of the error.
-
-        Parameters
-        ----------
-        seconds : float
-            CPU time (s) for the estimate.
-
-        Returns
-        -------
-        Trajectory
-            The trajectory itself if its engine makes no estimate. `Motion`, which mbref returns, has one.
-        """
-        return self
 
     @staticmethod
     def failed(

@@ -11,6 +11,7 @@ from mbref.scene.fields import Mass, Measures, Name, PointValue, Quaternion, Sce
 from mbref.scene.functions import TimeFunction
 from mbref.scene.validation import checked_inertia
 
+DRIVER = "driver({})"  # name of the driver of a joint in columns and records
 UNIT_TOLERANCE = 1e-6  # largest deviation of a quaternion from unit length that counts as rounding
 
 

@@ -17,7 +17,6 @@ from mbref.scene.loads import Load
 from mbref.scene.paths import replaced_at
 from mbref.scene.toml import as_lists, read_toml, scene_text, with_lines
 from mbref.scene.validation import GROUND, SceneError, field_faults, named_paths, reference_faults
-from mbref.scene_services import SERVICES, Counts
 
 
 class Scene(SceneEntry):
@@ -133,44 +132,6 @@ class Scene(SceneEntry):
         """Return whether every body has mass and inertia, as a dynamic analysis needs."""
         return all(body.mass is not None for body in self.body)
 
-    def assembled(self) -> Scene:
-        """Return the scene at the poses at which its motion starts: they obey the offsets of its couplings.
-
-        The bodies move by Newton steps of least mass-weighted displacement until joints, drivers and
-        couplings hold, and carry joints and points of loads. The result has no offsets, and its joint
-        coordinates count from the new poses. Velocities, in world axes, are unchanged. A scene without
-        offsets is returned as it is.
-
-        Raises
-        ------
-        SceneError
-            If no pose obeys an offset; the message names the coupling.
-        """
-        return SERVICES["assembled"](self) if any(c.offset for c in self.coupling) else self
-
-    def angles_at_start(self) -> dict[str, float]:
-        """Return the angles of joints, rad, between the given poses and the poses of ``assembled``.
-
-        Full turns are counted. The result has every joint that turns about one axis; without offsets all
-        angles are zero.
-
-        Raises
-        ------
-        SceneError
-            If no pose obeys an offset; the message names the coupling.
-        """
-        return SERVICES["angles_at_start"](self)
-
-    def counts(self) -> Counts:
-        """Return coordinates, rows by joint, rank, redundant rows and degrees of freedom at t = 0.
-
-        Raises
-        ------
-        SceneError
-            If the initial positions contradict the joints.
-        """
-        return SERVICES["counts"](self)
-
     def with_(self, path: str | None = None, value: Any = None, /, **changes: Any) -> Scene:
         """Return a validated copy with some top-level fields replaced, or with another value at a path.
 
@@ -194,9 +155,6 @@ class Scene(SceneEntry):
         if path is not None:
             data = replaced_at(data, path, lambda _: value)
         return Scene(**{**data, **changes})
-
-    def _repr_html_(self) -> str:
-        return SERVICES["still"](self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the scene as the nested tables of its file; fields with default values are left out.

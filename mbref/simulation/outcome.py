@@ -10,10 +10,10 @@ import numpy as np
 from mbref import __version__
 from mbref.equations.branches import Passed, branches_passed, tangents
 from mbref.equations.initial_state import Start
-from mbref.equations.joint_angles import angles_by_joint
 from mbref.equations.joint_reactions import lazy_reactions
 from mbref.equations.lazy import LazySequence
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled, counted_angles
 from mbref.kernels.layout import NOT_CONVERGED, NOT_FINITE, SINGULAR, SINGULAR_AHEAD
 from mbref.method import Method, default_method
 from mbref.motions.crossing import Crossing
@@ -112,7 +112,7 @@ def trajectory_of(run: Run, status: int, seconds: float, built: float) -> Motion
         times=times,
         **model.motion(q, v, a),
         **lazy_reactions(run.scene, times, q, multipliers),
-        angles=angles_by_joint(run.scene, model.structure, angles),
+        angles=counted_angles(run.scene, model.structure, angles),
         outcome=OUTCOMES[status],
         t_end=float(loop.clock.time),
         message=_message(run, status) if met is None else _met(run, met),
@@ -176,7 +176,7 @@ def lazy_crossings(scene: Scene, passed: Sequence[Passed]) -> Sequence[Crossing]
 
 def _with_branches(scene: Scene, passed: Sequence[Passed]) -> tuple[Crossing, ...]:
     """Return singular positions in the scene's frames."""
-    model = Model(scene)
+    model = Model(assembled(scene))
     found = tuple(_with_branches_of(model, one) for one in passed)
     model.release()
     return found

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mbref.equations.diagnosis import RANK_TOLERANCE, counts, scaled_jacobian
+from mbref.equations.counts import RANK_TOLERANCE, counts, scaled_jacobian
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
 from mbref.simulation.trial import passes_with, trial_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mbref.equations.diagnosis import RANK_TOLERANCE, scaled_jacobian
+from mbref.equations.counts import RANK_TOLERANCE, scaled_jacobian
 from mbref.equations.model import displaced
 from mbref.linear_algebra.least_norm import null_space
 from mbref.stepping.run import Run

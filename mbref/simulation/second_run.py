@@ -29,31 +29,46 @@ ORDER = 24
 RTOL_SERIES, RTOL_EXPLICIT = 1e-13, 1e-12
 TIGHTER = 0.1  # factor on the motion's own tolerance, if that gives a smaller tolerance
 UNIT = 2.0**-52  # largest relative distance between neighbouring doubles
-LONGER = "; --estimate yes and motion.error_estimate have no time limit"
+LONGER = "; --estimate yes and with_error_estimate have no time limit"
 
 
 ProgressCallback = Callable[[float], None]
 
 
-def estimate_error(
+def with_error_estimate(
     motion: Motion, seconds: float = np.inf, progress: ProgressCallback | None = None
-) -> ErrorEstimate:
-    """Estimate the global error of a motion of mbref by a second run.
+) -> Motion:
+    """Return the motion with its estimated global error, by a second run at a smaller tolerance.
+
+    The second run takes about twice the time of the motion. The estimate is ``error_estimate``, and its
+    warning, if any, is part of ``message``.
 
     Parameters
     ----------
     motion : Motion
         A motion that ``simulate`` returned.
     seconds : float
-        Time limit of the second run, s. A motion whose own steps took longer has no estimate.
+        Limit of CPU time, s, of the motion and of its second run; a longer run has no estimate.
     progress : callable, optional
         Called with the time reached (s) between steps of the second run.
+
+    Returns
+    -------
+    Motion
+        The motion, whose ``error_estimate.error`` (k,) is relative or in rad.
 
     Raises
     ------
     InputError
-        If the motion is of another engine.
+        If the motion is of another engine than mbref.
     """
+    estimate = _estimate(motion, seconds, progress)
+    message = "; ".join(filter(None, (motion.message, estimate.warning)))
+    return replace(motion, message=message, error_estimate=estimate)
+
+
+def _estimate(motion: Motion, seconds: float, progress: ProgressCallback | None) -> ErrorEstimate:
+    """Return the estimated error of a motion."""
     if motion.engine != "mbref":
         raise InputError(f"error_estimate: a motion of {motion.engine}; crosscheck judges other engines")
     method = Method.parse(motion.method)

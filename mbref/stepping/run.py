@@ -8,10 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from mbref.equations.branches import Passed
-from mbref.equations.diagnosis import freedoms_left
+from mbref.equations.counts import freedoms_left
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import Start, consistent_start
 from mbref.equations.model import Model
+from mbref.equations.offsets import assembled
 from mbref.equations.reduction import Reduction, reduced_start
 from mbref.kernels.layout import (
     Active,
@@ -91,8 +92,8 @@ class Run:
         None stands for all equations. Raises SceneError if bodies lack a mass and drivers leave a degree of
         freedom.
         """
-        refuse_conflict(self.scene, float(self.times[-1]))
-        model = Model(self.scene)
+        model = Model(assembled(self.scene))
+        refuse_conflict(model.scene, float(self.times[-1]))
         start = consistent_start(model)
         if model.kinematic and freedoms_left(model, start) > 0:
             raise SceneError(missing_masses(self.scene))

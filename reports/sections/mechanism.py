@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
+import mbref
+
 from .. import mechanisms
 from ..blocks import Block, Figure, Heading, Table, Text
 from ..runs import Run, SceneRuns
@@ -32,7 +34,7 @@ def _most_accurate(scene_runs: SceneRuns) -> Run | None:
 
 
 def _counts(scene_runs: SceneRuns) -> Table:
-    counts = scene_runs.scene.counts()
+    counts = mbref.counts(scene_runs.scene)
     joints = {joint.name: joint.type for joint in scene_runs.scene.joint}
     columns = {
         "Coordinates": counts.coordinates,

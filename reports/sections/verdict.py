@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import mbref
 from crosscheck.judge.tolerances import FALSE_SUCCESS, FLOOR
 from crosscheck.study.grades import DEFAULTS, Grade, Judged, grade
 from crosscheck.study.record_view import ended
@@ -91,7 +92,7 @@ def _engines(groups: Sequence[SceneRuns]) -> list[tuple[str, str, int, str]]:
 
 
 def _scene(group: SceneRuns) -> tuple[str, str]:
-    counts = group.scene.counts()
+    counts = mbref.counts(group.scene)
     redundant = f"{counts.redundant} redundant" if counts.redundant else "none redundant"
     return group.scene.name, f"{group.scene.duration:g} s, {counts.rows} rows, {redundant}"
 

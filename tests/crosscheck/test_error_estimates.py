@@ -47,7 +47,7 @@ def test_an_engine_without_estimates_has_none_in_its_record():
     record = run_case(Case(SCENE, TIMES, f"{FAKES}:FAKE", Setting("a", {"seconds": 0.5})))
     assert "error_estimate" not in record
     run = Fake().run(SCENE, TIMES, Setting("a", {"seconds": 0.5}))
-    assert run.with_error_estimate(1.0) is run
+    assert Fake().with_error_estimate(run, 1.0) is run
 
 
 def test_the_message_of_an_estimated_run_says_that_its_motion_is_sensitive():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.truth import truth_for
 from mbref.formulations import FORMULATIONS
@@ -83,7 +84,7 @@ STARTS = [n for n in CLOSED if n != "four_bar_straight"]
 def is_served(formulation, scene):
     """Whether a formulation claims the scene's redundant rows and bodies without inertia about an axis."""
     claims = FORMULATIONS[formulation]
-    is_redundant = formulation == "lm1" and scene.counts().redundant
+    is_redundant = formulation == "lm1" and mbref.counts(scene).redundant
     return not is_redundant and (claims.handles_singular_mass or not has_singular_mass(scene))
 
 

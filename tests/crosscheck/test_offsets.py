@@ -12,13 +12,12 @@ from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.metrics import measure
 from crosscheck.judge.reference.taylor import natural_motion
 from crosscheck.judge.reference.tree import tree_motion
-from crosscheck.judge.start import start_coordinates, started
+from crosscheck.judge.start import checked_start, start_coordinates, started
 from crosscheck.judge.truth import truth_for
 from crosscheck.recorded.exact import reference_table
 from crosscheck.recorded.judgement import judge_motion
 from mbref import formats
 from mbref.scene import Scene, SceneError
-from mbref.scene_services import SERVICES
 from tests.helpers.coupled_mechanisms import coupled_loops, gear_pair, rack, screw, spatial_chain
 
 TIMES = np.array([0.0, 0.2, 0.4])
@@ -44,7 +43,7 @@ def shifted(make, name: str, offset: float) -> Scene:
 def test_judge_measures_the_offset_in_the_assembled_poses(make, name, offset):
     """q₂ - ratio · q₁ = offset, in the judge's joint coordinates of the poses that mbref assembles."""
     scene = shifted(make, name, offset)
-    assert started(scene) == scene.assembled()
+    assert started(scene) == mbref.assembled(scene)
     (coupling,) = scene.coupling
     (first, one), (second, other) = scene.coupled(coupling)
     at = start_coordinates(scene)
@@ -56,28 +55,25 @@ def test_judge_measures_the_offset_in_the_assembled_poses(make, name, offset):
 
 
 @pytest.mark.parametrize("factor", [0.5, -1.0, 1.0 + 1e-9])
-def test_start_with_another_offset_is_refused(factor, monkeypatch):
+def test_start_with_another_offset_is_refused(factor):
     """Half of the offset, the opposite offset and an inaccurate assembly violate the judge's equation."""
-    usual = SERVICES["assembled"]
-    wrong = lambda scene: usual(scene.with_("coupling[teeth].offset", factor * scene.coupling[0].offset))  # noqa: E731
-    monkeypatch.setitem(SERVICES, "assembled", wrong)
+    scene, other = (shifted(gear_pair, "teeth", share * 0.4) for share in (1.0, factor))
     with pytest.raises(SceneError, match="teeth: the poses at the start violate it by"):
-        started(shifted(gear_pair, "teeth", 0.4))
+        checked_start(scene, mbref.assembled(other), mbref.angles_at_start(scene))
 
 
-def test_start_that_opens_a_joint_is_refused(monkeypatch):
+def test_start_that_opens_a_joint_is_refused():
     """The wheel is moved by 0.1 mm off joint B."""
-    usual = SERVICES["assembled"]
-    wrong = lambda scene: usual(scene).with_("body[wheel].position[0]", 0.4001)  # noqa: E731
-    monkeypatch.setitem(SERVICES, "assembled", wrong)
+    scene = shifted(gear_pair, "teeth", 0.4)
+    wrong = mbref.assembled(scene).with_("body[wheel].position[0]", 0.4001)
     with pytest.raises(SceneError, match=r"B: the poses at the start violate it by 0\.0001"):
-        started(shifted(gear_pair, "teeth", 0.4))
+        checked_start(scene, wrong, mbref.angles_at_start(scene))
 
 
 def test_full_turns_at_the_start_are_no_violation():
     """An offset of 20 rad turns a wheel by three full turns and 1.15 rad."""
     scene = shifted(gear_pair, "teeth", 20.0)
-    assert started(scene) == scene.assembled()
+    assert started(scene) == mbref.assembled(scene)
 
 
 @every
@@ -109,7 +105,7 @@ def test_engines_refuse_a_scene_that_is_not_assembled():
     refusal = engine("mujoco").cannot(shifted(gear_pair, "teeth", 0.4))
     assert refusal is not None
     assert refusal.reason == (
-        "coupling 'teeth' has an offset (scene.assembled() has none), which the adapter does not map"
+        "coupling 'teeth' has an offset (mbref.assembled(scene) has none), which the adapter does not map"
     )
 
 
@@ -129,7 +125,7 @@ def test_coordinates_of_a_reference_table_count_from_the_file_s_poses(tmp_path):
 def test_find_scenes_assembles_offsets_and_read_scenes_does_not(tmp_path):
     scene, path = shifted(gear_pair, "teeth", 0.4), str(tmp_path / "gears.toml")
     scene.save(path)
-    assert find_scenes([path]) == [scene.assembled()] and read_scenes([path]) == [scene]
+    assert find_scenes([path]) == [mbref.assembled(scene)] and read_scenes([path]) == [scene]
 
 
 def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
@@ -145,4 +141,4 @@ def test_mjcf_keeps_the_offset_of_a_coupling(tmp_path):
 
 def test_judge_accepts_the_assembled_chain_of_two_offsets():
     scene = shifted(spatial_chain, "cable", 0.1).with_("coupling[mesh].offset", "-20 deg")
-    assert started(scene) == scene.assembled()
+    assert started(scene) == mbref.assembled(scene)

@@ -11,6 +11,7 @@ import functools
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.engine import Setting, engine
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
@@ -64,7 +65,7 @@ def exact() -> Trajectory:
 
 def test_bricard_s_linkage_has_one_redundant_row_and_one_freedom():
     """Six hinges have 30 rows, of rank 29, on five bodies with 30 coordinates."""
-    counts = bricard().counts()
+    counts = mbref.counts(bricard())
     assert (counts.rows, counts.rank, counts.degrees_of_freedom) == (30, 29, 1), counts
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.conformance.initial_accelerations import PRINCIPLE, compare
 from crosscheck.judge.constraints import closure, initial_poses
 from crosscheck.judge.gauss_principle import gauss, rank, singular_values
@@ -60,7 +61,7 @@ def test_rounded_loop_is_closed_and_keeps_its_redundant_rows(name, digits):
     scene, whole = turned(name, digits), turned(name, None)
     gaps = closure(scene, np.zeros(1), *(a[None] for a in initial_poses(scene)))
     assert max(np.abs(rows).max() for rows in gaps.values()) < 1e-14
-    assert (scene.counts().redundant, rank(scene)) == (whole.counts().redundant, rank(whole))
+    assert (mbref.counts(scene).redundant, rank(scene)) == (mbref.counts(whole).redundant, rank(whole))
     dependent = singular_values(scene)[rank(scene) :]
     assert dependent.max(initial=0.0) < 1e-13
 

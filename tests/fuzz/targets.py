@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from mbref.equations.diagnosis import diagnose
+from mbref.design.diagnosis import diagnose
 from mbref.method import Method, MethodError
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError

@@ -11,9 +11,9 @@ from mbref.cli.scene_files import template
 from mbref.design.along_motion import along_motion, general_pose
 from mbref.design.assemble import assemble
 from mbref.design.exchange import exchanges
-from mbref.design.placed import placed
-from mbref.equations.diagnosis import counts
+from mbref.equations.counts import counts
 from mbref.equations.model import Model
+from mbref.equations.placed import placed
 from mbref.scene import Body, Coupling, Driver, Revolute, Scene, SceneError, TorsionSpring
 from mbref.scenes import find_scene
 

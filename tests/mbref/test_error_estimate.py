@@ -12,7 +12,7 @@ import pytest
 
 from crosscheck.judge.metrics import error_series
 from crosscheck.judge.truth import truth_for
-from mbref import ErrorEstimate, Limits, Motion, Scene, find_scene, simulate
+from mbref import ErrorEstimate, Limits, Motion, Scene, find_scene, simulate, with_error_estimate
 from mbref.cli.commands import main
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Body, Driver, Revolute, Spring, Translational
@@ -140,38 +140,38 @@ def test_estimate_is_the_true_error_of_an_oscillation(oscillator):
     motion = simulate(oscillator, "taylor[order=4]", limits=Limits(rtol=1e-4))
     true = np.abs(motion["mass"].position[:, 0] - 1 - 0.2 * np.cos(10 * motion.times)) / 1.2
     assert true.max() > 1e-10, "the run is too accurate for a test"
-    assert np.abs(motion.error_estimate.error - true).max() < 1e-3 * true.max()
+    assert np.abs(with_error_estimate(motion).error_estimate.error - true).max() < 1e-3 * true.max()
 
 
 def test_message_warns_of_a_sensitive_motion_and_states_the_error_at_a_tighter_tolerance(pendulums):
     """A chaotic triple pendulum: the error stated for the tighter tolerance is, to a factor of ten, the
     estimate of a run with this tolerance."""
     motion = simulate(pendulums, "taylor", rtol=1e-4)
-    warned = motion.with_error_estimate()
+    warned = with_error_estimate(motion)
     found = warned.error_estimate
     assert motion.outcome is warned.outcome is Outcome.COMPLETED and motion.message == ""
     assert warned.message == found.warning and found.warning.startswith("sensitive motion: error about ")
     assert found.largest > 0.1 and found.tighter is not None and found.tighter[1] < 1e-2 * found.largest
-    accurate = simulate(pendulums, "taylor", rtol=1e-12).error_estimate
+    accurate = with_error_estimate(simulate(pendulums, "taylor", rtol=1e-12)).error_estimate
     assert 0.1 < accurate.largest / found.tighter[1] < 10 and accurate.tighter is None
 
 
 def test_estimate_at_the_smallest_tolerance_shows_the_growth_of_rounding_errors(pendulums):
     """In a chaotic motion the rounding of the start grows; two runs with one start would not show it."""
-    found = simulate(pendulums, "taylor", rtol=1e-15).error_estimate
+    found = with_error_estimate(simulate(pendulums, "taylor", rtol=1e-15)).error_estimate
     assert found.error[-1] > 20 * found.error[1] > 0
 
 
 def test_estimate_of_a_prescribed_motion_is_of_the_size_of_rounding():
     """A driver prescribes the whole motion, so that no error of integration is left."""
-    found = simulate("four_bar", duration=0.1).error_estimate
+    found = with_error_estimate(simulate("four_bar", duration=0.1)).error_estimate
     assert found.exceeds_rtol_from is None and 0 < found.largest < 1e-11
 
 
 def test_motions_through_and_from_singular_positions_have_an_estimate():
     """Crank and rod of equal length pass one; the straight four-bar begins at one."""
     for name, duration in (("planar_slider_crank_equal", 0.3), ("four_bar_straight", 0.1)):
-        found = simulate(name, duration=duration).error_estimate
+        found = with_error_estimate(simulate(name, duration=duration)).error_estimate
         assert not np.isnan(found.error).any() and 0.0 < found.largest < 1e-7, (name, found)
 
 
@@ -193,7 +193,7 @@ def test_start_of_the_second_run_differs_by_rounding_and_keeps_zeros(pendulums):
 
 def test_samples_that_the_second_run_does_not_reach_have_no_estimate(dead):
     """Three samples at t ≥ 2 s are added to a motion that ends at a dead position before."""
-    motion = simulate(dead)
+    motion = with_error_estimate(simulate(dead))
     assert 2 < len(motion.times) < 101 and not np.isnan(motion.error_estimate.error).any()
     last = np.repeat([len(motion.times) - 1], 3)
     more = {
@@ -201,39 +201,40 @@ def test_samples_that_the_second_run_does_not_reach_have_no_estimate(dead):
         for name in ("position", "orientation", "velocity", "angular_velocity")
     }
     times = np.concatenate([motion.times, 2.0 + np.arange(3)])
-    found = replace(motion, times=times, **more).error_estimate
+    found = with_error_estimate(replace(motion, times=times, **more)).error_estimate
     assert np.isnan(found.error).tolist() == [False] * len(motion.times) + [True] * 3
     assert found.reason.startswith("the second run ended at t = ") and "dead position" in found.reason
 
 
 def test_run_of_more_seconds_than_the_limit_is_not_repeated(pendulums):
     motion = replace(simulate(pendulums, duration=0.1), cost=Cost(seconds=7.0))
-    found = motion.with_error_estimate(5.0).error_estimate
+    found = with_error_estimate(motion, 5.0).error_estimate
     assert found.largest is None and found.second_run == "" and np.isnan(found.error).all()
     assert found.sentence == (
         "no error estimate: the run took 7 s, more than 5 s; "
-        "--estimate yes and motion.error_estimate have no time limit"
+        "--estimate yes and with_error_estimate have no time limit"
     )
-    assert motion.error_estimate.largest is not None
+    assert with_error_estimate(motion).error_estimate.largest is not None
 
 
 def test_second_run_ends_at_its_time_limit(pendulums):
     motion = replace(simulate(pendulums), cost=Cost(seconds=0.0))
-    found = motion.with_error_estimate(0.0).error_estimate
+    found = with_error_estimate(motion, 0.0).error_estimate
     assert found.largest is None and found.reason.startswith("a second run takes longer than 0 s")
 
 
 def test_error_of_a_motion_by_another_engine_cannot_be_estimated(pendulums):
     motion = replace(simulate(pendulums, duration=0.1), engine="mujoco")
     with pytest.raises(ValueError, match="a motion of mujoco"):
-        motion.error_estimate  # noqa: B018
+        with_error_estimate(motion)
 
 
 def test_estimate_is_written_only_after_it_was_requested(pendulums, tmp_path):
-    """Record, columns and CSV file have no estimate before ``error_estimate`` is read, and its values
+    """Record, columns and CSV file have no estimate before ``with_error_estimate``, and its values
     after."""
     motion = simulate(pendulums, duration=0.5)
     assert motion.to_record()["error_estimate"] is None and "error_estimate" not in motion.columns()
+    motion = with_error_estimate(motion)
     found = motion.error_estimate
     motion.save(tmp_path / "motion.json")
     read = Motion.load(tmp_path / "motion.json").error_estimate
@@ -283,4 +284,4 @@ def test_estimate_is_the_error_against_a_closed_form_within_one_percent():
     truth = truth_for(scene, 0.0)
     assert truth is not None, "the scene has a closed form"
     true = error_series(scene, motion, truth.poses(motion.times))
-    assert motion.error_estimate.largest == pytest.approx(true.max(), rel=1e-2)
+    assert with_error_estimate(motion).error_estimate.largest == pytest.approx(true.max(), rel=1e-2)

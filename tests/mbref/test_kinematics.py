@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+import mbref
 from crosscheck.judge.truth import closed_form
-from mbref.equations.diagnosis import undriven_freedoms
+from mbref.equations.counts import undriven_freedoms
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
 from mbref.scene import Driver, SceneError
@@ -50,7 +51,7 @@ def test_a_freedom_without_driver_needs_masses():
 def test_driver_prescribes_the_motion_also_from_a_singular_start():
     """The straight four-bar has one degree of freedom at other poses, which its driver takes."""
     scene = SCENES["four_bar_straight"]()
-    assert scene.counts().degrees_of_freedom == 1
+    assert mbref.counts(scene).degrees_of_freedom == 1
     assert undriven_freedoms(scene) == 0
 
 

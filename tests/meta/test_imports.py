@@ -10,33 +10,28 @@ from imports import ROOT, children, circles, floors, graph, imported, sources, u
 DOORS = (
     r"command_line|files|formats|printable|terminal|scene(\.(fields|joints|loads|toml|units|validation))?"
     r"|scenes(\.\w+)?|motions\.(crossing|trajectory)|rotations|records|__version__"
+    r"|angles_at_start|assembled|counts"  # functions of scenes, whose results the judge checks
 )
 ALLOWED = {  # package → the names of mbref that it may import
     "crosscheck": re.compile(rf"mbref(\.({DOORS})(\.\w+)?)?"),
     "reports": re.compile(
-        r"mbref(\.(command_line|files|printable|scene|motions\.trajectory|rotations|records|motions\.drawing(\.\w+)?)(\.\w+)?)?"
+        r"mbref(\.(command_line|counts|files|printable|scene|motions\.trajectory|rotations|records|motions\.drawing(\.\w+)?)(\.\w+)?)?"
     ),
 }
 ADAPTER = "crosscheck.engines.mbref"  # the one module that may import all of mbref
 
 FLOORS = {  # lowest first; an arrow within a floor or downwards
     "mbref": (
-        ["input_error", "files", "printable", "terminal", "rotations", "records", "scene_services"],
-        ["scene"],
-        ["command_line", "formats", "scenes"],
-        ["motions"],
-        ["kernels"],
-        ["linear_algebra"],
-        ["equations"],
-        ["formulations"],
-        ["stabilisation"],
-        ["integrators"],
+        ["input_error", "files", "printable", "terminal", "rotations", "records"],
+        ["scene", "kernels"],
+        ["command_line", "scenes", "linear_algebra"],
+        ["equations", "formulations", "integrators"],
+        ["motions", "formats", "stabilisation"],
         ["method"],
         ["stepping"],
         ["taylor"],
         ["simulation"],
-        ["ensembles"],
-        ["design"],
+        ["ensembles", "design"],
         ["cli"],
         ["__main__"],
     ),

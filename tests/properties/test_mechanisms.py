@@ -20,7 +20,7 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.reaction_balance import balance, idle
 from crosscheck.judge.tolerances import RANK
 from mbref import Limits, rotations, simulate
-from mbref.equations.diagnosis import diagnose
+from mbref.design.diagnosis import diagnose
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.scene import Scene
 

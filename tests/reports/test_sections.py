@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from synthetic import groups, nothing, record, records, scene
 
+import mbref
 from crosscheck.conformance.suite import Conformance, Verdict
 from crosscheck.judge.constraints import scene_length
 from crosscheck.judge.model_identity import gate_times
@@ -233,7 +234,7 @@ def test_mechanism_table_has_the_scene_s_rows_and_rank():
     """The rows of its joints, one column each, add up to the scene's."""
     found = table(mechanism.render(groups()[0]), "Redundant rows")
     cells = dict(zip(found.header, found.rows[0], strict=True))
-    counts = scene().counts()
+    counts = mbref.counts(scene())
     assert cells["Rank"] == str(counts.rank) and cells["Rows"] == str(counts.rows), (cells, counts)
     assert (
         sum(int(v) for k, v in cells.items() if k[:2] in {f"{j.name} " for j in scene().joint}) == counts.rows

@@ -95,12 +95,14 @@ class Exudyn(Linearising, Engine):
         """Return the statements that set up SolveDynamic, for ``settings = exu.SimulationSettings()``."""
         if setting.family not in DYNAMIC:
             return ""
+        from mbref import counts
+
         statements: list[str] = []
         exu, settings = Written("exu", statements), Written("settings", statements)
         integration = settings.timeIntegration
         integration.endTime = scene.duration
         integration.numberOfSteps = step_count(scene.duration, float(setting.options["step"]))
-        kind = DYNAMIC[setting.family](exu, settings, bool(scene.counts().redundant or scene.driver))
+        kind = DYNAMIC[setting.family](exu, settings, bool(counts(scene).redundant or scene.driver))
         return "; ".join([*statements, f"mbs.SolveDynamic(settings, solverType={kind!r})"])
 
     def own_eigenvalues(self, scene: Scene) -> np.ndarray:

@@ -9,6 +9,7 @@ import numpy as np
 from crosscheck.engines.mujoco.importing.left_out import Part
 from crosscheck.judge.constraints import initial_poses, joint_coordinates, joint_rates
 from crosscheck.judge.gauss_principle import gauss
+from crosscheck.judge.start import started
 from mbref.scene import Scene
 from mbref.scene.joints import DISPLACEMENT
 
@@ -24,7 +25,7 @@ def acting(scene: Scene, limits: Mapping[str, tuple[float, float]]) -> Iterator[
     is_moved = any(coupling.offset for coupling in scene.coupling)
     if not is_moved and not any(low >= -AT_LIMIT or high <= AT_LIMIT for low, high in limits.values()):
         return
-    start = scene.assembled()
+    start = started(scene)
     places, still = initial_poses(start), np.zeros((len(scene.body), 3))
     now = joint_coordinates(scene, np.zeros(1), places[0][None], places[1][None], still[None])
     found = gauss(start)

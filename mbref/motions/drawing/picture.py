@@ -72,20 +72,44 @@ class Form(NamedTuple):
 BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # layout of motions side by side
 
 
-def still(scene: Scene, view: View | None = None, width: float = Form().width) -> str:
-    """Return the scene at t = 0 as SVG, seen normal to its plane unless a view is given."""
+class Picture(str):
+    """Text of an SVG, which a notebook shows as a picture."""
+
+    def _repr_html_(self) -> str:
+        return str(self)
+
+
+def still(scene: Scene, view: View | None = None, width: float = Form().width) -> Picture:
+    """Return the scene at t = 0 as the text of an SVG, which a notebook shows as a picture.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+    view : View, optional
+        Direction of sight. Default: normal to the plane of the mechanism, otherwise oblique.
+    width : float
+        Width of the picture, px.
+
+    Returns
+    -------
+    str
+        The SVG.
+    """
     panel = Panel([Layer(at_rest(scene), more=(signs, names))])
-    return picture(scene, [panel], _title(scene), view=view, form=Form(width))
+    return Picture(picture(scene, [panel], _title(scene), view=view, form=Form(width)))
 
 
-def moving(scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width) -> str:
+def moving(
+    scene: Scene, motion: Trajectory, view: View | None = None, width: float = Form().width
+) -> Picture:
     """Return the motion as animated SVG, in real time if its duration is 4 to 12 s.
 
     The animation shows every n-th of the samples, at most 120.  Raises InputError if there is no sample.
     """
     _check([motion])
     panel, timeline = Panel([Layer(motion, more=(signs, names))]), Timeline.of(motion.times)
-    return picture(scene, [panel], _title(scene), timeline, view, Form(width))
+    return Picture(picture(scene, [panel], _title(scene), timeline, view, Form(width)))
 
 
 def frames(scene: Scene, motion: Trajectory, view: View | None = None) -> Iterator[str]:

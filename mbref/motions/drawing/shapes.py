@@ -74,7 +74,9 @@ def _ordered(points: np.ndarray) -> np.ndarray:
 
 def at_rest(scene: Scene) -> Trajectory:
     """Return the trajectory of one sample, t = 0, at the poses of the start, with zero velocities."""
-    nb, start = len(scene.body), scene.assembled().body
+    from mbref.equations.offsets import assembled  # imported here: other pictures need no equations
+
+    nb, start = len(scene.body), assembled(scene).body
     return Trajectory(
         scene=scene.name,
         engine="mbref",

@@ -79,7 +79,7 @@ def test_joints_of_a_mimic_with_an_offset_start_at_angles_that_obey_it(files):
     )
     scene, out = files.scene(text, "pair.sdf")
     assert "follow mimics lead with an offset of -0.4" in out
-    start = scene.assembled()
+    start = mbref.assembled(scene)
     angles = [2 * math.atan2(body.orientation[3], body.orientation[0]) for body in start.body]
     assert angles[1] == pytest.approx(-1.5 * (angles[0] + 0.4) + 0.2, abs=1e-12)
     assert max(map(abs, angles)) > 0.1

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import mbref
+
 MASS = '<inertial><origin xyz="0.15 0 0"/><mass value="0.3"/><inertia {}/></inertial>'
 MOMENTS = 'ixx="1e-4" ixy="0" ixz="0" iyy="2e-3" iyz="0" izz="2e-3"'
 
@@ -46,7 +48,7 @@ def test_an_element_that_closes_a_loop_is_a_joint_of_the_scene(files, tag, kind,
     loop = f'<{tag} name="tip" type="{kind}">{places}{axes}</{tag}>'
     scene, out = files.scene(robot(*CRANKS, loop), "r.urdf")
     assert scene.joint_named("tip").bodies == ("b", "c")
-    assert scene.counts().degrees_of_freedom == freedoms
+    assert mbref.counts(scene).degrees_of_freedom == freedoms
     assert "is not read" not in out
     tip = scene.joint_named("tip").anchor
     expected = [0.3 + 0.3 * np.cos(1.2), 0.0, 0.3 * np.sin(1.2)]

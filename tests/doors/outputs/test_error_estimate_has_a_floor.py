@@ -80,7 +80,7 @@ def check(make, rate: float, method: str | None, rtol: float) -> None:
     """Check the estimate at all TIMES for a motion of a speed (rad/s, m/s) or a distance (m)."""
     scene, truth = make(rate)
     motion = mbref.simulate(scene, method, TIMES, rtol=rtol)
-    estimate = motion.error_estimate.error
+    estimate = mbref.with_error_estimate(motion).error_estimate.error
     assert motion.outcome.name == "COMPLETED" and (estimate > 0.0).all()
     assert (true_error(scene, motion, truth) <= 10 * estimate).all()
 
@@ -102,5 +102,5 @@ def test_true_error_of_many_motions_is_at_most_ten_estimates(make, rate, rtol):
 def test_estimate_of_a_motion_without_error_is_its_rounding_and_not_zero(make):
     """Both runs of the estimate are equal; a number is stored to 2⁻⁵³ of its size."""
     scene, _ = make(1.0)
-    largest = mbref.simulate(scene, times=TIMES).error_estimate.largest
+    largest = mbref.with_error_estimate(mbref.simulate(scene, times=TIMES)).error_estimate.largest
     assert 2.0**-53 < largest < 1e-13

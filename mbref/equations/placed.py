@@ -9,10 +9,8 @@ from typing import Any
 import numpy as np
 
 from mbref import rotations
+from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
-from mbref.motions.drawing.shapes import at_rest
-from mbref.motions.joint_motion import along, joint_motion
-from mbref.motions.trajectory import Trajectory
 from mbref.scene import Joint, Load, Scene, SlideSpring, TorsionSpring
 
 
@@ -40,27 +38,38 @@ def placed_with_springs(model: Model, q: np.ndarray, angles: Mapping[int, float]
     ``angles`` (rad) of torsion springs, by their number in the scene, may be more than half a turn.
     """
     found, turned = placed(model, q), angles or {}
-    pose = at_rest(found)
-    return found.with_(
-        load=[
-            _with_natural_value(model.scene, pose, load, turned.get(k)) for k, load in enumerate(found.load)
-        ]
-    )
+    loads = [_with_natural_value(model, q, load, turned.get(k)) for k, load in enumerate(found.load)]
+    return found.with_(load=loads)
 
 
-def _with_natural_value(scene: Scene, pose: Trajectory, load: Load, angle: float | None) -> Load:
-    """Return a load whose natural angle or displacement counts from a pose of the scene."""
+def _with_natural_value(model: Model, q: np.ndarray, load: Load, angle: float | None) -> Load:
+    """Return a load whose natural angle or displacement counts from the pose q of the model."""
     if not isinstance(load, TorsionSpring | SlideSpring):
         return load
-    if isinstance(load, SlideSpring) or angle is None:
-        angle = float(along(joint_motion(scene, pose, load.joint), load.coordinate)[0][0])
-    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - angle})
+    if isinstance(load, SlideSpring):
+        moved = _displacement(model, q, model.scene.joint_named(load.joint))
+    else:
+        moved = _angle(model, q, load.joint) if angle is None else angle
+    return load.model_copy(update={f"natural_{load.coordinate}": load.action.natural - moved})
+
+
+def _angle(model: Model, q: np.ndarray, joint: str) -> float:
+    """Return the angle of a joint at q, rad, within half a turn."""
+    return float(angles_by_joint(model.scene, model.structure, angles_of_pose(model, q)[None])[joint][0])
+
+
+def _displacement(model: Model, q: np.ndarray, joint: Joint) -> float:
+    """Return (r₂ - r₁)·axis, m, of the anchors and the axis that the first body carries, at q."""
+    first, second = (_point(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
+    axis = rotations.unit(_direction(model, joint.bodies[0], joint.directions[0], q))
+    return float((second - first) @ axis)
 
 
 def _moved_geometry(model: Model, joint: Joint, q: np.ndarray) -> dict[str, Any]:
     """Return the geometric fields of a joint at coordinates q."""
     ends = tuple(place(model, *end, q) for end in zip(joint.bodies, joint.anchor_pair, strict=True))
-    axes = tuple(_world_axis(model, *end, q) for end in zip(joint.bodies, joint.directions * 2, strict=False))
+    carried = zip(joint.bodies, joint.directions * 2, strict=False)
+    axes = tuple(_rounded(_direction(model, *each, q)) for each in carried)
     every: dict[str, Any] = {"anchor": ends[1], "anchors": ends, "axis": axes[:1] and axes[0], "axes": axes}
     return {key: value for key, value in every.items() if key in type(joint).model_fields}
 
@@ -76,18 +85,22 @@ def _moved_points(model: Model, load: Any, q: np.ndarray) -> dict[str, Any]:
 
 def place(model: Model, body: str, point: tuple[float, float, float], q: np.ndarray) -> tuple[float, ...]:
     """Return the world position at coordinates q of a body-fixed point (world, t = 0)."""
+    return _rounded(_point(model, body, point, q), model.length)
+
+
+def _point(model: Model, body: str, point: tuple[float, float, float], q: np.ndarray) -> np.ndarray:
+    """Return ``place`` (3,) with all digits."""
     b, local = model.index(body), model.point(body, point)
     if b == model.nb:
-        return _rounded(local, model.length)
+        return local
     r, p = np.split(q.reshape(model.nb, 7)[b], [3])
-    return _rounded(r + rotations.rotate(p, local), model.length)
+    return np.asarray(r + rotations.rotate(p, local))
 
 
-def _world_axis(
-    model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray
-) -> tuple[float, ...]:
+def _direction(model: Model, body: str, axis: tuple[float, float, float], q: np.ndarray) -> np.ndarray:
+    """Return a body-fixed direction (world, t = 0) as a world vector (3,) at coordinates q."""
     b, local = model.index(body), model.direction(body, axis)
-    return _rounded(local if b == model.nb else rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
+    return local if b == model.nb else np.asarray(rotations.rotate(q.reshape(model.nb, 7)[b, 3:], local))
 
 
 def _rounded(vector: np.ndarray, size: float = 1.0) -> tuple[float, ...]:

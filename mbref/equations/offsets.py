@@ -6,11 +6,12 @@ import functools
 
 import numpy as np
 
-from mbref.design.placed import placed_with_springs
 from mbref.equations.gaps import gaps
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.joint_angles import angles_by_joint, angles_of_pose
 from mbref.equations.model import Model
+from mbref.equations.placed import placed_with_springs
+from mbref.equations.structure import Structure
 from mbref.scene import Scene, SceneError
 
 # largest rotation (rad), or displacement over the mechanism's length, in one of the equal parts of a change,
@@ -21,16 +22,64 @@ MET_OFFSET = 1e-12  # gap (lengths of the mechanism, or rad) that rounding may l
 
 
 def assembled(scene: Scene) -> Scene:
-    """Return a scene with offsets of couplings at poses that obey them (see ``Scene.assembled``)."""
-    return _at_offsets(scene)[0]
+    """Return the scene at the poses at which its motion starts: they obey the offsets of its couplings.
+
+    The bodies move by Newton steps of least mass-weighted displacement until joints, drivers and
+    couplings hold, and carry joints and points of loads. The result has no offsets, and its joint
+    coordinates count from the new poses. Velocities, in world axes, are unchanged. A scene without
+    offsets is returned as it is.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+
+    Returns
+    -------
+    Scene
+        The mechanism at its start, in SI units.
+
+    Raises
+    ------
+    SceneError
+        If no pose obeys an offset; the message names the coupling.
+    """
+    return _at_offsets(scene)[0] if any(c.offset for c in scene.coupling) else scene
 
 
 def angles_at_start(scene: Scene) -> dict[str, float]:
-    """Return the angle, rad, by joint that turns about one axis, from the poses that the scene gives to the
-    poses that obey its offsets; full turns count."""
+    """Return the angles of joints, rad, between the given poses and the poses of ``assembled``.
+
+    Full turns are counted. The result has every joint that turns about one axis; without offsets all
+    angles are zero.
+
+    Parameters
+    ----------
+    scene : Scene
+        The mechanism.
+
+    Returns
+    -------
+    dict of str to float
+        Angle, rad, by the name of the joint.
+
+    Raises
+    ------
+    SceneError
+        If no pose obeys an offset; the message names the coupling.
+    """
     if not any(coupling.offset for coupling in scene.coupling):
         return {joint.name: 0.0 for joint in scene.joint if joint.facts.turns}
     return _at_offsets(scene)[1]
+
+
+def counted_angles(scene: Scene, structure: Structure, angles: np.ndarray) -> dict[str, np.ndarray]:
+    """Return the angles (k, a) of turning joints in a run, rad, as columns (k,) by joint.
+
+    They count from the poses that the scene gives.
+    """
+    start = angles_at_start(scene)
+    return {name: each + start[name] for name, each in angles_by_joint(scene, structure, angles).items()}
 
 
 @functools.lru_cache(maxsize=64)

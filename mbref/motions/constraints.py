@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,10 +11,28 @@ from mbref import rotations
 from mbref.equations.couplings import couplings_of
 from mbref.equations.joint_reactions import determined_components
 from mbref.equations.model import Model
+from mbref.equations.offsets import angles_at_start, assembled
 from mbref.motions.joint_motion import along, joint_motion
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
-from mbref.scene_services import Violation
+
+
+class Violation(NamedTuple):
+    """Largest violation of a constraint row at k sample times, at three levels.
+
+    Attributes
+    ----------
+    position : ndarray, shape (k,)
+        m or rad.
+    velocity : ndarray, shape (k,)
+        m/s or rad/s.
+    acceleration : ndarray, shape (k,), or None
+        m/s² or rad/s². None if the engine gives no accelerations.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray | None
 
 
 def violations(scene: Scene, motion: Trajectory) -> Violation:
@@ -23,7 +42,7 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
     perpendicular and sines of driven angles, which are radians to first order. Angles in rows of couplings
     count full turns along the trajectory.
     """
-    model = Model(without_armatures(scene))
+    model = Model(without_armatures(assembled(scene)))
     q, v, a = coordinates(model, motion)
     terms = model.terms(motion.times, q, v)
     counted = _from_start(scene, motion)
@@ -43,14 +62,14 @@ def violations(scene: Scene, motion: Trajectory) -> Violation:
 
 def _from_start(scene: Scene, motion: Trajectory) -> Trajectory:
     """Return the motion with angles that count from its start, as couplings without offsets do."""
-    start = scene.angles_at_start()
+    start = angles_at_start(scene)
     return replace(motion, angles={name: each - start[name] for name, each in (motion.angles or {}).items()})
 
 
 def determined_reactions(scene: Scene, motion: Trajectory) -> dict[str, np.ndarray]:
     """Return for each joint which components (k, 6) of its reaction equilibrium determines, along world
     axes."""
-    model = Model(without_armatures(scene))
+    model = Model(without_armatures(assembled(scene)))
     q, _, _ = coordinates(model, motion)
     q = q.reshape(len(q), model.nb, 7)
     found = determined_components(model, q, model.terms(motion.times, q).blocks)
