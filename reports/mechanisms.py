@@ -9,9 +9,10 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from mbref.motions.drawing.labels import names
-from mbref.motions.drawing.picture import Form, Layer, Look, Panel, longest, picture, signs
+from mbref.motions.drawing.picture import Layer, Look, Panel, longest, picture, signs
 from mbref.motions.drawing.svg import GREY
 from mbref.motions.drawing.timeline import Timeline
+from mbref.motions.drawing.view import Form
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import Scene
 

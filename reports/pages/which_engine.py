@@ -168,17 +168,10 @@ def _section(kind: Kind, found: Sequence[SceneRuns]) -> list[Block]:
     return [Heading(kind.title, 2), Prose(kind.about), *answers]
 
 
-<<<<<<< HEAD:reports/pages/which_engine.py
 def _answers(group: Judged) -> list[Block]:
     """Return the table of a scene, its command and the engines' own lines."""
-    name, counts = group.scene.name, group.scene.counts()
-    caption = (
-=======
-def _answers(group: Judged) -> Iterator[str]:
-    """Yield the table of a scene, its command and the engines' own lines."""
     name, counts = group.scene.name, mbref.counts(group.scene)
-    yield (
->>>>>>> 641121b0 (Functions of scenes and motions replace methods that call upwards):reports/which_engine.py
+    caption = (
         f"`{name}` over {_end_time(group):g} s: {_count(len(group.scene.body), 'body', 'bodies')}, "
         f"{_count(counts.degrees_of_freedom, 'degree', 'degrees')} of freedom, "
         f"{_count(counts.redundant, 'redundant row', 'redundant rows')}. "

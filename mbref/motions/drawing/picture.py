@@ -12,9 +12,9 @@ from mbref.motions.drawing import svg
 from mbref.motions.drawing.labels import names
 from mbref.motions.drawing.marks import Stage, coupling_mark, driver_mark, ground_mark, joint_mark, load_mark
 from mbref.motions.drawing.shapes import Shape, anchors, at_rest, attack, shapes
-from mbref.motions.drawing.svg import COLOURS, GREY, INK
+from mbref.motions.drawing.svg import COLOURS, GREY, INK, Picture
 from mbref.motions.drawing.timeline import Timeline
-from mbref.motions.drawing.view import Page, View, round_length, view_of
+from mbref.motions.drawing.view import BESIDE, Form, Page, View, round_length, view_of
 from mbref.motions.joint_motion import carried
 from mbref.motions.trajectory import Trajectory
 from mbref.scene import GROUND, Scene
@@ -56,27 +56,6 @@ class Panel(NamedTuple):
     layers: Sequence[Layer]
     title: Sequence[str] = ()
     paths: Sequence[np.ndarray] = ()
-
-
-class Form(NamedTuple):
-    """Sizes of a picture, px: width, margin and largest height of a panel, letters; and number of panels in a
-    row."""
-
-    width: float = 720.0
-    margin: float = 64.0
-    tallest: float = 520.0
-    letters: int = 12
-    columns: int = 1
-
-
-BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # layout of motions side by side
-
-
-class Picture(str):
-    """Text of an SVG, which a notebook shows as a picture."""
-
-    def _repr_html_(self) -> str:
-        return str(self)
 
 
 def still(scene: Scene, view: View | None = None, width: float = Form().width) -> Picture:

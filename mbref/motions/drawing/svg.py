@@ -14,6 +14,13 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 INK, GREY, PAPER = "#222222", "#8a8a8a", "#ffffff"
 
 
+class Picture(str):
+    """Text of an SVG, which a notebook shows as a picture."""
+
+    def _repr_html_(self) -> str:
+        return str(self)
+
+
 def line(frames: np.ndarray, look: str, timeline: Timeline | None, closed: bool = False) -> str:
     """Return a line, or an outline, through points (k, n, 2), px, in k frames of a timeline."""
     texts = [" ".join(f"{x:.1f},{y:.1f}" for x, y in frame) for frame in frames]

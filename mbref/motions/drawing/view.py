@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,20 @@ from mbref.motions.drawing.shapes import FLAT
 
 NAMED = {"xy": (-90.0, 90.0), "xz": (-90.0, 0.0), "yz": (0.0, 0.0), "oblique": (-60.0, 22.0)}  # degrees
 ACROSS = ("yz", "xz", "xy")  # the view along each axis
+
+
+class Form(NamedTuple):
+    """Sizes of a picture, px: width, margin and largest height of a panel, letters; and number of panels in a
+    row."""
+
+    width: float = 720.0
+    margin: float = 64.0
+    tallest: float = 520.0
+    letters: int = 12
+    columns: int = 1
+
+
+BESIDE = Form(width=360.0, margin=44.0, letters=20, columns=2)  # layout of motions side by side
 
 
 @dataclass(frozen=True)
