@@ -15,7 +15,7 @@ from typing import Any
 import rich.console
 from rich.segment import Segment
 
-from mbref.printable import printable
+from mbref.printable import printable, shortened
 
 OUTPUT, ERRORS = "standard output", "standard error"
 
@@ -38,13 +38,14 @@ class Console(rich.console.Console):
 
 @contextmanager
 def printable_streams() -> Iterator[None]:
-    """Print by ``printable`` on standard output and standard error during the ``with`` block.
+    """Print by ``printable`` on standard output and standard error during the ``with`` block; messages on
+    standard error are ``shortened``.
 
     Consoles write to the streams themselves. An OSError of a stream has its name as ``filename``.
     """
     with (
         redirect_stdout(_Stream(sys.stdout, OUTPUT, printable)),
-        redirect_stderr(_Stream(sys.stderr, ERRORS, printable)),
+        redirect_stderr(_Stream(sys.stderr, ERRORS, lambda text: shortened(printable(text)))),
     ):
         yield
 

@@ -16,7 +16,7 @@ from crosscheck.cli.request import RequestError
 from crosscheck.cli.running import COMPLETED, OTHERWISE, console
 from crosscheck.recorded.column_errors import ColumnError
 from crosscheck.recorded.columns import SI, kind_of
-from crosscheck.recorded.exact import reference_table, write
+from crosscheck.recorded.exact import reference_table, uncounted, write
 from crosscheck.recorded.judgement import Judgement, judge_motion
 from crosscheck.recorded.reading import read
 from crosscheck.recorded.search import SECONDS as SEARCHED
@@ -61,8 +61,9 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
         unit = SI[kind_of(c.name)]
         table.add_row(c.name, f"{c.largest:.2e} {unit}", f"{c.bound:.2e} {unit}", _verdict(c), begins)
     console().print(table)
-    if found.left:
-        console().print(f"not determined by the mechanism: {', '.join(found.left)}", soft_wrap=True)
+    if undetermined := [n for n in found.left if n not in found.uncounted]:
+        console().print(f"not determined by the mechanism: {', '.join(undetermined)}", soft_wrap=True)
+    _say_uncounted(found.uncounted)
     if found.reason:
         console().print(f"The reference ends at t = {found.until:.6g} s: {found.reason}", soft_wrap=True)
     if any(c.largest > c.allowed for c in found.columns) and not found.explanations:
@@ -72,6 +73,12 @@ def _show(found: Judgement, ignored: Sequence[str]) -> None:
     if ignored:
         rest = f" and {len(ignored) - SHOWN} more" if len(ignored) > SHOWN else ""
         console().print(f"not read: {', '.join(ignored[:SHOWN])}{rest}", soft_wrap=True)
+
+
+def _say_uncounted(names: Sequence[str]) -> None:
+    if names:
+        text = f"unknown: {', '.join(names)}; full turns between samples cannot be counted, use more samples"
+        console().print(text, soft_wrap=True)
 
 
 def _nothing(found: Judgement) -> str:
@@ -111,4 +118,6 @@ def write_reference(arguments: argparse.Namespace) -> int:
         f"{table['bound'].max():.1e} of the mechanism's length or rad",
         soft_wrap=True,
     )
-    return COMPLETED if reached == times[-1] else OTHERWISE
+    missing = uncounted(table)
+    _say_uncounted(missing)
+    return COMPLETED if reached == times[-1] and not missing else OTHERWISE

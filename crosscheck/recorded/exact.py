@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +69,14 @@ def dense_exact(
         if dense >= FINEST * DENSE or all(np.isfinite(c).all() for c in turns):
             return found, columns
         dense *= 4
+
+
+def uncounted(columns: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """Return the columns (k,) that end in NaN because full turns between times cannot be counted."""
+    unknown = {name: column for name, column in columns.items() if np.isnan(column).any()}
+    if not any(kind_of(name) == "angle" for name in unknown):
+        return ()
+    return tuple(n for n, column in unknown.items() if kind_of(n) == "angle" or np.isfinite(column[0]))
 
 
 def with_dense(times: np.ndarray, dense: int) -> np.ndarray:

@@ -15,7 +15,7 @@ from crosscheck.judge.start import started
 from crosscheck.judge.tolerances import FLOOR
 from crosscheck.recorded.column_errors import ColumnError, Columns, Compared, aligned
 from crosscheck.recorded.columns import kind_of, names, scales, start_columns
-from crosscheck.recorded.exact import Exact, dense_exact
+from crosscheck.recorded.exact import Exact, dense_exact, uncounted
 from crosscheck.recorded.explanations import Explanation, with_signs
 from crosscheck.recorded.reading import Recording, read
 from crosscheck.recorded.search import SECONDS as SEARCHED
@@ -33,6 +33,7 @@ class Judgement:
     until: float
     reason: str
     left: tuple[str, ...] = ()  # columns that the judge cannot determine
+    uncounted: tuple[str, ...] = ()  # columns left because full turns between times cannot be counted
     alike: int = 0  # number of changes that explain the difference and that the table does not tell apart
     is_complete: bool = True  # False if the search for explanations ended by its limit of CPU time
 
@@ -48,6 +49,7 @@ class Judgement:
             "until": self.until,
             "reason": self.reason,
             "not judged": list(self.left),
+            "not counted": list(self.uncounted),
             "alike": self.alike,
             "searched": self.is_complete,
             "columns": [{**vars(c), "right": c.is_right} for c in self.columns],
@@ -161,5 +163,6 @@ def _judged(
             progress(f"searching for an explanation, at most {SEARCHED:g} CPU s")
         causes = search(scene, compared, later, float(found.motion.times[-1]))
     left = tuple(n for n in recording.columns if n not in whole)
+    turning = tuple(n for n in uncounted(columns) if n in left)
     until, searched = float(times[-1]), (causes.alike, causes.is_complete)
-    return Judgement(errors, causes.explanations, until, found.reason, left, *searched)
+    return Judgement(errors, causes.explanations, until, found.reason, left, turning, *searched)

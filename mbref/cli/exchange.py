@@ -12,6 +12,7 @@ from mbref.cli.options import add_scene
 from mbref.command_line import add_output
 from mbref.files import free
 from mbref.input_error import InputError
+from mbref.printable import shortened
 from mbref.scenes import find_scene
 
 
@@ -54,7 +55,7 @@ def _import(options: argparse.Namespace) -> int:
     found.scene.save(out)
     status = _report(out, found.left_out)
     for sentence in found.notes:
-        print(f"note: {sentence}")
+        print(shortened(f"note: {sentence}"))
     return status
 
 
@@ -65,5 +66,5 @@ def _export(options: argparse.Namespace) -> int:
 def _report(path: Path, left_out: Sequence[str]) -> int:
     print(path)
     for sentence in left_out:
-        print(f"left out: {sentence}")
+        print(shortened(f"left out: {sentence}"))
     return 0

@@ -26,6 +26,7 @@ AT_SINGULAR_POSITION = (
     "at a singular position, where the number of freedoms, stability and reactions are not defined"
 )
 PRINTED_AS_ZERO = 1e-9  # part of the largest number below which a number is printed as zero
+WOUND = "Torsion springs may also be in balance in further windings, full turns away."
 LIMITS = "Other equilibria may exist: the search begins at the scene's pose and follows the constraints."
 
 
@@ -109,6 +110,8 @@ def _equilibrium(options: argparse.Namespace) -> int:
             console().print("\n".join(_lines(number, each)), soft_wrap=True)
     if options.number is None:
         console().print(LIMITS)
+        if any(load.type == "torsion_spring" for load in found[0].scene.load):
+            console().print(WOUND)
     if options.out:
         console().print(options.out, soft_wrap=True)
     return 0

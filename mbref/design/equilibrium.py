@@ -14,6 +14,7 @@ from mbref.design.linearisation import Tangent, multipliers, unsteady
 from mbref.design.stability import eigenvalues_of, linear_at
 from mbref.design.turning import Turning, turning
 from mbref.design.winding import wound
+from mbref.design.windings import Windings
 from mbref.equations.driver_conflicts import refuse_conflict
 from mbref.equations.initial_state import consistent_start, solve_positions
 from mbref.equations.joint_reactions import reactions
@@ -150,6 +151,7 @@ def equilibria(scene: Scene | str | Path, starts: int = STARTS) -> list[Equilibr
         settled = _settled(tangent, freedoms)
         if settled is not None and not any(_is_known(settled, other) for other in found):
             found.append(settled)
+    Windings(found, freedoms, _is_known).search()
     return [
         _equilibrium(each, each.tangent.conditioning < SINGULAR_POSE * regular, freedoms) for each in found
     ]

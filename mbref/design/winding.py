@@ -25,7 +25,7 @@ def wound(first: Tangent) -> Tangent:
     if not np.abs(twist).max(initial=0.0) > FAR:
         return first
     for _ in range(STRIDES):
-        step = np.linalg.lstsq(_angle_derivatives(here, slots), twist, rcond=None)[0]
+        step = np.linalg.lstsq(angle_derivatives(here, slots), twist, rcond=None)[0]
         size = float(np.linalg.norm(here.basis @ step)) or 1.0
         moved = here.moved(min(1.0, STRIDE / size) * step)
         if moved is None or moved.freedoms != first.freedoms:
@@ -37,7 +37,7 @@ def wound(first: Tangent) -> Tangent:
     return here
 
 
-def _angle_derivatives(tangent: Tangent, slots: np.ndarray) -> np.ndarray:
+def angle_derivatives(tangent: Tangent, slots: np.ndarray) -> np.ndarray:
     """Return the derivatives (k, f) of the springs' angles by the coordinates y."""
     model, found = tangent.model, []
     for direction in tangent.basis.T:

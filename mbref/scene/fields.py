@@ -15,6 +15,7 @@ from mbref.scene.units import angle, length, length_or_angle
 
 # limits of numbers, whose products and squares then stay within double precision
 LARGEST, SMALLEST = 1e40, 1e-40
+MOST_CHARACTERS = 200  # characters of a name, which messages and pages repeat whole
 COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 OTHER_WORDS = {  # words of other programs and books → the words of scene files
     "hinge": "revolute",
@@ -122,7 +123,7 @@ Mass = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), AfterVali
 NotNegative = Annotated[float, Field(strict=True, allow_inf_nan=False, ge=0), Sized]
 VectorValue = Annotated[tuple[Real, Real, Real], BeforeValidator(as_list)]
 Quaternion = Annotated[tuple[Real, Real, Real, Real], BeforeValidator(as_list)]
-Name = Annotated[str, Field(min_length=1), AfterValidator(checked_name)]
+Name = Annotated[str, Field(min_length=1, max_length=MOST_CHARACTERS), AfterValidator(checked_name)]
 Pair = tuple[Name, Name]
 VectorPair = Annotated[tuple[VectorValue, VectorValue], BeforeValidator(as_list)]
 Reals = Annotated[tuple[Real, ...], Field(min_length=1), BeforeValidator(as_list)]

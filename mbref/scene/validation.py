@@ -100,6 +100,7 @@ def field_faults(error: ValidationError, tables: Mapping[str, Sequence[str]]) ->
             "float_type": f"must be a number, got {got}",
             "string_type": f"must be a string, got {got}",
             "string_too_short": "must not be empty",
+            "string_too_long": f"must have at most {limit.get('max_length')} characters, got {got}",
             "too_short": "must not be empty",
             "tuple_type": _must_hold(fault["loc"], got),
             "too_long": _must_hold(fault["loc"], got),

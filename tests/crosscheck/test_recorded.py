@@ -167,14 +167,6 @@ def test_column_states_the_time_at_which_its_error_begins(table):
     assert column.largest == pytest.approx(1e-3)
 
 
-def test_written_reference_table_is_judged_right(table, tmp_path):
-    write(reference_table(SCENE, TIMES), tmp_path / "ref.csv")
-    assert (tmp_path / "ref.csv").read_text().startswith("time [s],bound [1],upper.position.x [m]")
-    recording = read(tmp_path / "ref.csv", SCENE, {})
-    assert recording.ignored == ["bound [1]"]
-    assert judge_motion(SCENE, recording).is_right
-
-
 def test_tables_in_other_units_and_orders_are_judged_right(table, tmp_path):
     """A table without header in ms, mm and degrees; one with decimal commas and units in its header; one with
     quaternions whose w comes last."""

@@ -32,15 +32,6 @@ def test_a_pendulum_is_stable_below_and_unstable_above_its_hinge():
         assert np.allclose(each.reactions["A"], [0.0, MASS * G, 0.0, 0.0, 0.0, 0.0], atol=1e-10)
 
 
-def test_armature_lowers_the_frequency_of_a_pendulum():
-    """s² = -m g l / (J + m l² + I) with an armature I."""
-    scene = pendulum()
-    joint = scene.joint[0].model_copy(update={"armature": 0.5})
-    [below] = [e for e in equilibria(scene.with_(joint=[joint]), starts=6) if e.stability == "stable"]
-    square = MASS * G * ARM / (INERTIA + MASS * ARM**2 + 0.5)
-    assert np.allclose(below.eigenvalues**2, -square, rtol=1e-11)
-
-
 def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     """J s² + c s + k = 0 about the natural angle; the scene of the equilibrium has the natural angle 0."""
     spring = {"type": "torsion_spring", "joint": "A", "stiffness": 40.0, "damping": 3.0, "natural_angle": 0.4}
@@ -102,11 +93,6 @@ def test_parallelogram_with_a_diagonal_spring_has_the_frequency_of_its_energy():
         assert np.allclose(each.eigenvalues**2, -curvature / moment, rtol=1e-11)
 
 
-def test_pendulum_without_gravity_is_indifferent():
-    [each] = equilibria(pendulum(gravity=ORIGIN), starts=4)
-    assert each.stability == "indifferent" and len(each.frequencies) == 0
-
-
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -132,12 +118,6 @@ def test_vibration_keeps_the_constraints_and_returns_after_its_period():
     assert np.abs(moved).max() == pytest.approx(0.5 * 0.05, rel=0.05**2)
     assert np.allclose(motion.position[0], motion.position[-1], atol=1e-12)
     assert np.abs(moved[0]).max() > 0.9 * np.abs(moved).max(), "it begins displaced"
-
-
-def test_vibration_of_a_number_that_does_not_exist_is_refused():
-    [each] = [e for e in equilibria(pendulum(), starts=6) if e.stability == "stable"]
-    with pytest.raises(ValueError, match="there is none with number 2"):
-        motion_of_mode(each, 2)
 
 
 def test_commands_print_stability_reactions_and_frequency_of_a_pendulum(tmp_path, capsys):

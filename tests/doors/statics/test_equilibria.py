@@ -141,15 +141,24 @@ def test_spring_wound_by_many_turns_unwinds_to_the_equilibrium_near_its_natural_
     assert np.allclose(np.abs(each.eigenvalues) ** 2, squares, rtol=1e-8) and each.stability == "stable"
 
 
-def test_hanging_poses_of_several_turns_are_equilibria_of_their_own_under_a_soft_spring():
-    """Each balances k (φ₀ - φ) = m g l cos φ with another remaining twist φ₀ - φ."""
-    stiffness = 0.2
-    found = equilibria(pendulum(load=[spring(stiffness, natural_angle=2 * np.pi * 2.5)]), starts=12)
-    twists = np.array([each.scene.load[0].natural_angle for each in found])
-    weights = [TORQUE * each.scene.body[0].position[0] / ARM for each in found]
-    assert stiffness * twists == pytest.approx(weights, abs=1e-9 * TORQUE)
-    hanging = [twist for each, twist in zip(found, twists, strict=True) if each.stability == "stable"]
-    assert np.ptp(hanging) > np.pi
+@pytest.mark.parametrize(
+    ("share", "natural", "starts", "count"),
+    [
+        (0.15, 0.4, 2, 5),
+        (0.999, np.pi / 2, 1, 3),
+        pytest.param(0.07, 2 * np.pi * 3.1, 2, 9, marks=pytest.mark.slow),
+    ],
+)
+def test_all_windings_of_a_soft_spring_have_their_equilibria(share, natural, starts, count):
+    """Each balances k (φ₀ - φ) = m g l cos φ with another twist φ₀ - φ; near k = m g l three are close."""
+    stiffness = share * TORQUE
+    angles = natural + np.linspace(-1.01, 1.01, 20001) / share
+    off = stiffness * (natural - angles) - TORQUE * np.cos(angles)
+    twists = (natural - angles)[np.flatnonzero(off[:-1] * off[1:] < 0)]
+    found = equilibria(pendulum(load=[spring(stiffness, natural_angle=natural)]), starts=starts)
+    remaining = np.sort([each.scene.load[0].natural_angle for each in found])
+    assert len(twists) == count
+    assert remaining == pytest.approx(np.sort(twists), abs=1.01 / share * 1e-4)
 
 
 @pytest.mark.parametrize("angle", [0.0, 1.0])

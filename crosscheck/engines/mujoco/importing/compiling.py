@@ -21,7 +21,7 @@ def compiled(mujoco: Any, path: Path, options: ImportOptions) -> tuple[Any, urdf
             path.read_bytes()  # raises OSError for a missing file, which MuJoCo does not
             model, notes = holding.compiled(mujoco, path, options.hold, options.keyframe)
             return model, None, notes
-        text = urdf.prepared(path.read_bytes(), options.hold)
+        text = urdf.prepared(path.read_bytes(), options.hold, str(path))
         model = mujoco.MjModel.from_xml_string(text.text)
     except ValueError as error:
         raise SceneError([f"{path}: MuJoCo cannot read it: {' '.join(str(error).split())}"]) from None

@@ -57,12 +57,13 @@ class Text:
             model.body_subtreemass[model.body_parentid[b]] += model.body_subtreemass[b]
 
 
-def prepared(text: str | bytes, hold: Sequence[str] = ()) -> Text:
+def prepared(text: str | bytes, hold: Sequence[str] = (), where: str = "URDF") -> Text:
     """Return the URDF with links and joints alone; links are not merged.
 
-    The joints of the links ``hold`` become fixed joints. Raises SceneError if the text is no tree of links.
+    The joints of the links ``hold`` become fixed joints. Raises SceneError if the text is no tree of links;
+    ``where`` begins the sentence if the text is no XML.
     """
-    root = xml_files.parsed_bytes(text.encode() if isinstance(text, str) else text, "URDF")
+    root = xml_files.parsed_bytes(text.encode() if isinstance(text, str) else text, where)
     urdf_faults.check(root)
     whole = copy.deepcopy(root)
     urdf_faults.hold(root, hold)
