@@ -59,11 +59,6 @@ class Cell:
         names = dict.fromkeys(r["family"] for r in self.records if not is_refusal(r))
         return {name: min((r for r in self.records if r["family"] == name), key=_order) for name in names}
 
-    @property
-    def place(self) -> str:
-        """Identifier (HTML anchor) of the cell's records in a page."""
-        return f"{self.row} {self.column.scene}".replace("_", "-").replace(" ", "-").replace(",", "")
-
 
 def is_refusal(record: Record) -> bool:
     """Return whether a record is a refusal."""

@@ -9,34 +9,8 @@ from crosscheck.closed_loops import records
 from crosscheck.closed_loops.matrix import LEGEND, matrix, rerun, sentence, shown
 from crosscheck.closed_loops.mechanisms import DIFFICULTIES, ROOT
 from crosscheck.judge.truth import truth_for
-from crosscheck.study.store import REFUSED
 from mbref.scenes import find_scene
-
-FIRST = DIFFICULTIES[0]
-
-
-def run(error: float | None, family: str = "tuned", outcome: str = "COMPLETED", **changes) -> dict:
-    record = {
-        "key": f"{family}{error}",
-        "scene": FIRST.scene,
-        "engine": "mujoco",
-        "version": "4.0.0",
-        "family": family,
-        "asked": {"engine": "mujoco", "options": {"step": 1e-3}, "end": 1.0, "samples": 21},
-        "time_limit": records.TIME_LIMIT,
-        "outcome": outcome,
-        "message": "the Jacobian is singular" if outcome != "COMPLETED" else "",
-        "t_end": 1.0 if outcome == "COMPLETED" else 0.3,
-        "metrics": {} if error is None else {"error": error},
-        "cost": {"seconds": 0.5},
-    }
-    return {**record, **changes}
-
-
-def refusal() -> dict:
-    """Return the record of MuJoCo's refusal of the first mechanism."""
-    record = run(None, outcome=REFUSED, key="mujoco refuses", owner="missing in the engine")
-    return {**record, "message": "no hinge"}
+from tests.helpers.stored_runs import FIRST, measured, refused
 
 
 @pytest.mark.parametrize("column", DIFFICULTIES, ids=lambda column: column.heading)
@@ -62,16 +36,16 @@ def test_column_turned_has_the_four_bar_rotated_about_the_origin() -> None:
 @pytest.mark.parametrize(
     ("record", "text"),
     [
-        (run(9.9e-9), "✓ 1e-08"),
-        (run(1.1e-8), "≈ 1e-08"),
-        (run(9.9e-3), "≈ 1e-02"),
-        (run(0.0101), "✗ 0.01"),
-        (run(0.9512), "✗ 0.95"),
-        (run(1e-13, metrics={"error": 1e-13, "error_bound": 2e-12}), "✓ <2e-12"),
-        (run(None, outcome="STEP_FAILED"), "! ended"),
-        (run(None, outcome="CRASHED"), "! crashed"),
-        (run(None, outcome="TIMED_OUT"), "! no end"),
-        (refusal(), "–"),
+        (measured(9.9e-9), "✓ 1e-08"),
+        (measured(1.1e-8), "≈ 1e-08"),
+        (measured(9.9e-3), "≈ 1e-02"),
+        (measured(0.0101), "✗ 0.01"),
+        (measured(0.9512), "✗ 0.95"),
+        (measured(1e-13, metrics={"error": 1e-13, "error_bound": 2e-12}), "✓ <2e-12"),
+        (measured(None, outcome="STEP_FAILED"), "! ended"),
+        (measured(None, outcome="CRASHED"), "! crashed"),
+        (measured(None, outcome="TIMED_OUT"), "! no end"),
+        (refused(), "–"),
         (None, "○"),
     ],
 )
@@ -82,7 +56,12 @@ def test_cell_shows_the_grade_and_the_error_of_a_run(record, text) -> None:
 
 
 def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
-    found = [run(1e-3, "defaults"), run(1e-9), run(1e-5, "euler"), run(None, "other", "CRASHED")]
+    found = [
+        measured(1e-3, "defaults"),
+        measured(1e-9),
+        measured(1e-5, "euler"),
+        measured(None, "other", "CRASHED"),
+    ]
     cell = matrix(found)["mujoco"][FIRST.heading]
     assert cell.best() is found[1] and cell.defaults() is found[0]
     assert list(cell.families()) == ["defaults", "tuned", "euler", "other"]
@@ -90,14 +69,14 @@ def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
 
 
 def test_sentence_on_a_run_states_its_setting_and_error_or_its_failure() -> None:
-    right = run(1e-9)
+    right = measured(1e-9)
     assert "tuned (step 0.001)" in sentence(right) and "1e-09" in sentence(right)
     assert rerun(right).startswith(f"crosscheck run {FIRST.place()} --engine mujoco --setting tuned")
-    assert "the Jacobian is singular" in sentence(run(None, outcome="STEP_FAILED"))
+    assert "the Jacobian is singular" in sentence(measured(None, outcome="STEP_FAILED"))
 
 
 def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> None:
-    cell = matrix([refusal()])["mujoco"][FIRST.heading]
+    cell = matrix([refused()])["mujoco"][FIRST.heading]
     assert cell.best() is cell.defaults() is cell.records[0]
     assert sentence(cell.records[0]) == "refused: no hinge (missing in the engine)"
     assert rerun(cell.records[0]) == "" and not cell.families()
@@ -106,7 +85,10 @@ def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> N
 def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
     """In the family `terms` Drake gives only the terms of its equations, and crosscheck closes the loops; in
     `discrete` Drake closes them. The default scene of `run` is the one under "four-bar"."""
-    by_drake, by_crosscheck = run(1e-3, "discrete", engine="drake"), run(1e-11, "terms", engine="drake")
+    by_drake, by_crosscheck = (
+        measured(1e-3, "discrete", engine="drake"),
+        measured(1e-11, "terms", engine="drake"),
+    )
     rows = matrix([by_drake, by_crosscheck])
     assert list(rows) == ["drake", "drake, terms"]
     assert rows["drake"]["four-bar"].best() is by_drake
@@ -115,9 +97,9 @@ def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
 
 def test_a_record_supersedes_its_run_older_versions_and_refusals_of_engine_and_mechanism() -> None:
     """Records of another family of the version, and of another mechanism, remain."""
-    new = run(1e-9)
-    assert records.supersedes(new, run(1e-9)), "the same key"
-    assert not records.supersedes(new, run(1e-3, "defaults"))
-    assert records.supersedes(new, run(1e-3, "defaults", version="3.0.0")), "an older version"
-    assert records.supersedes(new, refusal()) and records.supersedes(refusal(), new)
-    assert not records.supersedes(new, run(1e-3, scene="bennett", version="3.0.0"))
+    new = measured(1e-9)
+    assert records.supersedes(new, measured(1e-9)), "the same key"
+    assert not records.supersedes(new, measured(1e-3, "defaults"))
+    assert records.supersedes(new, measured(1e-3, "defaults", version="3.0.0")), "an older version"
+    assert records.supersedes(new, refused()) and records.supersedes(refused(), new)
+    assert not records.supersedes(new, measured(1e-3, scene="bennett", version="3.0.0"))

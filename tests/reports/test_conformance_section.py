@@ -87,14 +87,9 @@ def test_random_violations_are_counted_by_check_with_the_worst_of_each(tmp_path)
     ]
 
 
-def committed() -> list[dict]:
-    folder = ROOT / "reports" / "reference" / "conformance"
-    return [json.loads(path.read_text()) for path in sorted(folder.glob("*.json"))]
-
-
 def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
     known = explained.explanations()
-    for found in committed():
+    for found in stored.verified(ROOT / "reports" / "reference"):
         failed = [v for v in found.get("verdicts", ()) if v["status"] == "fail"]
         unknown = [(v["property"], v["scene"]) for v in failed]
         unknown = [pair for pair in unknown if (found["engine"], *pair) not in known]
@@ -103,7 +98,7 @@ def test_each_committed_violation_on_a_mechanism_of_the_suite_has_a_cause():
 
 def test_page_on_engines_counts_the_violations_of_warp_by_cause():
     """The table's rows are the causes; the sentence before them has the numbers of verdicts."""
-    [warp] = [found for found in committed() if found["engine"] == "warp"]
+    [warp] = [v for v in stored.verified(ROOT / "reports" / "reference") if v["engine"] == "warp"]
     failed = [v for v in warp["verdicts"] if v["status"] == "fail"]
     causes = Counter(explained.explanations()["warp", v["property"], v["scene"]].cause for v in failed)
     page = (ROOT / "docs" / "engines.md").read_text()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from crosscheck.cli.comparison import Comparison
-from reports.pages.which_engine import FOLDERS, judged
+from reports.pages.which_engine import REPORTS, judged
 from reports.stored import groups
 
 PAGE = Path(__file__).parents[2] / "docs" / "compare.md"
@@ -20,7 +20,9 @@ HEADINGS = re.compile(
 @pytest.fixture(scope="module")
 def printed() -> str:
     """Return the output for the plane slider-crank of the reference report."""
-    group = next(group for group in groups(FOLDERS[0]) if group.scene.name == "planar_slider_crank")
+    group = next(
+        group for group in groups(REPORTS / "reference") if group.scene.name == "planar_slider_crank"
+    )
     return str(Comparison(judged(group), "planar_slider_crank", None))
 
 

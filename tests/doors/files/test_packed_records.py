@@ -18,16 +18,11 @@ from tests.fuzz.broken_files import RECORD
 REPORTS = Path(__file__).parents[3] / "reports"
 
 
-def folder(place: Path) -> Path:
-    """Return a new folder of a report with one run of the four-bar."""
-    (place / "scenes").mkdir(parents=True)
-    SCENES["four_bar"]().save(place / "scenes" / "four_bar.toml")
-    rewrite(place / "records.jsonl", [RECORD])
-    return place
-
-
 def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_path, capsys):
-    plain, packed = folder(tmp_path / "plain"), tmp_path / "packed"
+    plain, packed = tmp_path / "plain", tmp_path / "packed"
+    (plain / "scenes").mkdir(parents=True)
+    SCENES["four_bar"]().save(plain / "scenes" / "four_bar.toml")
+    rewrite(plain / "records.jsonl", [RECORD])
     command = [sys.executable, "-m", "reports.keep", str(plain), str(packed)]
     subprocess.run(command, cwd=REPORTS.parent, check=True, capture_output=True)
     assert [path.name for path in packed.iterdir()] == ["records.zip"]
