@@ -53,6 +53,7 @@ def wait_for(what: Any) -> Any:
 
 
 def test_killed_command_leaves_no_script(tmp_path: Path):
+    """The script writes its process number and sleeps; SIGKILL ends its parent, after which it ends, too."""
     told = tmp_path / "number"
     script = SLEEPER.format(path=str(told))
     parent = subprocess.Popen([sys.executable, "-c", PARENT.format(script=script)], cwd=os.getcwd())

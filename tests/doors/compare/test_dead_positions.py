@@ -26,6 +26,7 @@ def end_of(scene: Scene, end: float | None = None) -> float | None:
     ("crank", "rod", "angle", "size"), [(0.2, 0.5, 1.0, 1.0), (0.4, 0.3, 0.5, 1e-3), (0.1, 1.0, -1.4, 1e3)]
 )
 def test_time_of_a_dead_position_is_when_crank_and_rod_are_in_line(crank, rod, angle, size):
+    """A driver pushes the slider at a constant speed; `pushed` also gives the time of its farthest place."""
     scene, time = pushed(crank, rod, angle, 0.7, size)
     assert end_of(scene) == pytest.approx(time, rel=ACCURACY)
 

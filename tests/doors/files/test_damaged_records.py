@@ -43,7 +43,8 @@ def record_with(field: str, value: Any = None) -> bytes:
 
 
 def refused(capsys: pytest.CaptureFixture[str], place: Path) -> str:
-    """Return the message with which a folder is not rendered; it is not compared either."""
+    """Return the message of `report --render`, which ends with status 2 and one sentence that names the
+    file of records, as `crosscheck diff` must, too."""
     assert report(["--render", str(place)]) == 2
     rendering = capsys.readouterr().err
     assert crosscheck(["diff", str(place), str(place)]) == 2

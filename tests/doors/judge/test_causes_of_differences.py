@@ -239,7 +239,8 @@ def test_exchanged_columns_are_named(pairs: list[tuple[str, str]], says: str) ->
 
 
 @pytest.mark.slow
-def test_positions_of_a_late_clock_are_named_where_a_load_is_switched() -> None:
+def test_late_clock_of_velocities_is_named_where_a_load_is_switched() -> None:
+    """Samples are 0.025 s apart; the table begins at the third and is late by 0.3 of its time, 0.0225 s."""
     table = later(switched_motor(), known("switched_motor"))
     few = {n: c for n, c in table.items() if n == "time" or n.endswith(("velocity.x", "velocity.y"))}
     (found,) = crosscheck.judge_motion(switched_motor(), few).explanations

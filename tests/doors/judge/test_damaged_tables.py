@@ -65,33 +65,31 @@ def status(table: bytes, folder: Path) -> int:
     return main(["judge", str(folder / "scene.toml"), str(folder / "run.csv")])
 
 
-def refusal(table: bytes, folder: Path, capsys: pytest.CaptureFixture[str]) -> str:
-    """Return the only line that the command prints for a table, on standard error, with exit status 2."""
-    assert status(table, folder) == 2
-    printed = capsys.readouterr()
-    assert not printed.out and printed.err.count("\n") == 1 and len(printed.err) < 500
-    return printed.err
-
-
 @pytest.mark.parametrize("name", OFF)
 def test_wrong_numbers_of_any_size_are_off_and_not_explained(name: str, tmp_path: Path, capsys) -> None:
-    """Nor are zeros a motion in degrees, which would round to zeros."""
+    """Also zeros are not explained, as by angles in degrees that were rounded."""
     assert status(OFF[name].encode(), tmp_path) == 1
     shown = capsys.readouterr().out
     (angle,) = (line for line in shown.splitlines() if "A.angle" in line)
-    assert [cell.strip() for cell in angle.split("│")][4] == "off"
+    assert "off" in [cell.strip() for cell in angle.split("│")]
     assert "No single change explains the difference." in shown
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_damaged_table_is_refused_with_one_sentence_on_its_damage(name: str, tmp_path: Path, capsys) -> None:
+    """The one line on standard error is short, however long a cell is."""
     table, says = REFUSED[name]
-    assert f"run.csv: {says}" in refusal(table.encode(), tmp_path, capsys)
+    assert status(table.encode(), tmp_path) == 2
+    printed = capsys.readouterr()
+    assert not printed.out and printed.err.count("\n") == 1 and len(printed.err) < 500
+    assert f"run.csv: {says}" in printed.err
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_random_bytes_are_refused_with_one_sentence(seed: int, tmp_path: Path, capsys) -> None:
-    assert "run.csv: " in refusal(np.random.default_rng(seed).bytes(3000), tmp_path, capsys)
+    assert status(np.random.default_rng(seed).bytes(3000), tmp_path) == 2
+    printed = capsys.readouterr()
+    assert not printed.out and printed.err.count("\n") == 1 and "run.csv: " in printed.err
 
 
 @pytest.mark.parametrize(

@@ -140,11 +140,9 @@ def test_torque_that_the_mechanism_does_not_determine_is_named_and_not_right(
     assert "not determined by the mechanism: driver(A).torque" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))])
-def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[float, ...]) -> None:
-    """A disc on a torsion spring turns by 10 sin t: energy 50 J, torque -10 sin t. Angles between
-    -π and π are off; their cause is named from a few cells on."""
-    scene = Scene(
+def wound_disc() -> Scene:
+    """Return a disc of 1 kg m² on a torsion spring of 1 N m/rad, which turns by 10 sin t."""
+    return Scene(
         name="wound_disc",
         gravity=(0.0, 0.0, 0.0),
         duration=10.0,
@@ -152,17 +150,24 @@ def test_angles_count_full_turns_whatever_samples_are_asked_for(times: tuple[flo
         joint=[Revolute(name="A", bodies=("ground", "disc"), anchor=(0, 0, 0), axis=(0, 0, 1))],
         load=[TorsionSpring(joint="A", stiffness=1.0)],
     )
-    table, angle = crosscheck.reference_table(scene, times), 10 * np.sin(times)
+
+
+@pytest.mark.parametrize("times", [(1.0, 2.0, 5.0, 8.0), (8.0,), tuple(np.linspace(0.0, 8.0, 30))])
+def test_angles_of_a_reference_count_full_turns_whatever_samples_are_asked_for(times) -> None:
+    """φ = 10 sin t rad, spring torque -φ, energy 10² / 2 = 50 J."""
+    table, angle = crosscheck.reference_table(wound_disc(), times), 10 * np.sin(times)
     assert table["A.angle"] == pytest.approx(angle, abs=1e-10)
     assert table["load(0).torque"] == pytest.approx(-angle, abs=1e-10)
     assert table["energy"] == pytest.approx(50.0, abs=1e-9)
-    right = {"time": np.array(times), "A.angle": angle}
-    assert crosscheck.judge_motion(scene, right).is_right
-    wrapped = {"time": np.array(times), "A.angle": np.angle(np.exp(1j * angle))}
-    found = crosscheck.judge_motion(scene, wrapped)
-    assert not found.is_right
-    causes = ["A.angle: full turns are not counted (angles between -π and π)"] if len(times) > 1 else []
-    assert [e.sentence for e in found.explanations] == causes
+
+
+def test_angles_without_their_full_turns_are_off_and_the_cause_is_named() -> None:
+    times = np.array([1.0, 2.0, 5.0, 8.0])
+    angle = 10 * np.sin(times)
+    assert crosscheck.judge_motion(wound_disc(), {"time": times, "A.angle": angle}).is_right
+    wrapped = {"time": times, "A.angle": np.angle(np.exp(1j * angle))}
+    (cause,) = crosscheck.judge_motion(wound_disc(), wrapped).explanations
+    assert cause.sentence == "A.angle: full turns are not counted (angles between -π and π)"
 
 
 @pytest.mark.parametrize(

@@ -96,20 +96,23 @@ def test_reference_agrees_with_the_closed_form_within_its_bound(name):
 
 
 # --- invariance -------------------------------------------------------------------------------------------
-def assert_alike(found: Trajectory, wanted: Trajectory, bound: float) -> None:
-    """Assert that positions, rotations and rates are equal up to a bound relative to their sizes."""
+def apart(found: Trajectory, wanted: Trajectory) -> float:
+    """Return the largest difference of a position (over the largest one), of an orientation (rad), or of a
+    velocity, over ten times the largest one: velocities are less exact."""
     order = [found.bodies.index(name) for name in wanted.bodies]
     states = {
         name: getattr(wanted, name) for name in ("position", "orientation", "velocity", "angular_velocity")
     }
     arrays = {name: getattr(found, name)[:, order] for name in states}
     length = np.abs(wanted.position).max()
-    assert np.abs(arrays["position"] - wanted.position).max() <= bound * length
-    assert turned_between(arrays["orientation"], wanted.orientation).max() <= bound
     spin, speed = np.abs(wanted.angular_velocity).max(), np.abs(wanted.velocity).max()
     fastest = max(spin, speed / length)
-    assert np.abs(arrays["angular_velocity"] - wanted.angular_velocity).max() <= 10 * bound * fastest
-    assert np.abs(arrays["velocity"] - wanted.velocity).max() <= 10 * bound * fastest * length
+    return max(
+        np.abs(arrays["position"] - wanted.position).max() / length,
+        turned_between(arrays["orientation"], wanted.orientation).max(),
+        np.abs(arrays["angular_velocity"] - wanted.angular_velocity).max() / (10 * fastest),
+        np.abs(arrays["velocity"] - wanted.velocity).max() / (10 * fastest * length),
+    )
 
 
 def exact_motion(name: str) -> Trajectory:
@@ -141,7 +144,7 @@ def test_motion_does_not_depend_on_the_units_of_mass_length_and_time(name):
             "angular_velocity": exact.angular_velocity / 10,
         }
     )
-    assert_alike(motion_of(scene), wanted, bound_of(name))
+    assert apart(motion_of(scene), wanted) <= bound_of(name)
 
 
 @pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 5))
@@ -157,13 +160,13 @@ def test_motion_turns_and_shifts_with_the_frame(name):
         }
     )
     found = motion_of(in_another_frame(MOTIONS[name](), TURN, SHIFT))
-    assert_alike(found, wanted, 10 * bound_of(name))
+    assert apart(found, wanted) <= 10 * bound_of(name)
 
 
 @pytest.mark.parametrize("name", a_few(list(MOTIONS), 15, 8))
 def test_motion_does_not_depend_on_the_order_of_bodies_joints_and_loads(name):
     scene = in_another_order(MOTIONS[name]())
-    assert_alike(motion_of(scene), exact_motion(name), bound_of(name))
+    assert apart(motion_of(scene), exact_motion(name)) <= bound_of(name)
 
 
 @pytest.mark.parametrize("name", a_few(SMOOTH, 25, 3))
@@ -180,7 +183,8 @@ def test_states_of_a_reference_do_not_depend_on_other_samples(name):
 
 @pytest.mark.parametrize("name", a_few(SMOOTH, 6, 1))
 def test_jacobian_times_velocities_is_the_difference_of_joint_residuals(name):
-    """Of order 4, of residuals ± 1e-4 and 2e-4 s from the start at random velocities; with drivers' rates."""
+    """The difference is of order 4: residuals at ±h and ±2h, h = 1e-4 s, of poses that move from the start at
+    random velocities. Rows of drivers also change by the drivers' rates."""
     scene = MOTIONS[name]()
     place, turn = constraints.initial_poses(scene)
     rows, rates = constraints.jacobian(scene, 0.0, place, turn)
@@ -212,7 +216,8 @@ def test_length_of_a_mechanism_is_in_its_units_and_independent_of_frame_and_orde
 @pytest.mark.parametrize("size", [1e-4, 1e4])
 @pytest.mark.parametrize("name", ["four hinges", "doubled hinge", "slider-crank of hinges"])
 def test_open_reactions_and_joints_without_redundant_rows_do_not_depend_on_the_size(name, size):
-    """Redundancy leaves components of reactions open, and joints can be weakened until none is redundant."""
+    """A redundant joint leaves components of reactions undetermined (open). Weaker joints replace it until no
+    row is redundant, as in the mechanism of another size."""
     plain = MOTIONS[name]()
     scene = in_other_units(plain, 1.0, size, 1.0)
     shared, wanted = (shared_wrenches(s, 0.0, *constraints.initial_poses(s)) for s in (scene, plain))

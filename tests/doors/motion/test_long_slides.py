@@ -65,6 +65,7 @@ def test_beads_leave_a_turning_arm(scene, length):
 
 @pytest.mark.parametrize("seed", [27, 51, 63, 99])
 def test_spinning_trees_with_long_slides_are_followed_to_the_end(seed):
+    """Before, they ended at a singular position, found by rows relative to the lengths of the slides."""
     motion = mbref.simulate(spinning_mechanism(seed), times=[0.0, 4.0])
     assert motion.outcome == mbref.Outcome.COMPLETED, motion.message
     assert motion.violation.position.max() < 1e-9

@@ -66,30 +66,28 @@ def crank_rocker(lengths: tuple[float, ...], angle: float) -> Scene:
     return Scene(name="crank_rocker", gravity=[0.0, 0.0, 0.0], duration=1.0, body=bodies, joint=joints)
 
 
-def check(lengths: tuple[float, ...], angle: float, step: float, tolerance: float) -> None:
-    """Check that the run completes, on a branch of the linkage (m) and with its energy (relative).
-
-    A singular position magnifies the errors of the fixed steps, so that its tolerance is ten times as large.
-    """
+def deviation(lengths: tuple[float, ...], angle: float, step: float) -> float:
+    """Return the distance of a completed run from the nearer branch of the linkage (m), or the drift of its
+    energy over the energy, if that is larger."""
     scene = crank_rocker(lengths, angle)
     motion = mbref.simulate(scene, f"alf-dual+partitioning/rk4[step={step}]", np.linspace(0.0, END, 6))
     assert motion.outcome is mbref.Outcome.COMPLETED, motion.message
     crank = angle + motion.joint("A").angle
     tip = 2 * motion.position[:, 2, :2] - np.array([lengths[3], 0.0])
     apart = [np.linalg.norm(tip - pin(lengths, crank, side)[1], axis=1) for side in (1.0, -1.0)]
-    assert np.min(apart, axis=0).max() < tolerance
-    assert motion.energy == pytest.approx(motion.energy[0], rel=tolerance)
+    return max(np.min(apart, axis=0).max(), np.abs(motion.energy / motion.energy[0] - 1).max())
 
 
 @pytest.mark.parametrize("step", [2e-3, 5e-3])
 def test_partitioning_keeps_the_branch_and_the_energy_of_a_crank_rocker(step):
-    check(ORDINARY, 0.3 * math.pi, step, 1e-4)
+    assert deviation(ORDINARY, 0.3 * math.pi, step) < 1e-4
 
 
 @pytest.mark.parametrize("step", [2e-3, 5e-3])
 def test_partitioning_passes_a_singular_position_in_its_first_step(step):
-    """The crank passes half a turn in the first step; its coordinate turns back at a full turn."""
-    check(CHANGE_POINT, 0.9998 * math.pi, step, 1e-3)
+    """The crank passes half a turn, where all links are in line, in the first step. There errors of steps are
+    magnified."""
+    assert deviation(CHANGE_POINT, 0.9998 * math.pi, step) < 1e-3
 
 
 @pytest.mark.slow
@@ -97,4 +95,4 @@ def test_partitioning_passes_a_singular_position_in_its_first_step(step):
 @pytest.mark.parametrize("part", [0.9998, 0.99, 0.5, 1.0002, 1.5])
 @pytest.mark.parametrize("lengths", [ORDINARY, CHANGE_POINT, (0.1, 0.5, 0.45, 0.5)])
 def test_partitioning_keeps_branches_and_energies_of_crank_rockers_from_many_starts(lengths, part, step):
-    check(lengths, part * math.pi, step, 2e-3)
+    assert deviation(lengths, part * math.pi, step) < 2e-3

@@ -21,10 +21,10 @@ def motion_of(name, method, end):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
+    """Uprights of a floor stay parallel, and its bars horizontal. Lagrange's equations of the angles a from
+    the vertical are Σ M_ij cos(a_i - a_j) a_j'' = g c_i sin a_i - Σ M_ij sin(a_i - a_j) a_j'²."""
     columns, floors, end = 2, 3, 0.2
-    above = np.arange(floors)[::-1] * (
-        2.0 * columns + 1
-    )  # kg carried by the tops of a floor, without its bars
+    above = np.arange(floors)[::-1] * (2.0 * columns + 1)  # kg on the tops of a floor, without its bars
     carried = (columns + 1) / 2 + columns + above
     own = (columns + 1) * (1 / 4 + (3 * 0.01**2 + 1) / 12) + columns + above
     pairs = np.maximum(np.arange(floors)[:, None], np.arange(floors))
@@ -50,6 +50,8 @@ def test_floors_of_a_lattice_are_pendulums_on_pendulums(method):
 
 
 def test_stacked_platforms_fall_as_folding_bars_let_them():
+    """Lagrange's equations in the angles of the bars from the horizontal, with the Jacobians of heights and
+    reaches, integrated by scipy."""
     count, end, half, bar_mass, platform_mass = 2, 0.15, 0.5, 0.5, 1.0  # bars of 0.5 m
     across = bar_mass * (3 * 0.01**2 + half**2) / 12
     # rows of (height, reach) of bodies by sin and cos of the bars' angles: bars, then the platform
@@ -76,7 +78,8 @@ def test_stacked_platforms_fall_as_folding_bars_let_them():
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_legs_keep_their_lengths_and_their_energy(method):
+def test_joints_of_walking_legs_stay_closed_and_their_energy_constant(method):
+    """The world's points of both bodies of a joint coincide while the crank turns by more than 0.1 rad."""
     legs, end = 2, 0.1
     _, run = motion_of(f"strandbeest[{legs}]", method, end)
     scene = find_scene(f"strandbeest[{legs}]")
@@ -86,7 +89,6 @@ def test_legs_keep_their_lengths_and_their_energy(method):
     kinetic = (mass * (speed**2).sum(axis=2) + moment * spin**2).sum(axis=1) / 2
     energy = kinetic + G * run.position[..., 1] @ mass
     assert energy[1] == pytest.approx(energy[0], abs=1e-8 * np.abs(kinetic).max())
-    # every joint stays closed: the world points of both bodies coincide
     angle = 2 * np.arctan2(run.orientation[..., 3], run.orientation[..., 0])
     turned = angle[1] - angle[0]
     names = {body.name: k for k, body in enumerate(scene.body)}

@@ -35,7 +35,7 @@ def driven(rate: float) -> tuple[Scene, Truth]:
 
 
 def twisted(rate: float) -> tuple[Scene, Truth]:
-    """Return a wheel on a torsion spring, of one radian per second."""
+    """Return a wheel on a torsion spring of the frequency 1 rad/s."""
     spring = {"type": "torsion_spring", "joint": "J", "stiffness": 2.0}
     scene = Scene(**wheel(body={"angular_velocity": [0.0, 0.0, rate]}, load=[spring]))
     return scene, (0.0 * TIMES, rate * np.sin(TIMES))
@@ -76,18 +76,19 @@ def true_error(scene: Scene, motion: mbref.Motion, truth: Truth) -> np.ndarray:
     return np.maximum(apart, rotations.angle_between(motion.orientation[:, 0], turned))
 
 
-def check(make, rate: float, method: str | None, rtol: float) -> None:
-    """Check the estimate at all TIMES for a motion of a speed (rad/s, m/s) or a distance (m)."""
+def errors_over_estimates(make, rate: float, method: str | None, rtol: float) -> np.ndarray:
+    """Return the ratios at TIMES for a completed motion of a speed (rad/s, m/s) or a distance (m)."""
     scene, truth = make(rate)
     motion = mbref.simulate(scene, method, TIMES, rtol=rtol)
+    assert motion.outcome.name == "COMPLETED", motion.message
     estimate = mbref.with_error_estimate(motion).error_estimate.error
-    assert motion.outcome.name == "COMPLETED" and (estimate > 0.0).all()
-    assert (true_error(scene, motion, truth) <= 10 * estimate).all()
+    with np.errstate(divide="raise", invalid="raise"):  # an estimate is never zero
+        return true_error(scene, motion, truth) / estimate
 
 
 @pytest.mark.parametrize("make", MAKERS)
 def test_true_error_is_at_most_ten_estimates(make):
-    check(make, 3.3, None, 1e-12)
+    assert errors_over_estimates(make, 3.3, None, 1e-12).max() <= 10
 
 
 @pytest.mark.slow
@@ -95,7 +96,7 @@ def test_true_error_is_at_most_ten_estimates(make):
 @pytest.mark.parametrize("rate", [0.07, 1.0, 19.0, 410.0])
 @pytest.mark.parametrize("make", MAKERS)
 def test_true_error_of_many_motions_is_at_most_ten_estimates(make, rate, rtol):
-    check(make, rate, "taylor", rtol)
+    assert errors_over_estimates(make, rate, "taylor", rtol).max() <= 10
 
 
 @pytest.mark.parametrize("make", [resting, spinning])

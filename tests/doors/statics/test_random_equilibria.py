@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import pytest
 from scipy.optimize import linear_sum_assignment
@@ -25,13 +27,20 @@ def at_rest(seed: int) -> Scene:
     return scene.with_(body=[body.model_copy(update=still) for body in scene.body])
 
 
-def check(scene: Scene, starts: int) -> int:
-    """Check accelerations and eigenvalues of all equilibria of a scene; return their number."""
-    found = equilibria(scene, starts=starts)
-    size = np.abs(gauss(scene)).max()
-    for each in found:
-        assert np.abs(gauss(each.scene)).max() < BALANCED * size
+class Judged(NamedTuple):
+    """Errors of an equilibrium by the judge's own equations."""
+
+    acceleration: float  # over the acceleration at the start of the search
+    eigenvalues: float  # largest error / its bound and rounding; 0 at a singular position, which has none
+
+
+def judged(scene: Scene, starts: int) -> list[Judged]:
+    """Return the errors of all equilibria that are found for a scene."""
+    found, size = [], np.abs(gauss(scene)).max()
+    for each in equilibria(scene, starts=starts):
+        acceleration = np.abs(gauss(each.scene)).max() / size
         if each.is_singular:
+            found.append(Judged(acceleration, 0.0))
             continue
         balance = Balance(each.scene)
         state = balance.start()
@@ -41,25 +50,30 @@ def check(scene: Scene, starts: int) -> int:
         gaps = np.abs(exact[:, None] - each.eigenvalues[None])
         pairs = linear_sum_assignment(gaps)
         allowed = each.bounds[pairs[1]] + error_bounds(small, [coarse]) + ROUNDED * np.abs(exact).max()
-        assert (gaps[pairs] <= allowed).all()
-    return len(found)
+        found.append(Judged(acceleration, (gaps[pairs] / allowed).max()))
+    return found
 
 
 @pytest.mark.parametrize("seed", [0, 3])
 def test_eigenvalues_agree_with_the_judges_within_their_bounds(seed):
-    assert check(at_rest(seed), starts=1) == 1
+    (found,) = judged(at_rest(seed), starts=1)
+    assert found.acceleration < BALANCED and found.eigenvalues <= 1
 
 
-def test_eigenvalues_of_a_leg_of_seven_links_are_the_judges():
+def test_eigenvalues_of_two_equilibria_of_a_leg_of_seven_links_are_the_judges():
     """Its 50 constraint rows, 9 of them redundant, are solved by sparse factorisations."""
-    assert check(find_scene("strandbeest[1]"), starts=16) == 2
+    first, second = judged(find_scene("strandbeest[1]"), starts=16)
+    assert max(first.acceleration, second.acceleration) < BALANCED
+    assert max(first.eigenvalues, second.eigenvalues) <= 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(5, 215, 10))
 def test_eigenvalues_of_many_mechanisms_agree_with_the_judges_within_their_bounds(first):
-    """Of ten mechanisms several have an equilibrium."""
-    assert sum(check(at_rest(seed), starts=3) for seed in range(first, first + 10))
+    """Of ten mechanisms one or more have an equilibrium."""
+    found = [each for seed in range(first, first + 10) for each in judged(at_rest(seed), starts=3)]
+    assert found and max(each.acceleration for each in found) < BALANCED
+    assert max(each.eigenvalues for each in found) <= 1
 
 
 @pytest.mark.parametrize(("length", "mass", "time"), [(1e-6, 1.0, 1.0), (1e3, 1e-9, 1e-3), (1e6, 1e9, 1e3)])
