@@ -60,7 +60,7 @@ def test_cell_has_the_run_of_least_error_and_the_run_of_the_defaults() -> None:
         measured(1e-3, "defaults"),
         measured(1e-9),
         measured(1e-5, "euler"),
-        measured(None, "other", "CRASHED"),
+        measured(None, "other", outcome="CRASHED"),
     ]
     cell = matrix(found)["mujoco"][FIRST.heading]
     assert cell.best() is found[1] and cell.defaults() is found[0]
@@ -84,11 +84,8 @@ def test_sentence_on_a_refusal_names_its_reason_and_no_command_repeats_it() -> N
 
 def test_runs_whose_loops_crosscheck_closes_have_a_row_of_their_own() -> None:
     """In the family `terms` Drake gives only the terms of its equations, and crosscheck closes the loops; in
-    `discrete` Drake closes them. The default scene of `run` is the one under "four-bar"."""
-    by_drake, by_crosscheck = (
-        measured(1e-3, "discrete", engine="drake"),
-        measured(1e-11, "terms", engine="drake"),
-    )
+    `discrete` Drake closes them. The default scene of `measured` is the one under "four-bar"."""
+    by_drake, by_crosscheck = measured(1e-3, "discrete", "drake"), measured(1e-11, "terms", "drake")
     rows = matrix([by_drake, by_crosscheck])
     assert list(rows) == ["drake", "drake, terms"]
     assert rows["drake"]["four-bar"].best() is by_drake
