@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
 from crosscheck.judge import joint_coordinates, time_functions
-from crosscheck.judge.gauss_motion import accelerations, applied, gauss_motion, kinetic, power
+from crosscheck.judge.gauss_motion import accelerations, gauss_motion
 from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
 from crosscheck.judge.joint_residuals import (
-    acceleration_rows,
-    are_lengths,
-    grounded,
     joint_frames,
     position_rows,
-    velocity_rows,
     with_ground,
-    wrapped,
 )
 from crosscheck.judge.loads import Motion, wrenches
 from crosscheck.judge.terms import PARTS, terms_at, variants
@@ -33,15 +27,12 @@ from mbref.scene import (
     Driver,
     Fixed,
     Force,
-    JointForce,
     Moment,
     Planar,
     Revolute,
     Scene,
     Sine,
-    SlideSpring,
     Spherical,
-    Spring,
     TorsionSpring,
     Translational,
     Universal,
@@ -113,64 +104,6 @@ def test_pieces_of_a_scenes_functions_end_at_rows_of_tables_and_at_start_and_sto
 
 
 # --- joints -----------------------------------------------------------------------------------------------
-ANCHOR = (0.1, -0.2, 0.3)
-JOINTS = {
-    "fixed": Fixed(name="J", bodies=("a", "b"), anchor=ANCHOR),
-    "revolute": Revolute(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.0, 0.6, 0.8)),
-    "universal": Universal(name="J", bodies=("a", "b"), anchor=ANCHOR, axes=(X, Y)),
-    "spherical": Spherical(name="J", bodies=("a", "b"), anchor=ANCHOR),
-    "translational": Translational(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.6, 0.0, 0.8)),
-    "cylindrical": Cylindrical(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.0, -0.6, 0.8)),
-    "planar": Planar(name="J", bodies=("a", "b"), anchor=ANCHOR, axis=(0.8, 0.0, 0.6)),
-    "distance": Distance(name="J", bodies=("a", "b"), anchors=(ANCHOR, (1.0, 0.5, 0.2))),
-}
-
-
-def two_bodies(joint, driver: tuple[Driver, ...] = ()) -> Scene:
-    turned = (0.8, 0.0, 0.6, 0.0)
-    bodies = body("a", position=(0.2, 0.1, -0.3), orientation=turned), body("b", position=(0.9, 0.3, 0.4))
-    return Scene(name="s", body=bodies, joint=(joint,), driver=driver)
-
-
-def motion_of(scene: Scene, t: float) -> tuple[np.ndarray, ...]:
-    """Position, orientation, velocity, spin, acceleration and angular acceleration of two bodies at t, which
-    turn about fixed axes and move on parabolas from their places in the scene."""
-    velocity = np.array([[0.3, -0.5, 0.2], [-0.4, 0.7, 0.9]])
-    second = np.array([[0.6, 0.2, -0.3], [0.5, -0.8, 0.1]])
-    axis = np.array([[0.6, 0.0, 0.8], [0.0, 0.8, -0.6]])
-    rate, growth = np.array([1.3, -0.9]), np.array([0.4, 0.7])
-    start = np.array([b.position for b in scene.body])
-    angle, spin = rate * t + growth * t**2 / 2, rate + growth * t
-    turn = np.concatenate([np.cos(angle / 2)[:, None], np.sin(angle / 2)[:, None] * axis], axis=1)
-    q = rotations.multiply(turn, np.array([b.orientation for b in scene.body]))
-    place = start + velocity * t + second * t**2 / 2
-    return place, q, velocity + second * t, spin[:, None] * axis, second, growth[:, None] * axis
-
-
-def packed(scene: Scene, t: float) -> tuple[np.ndarray, ...]:
-    r, q, *rest = motion_of(scene, t)
-    return *with_ground(r, q), *(grounded(part) for part in rest)
-
-
-def rows_at(scene: Scene, t: float, level: int) -> np.ndarray:
-    [joint], motion = joint_frames(scene), packed(scene, t)
-    kinds = position_rows, velocity_rows, acceleration_rows
-    return kinds[level](joint, np.asarray(t), *motion[: 2 + 2 * level])
-
-
-def slope(function, t: float, h: float = 1e-3) -> np.ndarray:
-    """Return the derivative at t by differences of fourth order."""
-    return (8 * (function(t + h) - function(t - h)) - function(t + 2 * h) + function(t - 2 * h)) / (12 * h)
-
-
-@pytest.mark.parametrize("name", JOINTS)
-def test_acceleration_residuals_are_derivatives_of_velocity_residuals(name):
-    """The bodies move on parabolas, also in directions that the joint forbids."""
-    scene = two_bodies(JOINTS[name])
-    for t in (0.0, 0.35):
-        found = rows_at(scene, t, 2)
-        assert found == pytest.approx(slope(lambda s: rows_at(scene, s, 1), t), abs=1e-9)
-        assert len(found) == len(are_lengths(joint_frames(scene)[0]))
 
 
 def residual(joint, place, q=UNIT, driver: tuple[Driver, ...] = (), t: float = 0.0) -> list[float]:
@@ -219,31 +152,9 @@ def test_residual_of_a_driver_is_the_coordinate_less_its_law():
 
 
 # --- coordinates ------------------------------------------------------------------------------------------
-def rates_at(joint, scene: Scene, t: float) -> np.ndarray:
-    return joint_coordinates.coordinate_rates(joint, *packed(scene, t)[:4])
-
-
-def test_second_derivatives_of_joint_coordinates_are_derivatives_of_their_rates():
-    """The rates are the coordinates' Jacobian times the velocities."""
-    for name in ("revolute", "translational", "cylindrical"):
-        scene = two_bodies(JOINTS[name])
-        [joint] = joint_frames(scene)
-        rates = partial(rates_at, joint, scene)
-        second = joint_coordinates.coordinate_accelerations(joint, *packed(scene, 0.3))
-        assert second == pytest.approx(slope(rates, 0.3), abs=1e-9)
-        row = joint_coordinates.coordinate_jacobian(scene, "J", *motion_of(scene, 0.3)[:2])
-        _, _, v, w, _, _ = motion_of(scene, 0.3)
-        assert row @ np.hstack([v, w]).ravel() == pytest.approx(rates(0.3), abs=1e-14)
 
 
 SAMPLED = 0.2 * np.arange(6)  # s
-
-
-def test_full_turns_between_samples_are_counted_by_the_rates():
-    """20 rad/s gives 4 rad a step, more than half a turn; 3 t² gives rates that change by 0.24 rad a step."""
-    t = SAMPLED
-    assert joint_coordinates.counted(t, wrapped(20 * t), np.full(6, 20.0)) == pytest.approx(20 * t)
-    assert joint_coordinates.counted(t, wrapped(3 * t**2), 6 * t) == pytest.approx(3 * t**2)
 
 
 @pytest.mark.parametrize(("rate", "known"), [(15.6, 6), (15.8, 3)])
@@ -267,46 +178,6 @@ def at_state(
         np.tile(spin, (count, 1)).astype(float),
         np.array(angles, dtype=float),
     )
-
-
-def test_force_power_and_energy_of_one_body_are_those_of_gravity_and_its_loads():
-    """A force at (1, 0, 0) of a body turned by 90° about z acts at (0, 1, 0). Power: F · v + M · ω."""
-    load = (Force(body="b", point=X, force=(0.0, 0.0, 3.0)), Moment(body="b", moment=(5.0, 6.0, 7.0)))
-    scene = Scene(name="s", body=(body(),), gravity=(0.0, -10.0, 1.0), load=load)
-    found = applied(scene, 0.0, at_state(scene, turn=about(Z, math.pi / 2)))
-    assert found[0] == pytest.approx([0.0, -20.0, 5.0, 8.0, 6.0, 7.0])
-    spinning = applied(scene.with_(load=()), 0.0, at_state(scene, spin=(1.0, 2.0, 3.0)))
-    assert spinning[0] == pytest.approx([0.0, -20.0, 2.0, -0.6, 0.6, -0.2]), "-ω × Jω"
-    state = at_state(scene, velocity=(1.0, 2.0, 3.0), spin=(0.1, 0.2, 0.3))
-    assert power(scene, 0.0, state) == pytest.approx(-40.0 + 15.0 + 0.5 + 0.2 * (6.0 - 3.0) + 2.1)
-    assert kinetic(scene, state) == pytest.approx(14.0 + (0.3 * 0.01 + 0.4 * 0.04 + 0.5 * 0.09) / 2)
-
-
-def test_a_damped_spring_pulls_two_bodies_along_the_line_of_its_points():
-    """3 m longer at 10 N/m, and shorter by 3 · 0.6 m/s at 2 N s/m: 30 - 3.6 N along (0.6, 0.8).
-
-    From the ground to a point beside the centre it has a moment r × F as well.
-    """
-    first, second = body("a"), body("b", position=(3.0, 4.0, 0.0))
-    spring = Spring(
-        bodies=("a", "b"),
-        points=((0.0, 0.0, 0.0), (3.0, 4.0, 0.0)),
-        stiffness=10.0,
-        damping=2.0,
-        natural_length=2.0,
-    )
-    scene = Scene(name="s", body=(first, second), load=(spring,))
-    state = list(at_state(scene))
-    state[2] = np.array([[3.0, 0.0, 0.0], [0.0, 0.0, 7.0]])
-    found = applied(scene, 0.0, tuple(state))
-    assert found[:, :2] == pytest.approx(26.4 * np.array([[0.6, 0.8], [-0.6, -0.8]]))
-    assert found[:, 2:] == pytest.approx(np.zeros((2, 4)))
-    away = spring.model_copy(update={"bodies": ("ground", "b"), "points": ((0.0, 0.0, 1.0), (3.0, 5.0, 1.0))})
-    alone = applied(scene.with_(load=(away,)), 0.0, at_state(scene))
-    size = math.hypot(3.0, 5.0)
-    pull = -10.0 * (size - 2.0) * np.array([3.0, 5.0, 0.0]) / size
-    assert alone[0] == pytest.approx(np.zeros(6))
-    assert alone[1] == pytest.approx([*pull, *np.cross([0.0, 1.0, 1.0], pull)])
 
 
 def hinged(load) -> Scene:
@@ -439,46 +310,3 @@ def test_a_massless_link_does_not_change_the_acceleration_of_a_pendulum():
     longer = scene.with_(body=(link, scene.body[0]), joint=(pivot, weld))
     found = accelerations(longer, 0.0, at_state(longer))
     assert found[1] == pytest.approx([0.0, -7.2, 0.0, 0.0, 0.0, -7.2], abs=1e-12)
-
-
-def test_spring_and_force_along_a_slide_act_on_both_bodies():
-    """4 N/m · (0.3 - 0.1) m + 0.5 N s/m · 2 m/s = 1.8 N back, and 3 N times 1 + 2 t at 1 s."""
-    rail = Translational(name="J", bodies=("a", "b"), anchor=(0.0, 0.0, 0.0), axis=(0.0, 5.0, 0.0))
-    spring = SlideSpring(joint="J", stiffness=4.0, damping=0.5, natural_displacement=0.1)
-    push = JointForce(joint="J", force=3.0, factor={"polynomial": [1.0, 2.0]})
-    scene = Scene(name="s", body=(body("a"), body("b")), joint=(rail,), load=(spring, push))
-    pose = np.array([[0.0, 0.0, 0.0], [0.0, 0.3, 0.0]]), np.tile(UNIT, (2, 1))
-    twist = np.array([[0.0, 1.0, 0.0], [0.0, 3.0, 0.0]]), np.zeros((2, 3))
-    found = joint_wrenches(scene, 1.0, pose, twist, np.zeros(0))
-    assert found[:, 1] == pytest.approx([1.8 - 9.0, 9.0 - 1.8]) and not turning_loads(scene)
-    assert found[1, 3:] == pytest.approx(np.zeros(3)), "the force acts at the second body's anchor"
-
-
-def test_armature_of_a_hinge_adds_to_the_moment_of_inertia_of_a_pendulum():
-    """0.25 kg m² and 2.5 kg m²: the pendulum falls with 18 / 2.75 rad/s²."""
-    scene = pendulum().with_(load=())
-    geared = scene.with_(joint=(scene.joint[0].model_copy(update={"armature": 0.25}),))
-    assert accelerations(geared, 0.0, at_state(geared))[0, 5] == pytest.approx(-18 / 2.75)
-
-
-def test_armature_of_a_slide_resists_the_second_derivative_along_its_turning_axis():
-    """r = 2 m on an axis e turning at ω = 3 rad/s: (r · e)'' = 2 v · e' + r · e'' = 2 · 6 · 3 - 9 · 2 m/s².
-
-    For a body at rest only the axis turns: -ω² r = -18 m/s².
-    """
-    arm = Revolute(name="H", bodies=("ground", "a"), anchor=(0.0, 0.0, 0.0), axis=Z)
-    rail = Translational(name="J", bodies=("a", "b"), anchor=(2.0, 0.0, 0.0), axis=X, armature=0.4)
-    turning = Scene(name="s", body=(body("a"), body("b", position=(2.0, 0.0, 0.0))), joint=(arm, rail))
-    spin = np.array([[0.0, 0.0, 3.0]] * 2)
-    velocity = np.array([[0.0, 0.0, 0.0], [0.0, 6.0, 0.0]])
-    pose = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]), np.tile(UNIT, (2, 1))
-    found = joint_coordinates.reflected(turning, *pose, velocity, spin)
-    assert found.joints == ("J",) and found.inertia.tolist() == [0.4]
-    row = np.zeros(12)
-    row[[0, 6]] = -1.0, 1.0
-    assert found.jacobian[0] == pytest.approx(row) and found.drift == pytest.approx([18.0])
-    outer = joint_coordinates.reflected(turning, *pose, velocity * [[0], [0]], spin)
-    assert outer.drift == pytest.approx([-18.0])
-    assert outer.force == pytest.approx(0.4 * 18.0 * row) and outer.mass == pytest.approx(
-        0.4 * np.outer(row, row)
-    )

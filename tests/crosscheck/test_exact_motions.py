@@ -16,8 +16,7 @@ from crosscheck.judge.metrics import violation_series
 from crosscheck.judge.momentum import momentum_series
 from crosscheck.judge.truth import truth_for
 from mbref import rotations
-from mbref.motions.trajectory import Trajectory
-from mbref.scene import Body, Moment, Scene
+from mbref.scene import Body, Scene
 from mbref.scenes import SCENES
 
 PROBES = moving_probes()
@@ -41,24 +40,6 @@ def test_exact_motion_of_a_free_scene_has_no_error_of_momentum(name):
     assert momentum_series(scene, exact).max() < 1e-13
     faster = replace(exact, velocity=exact.velocity * 1.001)
     assert momentum_series(scene, faster).max() > 1e-5
-
-
-def test_angular_momentum_of_a_ball_grows_by_the_applied_moment():
-    """J ω = M t at the angle M t² / (2 J). In a scene without M all of J ω is an error."""
-    moment, inertia, times = np.array([0.0, 0.3, 0.4]), 0.2, np.linspace(0.0, 1.0, 4)
-    body = Body(name="ball", mass=1.0, inertia=(inertia,) * 3, position=(0.0, 0.0, 0.0))
-    scene = Scene(name="ball", body=(body,), load=(Moment(body="ball", moment=moment),))
-    turned = rotations.from_vector(np.outer(times**2 / 2 / inertia, moment))[:, None]
-    still, spin = np.zeros((4, 1, 3)), np.outer(times / inertia, moment)[:, None]
-    exact = Trajectory("ball", "", "", "", {}, times, ("ball",), still, turned, still, spin)
-    assert momentum_series(scene, exact).max() < 1e-15
-    assert momentum_series(scene.with_(load=()), exact).max() == pytest.approx(1.0)
-
-
-def test_momentum_is_not_compared_in_a_scene_with_a_joint_to_the_ground():
-    scene = PROBES["spring load"]
-    exact = gauss_motion(scene, (0.0, 0.01))
-    assert momentum_series(scene, exact) is None
 
 
 def test_gausss_principle_turns_a_free_asymmetric_top_by_jacobis_elliptic_functions():

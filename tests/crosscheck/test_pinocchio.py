@@ -161,16 +161,6 @@ def test_moment_about_a_fixed_axis_is_a_constant_joint_torque() -> None:
     assert not Loads(Mechanism(every_joint())).fixed, "loads in space were taken for constant ones"
 
 
-def test_pinocchio_moves_a_driven_crank_alike_with_and_without_masses() -> None:
-    """The driven crank moves alike with and without masses; without them it has no reactions."""
-    base = SCENES["spatial_slider_crank_driven"]()
-    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
-    runs = [simulate(s, 0.1, "tuned", rtol=1e-10, min_step=1e-4) for s in (base, bare)]
-    gap = abs(runs[0].position - runs[1].position).max()
-    assert gap < ROUNDING, f"positions with and without masses differ by {gap:.1e} m"
-    assert runs[1].reactions is None, "reactions without masses"
-
-
 def test_driver_beyond_the_slider_s_reach_ends_the_run_with_its_samples() -> None:
     """A slider is driven outward at 0.5 m/s. Crank and rod of 0.304 m and 0.4048 m are straight, and the
     slider is at the end of its reach, 0.0473 s later; the run ends within a shortest step (1e-4 s) of

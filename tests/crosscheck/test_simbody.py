@@ -136,15 +136,3 @@ def test_simbody_is_accurate_up_to_the_singular_position() -> None:
     scene = SCENES["planar_slider_crank_equal"]()
     run = simulate(scene, 0.06, 1e-10, samples=13)
     assert completed_error(run, scene) < MARGIN * 1.8e-11
-
-
-def test_simbody_moves_a_driven_crank_alike_with_and_without_masses() -> None:
-    """Without masses it has no reactions; without its driver it is refused."""
-    base = SCENES["spatial_slider_crank_driven"]()
-    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
-    runs = [simulate(scene, 0.05, 1e-9) for scene in (base, bare)]
-    gap = abs(runs[0].position - runs[1].position).max()
-    assert runs[0].outcome is runs[1].outcome is Outcome.COMPLETED
-    assert gap < MARGIN * ROUNDING, f"positions with and without masses differ by {gap:.1e} m"
-    assert runs[1].reactions is None, "reactions without masses"
-    assert engine("simbody").cannot(bare.with_(driver=())) is not None, "free motion without masses"

@@ -127,18 +127,6 @@ def test_ida_turns_a_redundant_crank_by_more_than_a_turn() -> None:
     assert completed_error(run, scene) < MARGIN * 1.5e-3
 
 
-def test_ida_moves_a_driven_crank_alike_with_and_without_masses() -> None:
-    """Without masses it has no reactions; without its driver it is refused. Measured difference: 8.8e-9 m."""
-    base = SCENES["spatial_slider_crank_driven"]()
-    bare = base.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in base.body))
-    runs = [simulate(scene, 0.02, 1e-7) for scene in (base, bare)]
-    gap = abs(runs[0].position - runs[1].position).max()
-    assert runs[0].outcome is runs[1].outcome is Outcome.COMPLETED
-    assert gap < MARGIN * 8.8e-9, f"positions with and without masses differ by {gap:.1e} m"
-    assert runs[1].reactions is None, "reactions without masses"
-    assert engine("sundials").cannot(bare.with_(driver=())) is not None, "free motion without masses"
-
-
 def test_drivers_that_no_motion_can_follow_end_the_run() -> None:
     base = SCENES["spatial_slider_crank"]()
     scene = base.with_(driver=(Driver(joint="D", polynomial=(0.0, 0.0, 50.0)),), load=())

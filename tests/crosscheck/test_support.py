@@ -14,7 +14,7 @@ from crosscheck.conformance.mechanisms.features import (
     feature_scenes,
     massless_link,
 )
-from crosscheck.engine import BUILT_IN, Cannot, Owner, engine
+from crosscheck.engine import BUILT_IN, Cannot, Owner, Setting, engine
 from crosscheck.judge.arithmetic import EXTENDED, doubles
 from crosscheck.judge.constraints import initial_poses, jacobian
 from crosscheck.judge.reference.taylor import natural_motion
@@ -22,6 +22,8 @@ from crosscheck.study.words.speed import COMPILED
 from mbref.motions.trajectory import Outcome
 from mbref.scene import Joint, Load, Scene, Universal
 from mbref.scene.validation import DRIVABLE
+from mbref.scenes import SCENES
+from tests.crosscheck.measured import MARGIN, ROUNDING
 
 
 def test_probes_have_every_type_of_joint_load_and_driver():
@@ -96,3 +98,22 @@ def test_engines_with_one_cause_share_a_note():
 def test_every_built_in_engine_refuses_motion_without_masses():
     answers = support.of_features(BUILT_IN).answers["motion without masses"]
     assert [name for name, answer in answers.items() if isinstance(answer, Cannot)] == list(BUILT_IN)
+
+
+CRANKS = {  # engine: its setting, the duration (s), and the largest measured difference of positions (m)
+    "pinocchio": (Setting("tuned", {"rtol": 1e-10, "min_step": 1e-4}), 0.1, ROUNDING),
+    "simbody": (Setting("merson", {"accuracy": 1e-9}), 0.05, ROUNDING),
+    "sundials": (Setting("ggl", {"rtol": 1e-7}), 0.02, 8.8e-9),
+}
+
+
+@pytest.mark.parametrize("name", CRANKS)
+def test_driven_crank_moves_alike_with_and_without_masses(name):
+    """Without masses there are no reactions."""
+    pytest.importorskip({"simbody": "opensim", "sundials": "sksundae.ida"}.get(name, name))
+    setting, duration, measured = CRANKS[name]
+    scene = SCENES["spatial_slider_crank_driven"]()
+    bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
+    heavy, light = (engine(name).run(s, np.linspace(0.0, duration, 6), setting) for s in (scene, bare))
+    assert heavy.outcome is light.outcome is Outcome.COMPLETED
+    assert abs(heavy.position - light.position).max() < MARGIN * measured and light.reactions is None

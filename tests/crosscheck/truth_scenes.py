@@ -92,7 +92,6 @@ SPRUNG = {
     ),
 }
 CLOSED = tuple(n for n in SCENES if closed_form(SCENES[n]()) is not None)  # others: test_published
-DYNAMIC = {n: SCENES[n]() for n in CLOSED if not SCENES[n]().driver} | SPRUNG
 ALL = (
     {n: SCENES[n]() for n in CLOSED}
     | SPRUNG

@@ -6,12 +6,10 @@ import json
 
 import numpy as np
 import pytest
-from scipy.linalg import eigvalsh
-from scipy.optimize import brentq
 
 from mbref import Scene, SceneError, equilibria, find_scene, motion_of_mode
 from mbref.cli.commands import main
-from tests.helpers.statics import DOWN, ORIGIN, G, hinge, pendulum, rod
+from tests.helpers.statics import ORIGIN, G, pendulum
 
 MASS, INERTIA, ARM = 2.0, 0.3, 0.7  # of the pendulum
 
@@ -45,52 +43,6 @@ def test_a_damped_torsion_spring_has_the_roots_of_its_equation():
     assert each.scene.load[0].natural_angle == pytest.approx(0.0, abs=1e-10)
     [again] = equilibria(each.scene, starts=1)
     assert np.allclose(again.scene.body[0].position, each.scene.body[0].position, atol=1e-10)
-
-
-def test_hanging_double_pendulum_has_the_frequencies_of_its_matrices():
-    """M = m l² [[4/3, 1/2], [1/2, 1/3]] and K = m g l diag(3/2, 1/2) of two equal slender rods."""
-    bodies = [rod("upper", (0.5, 0.0, 0.0), 1.0, 1 / 12), rod("lower", (1.5, 0.0, 0.0), 1.0, 1 / 12)]
-    joints = [hinge("A", ("ground", "upper")), hinge("B", ("upper", "lower"), (1.0, 0.0, 0.0))]
-    scene = Scene(name="double", gravity=DOWN, body=bodies, joint=joints)
-    found = equilibria(scene, starts=8)
-    [hanging] = [each for each in found if each.stability == "stable"]
-    squares = eigvalsh(G * np.diag([1.5, 0.5]), np.array([[4 / 3, 1 / 2], [1 / 2, 1 / 3]]))
-    assert np.allclose(hanging.frequencies, np.sqrt(squares) / (2 * np.pi), rtol=1e-11)
-    assert np.allclose([b.position[1] for b in hanging.scene.body], [-0.5, -1.5], atol=1e-10)
-    assert all(np.abs(np.array(each.scene.body[0].position)[[0, 2]]).max() < 1e-9 for each in found)
-
-
-def test_parallelogram_with_a_diagonal_spring_has_the_frequency_of_its_energy():
-    """With one angle θ of all links: V'(θ) = 0 and s² = -V''(θ) / I; V is of weights and spring."""
-    scene = find_scene("four_bar_gravity")
-    links, length = [body.mass for body in scene.body], 0.5
-    stiffness, natural = 60.0, 0.4
-    ends = [[0.0, 0.0, 0.0], list(scene.joint_named("C").anchor_pair[0])]
-    spring = {"type": "spring", "bodies": ["ground", "coupler"], "points": ends, "stiffness": stiffness}
-    weight = G * length * (links[0] / 2 + links[1] + links[2] / 2)
-    moment = (
-        sum(b.inertia[2] + b.mass * length**2 / 4 for b in (scene.body[0], scene.body[2]))
-        + links[1] * length**2
-    )
-
-    def stretched(angle):
-        d = np.sqrt(2 * length**2 * (1 + np.cos(angle)))
-        first = -(length**2) * np.sin(angle) / d
-        return d, first, (-(length**2) * np.cos(angle) - first**2) / d
-
-    def slope(angle):
-        d, first, _ = stretched(angle)
-        return weight * np.cos(angle) + stiffness * (d - natural) * first
-
-    found = equilibria(scene.with_(load=[spring | {"natural_length": natural}]))
-    angles = [np.arctan2(*np.array(each.scene.body[0].position)[[1, 0]]) for each in found]
-    assert {"stable", "unstable"} <= {each.stability for each in found}
-    for each, angle in zip(found, angles, strict=True):
-        exact = brentq(slope, angle - 1e-3, angle + 1e-3, xtol=1e-15)
-        assert angle == pytest.approx(exact, abs=1e-10)
-        d, first, second = stretched(exact)
-        curvature = -weight * np.sin(exact) + stiffness * (first**2 + (d - natural) * second)
-        assert np.allclose(each.eigenvalues**2, -curvature / moment, rtol=1e-11)
 
 
 @pytest.mark.parametrize(

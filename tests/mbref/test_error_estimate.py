@@ -10,9 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.judge.metrics import error_series
-from crosscheck.judge.truth import truth_for
-from mbref import ErrorEstimate, Limits, Motion, Scene, find_scene, simulate, with_error_estimate
+from mbref import ErrorEstimate, Limits, Motion, Scene, simulate, with_error_estimate
 from mbref.cli.commands import main
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Body, Driver, Revolute, Spring, Translational
@@ -276,12 +274,3 @@ def test_table_of_columns_shows_errors_far_below_one(capsys, oscillator, tmp_pat
     assert main(["run", str(path), "--times", "0,0.01", "--columns", "error_estimate"]) == 0
     rows = [line.split("│") for line in capsys.readouterr().out.splitlines() if line.startswith("│ 0.01")]
     assert len(rows) == 1 and 0 < float(rows[0][2]) < 1e-12
-
-
-def test_estimate_is_the_error_against_a_closed_form_within_one_percent():
-    scene = find_scene("planar_slider_crank_gravity").with_(duration=0.5)
-    motion = simulate(scene, rtol=1e-6)
-    truth = truth_for(scene, 0.0)
-    assert truth is not None, "the scene has a closed form"
-    true = error_series(scene, motion, truth.poses(motion.times))
-    assert with_error_estimate(motion).error_estimate.largest == pytest.approx(true.max(), rel=1e-2)

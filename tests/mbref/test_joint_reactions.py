@@ -68,40 +68,6 @@ def near(*values: float) -> Any:
 
 
 @pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_weld_to_the_ground_balances_force_and_moment_of_its_body(sense, orientation):
-    """F = (1, 2, 3) N and M = (4, 5, 6) N m at (2, 0, 1), moved to the weld at (1, 1, 1): the arm (1, -1, 0)
-    turns F into (-3, -3, 3) N m. The weld exerts the opposite on the body."""
-    bodies = ("ground", "b") if sense > 0 else ("b", "ground")
-    weld = Fixed(name="W", bodies=bodies, anchor=(1.0, 1.0, 1.0))
-    wrench = found(model(body("b", (2.0, 0.0, 1.0), orientation), joint=(weld,)), b=((1, 2, 3), (4, 5, 6)))
-    assert wrench["W"] == near(*(-sense * x for x in (1, 2, 3, 1, 2, 9)))
-
-
-@pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_welds_of_a_chain_carry_all_forces_beyond_them(sense, orientation):
-    """Forces 3 N along y at (3, 0, 0) and 5 N along z at (1, 0, 0); joints at the origin and at (2, 0, 0)."""
-    near_end = Fixed(name="A", bodies=("ground", "b"), anchor=ORIGIN)
-    far_end = Fixed(name="B", bodies=("b", "c") if sense > 0 else ("c", "b"), anchor=(2.0, 0.0, 0.0))
-    system = model(body("b", X, orientation), body("c", (3.0, 0.0, 0.0)), joint=(near_end, far_end))
-    wrenches = found(system, b=((0, 0, 5), ORIGIN), c=((0, 3, 0), ORIGIN))
-    assert wrenches["B"] == near(0, -3 * sense, 0, 0, 0, -3 * sense)
-    assert wrenches["A"] == near(0, -3, -5, 0, 5, -9)
-
-
-def test_ball_joint_carries_force_alone_and_the_weld_behind_it_the_moment():
-    """7 N m about z on body b; (1, 2, 3) N on body c at (2, 0, 0), whose moment about the weld is
-    (2, 0, 0) × (1, 2, 3) = (0, -6, 4) N m."""
-    ball = Spherical(name="ball", bodies=("b", "c"), anchor=(2.0, 0.0, 0.0))
-    weld = Fixed(name="weld", bodies=("ground", "b"), anchor=ORIGIN)
-    system = model(body("b", X), body("c", (2.0, 0.0, 0.0)), joint=(weld, ball))
-    wrenches = found(system, b=(ORIGIN, (0, 0, 7)), c=((1, 2, 3), ORIGIN))
-    assert wrenches["ball"] == near(-1, -2, -3, 0, 0, 0)
-    assert wrenches["weld"] == near(-1, -2, -3, 0, 6, -4 - 7)
-
-
-@pytest.mark.parametrize("orientation", TURNED.values(), ids=TURNED)
 @pytest.mark.parametrize("frame", ["ground", "carrier"])
 def test_reactions_of_coupled_shafts_include_the_tooth_torques(frame, orientation):
     """Shaft c turns 3 times as fast as shaft b: 6 N m on b balance -2 N m on c. The tooth forces are part of

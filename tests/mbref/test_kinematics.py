@@ -8,7 +8,6 @@ from crosscheck.judge.truth import closed_form
 from mbref.equations.counts import undriven_freedoms
 from mbref.equations.initial_state import solve_positions
 from mbref.equations.model import Model, displaced
-from mbref.scene import Driver, SceneError
 from mbref.scenes import SCENES
 from mbref.simulation.simulate import simulate
 
@@ -21,31 +20,6 @@ def test_prescribed_motion_needs_neither_masses_nor_a_fixed_ground():
     run = simulate(bare, "taylor", [0.0, 0.01])
     assert run.outcome.name == "COMPLETED", run.message
     assert np.abs(run.position - closed_form(scene).poses(run.times).position).max() < 1e-12
-
-
-@pytest.mark.parametrize("rate", [-249.6, -124.8 * 1.01])
-def test_drivers_that_contradict_each_other_are_named(rate):
-    """Crank and rocker of a parallelogram turn at one rate, -124.8 rad/s."""
-    scene = SCENES["four_bar"]()
-    drivers = (*scene.driver, Driver(joint="D", polynomial=(0.0, rate)))
-    with pytest.raises(SceneError, match=r"driver\[D\]: the drivers of A and D contradict"):
-        simulate(scene.with_(driver=drivers), "taylor", [0.01])
-
-
-@pytest.mark.parametrize("method", ["alf-dual+projection", "taylor"])
-def test_two_drivers_that_agree_move_a_parallelogram_as_its_closed_form(method):
-    scene = SCENES["four_bar"]()
-    both = scene.with_(driver=(*scene.driver, Driver(joint="D", polynomial=scene.driver[0].polynomial)))
-    run = simulate(both, method, [0.01])
-    assert run.outcome.name == "COMPLETED", run.message
-    assert np.abs(run.position - closed_form(scene).poses(run.times).position).max() < 1e-12
-
-
-def test_a_freedom_without_driver_needs_masses():
-    scene = SCENES["planar_slider_crank"]()
-    bare = scene.with_(body=tuple(b.model_copy(update={"mass": None, "inertia": None}) for b in scene.body))
-    with pytest.raises(SceneError, match="'crank' has no mass and inertia, which a dynamic analysis needs"):
-        simulate(bare, "taylor", [0.1])
 
 
 def test_driver_prescribes_the_motion_also_from_a_singular_start():

@@ -27,32 +27,11 @@ def agree(found: np.ndarray, exact: np.ndarray) -> None:
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_mass_on_a_slide_with_spring_and_damper_swings_as_its_closed_form(method):
-    """A damped oscillator from rest: x = x₀ (1 - e^(-ζωt) (cos ω_d t + ζω/ω_d sin ω_d t)), ω² = k / m."""
-    motion = run(scenes.sprung_slide(), method)
-    agree(motion.joint("J").displacement, scenes.sprung_displacement(TIMES))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_wheel_turns_as_the_integral_of_a_sinusoidal_torque(method):
-    """From rest, φ'' = M A sin(ωt + p) / I is integrated twice."""
-    agree(run(scenes.wheel(), method).joint("J").angle, scenes.turned(TIMES))
-
-
-@pytest.mark.parametrize("method", METHODS)
 def test_force_by_a_table_of_a_cubic_acts_between_its_times(method):
     """The spline through a cubic's values is the cubic, an acceleration (m/s²) from 0.5 s to 1.5 s, which is
     integrated twice; the motion is uniform after it."""
     moved = run(scenes.thrown(), method).position[:, 0] @ AXIS
     agree(moved, scenes.switched(TIMES))
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_polynomial_force_along_a_slide_starts_and_stops(method):
-    """A cubic acceleration (m/s²) from 0.25 s to 1.9 s, integrated twice; uniform motion after it."""
-    factor = Factor(polynomial=tuple(CUBIC.coef), start=0.25, stop=1.9)
-    found = run(scenes.pushed(factor), method).joint("J").displacement
-    agree(found, scenes.switched(TIMES, 0.25, 1.9))
 
 
 @pytest.mark.parametrize("method", ("taylor", "lm1+projection"))

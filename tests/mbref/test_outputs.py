@@ -160,22 +160,9 @@ def test_torque_of_a_torsion_spring_and_damper_follows_from_the_angle(sprung):
     assert np.allclose(found.power, torque * turning, atol=1e-8)
 
 
-def test_force_on_a_body_has_power_and_no_numbers_of_springs(sprung):
-    pushed = vars(sprung.load_at(2))
-    assert [name for name in pushed if pushed[name] is not None] == ["place", "power"]
-
-
 def test_load_of_a_number_that_does_not_exist_is_refused(sprung):
     with pytest.raises(IndexError, match="no load 3; the scene has 3 loads"):
         sprung.load_at(3)
-
-
-def test_powers_of_driver_and_loads_sum_to_the_rate_of_energy(sprung):
-    """d/dt (½ J θ'² + m g l sin θ) is the power of driver, springs and the constant force."""
-    theta, turning, acceleration = angle(TIMES)
-    gained = (INERTIA + MASS * ARM**2) * turning * acceleration + MASS * G * ARM * np.cos(theta) * turning
-    powers = sprung.driver("A").power + sum(sprung.load_at(k).power for k in range(3))
-    assert np.allclose(powers, gained, atol=1e-8)
 
 
 def test_armature_changes_neither_violations_nor_determined_reactions():

@@ -3,12 +3,9 @@
 import numpy as np
 import pytest
 
-from mbref import rotations
 from mbref.method import Method, MethodError
 from mbref.scene import (
     Body,
-    Cylindrical,
-    Distance,
     Driver,
     Revolute,
     Scene,
@@ -16,10 +13,8 @@ from mbref.scene import (
     Sine,
     TorsionSpring,
     Translational,
-    Universal,
 )
 from mbref.scenes import SCENES
-from mbref.scenes.planar_slider_crank import slider_crank
 from mbref.simulation.simulate import Limits, simulate
 
 FINE = Limits(rtol=1e-11)
@@ -91,20 +86,6 @@ def test_orientation_of_every_sample_is_a_unit_quaternion(method):
     near(np.linalg.norm(run.orientation, axis=-1), 1.0, 1e-12, "length")
 
 
-def test_body_moves_equally_in_principal_axes_and_in_turned_axes():
-    """Its inertia tensor in turned axes is Aᵀ diag(J) A; the pose differs by the turn."""
-    hinge = Universal(name="U", bodies=("ground", "b"), anchor=(0, 0, 0), axes=((0, 0, 1), (0, 1, 0)))
-    spin = {"angular_velocity": (0.0, 1.0, 2.0)}
-    turn = np.array([np.cos(0.4), *(np.sin(0.4) * np.array([2, 1, 2]) / 3)])
-    axes = rotations.to_matrix(turn)
-    full = tuple(map(tuple, (axes.T @ np.diag((0.1, 0.5, 0.55)) @ axes).tolist()))
-    plain = completed(one_body((hinge,), inertia=(0.1, 0.5, 0.55), **spin))
-    turned = completed(one_body((hinge,), inertia=full, orientation=tuple(turn.tolist()), **spin))
-    near(turned.position, plain.position, 1e-9, "positions")
-    relative = rotations.multiply(plain.orientation, np.broadcast_to(turn, plain.orientation.shape))
-    near(rotations.angle_between(relative, turned.orientation), 0.0, 1e-8, "orientations")
-
-
 @pytest.mark.parametrize("method", ["mpi-svd+projection", "lm1+partitioning", "lm1+none"])
 def test_bodies_without_masses_follow_their_drivers(method):
     sine = Sine(amplitude=0.5, frequency=3.0)
@@ -124,35 +105,6 @@ def test_bodies_without_masses_follow_their_drivers(method):
     trajectory = completed(scene, method, t)
     expected = np.stack([reach * np.cos(angle), reach * np.sin(angle), 0 * t], axis=1)
     near(trajectory.position[:, 1], expected, 1e-9, f"block by {method}")
-
-
-def rod_on_an_axle(spin):
-    """Return a body b on a cylindrical joint about z, with an angular velocity, and a body c at a distance of
-    √½ m from a point 0.5 m beside b's centre."""
-    return Scene(
-        name="rod",
-        gravity=(0, 0, -9.81),
-        body=(
-            Body(name="b", position=(1.0, 0, 0), angular_velocity=spin, **ROD),
-            Body(name="c", position=(2.0, 0, 0.5), **ROD),
-        ),
-        joint=(
-            Cylindrical(name="C", bodies=("ground", "b"), anchor=(1, 0, 0), axis=(0, 0, 1)),
-            Distance(name="D", bodies=("b", "c"), anchors=((1.5, 0, 0), (2.0, 0, 0.5))),
-        ),
-    )
-
-
-def test_angular_velocity_that_a_cylindrical_joint_forbids_is_refused():
-    with pytest.raises(SceneError, match=r"joint\[C\]: velocities given to bodies violate it by"):
-        simulate(rod_on_an_axle((1.0, 0.0, 0.0)), "lm1+projection", [0.1])
-
-
-def test_cylindrical_joint_keeps_its_axis_and_distance_joint_its_length():
-    run = completed(rod_on_an_axle((0.0, 0.0, 3.0)), "lm1+projection", [0.5])
-    near(run.position[-1, 0, :2], (1.0, 0.0), 1e-12, "on the axis")
-    end = run.position[-1, 0] + rotations.rotate(run.orientation[-1, 0], np.array([0.5, 0.0, 0.0]))
-    near(np.linalg.norm(run.position[-1, 1] - end), np.sqrt(0.5), 1e-9, "distance")
 
 
 def test_scene_without_masses_and_drivers_names_every_body():
@@ -220,26 +172,3 @@ def test_first_step_of_the_length_of_the_run_is_its_only_step(integrator):
         for first in (1e-4, 1e-5)
     ]
     assert steps[0] == 1 < steps[1], f"{integrator}: {steps} steps with the first of 1e-4 and 1e-5 s"
-
-
-@pytest.mark.parametrize("unit", [1e-6, 1e-3, 1e6])
-def test_unit_of_length_does_not_change_a_motion(unit):
-    """Froude's scaling: lengths times s, times times √s.  Start velocities are found from the crank's."""
-    times = np.linspace(0.0, 0.3, 7)
-    turned = [
-        simulate(slider_crank_of(size), "alf-dual+projection", times * size**0.5).orientation
-        for size in (1.0, unit)
-    ]
-    assert np.abs(turned[0] - turned[1]).max() < 1e-8
-
-
-def slider_crank_of(unit):
-    """Return the slider-crank that turns under gravity, with lengths in another unit (m); masses stay."""
-    base = slider_crank(0.304, 0.4048, 0.3, "crank")
-    scene = slider_crank(0.304 * unit, 0.4048 * unit, 0.3, "crank", rate=30.0 / unit**0.5)
-    masses = [(body.mass, tuple((np.array(body.inertia) * unit**2).tolist())) for body in base.body]
-    body = tuple(
-        b.model_copy(update={"mass": mass, "inertia": inertia})
-        for b, (mass, inertia) in zip(scene.body, masses, strict=True)
-    )
-    return scene.with_(body=body, gravity=(0.0, -9.81, 0.0))

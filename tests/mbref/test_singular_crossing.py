@@ -35,24 +35,6 @@ def test_light_crank_turns_through_dead_centres_of_a_heavy_slider(rung, allowed)
     assert error_of(scene, scene.duration, "taylor") < allowed
 
 
-@pytest.mark.parametrize("unit", [1e-3, 1e3])
-def test_rhombus_in_millimetres_and_in_kilometres_crosses_as_its_closed_form(unit):
-    """Lengths, gravity and inertias are scaled, so that the motion in time stays."""
-    scene = four_bar_gravity()
-    bodies = tuple(
-        body.model_copy(
-            update={
-                "position": tuple(unit * x for x in body.position),
-                "inertia": tuple(unit**2 * x for x in body.inertia),
-            }
-        )
-        for body in scene.body
-    )
-    joints = tuple(j.model_copy(update={"anchor": tuple(unit * x for x in j.anchor)}) for j in scene.joint)
-    scaled = scene.with_(body=bodies, joint=joints, gravity=tuple(unit * x for x in scene.gravity))
-    assert error_of(scaled, 5.0, "taylor") < 1e-6
-
-
 def door(tilt: float, seed: int) -> Scene:
     """Return a door on two hinges, the second tilted (rad), in a random orientation unless the seed is 0."""
     turn = rotations.from_vector(np.random.default_rng(seed).normal(size=3) if seed else np.zeros(3))

@@ -18,7 +18,9 @@ def ends(scene: Scene) -> tuple[tuple[Outcome, str, int], np.ndarray]:
 
 
 @pytest.mark.parametrize(("length", "time"), [(1e-6, 1.0), (1e6, 1.0), (1.0, 1e3)])
-@pytest.mark.parametrize("name", ["four_bar_quarter", "flyball_governor", "bennett"])
+@pytest.mark.parametrize(
+    "name", ["four_bar_quarter", "planar_slider_crank_equal", "flyball_governor", "bennett"]
+)
 def test_built_in_scenes_complete_with_proportional_positions_at_every_size(name, length, time):
     scene = find_scene(name)
     scene = scene.with_(duration=min(scene.duration, 0.2))
