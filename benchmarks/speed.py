@@ -376,11 +376,9 @@ def main() -> None:
             options.out.write_text(json.dumps(data, allow_nan=False))
     summary(console, tables)
     if options.plot:
-        from speed_plot import draw
+        from reports import benchmark_plot, figures
 
-        from reports import figures
-
-        options.plot.write_bytes(figures.png(draw(data)))
+        options.plot.write_bytes(figures.png(benchmark_plot.draw(data)))
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.judge.constraints import inertia_matrices, initial_poses, initial_twists
 from crosscheck.refusals import Cannot, Owner, Supports
-from crosscheck.setting import FamilyParts, Setting, best_family
+from crosscheck.setting import Alternatives, FamilyParts, Setting, best_family
 from mbref import rotations
 from mbref.motions.trajectory import Cost, Outcome, Trajectory
 from mbref.scene import GROUND, Scene
@@ -30,6 +30,7 @@ __all__ = [
     "LARGE",
     "ON_REQUEST",
     "OPTIONAL",
+    "Alternatives",
     "Cannot",
     "Cost",
     "Engine",
@@ -75,6 +76,9 @@ class Engine(ABC):
     defaults_of : collection of str
         Places of default values in the library, which `crosscheck versions` compares: an object or a part of
         it, such as ``mujoco.MjSpec().option``, or a function with a signature, such as ``module.function``.
+    alternatives : sequence of Alternatives
+        Ways to solve the same equations, which must agree: linear solvers, sparse and dense matrices, warm
+        starts, threads. `settings` need not list their families.
     compile_seconds : float
         CPU time, s, by which the time limit of a run is extended, for an engine that compiles code for each
         model within its runs.
@@ -90,6 +94,7 @@ class Engine(ABC):
     options: Mapping[str, str] = {}
     with_default: Collection[str] = ()
     defaults_of: Collection[str] = ()
+    alternatives: Sequence[Alternatives] = ()
     compile_seconds: float = 0.0
 
     def version(self) -> str:

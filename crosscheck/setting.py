@@ -38,6 +38,22 @@ class Setting:
         )
 
 
+@dataclass(frozen=True)
+class Alternatives:
+    """Several ways in which an engine solves the same equations.
+
+    Attributes
+    ----------
+    ways : mapping of str to Setting
+        Complete settings by name. The first one is the way of which the engine's author is surest.
+    within : float
+        Largest relative difference of accelerations, reactions and velocities after a short motion.
+    """
+
+    ways: Mapping[str, Setting]
+    within: float = 1e-9
+
+
 def best_family(settings: Sequence[Setting]) -> list[Setting]:
     """Return the settings of the family "tuned", or of the first family of settings if the engine has no such
     family, coarse to fine."""

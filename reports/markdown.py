@@ -40,12 +40,7 @@ TITLE = "Closed-loop mechanisms: engines compared with the true motion"
 
 def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
     """Return the report as Markdown that shows figures/NAME.svg."""
-    return f"# {_words(title)}\n\n{body(blocks)}\n"
-
-
-def body(blocks: Iterable[Block]) -> str:
-    """Return blocks as Markdown, without a title."""
-    return "\n\n".join(map(_markdown, blocks))
+    return "\n\n".join([f"# {_words(title)}", *map(_markdown, blocks)]) + "\n"
 
 
 def _markdown(block: Block) -> str:

@@ -42,7 +42,7 @@ def hint(runner: Runner, failures: Sequence[Failure], family: str = "") -> str:
     """Return one sentence on the cause that explains most failing scenes; empty if no scene can be
     examined."""
     ordered = sorted(failures, key=lambda failure: len(parts_of(failure.specimen.scene)))
-    asked = [failure for failure in ordered if failure.specimen.scene.has_mass()][:MOST]
+    asked = [f for f in ordered if f.specimen.scene.has_mass() and not f.specimen.large][:MOST]
     found = [pair for failure in asked for pair in _looked_at(runner, failure, family)]
     if not found:
         return ""

@@ -9,6 +9,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
+from crosscheck.conformance.agreeing import accelerations_at_start, alternatives_agree
 from crosscheck.conformance.changes.copies import Outside
 from crosscheck.conformance.changes.relations import RELATIONS
 from crosscheck.conformance.precise import double_precision, refined, settled, smooth
@@ -265,7 +266,15 @@ def _at(run: Trajectory, samples: slice | np.ndarray) -> Trajectory:
 
 
 def _every(specimen: Specimen) -> bool:
-    return not specimen.dead_end
+    return not (specimen.dead_end or specimen.large)
+
+
+def _large(specimen: Specimen) -> bool:
+    return specimen.large
+
+
+def _several_ways(specimen: Specimen) -> bool:
+    return specimen.related or specimen.large
 
 
 def _without_joints(specimen: Specimen) -> bool:
@@ -299,6 +308,8 @@ PROPERTIES: Mapping[str, Property] = {
     "settled": _property(settled),
     "digits": _property(double_precision),
     "smooth": _property(smooth),
+    "start": _property(accelerations_at_start, _large),
+    "alternatives": _property(alternatives_agree, _several_ways),
     "energy": _property(energy, version=2),
     "momentum": _property(momentum),
     "balance": _property(balanced),

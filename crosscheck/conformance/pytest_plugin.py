@@ -62,6 +62,7 @@ class Session:
 
     def __init__(self, config: pytest.Config):
         from crosscheck.conformance.mechanisms.features import undetermined
+        from crosscheck.conformance.mechanisms.large_graphs import large_graph
         from crosscheck.conformance.mechanisms.planar import is_planar, planar_specimens
         from crosscheck.conformance.mechanisms.random_mechanisms import random_mechanism
         from crosscheck.conformance.mechanisms.specimens import Specimen, specimens
@@ -75,6 +76,7 @@ class Session:
         deep, first = config.getoption("depth") == "deep", config.getoption("mechanism_seed")
         seeds = range(first, first + config.getoption("mechanisms"))
         drawn = [Specimen(random_mechanism(seed), None, deep) for seed in seeds]
+        drawn += [Specimen(large_graph(seed), large=True) for seed in seeds]
         planar = planar_specimens() if is_planar(engine(self.name)) else []
         known = [Specimen(undetermined()), *specimens(deep), *planar, *drawn]
         if not deep:  # replace references, which take 20 s each, by Gauss's principle

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from crosscheck.engine import Cannot, Engine, Setting, engine
+from crosscheck.engine import Alternatives, Cannot, Engine, Setting, engine
 from crosscheck.processes import serve
 from crosscheck.processes.answer import answered
 from crosscheck.processes.pool import ChildFailed, Observation, ask, observe, run_isolated
@@ -37,6 +37,10 @@ class Runner(Protocol):
     @property
     def rounding(self) -> float:
         """Relative rounding error of the numbers that the engine declares."""
+
+    @property
+    def alternatives(self) -> Sequence[Alternatives]:
+        """The engine's ways to solve the same equations."""
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         """Return the version, and the reason of a refusal or the settings, of the engine or of one family of
@@ -77,6 +81,11 @@ class Isolated:
     def rounding(self) -> float:
         with answering():
             return engine(self.name).rounding
+
+    @property
+    def alternatives(self) -> Sequence[Alternatives]:
+        with answering():
+            return engine(self.name).alternatives
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         return ask(self.name, serve.offered, (scene, family), self.time_limit)
@@ -136,6 +145,10 @@ class InProcess:
     @property
     def rounding(self) -> float:
         return self.engine.rounding
+
+    @property
+    def alternatives(self) -> Sequence[Alternatives]:
+        return self.engine.alternatives
 
     def offers(self, scene: Scene, family: str = "") -> tuple[str, Cannot | None, list[Setting]]:
         with answering():

@@ -29,6 +29,7 @@ from mbref.scene.joints import DISPLACEMENT
 Residuals = dict[str, np.ndarray]
 
 KEPT = 64  # scenes whose initial velocities and length are kept: each run of a comparison asks for them
+HELD = 1e-14  # residual / largest sum of terms; a smaller residual is rounding
 COINCIDENT = 1e-14  # distance / largest coordinate; points at a smaller distance differ by rounding
 
 
@@ -202,6 +203,8 @@ def _initial_twists(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     given, wanted = _given(scene, scale)
     j, b = jacobian(scene, 0.0, *pose)
     j = j * scale
+    if given.all() and _holds(j, wanted, b):
+        return tuple(np.hsplit((wanted * scale).reshape(-1, 6), 2))
     x, free = _solve(j, b)
     _refuse(scene, "drivers contradict it", j @ x - b, x, CONTRADICTED)
     step, still_free = _solve(free[given], wanted - x[given])
@@ -258,6 +261,13 @@ def _given(scene: Scene, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     values = np.array(rows, dtype=float).ravel()
     given = ~np.isnan(values)
     return given, values[given] / scale[given]
+
+
+def _holds(j: np.ndarray, x: np.ndarray, b: np.ndarray) -> bool:
+    """Return whether complete velocities x satisfy J x = b to rounding, so that they need no correction."""
+    left = np.abs(j @ x - b)
+    sizes = np.abs(j) @ np.abs(x) + np.abs(b)
+    return bool((left <= HELD * sizes.max(initial=0.0)).all())
 
 
 def _solve(matrix: np.ndarray, rhs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

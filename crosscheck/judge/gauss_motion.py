@@ -98,7 +98,7 @@ def accelerations(
     turn = rotations.to_matrix(orientation)
     force = applied(scene, t, state, since)
     inertia = turn @ inertia_matrices(scene) @ np.swapaxes(turn, 1, 2)
-    is_singular = _has_singular_mass(scene)
+    is_singular = has_singular_mass(scene)
     if is_singular or any(joint.reflected_inertia for joint in scene.joint):
         return _with_coupled_masses(scene, t, state, force, rank, is_singular)
     roots = np.zeros((len(scene.body), 6, 6))  # W with WᵀW the mass matrix
@@ -117,7 +117,7 @@ def accelerations(
 
 
 @functools.lru_cache(maxsize=64)
-def _has_singular_mass(scene: Scene) -> bool:
+def has_singular_mass(scene: Scene) -> bool:
     """Return whether a body lacks mass, or inertia about an axis, as points and thin rods do."""
     least = np.linalg.eigvalsh(inertia_matrices(scene))[:, 0]
     thin = least <= WITHOUT_INERTIA * np.trace(inertia_matrices(scene), axis1=1, axis2=2)

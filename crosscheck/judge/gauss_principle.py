@@ -32,7 +32,7 @@ def gauss(scene: Scene) -> np.ndarray:
     Among all accelerations that joints and drivers allow, the result minimises ½ aᵀ M a - aᵀ f. The scene
     must have masses. A moment of inertia may be zero if joints prevent the rotation.
     """
-    mass, force = _unbound(scene)
+    mass, force = unbound(scene)
     # weights of the entries of `stacked`
     weights = np.tile(np.repeat([1.0, 1 / scene_length(scene)], 3), len(scene.body))
     rows = jacobian(scene, 0.0, *initial_poses(scene))[0]
@@ -56,7 +56,7 @@ def of_least_constraint(
     return found
 
 
-def _unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+def unbound(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Return the mass matrix M (6 nb, 6 nb) of the twists at t = 0, and the forces f (6 nb,) of loads and
     gyroscopic moments."""
     position, orientation = initial_poses(scene)

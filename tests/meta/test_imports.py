@@ -58,7 +58,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["runs"],
         ["places", "engine_looks"],
         ["figures"],
-        ["mechanisms", "speed_figure", "time_series"],
+        ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
         ["sections"],
         ["render", "stored"],
         ["pages"],

@@ -20,8 +20,9 @@ passes, fails, or does not apply, with a reason. The number of a check increases
 that verdicts of different versions are never compared.
 
 Each check has been tested with defects: {len(DEFECTS)} changes of one line, planted one at a time in
-`examples/spatial_engine` (`tests/zoo/defects.toml`). With a defect the check in its row fails on the scene in
-its row, and passes without it (`pytest -m "slow or not slow" tests/zoo`). This page is written by
+`examples/spatial_engine` (`tests/zoo/defects.toml`), or in four linear solvers of that engine
+(`tests/zoo/ways.py`). With a defect the check in its row fails on the scene in its row, and passes without it
+(`pytest -m "slow or not slow" tests/zoo`). This page is written by
 `python -m tests.zoo.table docs/results/conformance.md`.
 """
 

@@ -21,15 +21,16 @@ SPECIMENS = {s.scene.name: s for s in [Specimen(undetermined()), *specimens()]}
 
 
 @functools.cache
-def sound_bench(scene: str) -> trial.Bench:
-    return trial.set_up(InProcess(engine()), SPECIMENS[scene])
+def sound_bench(scene: str, has_ways: bool = False) -> trial.Bench:
+    return trial.set_up(InProcess(engine(has_ways=has_ways)), SPECIMENS[scene])
 
 
 @pytest.mark.parametrize("about", DEFECTS)
 def test_planted_defect_fails_its_check_which_the_sound_engine_passes(about):
     """The table tests/zoo/defects.toml names a check and a scene for each change of one line."""
     defect = DEFECTS[about]
-    runner, sound = InProcess(engine(defect)), suite.verdict_on(defect.check, sound_bench(defect.scene))
+    runner = InProcess(engine(defect, defect.has_ways))
+    sound = suite.verdict_on(defect.check, sound_bench(defect.scene, defect.has_ways))
     bench = suite.asked(runner, SPECIMENS[defect.scene])
     if isinstance(bench, trial.Bench):
         faulty = suite.verdict_on(defect.check, bench)

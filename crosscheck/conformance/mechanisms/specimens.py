@@ -8,6 +8,7 @@ from functools import cache
 from crosscheck.conformance.mechanisms.closed_forms import CLOSED_FORMS, Exact
 from crosscheck.conformance.mechanisms.features import feature_scenes
 from crosscheck.conformance.mechanisms.geared_forms import GEARED
+from crosscheck.conformance.mechanisms.large_graphs import large_graph
 from crosscheck.conformance.mechanisms.moving import dead_end, moving_probes
 from crosscheck.conformance.mechanisms.random_scenes import mechanism
 from crosscheck.judge.reference.reference import SECONDS
@@ -22,6 +23,7 @@ SHORT = {  # built-in scenes with a truth, and end times (s) before their first 
     "spatial_slider_crank_driven": 0.02,
 }
 DRAWN = {"drawn loop": 0, "drawn driven loop": 1}  # seeds of the random mechanisms that belong to the suite
+GRAPHS = (11, 0, 5)  # seeds of the large mechanisms that belong to the suite, of 13, 31 and 78 bodies
 RELATED = (  # scenes to which the metamorphic relations are applied at quick depth
     "pendulum", "torsion", "oscillator", "driven", "turntable", "four_bar_gravity", "spinning loop",
     "cylindrical driver", "force load", "tumbling body", *DRAWN,
@@ -32,13 +34,15 @@ RELATED = (  # scenes to which the metamorphic relations are applied at quick de
 class Specimen:
     """A scene of the suite. ``exact`` returns its poses if a formula is known. ``related`` applies the
     metamorphic relations. ``reference_time`` is the CPU time (s) of a reference if no closed form exists. A
-    ``dead_end`` has drivers that the mechanism cannot follow to the end."""
+    ``dead_end`` has drivers that the mechanism cannot follow to the end. A ``large`` mechanism is judged by
+    accelerations at the start."""
 
     scene: Scene
     exact: Exact | None = None
     related: bool = False
     reference_time: float = SECONDS
     dead_end: bool = False
+    large: bool = False
 
 
 @cache
@@ -50,4 +54,6 @@ def specimens(deep: bool = False) -> tuple[Specimen, ...]:
     drawn = [mechanism(seed).with_(name=name) for name, seed in DRAWN.items()]
     scenes += [*(features | moving_probes()).values(), *drawn]
     forms += [Specimen(scene, None, deep or scene.name in RELATED) for scene in scenes]
-    return (*forms, *(Specimen(*make()) for make in GEARED), Specimen(dead_end(), dead_end=True))
+    geared = (Specimen(*make()) for make in GEARED)
+    graphs = (Specimen(large_graph(seed), large=True) for seed in GRAPHS)
+    return (*forms, *geared, Specimen(dead_end(), dead_end=True), *graphs)

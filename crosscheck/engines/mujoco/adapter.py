@@ -15,6 +15,7 @@ import numpy as np
 from crosscheck.engine import Cannot, Engine, Setting
 from crosscheck.engines.mujoco import compiled_run, linearised, original
 from crosscheck.engines.mujoco.families import (
+    CHOSEN,
     COMPILED,
     FAMILIES,
     HARD,
@@ -25,6 +26,7 @@ from crosscheck.engines.mujoco.families import (
 )
 from crosscheck.engines.mujoco.model import SUPPORTS
 from crosscheck.engines.mujoco.simulation import Simulation
+from crosscheck.engines.mujoco.ways import ALTERNATIVES
 from crosscheck.engines.shared.driver_motion import fastest_rate
 from crosscheck.engines.shared.initial_velocities import lacks_mass
 from crosscheck.engines.shared.planar_scene import planar_scene
@@ -48,7 +50,7 @@ class MuJoCo(linearised.Linearised, Engine):
     package = "mujoco"
     supports = SUPPORTS
     families, options = FAMILIES | original.FAMILIES, OPTIONS | original.OPTIONS
-    integrated_here = INTEGRATED_HERE
+    integrated_here, alternatives = INTEGRATED_HERE, ALTERNATIVES
     defaults_of = tuple(f"mujoco.MjSpec().{part}" for part in DEFAULTS)
 
     def version(self) -> str:
@@ -67,8 +69,14 @@ class MuJoCo(linearised.Linearised, Engine):
         return sweep(scene, fastest_rate(scene, lambda step: self._coarse(scene, step)))
 
     def serves(self, scene: Scene, family: str) -> bool:
-        """Return whether a family can run a scene; the sweep offers the tuned family for every scene."""
-        return family == "tuned" or super().serves(scene, family)
+        """Return whether a family can run a scene; `tuned` and `chosen` run every scene."""
+        return family in ("tuned", CHOSEN) or super().serves(scene, family)
+
+    def settings_of(self, scene: Scene, family: str) -> Sequence[Setting]:
+        """Return the settings of a family; of `chosen` the first of the alternatives."""
+        if family == CHOSEN:
+            return [next(iter(ALTERNATIVES[0].ways.values()))]
+        return super().settings_of(scene, family)
 
     def own_code(self, scene: Scene, setting: Setting) -> str:
         """Return the MJCF of a setting, and Python statements for options that MJCF does not have."""

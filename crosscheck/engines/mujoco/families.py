@@ -34,6 +34,7 @@ RTOLS = (1e-3, 1e-4, 1e-6, 1e-8, 1e-10)  # at tighter tolerances the noise at si
 # factor on the regulariser; with smaller factors the accelerations are too noisy
 ADAPTIVE = {"forward": 1e-7, "projected": 1e-9}
 FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON = "forward, compiled", "projected, compiled", "newton, compiled"
+CHOSEN = "chosen"
 COMPILED = (FORWARD_COMPILED, PROJECTED_COMPILED, NEWTON)
 COMPILED_HARD = {"point": 1e-9, "weld": 1e-7}  # factor on the regulariser; welds are redundant
 # decay rate of the closure errors, a double root, in fastest rates and in 1/duration
@@ -57,9 +58,18 @@ FAMILIES = {
     FORWARD_COMPILED: "like forward, without Python: mj_forward of libmujoco called by a compiled DOP853",
     PROJECTED_COMPILED: "like projected, without Python; closure errors are removed by projection only",
     NEWTON: "Newton's method on MuJoCo's closures, without Python; where drivers prescribe the whole motion",
+    CHOSEN: "solver, Jacobian, islands and warm start as the options say, iterated to convergence, Euler; "
+    "hard closures where `hard` is given, else the library's",
 }
 INTEGRATED_HERE = (*ADAPTIVE, *COMPILED)
-OPTIONS = {
+SOLVERS = {
+    "jacobian": "dense, sparse or auto",
+    "islands": "whether islands are solved apart",
+    "warm": "whether the solver starts from the accelerations of the step before",
+    "forward": "calls of mj_forward for one sample",
+    "parts": "whether mj_step1 and mj_step2 replace mj_step",
+}
+OPTIONS = SOLVERS | {
     "step": "time step, s",
     "rtol": "relative tolerance of a step",
     "min_step": "shortest step, s",
@@ -146,7 +156,7 @@ def own_code(setting: Setting) -> str:
     """Return the MJCF of a setting that MuJoCo integrates, and Python statements for options that MJCF does
     not have."""
     family, options = setting.family, setting.options
-    if family in INTEGRATED_HERE:
+    if family in (*INTEGRATED_HERE, CHOSEN):
         return ""
     step = options.get("step", DEFAULT_STEP)
     attributes = {"timestep": f"{step!r}"}

@@ -19,6 +19,7 @@ import numpy as np
 from crosscheck.engine import Setting
 from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
+from crosscheck.engines.mujoco.options import change, keyword
 from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
@@ -72,8 +73,8 @@ def own_settings(model: Any) -> dict[str, Any]:
 
     found = {
         "step": float(model.opt.timestep),
-        "integrator": _keyword(mujoco.mjtIntegrator(model.opt.integrator)),
-        "solver": _keyword(mujoco.mjtSolver(model.opt.solver)),
+        "integrator": keyword(mujoco.mjtIntegrator(model.opt.integrator)),
+        "solver": keyword(mujoco.mjtSolver(model.opt.solver)),
         "iterations": int(model.opt.iterations),
     }
     active = model.eq_active0.astype(bool)
@@ -81,29 +82,6 @@ def own_settings(model: Any) -> dict[str, Any]:
         if len(rows) and np.all(rows == rows[0]):
             found[name] = " ".join(f"{number:.15g}" for number in rows[0])
     return found
-
-
-def _keyword(kind: Any) -> str:
-    """Return the word of MJCF for an integrator or a solver."""
-    name = str(kind.name.split("_", 1)[1])
-    return {"EULER": "Euler", "NEWTON": "Newton"}.get(name, name.lower() if len(name) > 3 else name)
-
-
-def _change(mujoco: Any, model: Any, options: Mapping[str, Any]) -> None:
-    """Give a model the settings among some options; a ValueError names an option that MuJoCo does not
-    have."""
-    model.opt.timestep = float(options.get("step", model.opt.timestep))
-    model.opt.iterations = int(options.get("iterations", model.opt.iterations))
-    for name, kinds in (("integrator", mujoco.mjtIntegrator), ("solver", mujoco.mjtSolver)):
-        known = {_keyword(kind): kind for kind in kinds.__members__.values()}
-        if name in options:
-            if options[name] not in known:
-                raise ValueError(f"option {name}: {options[name]!r} is none of {', '.join(known)}")
-            setattr(model.opt, name, known[options[name]])
-    for name, rows in (("solref", model.eq_solref), ("solimp", model.eq_solimp)):
-        if name in options:
-            numbers = [float(word) for word in str(options[name]).split()]
-            rows[:, : len(numbers)] = numbers
 
 
 def own_code(setting: Setting) -> str:
@@ -147,7 +125,7 @@ class _Original:
         bits = mujoco.mjtDisableBit
         for name in ("CONTACT", "LIMIT", "FRICTIONLOSS"):
             self.model.opt.disableflags |= getattr(bits, f"mjDSBL_{name}")
-        _change(mujoco, self.model, setting.options)
+        change(mujoco, self.model, setting.options)
         self.step = float(self.model.opt.timestep)
         if setting.family in (STIFFER, STIFFER_RK4):
             self.model.eq_solref[:], self.model.eq_solimp[:] = (2 * self.step, 1.0), STIFFEST

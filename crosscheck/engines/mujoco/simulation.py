@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from crosscheck.engine import Setting
 from crosscheck.engines.mujoco import compiled_run
 from crosscheck.engines.mujoco.families import (
     ADAPTIVE,
+    CHOSEN,
     COMPILED,
     CONVERGED,
     DEFAULT_STEP,
@@ -24,6 +25,7 @@ from crosscheck.engines.mujoco.families import (
     STOCK,
 )
 from crosscheck.engines.mujoco.model import compiled
+from crosscheck.engines.mujoco.options import change as change_options
 from crosscheck.engines.mujoco.projection import projected
 from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
 from crosscheck.engines.shared.driver_motion import motion, stated_rate
@@ -60,7 +62,11 @@ class Simulation:
         self.nominal = options.get("step", DEFAULT_STEP)
         model.opt.timestep = self.nominal
         self.step = self._fixed
+        self.forwards, self.parts = int(options.get("forward", 1)), bool(options.get("parts", False))
         if setting.family == "defaults":
+            return
+        if setting.family == CHOSEN:
+            self._choose(options)
             return
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
         model.opt.integrator = getattr(mujoco.mjtIntegrator, STOCK.get(setting.family, RK4))
@@ -92,6 +98,17 @@ class Simulation:
         model.dof_invweight0[:] *= factor
         model.opt.tolerance, model.opt.iterations = CONVERGED, MOST_ITERATIONS
         model.opt.disableflags |= self.mujoco.mjtDisableBit.mjDSBL_REFSAFE
+
+    def _choose(self, options: Mapping[str, Any]) -> None:
+        """Set the solver, Jacobian, islands and warm start that the options name."""
+        if "hard" in options:
+            self._harden(options["beta"], options["hard"])
+        self.model.opt.tolerance = CONVERGED
+        bits = self.mujoco.mjtDisableBit
+        for name, bit in (("islands", bits.mjDSBL_ISLAND), ("warm", bits.mjDSBL_WARMSTART)):
+            if not options.get(name, True):
+                self.model.opt.disableflags |= bit
+        change_options(self.mujoco, self.model, options)
 
     @contextlib.contextmanager
     def installed(self) -> Iterator[None]:
@@ -152,7 +169,12 @@ class Simulation:
     def _fixed(self, t0: float, t1: float) -> None:
         n = step_count(t0, t1, self.nominal)
         self.model.opt.timestep = (t1 - t0) / n
-        self.mujoco.mj_step(self.model, self.data, nstep=n)
+        if self.parts:
+            for _ in range(n):
+                self.mujoco.mj_step1(self.model, self.data)
+                self.mujoco.mj_step2(self.model, self.data)
+        else:
+            self.mujoco.mj_step(self.model, self.data, nstep=n)
         rk4 = self.model.opt.integrator == self.mujoco.mjtIntegrator.mjINT_RK4
         self.counts.steps += n
         self.counts.rhs += 4 * n if rk4 else n
@@ -212,7 +234,8 @@ class Simulation:
     def link_motion(self) -> LinkMotion:
         """Return the motion of the links; afterwards the data's forces belong to this state."""
         mujoco, model, data, links = self.mujoco, self.model, self.data, self.compiled.links
-        mujoco.mj_forward(model, data)
+        for _ in range(self.forwards):
+            mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
         twists, changes = np.zeros((2, len(links), 6))
         for twist, change, body in zip(twists, changes, links, strict=True):
