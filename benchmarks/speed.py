@@ -376,9 +376,11 @@ def main() -> None:
             options.out.write_text(json.dumps(data, allow_nan=False))
     summary(console, tables)
     if options.plot:
-        from reports import benchmark_plot, figures
+        from speed_plot import draw
 
-        options.plot.write_bytes(figures.png(benchmark_plot.draw(data)))
+        from reports import figures
+
+        options.plot.write_bytes(figures.png(draw(data)))
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from mbref.command_line import INTERRUPTED, Parser, output_file, status_of
 from mbref.files import write
 
 from .blocks import Block
-from .runs import Run, by_scene
+from .runs import Run, SceneRuns, by_scene
 
 # module → package to install
 NEEDS = {"matplotlib": "matplotlib", "jinja2": "jinja2", "resvg_py": "resvg-py"}
@@ -75,45 +75,41 @@ def _picture(path: Path) -> int:
 
 def _render(folder: Path, names: Sequence[str]) -> int:
     """Render the records of a folder again; nothing runs."""
-    from . import sections, stored
-    from .sections import closed_loops, paper, stability
-
-    blocks: list[Block] = []
     try:
-        if set(names) - set(OWN):
-            blocks += sections.blocks(stored.groups(folder), names, stored.verified(folder))
-        if STABILITY in names:
-            blocks += stability.render(collection.stored_ladders(folder))
-        if CLOSED_LOOPS in names:
-            blocks += closed_loops.render(collection.closed_loops())
-        if PAPER in names:
-            blocks += paper.render(*collection.stored_paper(folder))
+        _write(_blocks(folder, None, names), folder, names)
     except FileNotFoundError as error:
         raise RequestError(str(error)) from None
-    _write(blocks, folder, names)
     return 0
 
 
-def _blocks(out: Path, wanted: collection.Runs, names: Sequence[str]) -> list[Block]:
-    """Return the blocks of the named sections; only the records that they need are made."""
+def _blocks(out: Path, wanted: collection.Runs | None, names: Sequence[str]) -> list[Block]:
+    """Return the blocks of the named sections from a folder's records; with ``wanted`` missing records that
+    they need are made before."""
     from . import sections, stored
     from .sections import closed_loops, paper, stability
 
     blocks: list[Block] = []
     if set(names) - set(OWN):
-        found = collection.comparison(out, wanted, _notice)
-        named = {scene.name: scene for scene in found.scenes}
-        groups = by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
+        groups = _compared(out, wanted) if wanted else stored.groups(out)
         blocks += sections.blocks(groups, names, stored.verified(out))
     if STABILITY in names:
-        blocks += stability.render(collection.stability_ladders(out, wanted.engines, _notice))
+        ladders = collection.stability_ladders
+        runs = ladders(out, wanted.engines, _notice) if wanted else collection.stored_ladders(out)
+        blocks += stability.render(runs)
     if CLOSED_LOOPS in names:
         blocks += closed_loops.render(collection.closed_loops())
     if PAPER in names:
-        found_of_paper = collection.paper(out, not wanted.is_quick, _notice)
-        print(paper.score(found_of_paper.records))
-        blocks += paper.render(*found_of_paper)
+        if wanted:
+            print(paper.score(collection.paper(out, not wanted.is_quick, _notice).records))
+        blocks += paper.render(*collection.stored_paper(out))
     return blocks
+
+
+def _compared(out: Path, wanted: collection.Runs) -> list[SceneRuns]:
+    """Return the runs of a comparison, of which missing records are made."""
+    found = collection.comparison(out, wanted, _notice)
+    named = {scene.name: scene for scene in found.scenes}
+    return by_scene(found.records, named, found.identities, found.truths, found.motions, found.branches)
 
 
 def _write(blocks: Sequence[Block], out: Path, names: Sequence[str]) -> None:

@@ -5,7 +5,7 @@ A section returns blocks; ``reports.render`` writes them as HTML and as Markdown
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -218,3 +218,10 @@ Block = (
     | Plot
     | Record
 )
+Parts = Mapping[str, Sequence[Block] | str]  # of a page of the documentation, by their names in its template
+
+
+def listing(lines: Iterable[str], numbered: bool = False) -> list[Block]:
+    """Return a list of lines in Markdown; empty without lines."""
+    items = [f"{i}. {line}" if numbered else f"- {line}" for i, line in enumerate(lines, 1)]
+    return [Prose("\n".join(items))] if items else []

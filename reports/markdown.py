@@ -40,7 +40,12 @@ TITLE = "Closed-loop mechanisms: engines compared with the true motion"
 
 def markdown(blocks: Iterable[Block], title: str = TITLE) -> str:
     """Return the report as Markdown that shows figures/NAME.svg."""
-    return "\n\n".join([f"# {_words(title)}", *map(_markdown, blocks)]) + "\n"
+    return f"# {_words(title)}\n\n{body(blocks)}\n"
+
+
+def body(blocks: Iterable[Block]) -> str:
+    """Return blocks as Markdown, without a title."""
+    return "\n\n".join(map(_markdown, blocks))
 
 
 def _markdown(block: Block) -> str:

@@ -13,16 +13,19 @@ from pathlib import Path
 from mbref.command_line import Parser, status_of
 from mbref.files import write
 
-from ..markdown import markdown
+from ..markdown import body
 
 NAMES = ("which-engine", "closed-loops", "convergence", "small-motions", "findings", "support")
+TEMPLATES = Path(__file__).parents[1] / "templates"  # texts of the pages, with names of parts in braces
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 
 
 def text(name: str, records: Path | None = None) -> str:
     """Return a page in Markdown, of a file of records or, by default, of the stored records."""
     page = import_module(f"{__package__}.{name.replace('-', '_')}")
-    return markdown(page.blocks(*([] if records is None else [records])), page.TITLE)
+    parts = page.parts(*([] if records is None else [records]))
+    made = {name: part if isinstance(part, str) else body(part) for name, part in parts.items()}
+    return (TEMPLATES / f"{name}.md").read_text(encoding="utf-8").format(**made)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -6,22 +6,14 @@ import math
 
 from crosscheck.findings.finding import FOLDER, Finding, findings
 
-from ..blocks import Block, Fold, Heading, Listing, Prose, Table, Within
-
-TITLE = "Findings"
-HEAD = """
-What crosscheck found in other engines, each with a proof that runs again: `crosscheck findings` lists them,
-and `crosscheck findings --recheck` asks the installed versions which of them are still there. Scripts need
-the engine alone. An error that ends the process is described in words, without a proof. Made by
-`python -m reports.pages findings` from `crosscheck/findings/findings.toml`.
-"""
+from ..blocks import Block, Fold, Heading, Listing, Parts, Prose, Table, Within
 
 
-def blocks() -> list[Block]:
-    """Return the page of the stored findings."""
+def parts() -> Parts:
+    """Return the parts of the page of the stored findings."""
     rows = [(Within(f.name, f"#{f.name}"), f.engine, f.version, _measured(f)) for f in findings()]
     table = Table("Findings by engine.", ("finding", "engine", "version", "measured"), rows)
-    return [Prose(HEAD), table, *(block for found in findings() for block in _entry(found))]
+    return {"table": [table], "findings": [block for found in findings() for block in _entry(found)]}
 
 
 def _measured(found: Finding) -> str:

@@ -15,37 +15,12 @@ from crosscheck.study.record_view import ended, error_text, is_completed
 from crosscheck.study.words.speed import LEVEL, SAID, title
 from mbref.motions.trajectory import Outcome
 
-from ..blocks import Block, Fold, Heading, Listing, Marked, Prose, Table, Within
+from ..blocks import Block, Fold, Heading, Listing, Marked, Parts, Prose, Table, Within
 from ..runs import SceneRuns, duration, plain
 from ..stored import groups, verified
 
 REPORTS = Path(__file__).parents[1]
 FOLDERS = ("reference", "kinds")  # of committed records
-TITLE = "Which engine, which settings, for my mechanism?"
-HEAD = f"""
-This page answers by kind of mechanism: which engines reach an error of {SAID}, at which settings, in which
-time, and what the engines' own defaults do. Use it to choose a first engine and first settings. Every answer
-is read from committed records of runs (`reports/reference`, `reports/kinds`), by
-`python -m reports.pages which-engine`.
-
-For numbers of your own mechanism, on your machine, type
-
-```sh
-mbref diagnose my.toml             # which kind is it? redundant rows, freedoms, singular positions
-crosscheck compare my.toml         # the tables of this page for your mechanism
-crosscheck tune mujoco my.toml     # the cheapest settings of one engine
-```
-
-Times are CPU time of stepping, of one machine; compare them within a table only. `crosscheck list settings`
-explains the families of settings, such as `tuned`; families named `compiled` or `dop853` are integrated by
-crosscheck, not by the engine. The page [Engines on closed loops](closed-loops.md) has the errors of more
-engines on more kinds (long runs, couplings). [Compare engines](../compare.md#verdicts) explains errors and
-grades, and the [support table](support.md) has the joints and loads of each engine.
-"""
-CHECKS = """Checks of the [conformance suite](../verify-your-engine.md), and defects that a script shows:"""
-RUNS = """`crosscheck verify ENGINE` runs the checks, `crosscheck findings --recheck` the scripts."""
-SHARED = """`mbref ensemble` runs variants on every core and shares what they have in common
-([Many runs at once](../methods.md#many-runs-at-once))."""
 
 
 class Kind(NamedTuple):
@@ -100,19 +75,19 @@ KINDS = (
 )
 
 
-def blocks(records: Path = REPORTS) -> list[Block]:
-    """Return the page of the folders of committed reports."""
+def parts(records: Path = REPORTS) -> Parts:
+    """Return the parts of the page from the folders of committed reports."""
     folders = [folder for name in FOLDERS if (folder := records / name).is_dir()]
     known = {g.scene.name: g for folder in folders for g in groups(folder)}
     kinds = [(kind, [known[name] for name in kind.scenes if name in known]) for kind in KINDS]
     kinds = [(kind, found) for kind, found in kinds if found]
-    return [
-        Prose(HEAD),
-        *_in_short(kinds),
-        *(block for kind, found in kinds for block in _section(kind, found)),
-        *_many(known["planar_slider_crank"]),
-        *_failures(folders[0]),
-    ]
+    return {
+        "in_short": [_in_short(kinds)],
+        "kinds": [block for kind, found in kinds for block in _section(kind, found)],
+        "many": [_many(known["planar_slider_crank"])],
+        "failures": [_failures(folders[0])],
+        "level": SAID,
+    }
 
 
 def judged(group: SceneRuns) -> Judged:
@@ -122,7 +97,7 @@ def judged(group: SceneRuns) -> Judged:
     return Judged(group.scene, group.truth, [run.record for run in group.runs])
 
 
-def _in_short(kinds: Sequence[tuple[Kind, Sequence[SceneRuns]]]) -> list[Block]:
+def _in_short(kinds: Sequence[tuple[Kind, Sequence[SceneRuns]]]) -> Table:
     rows = []
     for kind, found in kinds:
         group = judged(found[0])
@@ -130,7 +105,7 @@ def _in_short(kinds: Sequence[tuple[Kind, Sequence[SceneRuns]]]) -> list[Block]:
         name = Within(kind.title, f"#{kind.title.lower().replace(' ', '-')}")
         rows.append((name, _named(first), _named(second), _bad_defaults(group)))
     header = ("mechanism", f"fastest within {SAID}", "next engine", "defaults that end wrong or fail")
-    return [Heading("In short", 2), Table("The first scene of each kind.", header, rows)]
+    return Table("The first scene of each kind.", header, rows)
 
 
 def _fastest(group: Judged) -> list[Record]:
@@ -236,7 +211,7 @@ def _lines(group: Judged) -> list[Block]:
     return [Fold(summary, f"{group.scene.name}-lines", [Listing("\n".join(lines), "text")])]
 
 
-def _many(group: SceneRuns) -> list[Block]:
+def _many(group: SceneRuns) -> Table:
     """Return the cost of one variant among many: construction of the model and steps."""
     caption = (
         "If each of many runs has other numbers, the engine's model is built anew for each, so that "
@@ -248,15 +223,14 @@ def _many(group: SceneRuns) -> list[Block]:
         build, steps = record["cost"]["build_seconds"], record["cost"]["seconds"]
         name = f"{title(record['engine'])}, `{record['family']}`"
         rows.append((name, *map(duration, (build, steps, build + steps))))
-    table = Table(caption, ("engine", "construction", "stepping", "both"), rows, frozenset({1, 2, 3}))
-    return [Heading("Many variants at once", 2), table, Prose(SHARED)]
+    return Table(caption, ("engine", "construction", "stepping", "both"), rows, frozenset({1, 2, 3}))
 
 
 def _whole(record: Record) -> float:
     return float(record["cost"]["build_seconds"] + record["cost"]["seconds"])
 
 
-def _failures(folder: Path) -> list[Block]:
+def _failures(folder: Path) -> Table:
     """Return the failed checks of the conformance suite and the findings, by engine."""
     known: dict[str, list[str]] = {}
     for found in findings():
@@ -267,8 +241,7 @@ def _failures(folder: Path) -> list[Block]:
         for name in dict.fromkeys([*failed, *known])
     ]
     header = ("engine", "checks that fail", "of", "findings")
-    table = Table("Failed checks and findings by engine.", header, rows, frozenset({1, 2}))
-    return [Heading("What each engine fails at", 2), Prose(CHECKS), table, Prose(RUNS)]
+    return Table("Failed checks and findings by engine.", header, rows, frozenset({1, 2}))
 
 
 def _checks(folder: Path) -> Iterator[tuple[str, int, int]]:

@@ -58,7 +58,7 @@ FLOORS = {  # lowest first; an arrow within a floor or downwards
         ["runs"],
         ["places", "engine_looks"],
         ["figures"],
-        ["mechanisms", "speed_figure", "time_series", "benchmark_plot"],
+        ["mechanisms", "speed_figure", "time_series"],
         ["sections"],
         ["render", "stored"],
         ["pages"],

@@ -7,8 +7,8 @@ import zipfile
 import pytest
 
 from reports.keep import keep
-from reports.markdown import markdown
-from reports.pages.which_engine import FOLDERS, KINDS, REPORTS, blocks, judged
+from reports.markdown import body
+from reports.pages.which_engine import FOLDERS, KINDS, REPORTS, judged, parts
 from reports.stored import groups
 
 
@@ -44,7 +44,7 @@ def test_page_says_none_for_an_engine_whose_runs_all_failed(folder):
         for line in text.splitlines()
     ]
     (folder / "records.jsonl").write_text("\n".join(lines) + "\n")
-    text = markdown(blocks(folder.parent))
+    text = body(parts(folder.parent)["kinds"])
     row = next(line for line in text.splitlines() if line.startswith("| MuJoCo | "))
     assert row.startswith("| MuJoCo | none | – | – | ") and "step failed" in row
 

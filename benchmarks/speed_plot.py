@@ -10,8 +10,8 @@ import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from . import figures
-from .runs import short
+from reports import figures
+from reports.runs import short
 
 LIMIT, NARROW = "limit", 0.06  # distance of the engines' marks, in data units
 
