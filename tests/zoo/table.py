@@ -3,15 +3,19 @@ docs/results/conformance.md``, and the same as data for reports."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
 from pathlib import Path
 
 from crosscheck.conformance import suite
 from crosscheck.conformance.suite import Verdict, abouts
 from mbref.command_line import Parser
+from reports.blocks import Fold, Table
+from reports.markdown import body
 from tests.zoo.defects import DEFECTS
 
 FOR_REPORTS = Path(suite.__file__).with_name("proved_by.toml")
+CAPTION = "Planted defects."
+HEADER = ("check", "what it checks", "defects")
 HEAD = f"""# Conformance checks
 
 This page lists the checks of the conformance suite, for readers of a verdict by
@@ -29,24 +33,17 @@ Each check has been tested with defects: {len(DEFECTS)} changes of one line, pla
 
 def page() -> str:
     """The whole page."""
-    return "\n".join([HEAD, *_checks(), "", "## Defects", "", *_defects()]) + "\n"
-
-
-def _checks() -> Iterator[str]:
-    yield "## Checks"
-    yield ""
-    yield "| check | what it checks | defects |"
-    yield "| --- | --- | --: |"
-    for name, about in abouts().items():
-        count = sum(defect.check == name for defect in DEFECTS.values())
-        yield f"| {Verdict(name, '', '').check()} | {about} | {count} |"
-
-
-def _defects() -> Iterator[str]:
-    yield "| defect | scene | check that fails |"
-    yield "| --- | --- | --- |"
-    for defect in DEFECTS.values():
-        yield f"| {defect.about} | {defect.scene} | {defect.check} |"
+    counts = Counter(defect.check for defect in DEFECTS.values())
+    checks = [(Verdict(n, "", "").check(), about, str(counts[n])) for n, about in abouts().items()]
+    defects = [(defect.about, defect.scene, defect.check) for defect in DEFECTS.values()]
+    header = ("defect", "scene", "check that fails")
+    made = [
+        Table("Each check, and the number of defects that it detects.", HEADER, checks, frozenset({2})),
+        Fold(
+            f"The {len(defects)} defects", "defects", [Table("One change of a line each.", header, defects)]
+        ),
+    ]
+    return f"{HEAD}\n{body(made)}\n"
 
 
 def data() -> str:
