@@ -1,6 +1,6 @@
 """Table of the thresholds of mbref outside ``mbref.taylor.crossing``, from the constants and their comments.
 
-``python -m tests.thresholds docs/internals/thresholds.md`` writes the page.
+``python -m tests.thresholds docs/results/thresholds.md`` writes the page.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mbref.command_line import Parser
+from reports.blocks import Fold, Table, Within
+from reports.markdown import body
 
 ROOT = Path(__file__).parents[1]
 LEFT_OUT = (
@@ -36,11 +38,12 @@ COSTS = {
     "MOST_COMPARED_STEPS", "MOST_TERMS", "MOST_FACTORS", "MOST_KINEMATIC", "AIM", "POSES", "INSTANTS",
     "STARTS", "STRIDE", "STEP_SHARES",
 }  # fmt: skip
+COLUMNS = ("file", "name", "value", "quantity and reason", "acts on")
 HEAD = """# Thresholds
 
 Numbers on which decisions of mbref depend, besides the thresholds at singular positions, which stand in
-`mbref/taylor/crossing/thresholds.py`. `python -m tests.thresholds docs/internals/thresholds.md` writes this
-page from the constants and their comments. {count}
+`mbref/taylor/crossing/thresholds.py`. `python -m tests.thresholds docs/results/thresholds.md` writes this
+page from the constants and their comments.
 
 | acts on | meaning |
 |---|---|
@@ -109,20 +112,21 @@ def _is_number(node: ast.expr) -> bool:
 
 
 def page() -> str:
-    """Return the page: a table for each folder of mbref."""
-    rows, marks = dict[str, list[str]](), list[str]()
+    """Return the page: the number of thresholds in each folder of mbref, and a folded table for each."""
+    rows = dict[str, list[tuple[str, ...]]]()
     for each in thresholds():
-        if each.name in NUMBERS:
-            continue
-        mark = "cost" if each.name in COSTS else "result"
-        marks.append(mark)
-        folder, _, file = each.module.rpartition(".")
-        cells = f"`{file}`", f"`{each.name}`", f"`{each.value}`", each.comment.replace("|", "\\|"), mark
-        rows.setdefault(folder or "scenes and methods", []).append(f"| {' | '.join(cells)} |")
-    count = f"Of {len(marks)} numbers {marks.count('cost')} change cost only."
-    head = "| file | name | value | quantity and reason | acts on |\n|---|---|---|---|---|\n"
-    parts = [f"## {folder}\n\n{head}" + "\n".join(lines) + "\n" for folder, lines in rows.items()]
-    return HEAD.format(count=count) + "\n".join(parts)
+        if each.name not in NUMBERS:
+            mark = "cost" if each.name in COSTS else "result"
+            folder, _, file = each.module.rpartition(".")
+            cells = (f"`{file}`", f"`{each.name}`", f"`{each.value}`", each.comment, mark)
+            rows.setdefault(folder or "root", []).append(cells)
+    counts = [
+        (Within(folder, f"#{folder}"), str(len(of)), str(sum(row[-1] == "cost" for row in of)))
+        for folder, of in rows.items()
+    ]
+    overview = Table("Folders of mbref.", ("folder", "numbers", "of cost only"), counts, frozenset({1, 2}))
+    tables = [Fold(folder, folder, [Table("Constants.", COLUMNS, of)]) for folder, of in rows.items()]
+    return f"{HEAD}{body([overview, *tables])}\n"
 
 
 if __name__ == "__main__":
