@@ -18,7 +18,7 @@ from crosscheck.study.comparison import scouted
 from crosscheck.study.grid import TIME_LIMIT, Case, Record, study
 from crosscheck.study.progress import shown
 from crosscheck.study.record_view import is_judged, public
-from crosscheck.study.search.execution import Hurried
+from crosscheck.study.search.execution import CoarseFirst
 from crosscheck.study.search.selection import QUICK_LIMIT, thinned
 from crosscheck.study.truths import known_at
 from crosscheck.study.words.truth import unknown
@@ -80,7 +80,7 @@ def studied(cases: Sequence[Case], finished: list[Record]) -> list[Record]:
             finished.append(record)
             advance(done, total, record)
 
-        return study(cases, progress=progress, run=Hurried())
+        return study(cases, progress=progress, run=CoarseFirst())
 
 
 def missing_truths(cases: Sequence[Case], records: Sequence[Record]) -> list[str]:

@@ -22,7 +22,7 @@ from crosscheck.study.grid import Case, Record, key, known, record_of, study
 from crosscheck.study.progress import counted, shown
 from crosscheck.study.record_shape import Truth, checked
 from crosscheck.study.search import selection
-from crosscheck.study.search.execution import Chains, Hurried
+from crosscheck.study.search.execution import Chains, CoarseFirst
 from crosscheck.study.search.neighbours import MOST_COARSER
 from crosscheck.study.search.offers import default_cases, scout, unasked
 from crosscheck.study.search.selection import Family, beyond, families, finest, first
@@ -188,7 +188,7 @@ def _made(what: str, cases: Sequence[Case], path: Path | None) -> dict[str, Reco
         return {}
     order = _long_first(cases)
     with shown(what, len(order)) as progress, Chains(record_of) as threads:
-        found = study(order, threads, path, progress, Hurried().trajectory)
+        found = study(order, threads, path, progress, CoarseFirst().trajectory)
     return {record["key"]: record for record in found}
 
 

@@ -19,7 +19,7 @@ from crosscheck.engine import engine
 from crosscheck.study import grid
 from crosscheck.study.command import command
 from crosscheck.study.search.cheapest import by_error
-from crosscheck.study.search.execution import NOT_STARTED, Hurried
+from crosscheck.study.search.execution import NOT_STARTED, CoarseFirst
 from mbref.scene import Body, Moment, Revolute, Scene, TorsionSpring
 from mbref.scenes import SCENES
 from tests.helpers.fake_engines import FAKES
@@ -325,7 +325,7 @@ def test_settings_finer_than_one_that_timed_out_are_not_started(tmp_path):
     settings = [grid.Setting("a", {"sleep": s}) for s in (0.0, 30.0, 40.0)]
     times = np.array([0.0, 1.0])
     slow = [grid.Case(scene, times, f"{FAKES}:RECORDER", setting, 0.5) for setting in settings]
-    records = grid.study(slow, ThreadPoolExecutor(1), run=Hurried())
+    records = grid.study(slow, ThreadPoolExecutor(1), run=CoarseFirst())
     assert [r["outcome"] for r in records] == ["COMPLETED", "TIMED_OUT", "TIMED_OUT"], records
     assert records[2]["message"] == NOT_STARTED and len((tmp_path / "log").read_text().splitlines()) == 2
 

@@ -181,7 +181,7 @@ def replayed(scene: Scene, motion: Trajectory) -> Scene | Outside:
     joint = next(j for j in scene.joint if j.name == scene.driver[0].joint)
     if joint.facts.driven == "displacement" or joint.bodies[0] != GROUND:
         return Outside("its driver does not turn a body about an axis on the ground")
-    axis = rotations.unit(joint.directions[0])
+    axis: Any = rotations.unit(joint.directions[0])
     moment = motion.reactions[joint.name][:, 3:] @ axis
     if np.ptp(moment) > CONSTANT * np.abs(moment).max():
         return Outside("its driver's moment varies, and the scene format has constant moments only")

@@ -92,7 +92,7 @@ def satisfied(scene: Scene) -> Scene | Outside:
     if not hinges:
         return Outside("the scene has no revolute joint, on whose axis a second joint could be added")
     hinge = hinges[0]
-    axis = rotations.unit(hinge.axis)
+    axis: Any = rotations.unit(hinge.axis)
     place = np.array(hinge.anchor) + 0.3 * axis
     twin = Cylindrical(name="sleeve", bodies=hinge.bodies, anchor=place, axis=axis)
     return scene.with_(joint=(*scene.joint, twin))

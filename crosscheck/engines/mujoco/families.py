@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from crosscheck.engine import Setting
+from crosscheck.engines.shared.fixed_steps import turning
 from crosscheck.engines.shared.initial_velocities import may_move_freely
 from crosscheck.engines.shared.planar_scene import planar_scene
 from crosscheck.engines.shared.spanning_tree import spanning_tree
@@ -78,7 +79,6 @@ OPTIONS = SOLVERS | {
     "tolerance": "closure error at which Newton's method stops, m or rad",
     "turn": "rad a driver may move within one step",
 }
-MAX_STEPS = 250_000
 # impedance parameters; MuJoCo clamps the first two at this value
 STIFFEST = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 CONVERGED, MOST_ITERATIONS = 1e-20, 50  # scaled gain at which Newton iterations end; two or three are usual
@@ -93,7 +93,7 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
     Settings are coarse to fine in each family.
     """
     beta = _rounded(BETA * rate)
-    steps, stiff = (_steps(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
+    steps, stiff = (turning(scene, rate, angles) for angles in (STEPS, STIFF_STEPS))
     plain = sorted({DEFAULT_STEP, *steps}, reverse=True)
     return [
         *(Setting("defaults", {"step": h}) for h in plain),
@@ -143,13 +143,6 @@ def _stock(scene: Scene) -> list[str]:
     """Return the families with default closures whose integrators differ on the scene."""
     is_damped = any(load.is_damped for load in scene.load)
     return [family for family in STOCK if is_damped or family != "implicitfast"]
-
-
-def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Return steps (s) in which a body at a rate (rad/s) turns by the angles (rad); steps so short that a run
-    takes too many are left out."""
-    steps = [_rounded(angle / rate) for angle in angles]
-    return [h for h in steps if scene.duration / h <= MAX_STEPS] or steps[:1]
 
 
 def own_code(setting: Setting) -> str:

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engine import Setting
-from crosscheck.engines.mujoco.families import MAX_STEPS, STIFFEST
+from crosscheck.engines.mujoco.families import STIFFEST
 from crosscheck.engines.mujoco.importing.reading import Source, source
 from crosscheck.engines.mujoco.options import change, keyword
 from crosscheck.engines.mujoco.warnings_off import was_reset, without_warnings
+from crosscheck.engines.shared.fixed_steps import MOST_STEPS
 from crosscheck.engines.shared.sampling import Counts, Failed, Sample, run_through
 from crosscheck.setting import AS_IN_FILE
 from mbref.formats import ImportOptions, OriginalRun, add_options, import_options
@@ -56,7 +57,7 @@ def originals(path: Path, options: ImportOptions, read: Source) -> tuple[Origina
     if words := options.words():
         where["import"] = shlex.join(words)
     own, duration = own_settings(read.original), read.imported.scene.duration
-    steps = [own["step"] / k for k in DIVISORS if duration * k / own["step"] <= MAX_STEPS] or [own["step"]]
+    steps = [own["step"] / k for k in DIVISORS if duration * k / own["step"] <= MOST_STEPS] or [own["step"]]
     return (
         OriginalRun("mujoco", AS_IN_FILE, {**where, **own}),
         *(

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from crosscheck.engine import Setting
 from crosscheck.engines.pinocchio import compiled_run
+from crosscheck.engines.shared.fixed_steps import turning
 from mbref.scene import Scene
 
 BAUMGARTE = 0.1  # decay rate of the closure errors in 1/step, a double root
@@ -15,7 +14,6 @@ LEAST_TURN = 0.03  # rad turned within the shortest adaptive step
 STEPS = (0.2, 0.06, 0.02, 0.006, 0.002)  # rad turned per fixed step, for each setting
 # rad turned per step, for the stabilised family only; in the others closure errors dominate
 FINEST = 0.0007
-MAX_FIXED_STEPS = 250_000
 FIXED = ("defaults", "proximal", "baumgarte")
 DOP853_COMPILED, TUNED_COMPILED = "dop853, compiled", "tuned, compiled"
 COMPILED = (DOP853_COMPILED, TUNED_COMPILED)
@@ -49,7 +47,7 @@ def sweep(scene: Scene, rate: float) -> list[Setting]:
     fixed = [
         Setting(family, {"step": h})
         for family in FIXED
-        for h in _steps(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
+        for h in turning(scene, rate, (*STEPS, FINEST) if family == "baumgarte" else STEPS)
     ]
     least = float(f"{LEAST_TURN / rate:.2g}")
     adaptive = [{"rtol": r, "min_step": least} for r in RTOLS]
@@ -65,13 +63,6 @@ def _compiled(least: float) -> list[Setting]:
         for family, options in given
         for rtol in COMPILED_RTOLS
     ]
-
-
-def _steps(scene: Scene, rate: float, angles: Sequence[float]) -> list[float]:
-    """Return steps (s) in which a body at a rate (rad/s) turns by the angles (rad); steps so short that a run
-    takes too many are left out."""
-    steps = [float(f"{angle / rate:.2g}") for angle in angles]
-    return [h for h in steps if scene.duration / h <= MAX_FIXED_STEPS] or steps[:1]
 
 
 def own_code(setting: Setting) -> str:

@@ -105,7 +105,12 @@ def steps(scene: Scene, rate: float, finer: int = 0, most: int = MOST_STEPS) -> 
     further steps, each a third of the previous step. Steps so short that a run takes more than ``most`` are
     left out.
     """
-    angles = [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))]
+    return turning(scene, rate, [*ANGLES, *(ANGLES[-1] / 3.0 ** (k + 1) for k in range(finer))], most)
+
+
+def turning(scene: Scene, rate: float, angles: Sequence[float], most: int = MOST_STEPS) -> list[float]:
+    """Return steps (s) in which a body at a rate (rad/s) turns by the angles (rad); steps so short that a run
+    takes more than ``most`` are left out."""
     found = [float(f"{angle / rate:.2g}") for angle in angles]
     return [h for h in found if scene.duration / h <= most] or found[:1]
 

@@ -10,6 +10,7 @@ bound from there on.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
 
@@ -24,11 +25,13 @@ from crosscheck.judge.reference.tree import tree_motion
 from mbref.scene import Scene
 
 SECONDS = 20.0
-SECOND_RUN_ORDER, SECOND_RUN_NODES, SECOND_RUN_SEED = (
-    24,
-    1.8,
-    1,
-)  # second runs: order of A, nodes per digit of B, seed
+Formulation = Callable[..., Motion]
+# second runs: order of A, nodes per digit of B, and the seed that chooses rows
+SECOND_RUNS: dict[Formulation, dict[str, float]] = {
+    natural_motion: {"order": 24},
+    tree_motion: {"nodes_per_digit": 1.8},
+}
+SECOND_RUN_SEED = 1
 # residual that is due to the rounding of the motion, not to the scene's numbers
 CONSISTENT = 32 * EXTENDED.eps
 SHARE = 0.4  # fraction of the remaining time for each run of A
@@ -109,37 +112,27 @@ def runs(scene: Scene, times: np.ndarray, seconds: float) -> tuple[Motion, Motio
     if a.reason == OVER:
         b = tree_motion(scene, times, EXTENDED, seconds=left / 2)
         if len(b.times) > len(a.times):
-            return b, _other_b(scene, b.times, moved, left - b.seconds), a
-        return a, _other_a(scene, a.times, moved, left - b.seconds), b
+            return b, _second(tree_motion, scene, b.times, moved, left - b.seconds), a
+        return a, _second(natural_motion, scene, a.times, moved, left - b.seconds), b
     if not len(a.times):
         return a, a, a
-    second_run = _other_a(scene, a.times, moved, SHARE * left)
+    second_run = _second(natural_motion, scene, a.times, moved, SHARE * left)
     return a, second_run, tree_motion(scene, a.times, EXTENDED, seconds=left - second_run.seconds)
 
 
-def _other_a(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
-    """Return the second run of A: of another order and with other rows, with displaced joints."""
-    return natural_motion(
+def _second(
+    formulation: Formulation, scene: Scene, times: np.ndarray, displaced: float, seconds: float
+) -> Motion:
+    """Return the second run of a formulation: A of another order, B on fewer points; with other rows and
+    displaced joints."""
+    return formulation(
         scene,
         times,
         EXTENDED,
         seconds=seconds,
-        order=SECOND_RUN_ORDER,
         seed=SECOND_RUN_SEED,
         displaced=displaced,
-    )
-
-
-def _other_b(scene: Scene, times: np.ndarray, displaced: float, seconds: float) -> Motion:
-    """Return the second run of B: on fewer points and with other rows, with displaced joints."""
-    return tree_motion(
-        scene,
-        times,
-        EXTENDED,
-        seconds=seconds,
-        nodes_per_digit=SECOND_RUN_NODES,
-        seed=SECOND_RUN_SEED,
-        displaced=displaced,
+        **SECOND_RUNS[formulation],
     )
 
 

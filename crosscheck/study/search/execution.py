@@ -81,7 +81,7 @@ def _reported(future: Future[Record], function: Callable[..., Any], *arguments: 
         return None
 
 
-class Hurried:
+class CoarseFirst:
     """Replacement of ``run_case`` for cases that come coarse to fine in each family.
 
     After a run that ran out of time, finer settings of its family are not started.

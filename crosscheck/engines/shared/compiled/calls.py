@@ -53,26 +53,26 @@ def _rates_of(typing: Any, address: Any, context: Any, t: Any, y: Any, rates: An
     return types.int32(types.intp, types.intp, types.float64, types.intp, types.intp), code
 
 
-@intrinsic
-def call_with_two(typing: Any, address: Any, first: Any, second: Any) -> Any:
-    """Call ``void function(void *first, void *second)`` at an address."""
+def _void(*kinds: Any) -> tuple[Any, Any]:
+    """Return signature and code of the call of a C function at an address, which returns nothing."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
         _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
         return target.get_dummy_value()
 
-    return types.void(types.intp, types.intp, types.intp), code
+    return types.void(types.intp, *kinds), code
+
+
+@intrinsic
+def call_with_two(typing: Any, address: Any, first: Any, second: Any) -> Any:
+    """Call ``void function(void *first, void *second)`` at an address."""
+    return _void(types.intp, types.intp)
 
 
 @intrinsic
 def call_with_three(typing: Any, address: Any, first: Any, second: Any, third: Any) -> Any:
     """Call ``void function(void *first, void *second, void *third)`` at an address."""
-
-    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
-        _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
-        return target.get_dummy_value()
-
-    return types.void(types.intp, types.intp, types.intp, types.intp), code
+    return _void(types.intp, types.intp, types.intp)
 
 
 @intrinsic
@@ -80,42 +80,34 @@ def call_with_three_and_real(
     typing: Any, address: Any, first: Any, second: Any, third: Any, real: Any
 ) -> Any:
     """Call ``void function(void *first, void *second, void *third, double real)`` at an address."""
+    return _void(types.intp, types.intp, types.intp, types.float64)
+
+
+def _pointer(kind: Any) -> tuple[Any, Any]:
+    """Return signature and code of the conversion of an integer address to a pointer."""
 
     def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
-        _called(target, builder, arguments[0], ir.VoidType(), arguments[1:])
-        return target.get_dummy_value()
+        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
 
-    return types.void(types.intp, types.intp, types.intp, types.intp, types.float64), code
+    return types.CPointer(kind)(types.intp), code
 
 
 @intrinsic
 def small_integers(typing: Any, address: Any) -> Any:
     """Return the pointer to 32-bit integers at an integer address."""
-
-    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
-        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
-
-    return types.CPointer(types.int32)(types.intp), code
+    return _pointer(types.int32)
 
 
 @intrinsic
 def reals(typing: Any, address: Any) -> Any:
     """Return the pointer to doubles at an integer address."""
-
-    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
-        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
-
-    return types.CPointer(types.float64)(types.intp), code
+    return _pointer(types.float64)
 
 
 @intrinsic
 def integers(typing: Any, address: Any) -> Any:
     """Return the pointer to 64-bit integers at an integer address."""
-
-    def code(target: Any, builder: Any, signature: Any, arguments: list[Any]) -> Any:
-        return builder.inttoptr(arguments[0], target.get_value_type(signature.return_type))
-
-    return types.CPointer(types.intp)(types.intp), code
+    return _pointer(types.intp)
 
 
 def _plain_rates_of(address: int, context: int, t: float, y: int, rates: int) -> int:
