@@ -82,7 +82,7 @@ def _map(
 ) -> HeatMap:
     """Return the chosen record of each cell; with ``only_runs`` without engines that have no chosen run."""
     found = {name: [(cell, chosen(cell)) for cell in row.values()] for name, row in cells.items()}
-    rows = {
+    rows: dict[str, list[Shown]] = {
         Within(name, f"#{_place(name)}"): [_shown(*pair) for pair in row]
         for name, row in found.items()
         if not only_runs or any(is_run(record) for _, record in row)
