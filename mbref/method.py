@@ -1,6 +1,6 @@
-"""Method: a formulation, a stabilisation and an integrator, as a name with options and as objects.
+"""Method: the Taylor series, or a formulation with a stabilisation and an integrator; by name and as objects.
 
-mpi-svd+projection            lm1+baumgarte[alpha=10,beta=10]            lm1+none/rk4[step=1e-4]
+taylor            mpi-svd+projection            lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 
 from mbref.formulations import FORMULATIONS
 from mbref.formulations.base import Formulation
-from mbref.integrators import INTEGRATORS
+from mbref.integrators import INTEGRATORS, TAYLOR
 from mbref.integrators.base import Integrator
 from mbref.kernels.layout import Settings
 from mbref.kernels.named_memory import Packed, packed
@@ -31,17 +31,14 @@ if TYPE_CHECKING:
 MOST_NAMES = 256  # names whose parsed methods are cached
 MOST_ORIENTATIONS = 400  # of runs by `taylor` in place of a sparse run: a step takes a second
 # default methods for few and for many bodies
-SERIES_METHOD, SPARSE_METHOD = "taylor", "alf-dual+projection/dop853"
+SERIES_METHOD, SPARSE_METHOD = TAYLOR.name, "alf-dual+projection/dop853"
+OLD_SERIES_NAME = "alf-dual+projection/taylor"  # in records of versions up to 0.2
 # Largest number of bodies of runs by `taylor` that check or repeat another run
 MOST_BODIES = 100
 # Largest (variables of `taylor`)³ / bodies for which it is the default, where all axes are parallel, and in
 # space; an orientation has two variables. By ``benchmarks/growth.py`` both methods cost the same at 3600 on
 # four_bar_chain, 6500 on lattice and 9800 on slider_crank_chain, and at more than 300 000 on sarrus_stack.
 MOST_IN_PLANE, MOST_IN_SPACE = 5500.0, 4e5
-SHORT_NAMES = {
-    "taylor": "alf-dual+projection/taylor",  # see mbref/taylor
-}
-
 
 Part = TypeVar("Part", Formulation, Stabilisation, Integrator)
 
@@ -75,11 +72,6 @@ def may_be_series(scene: Scene) -> bool:
     return orientations(scene) <= MOST_ORIENTATIONS and not bushings(scene)
 
 
-def short_name(name: str) -> str:
-    """Return the short name of a method, such as ``taylor``; the given name if there is none."""
-    return next((short for short, long in SHORT_NAMES.items() if long == name), name)
-
-
 class MethodError(Exception):
     """Error: a method is unknown, or a part of the method does not have an option."""
 
@@ -87,7 +79,7 @@ class MethodError(Exception):
 @dataclass(frozen=True)
 class Method:
     """Formulation, stabilisation and integrator of a run: a row of the paper's tables, and the integrator of
-    the run.
+    the run. Or the Taylor series, which needs the reduced equations of ``alf-dual+projection`` only.
 
     Attributes
     ----------
@@ -107,8 +99,8 @@ class Method:
     options: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # keyed by name of the part
 
     def __str__(self) -> str:
-        parts = [_text(p.name, self.options.get(p.name, {})) for p in self.parts]
-        return f"{parts[0]}+{parts[1]}/{parts[2]}"
+        names = [_text(p.name, self.options.get(p.name, {})) for p in self.parts]
+        return names[2] if self.is_series else f"{names[0]}+{names[1]}/{names[2]}"
 
     @property
     def parts(self) -> tuple[Formulation, Stabilisation, Integrator]:
@@ -180,33 +172,35 @@ class Method:
     @staticmethod
     @functools.lru_cache(maxsize=MOST_NAMES)
     def parse(name: str) -> Method:
-        """Return the method of a name such as ``lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]``.
+        """Return the method of a name: ``taylor``, or as ``lm1+baumgarte[alpha=10,beta=10]/rk4[step=1e-4]``.
 
         Parameters
         ----------
         name : str
-            ``formulation+stabilisation/integrator``, options in brackets, or a short name of SHORT_NAMES. The
-            stabilisation defaults to ``none``, the integrator to ``dop853``.
+            ``formulation+stabilisation/integrator``, or ``taylor``. Options are in brackets. The default of the
+            stabilisation is ``none``, of the integrator ``dop853``.
 
         Raises
         ------
         MethodError
             If a part or an option is unknown (the message lists the known ones), or parts cannot be combined.
         """
-        short, bracket, rest = name.strip().partition("[")
-        name = SHORT_NAMES[short] + bracket + rest if short in SHORT_NAMES else name
+        name = name.strip().replace(OLD_SERIES_NAME, SERIES_METHOD)
+        options: dict[str, dict[str, float]] = {}
+        if name.partition("[")[0] == SERIES_METHOD:
+            series = _part(name, {SERIES_METHOD: TAYLOR}, "method", options)
+            return Method(FORMULATIONS["alf-dual"], STABILISATIONS["projection"], series, options)
         head, _, integrator = name.partition("/")
+        if integrator.partition("[")[0] == SERIES_METHOD:
+            raise MethodError(f"{SERIES_METHOD} has no formulation and no stabilisation: use {integrator}")
         formulation, plus, stabilisation = _split_outside_brackets(head)
         if not plus:
             stabilisation = "none"
-        options: dict[str, dict[str, float]] = {}
         parts = (
             _part(formulation, FORMULATIONS, "formulation", options),
             _part(stabilisation, STABILISATIONS, "stabilisation", options),
             _part(integrator or "dop853", INTEGRATORS, "integrator", options),
         )
-        if parts[2].step is None and not parts[1].projects:
-            raise MethodError(f"integrator {parts[2].name} projects every step: use it with +projection")
         return Method(*parts, options)
 
 

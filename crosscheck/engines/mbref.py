@@ -127,13 +127,14 @@ class Mbref(Engine):
 
     def family_parts(self) -> FamilyParts:
         from mbref.formulations import FORMULATIONS
-        from mbref.integrators import INTEGRATORS
+        from mbref.integrators import INTEGRATORS, TAYLOR
         from mbref.stabilisation import STABILISATIONS
 
         return {
             "formulation": {name: part.options for name, part in FORMULATIONS.items()},
             "stabilisation": {name: part.options for name, part in STABILISATIONS.items()},
             "integrator": {name: part.options for name, part in INTEGRATORS.items()},
+            "series": {TAYLOR.name: TAYLOR.options},
         }
 
     def prepare(self, families: Sequence[str]) -> None:

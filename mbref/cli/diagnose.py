@@ -8,8 +8,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
+from mbref.cli.request import add_scene
 from mbref.records import strict_json
 from mbref.scene import Scene, SceneError
 from mbref.scene.slips import link_lengths

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import MOST_STATES, add_method_options, add_scene, limits_of, sample_times
 from mbref.cli.output import QUANTITIES, body_table, console, progress_bar, rounded, warn
+from mbref.cli.request import MOST_STATES, add_method_options, add_scene, limits_of, sample_times
 from mbref.command_line import record_file, whole
 from mbref.input_error import InputError
 from mbref.motions.trajectory import Trajectory

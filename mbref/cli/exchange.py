@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mbref import formats
-from mbref.cli.options import add_scene
+from mbref.cli.request import add_scene
 from mbref.command_line import add_output
 from mbref.files import free
 from mbref.input_error import InputError

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status, warn
+from mbref.cli.request import add_method_options, add_scene, request_of
 from mbref.command_line import MOST_PLACE, add_output, whole
 from mbref.equations.branches import SMOOTH
 from mbref.files import free, write

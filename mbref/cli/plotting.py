@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import exit_status
 from mbref.cli.pictures import path_of
+from mbref.cli.request import add_method_options, add_scene, request_of
 from mbref.command_line import add_output
 from mbref.files import replaced
 from mbref.input_error import InputError

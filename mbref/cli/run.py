@@ -10,11 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from mbref.cli.options import add_method_options, add_scene, request_of
 from mbref.cli.output import body_table, column_table, console, progress_bar, rounded
+from mbref.cli.request import add_method_options, add_scene, request_of
 from mbref.command_line import add_output
 from mbref.input_error import InputError
-from mbref.method import short_name
 from mbref.motions.motion import Motion
 from mbref.motions.outputs import UNIT_OF
 from mbref.records import strict_json
@@ -122,8 +121,7 @@ def _writer(out: str | None) -> Any:
 def show(scene: Scene, trajectory: Motion, columns: Sequence[str] = ()) -> None:
     """Print the end of a run, its error estimate and cost, and its last state or the requested columns."""
     out, cost = console(), trajectory.cost
-    method = short_name(trajectory.method)
-    out.print(f"{scene.name} by {method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
+    out.print(f"{scene.name} by {trajectory.method}: {trajectory.outcome.name} at t = {trajectory.t_end:g} s")
     if trajectory.message:
         out.print(trajectory.message)
     if trajectory.error_estimate is not None:

@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from mbref.cli.options import add_scene
+from mbref.cli.request import add_scene
 from mbref.command_line import add_output
 from mbref.files import write
 from mbref.input_error import InputError

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mbref.cli.options import add_scene
 from mbref.cli.output import console, warn
 from mbref.cli.pictures import VIEW, path_of, requested_view
+from mbref.cli.request import add_scene
 from mbref.command_line import MOST_PLACE, add_output, whole
 from mbref.input_error import InputError
 from mbref.motions.drawing.film import MOVING, write_film

@@ -11,7 +11,7 @@ from rich.table import Table
 
 from mbref.cli.output import console
 from mbref.formulations import FORMULATIONS
-from mbref.integrators import INTEGRATORS
+from mbref.integrators import INTEGRATORS, TAYLOR
 from mbref.motions.outputs import OUTPUTS
 from mbref.scenes import SCENES
 from mbref.stabilisation import STABILISATIONS
@@ -78,6 +78,7 @@ def _methods() -> Table:
         "formulation": FORMULATIONS,
         "stabilisation": STABILISATIONS,
         "integrator": INTEGRATORS,
+        "in place of all three": {TAYLOR.name: TAYLOR},
     }
     meanings = MEANINGS | {name: entry.about.meaning for name, entry in FORMULATIONS.items()}
     for part, entries in parts.items():

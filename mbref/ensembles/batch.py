@@ -27,9 +27,9 @@ from mbref.motions.crossing import Crossing
 from mbref.motions.motion import Motion
 from mbref.scene import Scene
 from mbref.simulation.outcome import OUTCOMES, cost_of, facts_of, lazy_crossings, report_of
+from mbref.stepping.leaving import begins_at_rest, begins_in_motion
 from mbref.stepping.loop import DONE
 from mbref.stepping.run import NEARLY, Run
-from mbref.stepping.singular_start import begins_at_rest, begins_in_motion
 from mbref.taylor.stepper import SeriesStepper
 
 

@@ -21,11 +21,11 @@ from mbref.motions.motion import Motion
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
-from mbref.simulation.dead_position import ROUNDED, is_at_dead_position
+from mbref.simulation.end_positions import ROUNDED, Met, is_at_dead_position, is_near, met_by
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice
-from mbref.simulation.singular_position import Met, is_near, met_by
 from mbref.simulation.trial import trial_of
+from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.stepping.loop import (
     CREEPING,
     DONE,
@@ -37,7 +37,6 @@ from mbref.stepping.loop import (
 )
 from mbref.stepping.ranks import Ranks
 from mbref.stepping.run import NEARLY, Run
-from mbref.stepping.singular_start import begins_at_rest, fits_no_branch, leaving_acceleration
 
 OUTCOMES = {
     DONE: Outcome.COMPLETED,

@@ -4,7 +4,7 @@ The projection is mass-orthogonal: the correction is the least in the metric of 
 Dynamics 9, 1996). Positions are corrected by Newton's method, velocities with the factor of the last Newton
 step.  Only active coordinates are integrated (``equations.active_coordinates``).  Near a singular position
 the pivots are sorted by size, largest first. With r independent rows, the r-th pivot falls with the distance
-from the singular position; ``stepping.singular_crossing`` monitors this pivot.  A redundant row has a pivot
+from the singular position; ``stepping.watch`` monitors this pivot.  A redundant row has a pivot
 of α^(-1/2); where two rows exchange their roles, the larger of their pivots is still about α^(-1/4).
 """
 

@@ -6,11 +6,11 @@ import time
 from collections.abc import Callable
 
 from mbref.kernels.layout import SINGULAR_AHEAD
+from mbref.stepping.leaving import begins_on_singular_position
 from mbref.stepping.loop import PAUSED, advance_to_end
 from mbref.stepping.pace import Pace
 from mbref.stepping.ranks import ranks_at
 from mbref.stepping.run import NEARLY, Run
-from mbref.stepping.singular_start import begins_on_singular_position
 
 
 class ExplicitStepper:

@@ -10,7 +10,7 @@ from mbref.equations.loads import advance_angles
 from mbref.kernels.compilation import INT, entry, kernel
 from mbref.kernels.layout import CHANGED, MEMORY, NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import all_finite, copy
-from mbref.stepping.singular_crossing import (
+from mbref.stepping.watch import (
     keep_position,
     meets_singular_position,
     remember_watch,

@@ -18,17 +18,17 @@ from mbref.taylor.crossing.detection import (
     ends_near_singular,
     time_to_singular_position,
 )
-from mbref.taylor.crossing.short_crossing import is_full
+from mbref.taylor.crossing.steps_across import is_full
 from mbref.taylor.crossing.thresholds import CROSSING_START, PIVOT_AHEAD, PIVOT_NEAR
 from mbref.taylor.layout import SERIES
 from mbref.taylor.mode import is_accurate, set_high_accuracy, set_predictor
 from mbref.taylor.partition import least_pivot
 from mbref.taylor.samples import put_terms
 from mbref.taylor.series_options import ACCURATE_TOLERANCE, PREDICTOR_TOLERANCE
+from mbref.taylor.step_length import SHORTER, longest_step
 from mbref.taylor.stepping import (
     LOST_MOTION,
     LOST_ROWS,
-    SHORTER,
     begin_once,
     begin_pieces,
     end_of_step,
@@ -36,7 +36,6 @@ from mbref.taylor.stepping import (
     error_of_motion,
     expand_at,
     is_last,
-    longest_step,
     save_start,
 )
 

@@ -8,8 +8,7 @@ compiles ``driven.follow_drivers``, which takes long.
 from __future__ import annotations
 
 from mbref.kernels.compilation import prepare_all
-from mbref.taylor.advance import advance_series, enter_series
-from mbref.taylor.crossing.long_crossing import (
+from mbref.taylor.crossing.steps_across import (
     begin_crossing,
     continue_crossing,
     cross_position,
@@ -18,6 +17,7 @@ from mbref.taylor.crossing.long_crossing import (
 )
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import CALLED
+from mbref.taylor.stepping import advance_series, enter_series
 
 FROM_PYTHON = (
     complete_samples, enter_series, put_state_along, begin_crossing, end_crossing, continue_crossing,

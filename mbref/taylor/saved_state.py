@@ -1,9 +1,11 @@
-"""Saved states of a run, and saved starts of its series, to which it can return."""
+"""Saved states of a run, saved starts of its series, and the series that a step evaluates."""
 
 from __future__ import annotations
 
 from mbref.kernels.compilation import kernel
 from mbref.linear_algebra.vectors import copy
+from mbref.taylor.loads import TORSION, TORSION_SERIES
+from mbref.taylor.simd import WIDTH, load, store
 
 
 @kernel
@@ -42,3 +44,17 @@ def restore_variables(saved, series, angles):
     copy(saved.terms[0], series[0])
     copy(saved.terms[1], series[1])
     copy(saved.angles, angles)
+
+
+@kernel
+def save_series(memory):
+    """Save the series that starts here as the one that the step evaluates; angles have no last order."""
+    series, step, order = memory.series, memory.step, memory.mode.order
+    for j in range(0, (order + 1) * series.terms.shape[1], WIDTH):
+        store(load(series.terms, j), series.past, j)
+    for s in range(series.past_angles.shape[0]):
+        for k in range(order):
+            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + TORSION, k]
+        series.past_angles[s, order] = 0.0
+    step.last_order = step.used_order = order
+    step.time_to_pole = 0.0

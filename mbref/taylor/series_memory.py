@@ -14,8 +14,8 @@ from mbref.taylor.correction import correct_state
 from mbref.taylor.crossing.acceptance import pivot_at_turning_point
 from mbref.taylor.crossing.detection import contains_singular_position
 from mbref.taylor.crossing.determinants import evaluate_gradient, gradient_determinant
-from mbref.taylor.crossing.short_crossing import record_crossings
 from mbref.taylor.crossing.start import judge_start
+from mbref.taylor.crossing.steps_across import record_crossings
 from mbref.taylor.layout import Series, SeriesKernels, TaylorMemory
 from mbref.taylor.polynomial_layout import Polynomials
 from mbref.taylor.polynomials import Geometry

@@ -1,5 +1,5 @@
-"""The start of a step: its partition by complete pivoting of the gradient G, the saved series that the step
-evaluates, and the return to it after a failed attempt."""
+"""The start of a step: its partition by complete pivoting of the gradient G, and the return to it after a
+failed attempt."""
 
 from __future__ import annotations
 
@@ -8,26 +8,11 @@ from mbref.kernels.layout import OK
 from mbref.linear_algebra.vectors import copy
 from mbref.taylor.correction import violation
 from mbref.taylor.layout import PARTITION, RETURN_TO_START
-from mbref.taylor.loads import TORSION, TORSION_SERIES
 from mbref.taylor.partition import put_rows, save_start_pivots
 from mbref.taylor.simd import WIDTH, load, max_abs, store
 from mbref.taylor.solver import factorise_anew
 
 GROWN = 2.0  # largest entry of G / its value at the start: up to this growth, positions keep their unit
-
-
-@kernel
-def save_series(memory):
-    """Save the series that starts here as the one that the step evaluates; angles have no last order."""
-    series, step, order = memory.series, memory.step, memory.mode.order
-    for j in range(0, (order + 1) * series.terms.shape[1], WIDTH):
-        store(load(series.terms, j), series.past, j)
-    for s in range(series.past_angles.shape[0]):
-        for k in range(order):
-            series.past_angles[s, k] = series.torsions[TORSION_SERIES * s + TORSION, k]
-        series.past_angles[s, order] = 0.0
-    step.last_order = step.used_order = order
-    step.time_to_pole = 0.0
 
 
 @exchangeable(RETURN_TO_START)

@@ -18,9 +18,8 @@ from mbref.stepping.limits import AUTO, GENERATED
 from mbref.stepping.loop import DONE, PAUSED, UNDECIDED
 from mbref.stepping.pace import Pace
 from mbref.stepping.run import Run
-from mbref.taylor.advance import advance_series, enter_series
 from mbref.taylor.batch_equations import equations_of_all
-from mbref.taylor.crossing.branch_follower import BranchFollower
+from mbref.taylor.crossing.branches import BranchFollower
 from mbref.taylor.crossing.thresholds import START_ERROR
 from mbref.taylor.driven import follow_drivers
 from mbref.taylor.geometry import geometry_of
@@ -28,6 +27,7 @@ from mbref.taylor.mode import REGULAR
 from mbref.taylor.sample_completion import complete_samples
 from mbref.taylor.series_memory import acquire_memory, put_equations
 from mbref.taylor.series_options import series_options
+from mbref.taylor.stepping import advance_series, enter_series
 
 # expected steps above which generated code saves more time than its generation takes
 STEPS_WORTH_CODE = 20_000

@@ -1,6 +1,6 @@
-"""One step of a Taylor method: as long as the last terms of the series allow, and judged at its end.
+"""Steps of a Taylor method, each judged at its end, and kernels that take many steps in one call.
 
-Steps follow À.  Jorba and M.  Zou (Experimental Mathematics 14, 2005).  At the end of a step the rows are
+At the end of a step the rows are
 violated by the error of the series, which is corrected, and the accelerations of the equations differ from
 the series.  If either exceeds what the tolerance explains, or rows have become dependent, the step is
 repeated with a smaller length. So only a series that continues across a singular position crosses it.
@@ -8,43 +8,38 @@ repeated with a smaller length. So only a series that continues across a singula
 
 from __future__ import annotations
 
-from numpy import exp, isfinite, log
+from numpy import isfinite
 
 from mbref.equations.functions import end_of_pieces, select_pieces
-from mbref.kernels.compilation import exchangeable, kernel
+from mbref.kernels.compilation import INT, entry, exchangeable, kernel
 from mbref.kernels.layout import NOT_FINITE, OK, SINGULAR_AHEAD
 from mbref.linear_algebra.vectors import larger
-from mbref.stepping.loop import STEP_TOO_SMALL, UNDECIDED, share
+from mbref.stepping.loop import DONE, PAUSED, STEP_TOO_SMALL, TOO_MANY_STEPS, UNDECIDED
 from mbref.taylor.coefficients import largest_used
 from mbref.taylor.crossing.acceptance import crossing_tolerance, judge_branch, step_tolerance
 from mbref.taylor.crossing.detection import save_pivots, time_to_singular_position
 from mbref.taylor.crossing.location import count_crossings
 from mbref.taylor.crossing.rounding_pole import remove_pole, time_of_pole
 from mbref.taylor.crossing.start import is_turned
+from mbref.taylor.crossing.steps_across import cross_briefly, is_full, switches_branch
 from mbref.taylor.crossing.thresholds import (
-    CROSSING_MARGIN,
-    CROSSING_START,
-    LOOSER_RATES,
     MIN_GAIN,
-    MIN_PIVOT_RATIO,
-    OVERSHOOT,
 )
-from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, TAKE_STEP
-from mbref.taylor.loads import expand_functions, part_behind_no_length, time_to_no_length
+from mbref.taylor.layout import BEGIN, EXPAND, SAVE_SERIES, SERIES, TAKE_STEP
+from mbref.taylor.loads import expand_functions, part_behind_no_length
 from mbref.taylor.mode import is_accurate
-from mbref.taylor.partition import least_pivot
 from mbref.taylor.pose_maps import read_variables
-from mbref.taylor.samples import evaluate_series, keep_sample, put_angles
+from mbref.taylor.samples import evaluate_series, keep_sample, put_angles, put_terms
+from mbref.taylor.saved_state import save_series
 from mbref.taylor.series import turns_back_in
 from mbref.taylor.simd import WIDTH, load, store
-from mbref.taylor.step_start import save_series
+from mbref.taylor.step_length import first_lengths, longest_step, next_length
 from mbref.taylor.turning import begin_turns, follow_turns, turning_speed
 
 ROW_ROUNDING = 1e-12  # violation of a row, in units of the scene, that rounding may leave
 LOST_ROWS = 100.0  # violation of rows at the end of a step, relative to the tolerance
 LOST_MOTION = 30.0  # error of accelerations times the square of the step, relative to tolerance × order²
 MOTION_ROUNDING = 1e-9  # error by rounding, relative to accelerations times the square of the step
-SHORTER = 0.7  # length of the next attempt / length of the failed attempt
 
 
 @exchangeable(EXPAND)
@@ -59,81 +54,6 @@ def expand_from(t, memory):
     return status
 
 
-# --- length ---------------------------------------------------------------------------------------------
-@kernel
-def longest_step(tolerance, memory):
-    """Return the step (s) at which the last two terms of the series are as large as the tolerance.
-
-    The terms of the rates must also be that small, relative to the largest rate if that is above 1.
-    High-accuracy steps have a larger tolerance of rates, and near a singular position rates are ignored. A
-    step ends shortly after a position at which a spring has zero length.
-    """
-    step, control, is_first = memory.step, memory.run.control, memory.run.equations.system.counts.steps == 0
-    h = control.largest_step
-    shortest, of_rates = log(h), tolerance * max(1.0, largest_used(1, memory))
-    if is_accurate(memory):
-        of_rates *= LOOSER_RATES
-    is_far = memory.distance.start_pivot >= CROSSING_START * memory.distance.largest_pivot
-    for k in range(step.last_order - 1, min(step.last_order + 1, memory.mode.order) + 1):
-        size = largest_used(k, memory)
-        if size > 0.0:
-            shortest = min(shortest, log(tolerance / size) / k)
-            if is_far or not is_accurate(memory):
-                shortest = min(shortest, log(of_rates / (k * size)) / (k - 1))
-    h = min(exp(shortest), OVERSHOOT * time_to_no_length(memory))
-    return min(h, control.first_step) if is_first and control.first_step > 0.0 else h
-
-
-@kernel
-def first_lengths(left, memory):
-    """Return the longest step (s) by the tolerance, and the longest step that crosses; both are at most the
-    remaining time."""
-    step = memory.step
-    if not is_accurate(memory):
-        part = share(memory.run.loop.clock.length, memory.run)
-        regular = min(longest_step(part * step_tolerance(memory), memory), left)
-        return regular, regular
-    tight, loose = step_tolerance(memory), crossing_tolerance(memory)
-    regular = min(longest_step(tight, memory), left)
-    across = regular if loose == tight else min(longest_step(loose, memory), left)
-    ahead = step.time_to_pole if step.time_to_pole > 0.0 else memory.distance.time_to_crossing
-    memory.distance.time_to_crossing = 0.0
-    if across < CROSSING_MARGIN * ahead and regular > (1.0 - MIN_PIVOT_RATIO) * ahead:
-        regular = across = ahead - CROSSING_START * across
-    return regular, across
-
-
-@kernel
-def next_length(h, regular, memory):
-    """Return the length (s) of the attempt after an attempt of h seconds.
-
-    The step ends clearly after the singular position that the attempt approached or crossed, if the terms of
-    the series above rounding allow this length. If not, the step ends before the position.
-    """
-    step = memory.step
-    near = step.crossed or least_pivot(memory) < MIN_PIVOT_RATIO * memory.distance.start_pivot
-    if step.used_order == step.last_order and near and h > regular:
-        across = OVERSHOOT * time_to_singular_position(h, memory)
-        step.used_order = order_of_least_term(across, memory)
-        return across
-    step.used_order = step.last_order
-    return regular if h > regular else h * SHORTER
-
-
-@kernel
-def order_of_least_term(h, memory):
-    """Return the order, below the last, of the smallest term at a distance h (s): later terms are
-    rounding."""
-    best, least, power = 2, 1e300, h
-    for k in range(2, memory.step.last_order):
-        power *= h
-        size = largest_used(k, memory) * power
-        if size < least:
-            best, least = k, size
-    return best
-
-
-# --- attempts -------------------------------------------------------------------------------------------
 @exchangeable(SAVE_SERIES)
 def save_series_without_pole(memory):
     """Save the series that starts here; its rounding pole is removed unless the removal makes steps short.
@@ -310,3 +230,41 @@ def begin_series(memory):
     memory.step.crossed, memory.distance.leaving, memory.distance.rests_near = 0, 0, 0
     status = memory.kernels.expand(t, memory)
     return status if t > 0.0 else memory.kernels.judge_start(status, memory)
+
+
+# --- kernels that Python calls --------------------------------------------------------------------------
+@entry(INT(SERIES))
+def enter_series(memory):
+    """Begin a series at the present state; return OK or the failure status."""
+    memory.progress.begun = 0
+    return begin_once(memory)
+
+
+@entry(INT(SERIES))
+def advance_series(memory):
+    """Begin a series unless one has begun, and advance until the end, a failure, or the limit of steps or
+    singular positions in a call; return the status.
+
+    The status is SINGULAR_AHEAD if a crossing cannot be short.
+    """
+    clock, counts = memory.run.loop.clock, memory.run.equations.system.counts
+    status = begin_once(memory)
+    if status != OK:
+        return status
+    for _ in range(int(memory.run.control.steps_per_call)):
+        if counts.steps >= memory.run.control.most_steps:
+            return TOO_MANY_STEPS
+        status = memory.kernels.step(memory)
+        if status == SINGULAR_AHEAD and cross_briefly(memory):
+            status = OK
+        if status != OK:
+            put_terms(memory.series.past, memory)
+            put_angles(0.0, memory)
+            return status
+        if memory.progress.recorded and switches_branch(counts.crossings, memory):
+            return PAUSED
+        if clock.time >= memory.progress.end:
+            return DONE
+        if is_full(memory):
+            return PAUSED
+    return PAUSED

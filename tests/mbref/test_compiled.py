@@ -31,8 +31,8 @@ def test_every_kernel_that_a_series_calls_is_compiled_before_a_run():
     """A missing kernel would compile while the clock of a run counts. The stepper prepares the kernel that
     follows drivers."""
     from mbref.taylor import stepper
-    from mbref.taylor.crossing import branch_follower
+    from mbref.taylor.crossing import branches
 
-    names = vars(stepper) | vars(branch_follower)
+    names = vars(stepper) | vars(branches)
     called = {kernel for kernel in names.values() if isinstance(kernel, Entry)}
     assert {*CALLED, *called} == {*KERNELS_OF_SERIES, follow_drivers} and called

@@ -50,14 +50,14 @@ def test_number_of_samples_changes_neither_steps_nor_end():
     assert np.array_equal(few.position[-1], many.position[-1])
 
 
-def test_taylor_is_short_for_alf_dual_with_projection_and_keeps_its_order():
-    assert str(Method.parse("taylor[order=14]")) == "alf-dual+projection/taylor[order=14]"
-    assert Method.parse(str(Method.parse("taylor"))) == Method.parse("taylor")
+def test_taylor_is_a_method_of_its_own_and_old_records_name_it_otherwise():
+    assert str(Method.parse("taylor[order=14]")) == "taylor[order=14]"
+    assert Method.parse("alf-dual+projection/taylor[order=14]") == Method.parse("taylor[order=14]")
 
 
-def test_taylor_without_projection_and_orders_above_30_are_refused():
-    with pytest.raises(MethodError, match="projects every step"):
-        Method.parse("lm1+none/taylor")
+def test_taylor_with_a_formulation_and_orders_above_30_are_refused():
+    with pytest.raises(MethodError, match=r"taylor has no formulation .* use taylor\[order=8\]"):
+        Method.parse("lm1+none/taylor[order=8]")
     with pytest.raises(ValueError, match="order must be 4 to 30, got 31"):
         simulate(SCENES["point_pendulum"](), "taylor[order=31]", [0.1])
 

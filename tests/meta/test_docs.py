@@ -12,7 +12,7 @@ import yaml
 
 from mbref.cli.commands import main
 from mbref.formulations import FORMULATIONS
-from mbref.integrators import INTEGRATORS
+from mbref.integrators import INTEGRATORS, TAYLOR
 from mbref.method import Method
 from mbref.scene import JOINT_TYPES, LOAD_TYPES
 from mbref.stabilisation import STABILISATIONS
@@ -24,7 +24,7 @@ import method_pages  # noqa: E402
 
 PAGES = sorted(DOCS.rglob("*.md"))
 MADE = method_pages.pages()
-METHODS = [*FORMULATIONS, *STABILISATIONS, *INTEGRATORS]
+METHODS = [*FORMULATIONS, *STABILISATIONS, *INTEGRATORS, TAYLOR.name]
 
 
 def paths(entry: object) -> list[str]:

@@ -4,5 +4,5 @@
 ``determinants`` evaluates the test function, and ``location`` finds its zeros. ``acceptance`` judges a step
 near a singular position. ``uniqueness`` bounds the sensitivity of the continuation. ``rounding_pole`` removes
 the pole that rounding causes. ``start`` judges a motion that starts near a singular position.
-``short_crossing`` and ``long_crossing`` take a run across a singular position.
+``steps_across`` takes a run across a singular position, and ``branches`` along requested branches.
 """

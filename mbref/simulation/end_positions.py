@@ -1,6 +1,12 @@
-"""The singular position at which a run that monitors the rank has ended: time, pose and joints.
+"""Positions at which runs end: singular positions, and dead positions of drivers.
 
-The joints are those whose rows depend on each other at that pose.
+The joints of a singular position are those whose rows depend on each other at that pose.
+
+At a dead position the mechanism cannot follow its drivers further. Near a dead position the velocities, over
+the rates of the drivers, grow with the inverse root of the remaining time: Φ_q v = ν has no solution there.
+If branches of a motion cross, Φ_q also loses rank, but ν is in the range of Φ_q, and the velocities are
+bounded. Near a dead position a state that violates the constraints has large velocities, too; but then
+`taylor` can follow the motion further.
 """
 
 from __future__ import annotations
@@ -11,10 +17,15 @@ import numpy as np
 
 from mbref.equations.branches import MOST_BRANCHED_ROWS
 from mbref.equations.units import unit_rows
+from mbref.simulation.trial import trial_of
 from mbref.stepping.run import Run
 
 TAKES_PART = 0.05  # entry of a left null vector / largest entry: rows with smaller entries are ignored
 NEAR_PIVOT = 0.03  # relative pivot below which failing steps are near a singular position
+TRANSMISSION = 1e2  # largest velocity / driver rate above which the position is dead
+ROUNDED = 1e-13  # relative singular value below which rows are redundant
+BEYOND = 1.01  # a run that gets beyond this multiple of the failure's time has met no dead position
+MOST_DRIVEN_ROWS = 400  # constraint rows; larger least-squares problems take seconds
 
 
 class Met(NamedTuple):
@@ -74,3 +85,19 @@ def _joints(run: Run, t: float, q: np.ndarray, rank: int) -> tuple[str, ...]:
     part = np.linalg.norm(left[:, lost], axis=1)
     rows = np.flatnonzero(part > TAKES_PART * part.max(initial=0.0))
     return tuple(dict.fromkeys(run.model.row_joint[row] for row in rows))
+
+
+def is_at_dead_position(run: Run) -> bool:
+    """Return whether a run that failed is at a dead position of its drivers."""
+    state, model = run.memory.state, run.model
+    if not run.scene.driver or model.m > MOST_DRIVEN_ROWS or not np.isfinite(state.coordinates).all():
+        return False
+    now, length = float(run.memory.loop.clock.time), model.length
+    terms = model.terms(now, state.coordinates)
+    jacobian = terms.jacobian * np.tile(np.repeat([length, 1.0], 3), model.nb)
+    velocities = np.linalg.lstsq(jacobian, terms.nu, rcond=ROUNDED)[0]
+    rate = np.abs(terms.nu).max() * max(1.0, 1.0 / length)
+    if not np.abs(velocities).max() > TRANSMISSION * rate > 0.0:
+        return False
+    trial = trial_of(run)
+    return trial is None or not (trial.completed or trial.reached > BEYOND * now)

@@ -15,7 +15,6 @@ from mbref.input_error import InputError
 from mbref.integrators import INTEGRATORS
 from mbref.method import (
     SERIES_METHOD,
-    SHORT_NAMES,
     SPARSE_METHOD,
     Method,
     MethodError,
@@ -44,7 +43,7 @@ def add_method_options(parser: argparse.ArgumentParser, json: bool = True) -> No
     """Add options for method, times and limits of a run, and --json if the command prints its result."""
     parser.add_argument(
         "--method",
-        help=f"formulation+stabilisation/integrator, or in short {', '.join(SHORT_NAMES)};\n"
+        help=f"{SERIES_METHOD}, or formulation+stabilisation/integrator;\n"
         f"formulations: {', '.join(FORMULATIONS)};\nstabilisations: {', '.join(STABILISATIONS)};\n"
         f"integrators: {', '.join(INTEGRATORS)} (default: {SERIES_METHOD},\nfor many bodies {SPARSE_METHOD})",
     )
