@@ -177,8 +177,8 @@ class Method:
         Parameters
         ----------
         name : str
-            ``formulation+stabilisation/integrator``, or ``taylor``. Options are in brackets. The default of the
-            stabilisation is ``none``, of the integrator ``dop853``.
+            ``formulation+stabilisation/integrator``, or ``taylor``. Options stand in brackets. The default
+            of the stabilisation is ``none``, of the integrator ``dop853``.
 
         Raises
         ------
