@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from planar_mujoco import CLOSED, SOLVERS, Model
 
-from crosscheck.study.origin import machine, versions
+from crosscheck.study.provenance import machine, versions
 from mbref import Limits, simulate
 from mbref.command_line import Parser
 from mbref.method import default_method

@@ -36,7 +36,7 @@ from crosscheck.judge.metrics import cost_at_error, measure
 from crosscheck.judge.tolerances import ERROR_LEVELS
 from crosscheck.judge.truth import truth_for
 from crosscheck.processes.pool import run_isolated
-from crosscheck.study.origin import machine, versions
+from crosscheck.study.provenance import machine, versions
 from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scenes import SCENES

@@ -27,8 +27,8 @@ from crosscheck.cli.running import (
 )
 from crosscheck.cli.stored_tables import closed_loops, convergence, modes
 from crosscheck.study.grid import Record, key
-from crosscheck.study.origin import made_by
 from crosscheck.study.progress import counted
+from crosscheck.study.provenance import made_by
 from mbref.command_line import status_of
 from mbref.motions.trajectory import Outcome
 
@@ -91,19 +91,22 @@ def _verify(arguments: argparse.Namespace) -> int:
 
 
 def _verify_random(engine: str, arguments: argparse.Namespace) -> int:
-    from crosscheck.conformance import deep
-    from crosscheck.conformance.deep_table import tables as deep_tables
+    from crosscheck.conformance.many_mechanisms import MOST, Plan, examined
+    from crosscheck.conformance.many_mechanisms_table import tables as tables_of_checks
 
     beside = arguments.beside or ()
     for other in beside:
         request.find_engines([other.partition("=")[0]], notice)
-    plan = deep.Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
-    with counted("verifying, at most", deep.MOST * plan.mechanisms) as advance, standard_output_kept():
-        found = deep.examined(plan, arguments.records, advance)
+    plan = Plan(engine, arguments.mechanisms, arguments.first_seed, arguments.family, beside)
+    with (
+        counted("verifying, at most", MOST * plan.mechanisms) as advance,
+        standard_output_kept(),
+    ):
+        found = examined(plan, arguments.records, advance)
     if arguments.json:
         print(json.dumps({**found.to_record(), **made_by()}, allow_nan=False))
     else:
-        for block in deep_tables(found):
+        for block in tables_of_checks(found):
             console().print(block)
     return COMPLETED if found.conforms else OTHERWISE
 

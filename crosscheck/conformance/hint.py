@@ -18,7 +18,7 @@ from crosscheck.conformance.mechanisms.specimens import Specimen
 from crosscheck.conformance.runners import Runner
 from crosscheck.conformance.trial import NEIGHBOURS, Bench, Broken, set_up
 from crosscheck.judge.constraints import initial_twists, scene_length
-from crosscheck.judge.terms import PARTS, accelerations, terms_at, variants
+from crosscheck.judge.equations_of_motion import PARTS, accelerations, terms_at, variants
 from crosscheck.judge.tolerances import GRAINS
 from crosscheck.processes.pool import ChildFailed
 from mbref.scene import Scene

@@ -25,7 +25,7 @@ from crosscheck.processes.child import ChildFailed
 from crosscheck.processes.interrupts import calls_ended
 from crosscheck.processes.pool import end_idle, run_estimated
 from crosscheck.processes.serve import run_once
-from crosscheck.study.origin import made_by
+from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import checked
 from mbref.motions.trajectory import Outcome, Trajectory
 from mbref.records import append, stored

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from pydantic import BaseModel
 
 from crosscheck.engine import Cannot, engine
-from crosscheck.study.origin import made_by
+from crosscheck.study.provenance import made_by
 from crosscheck.study.record_shape import Cost, Measured, Record, Refused, Run, checked
 from mbref.motions.trajectory import Outcome
 from mbref.records import RecordsError, looked_at, strict_json

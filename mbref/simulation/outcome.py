@@ -22,9 +22,9 @@ from mbref.motions.trajectory import Cost, Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
 from mbref.simulation.end_positions import ROUNDED, Met, is_at_dead_position, is_near, met_by
+from mbref.simulation.other_runs import trial_of
 from mbref.simulation.remedies import remedy
 from mbref.simulation.rounded_numbers import advice
-from mbref.simulation.trial import trial_of
 from mbref.stepping.leaving import begins_at_rest, fits_no_branch, leaving_acceleration
 from mbref.stepping.loop import (
     CREEPING,

@@ -13,7 +13,7 @@ import numpy as np
 from mbref.equations.counts import RANK_TOLERANCE, counts, scaled_jacobian
 from mbref.formulations import FORMULATIONS
 from mbref.kernels.layout import NOT_CONVERGED, SINGULAR
-from mbref.simulation.trial import passes_with, trial_of
+from mbref.simulation.other_runs import passes_with, trial_of
 from mbref.stepping.loop import (
     CREEPING,
     LEFT_MOTION,

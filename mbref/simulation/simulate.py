@@ -25,7 +25,7 @@ from mbref.motions.trajectory import Outcome
 from mbref.scene import Scene
 from mbref.scene.structure import bushings
 from mbref.scenes import find_scene
-from mbref.simulation.comparison import compare_with_default
+from mbref.simulation.other_runs import compare_with_default
 from mbref.simulation.outcome import trajectory_of
 from mbref.simulation.start_run import start_run
 from mbref.stepping import preparation

@@ -10,14 +10,13 @@ from matplotlib.figure import Figure as Drawing
 
 from crosscheck.paper import singular
 from crosscheck.paper.cells import CELLS, FIVE_BAR, FOUR_BAR_COLUMNS, Cell, Match, match
-from crosscheck.paper.runs import SHARE, SHORT, SIZED_ROWS, Label, Records, found
+from crosscheck.paper.runs import SHORT, SIZED_ROWS, Label, Records, found
 from crosscheck.paper.settings import BASE, DRAWN, FEW, LINKAGES, SIZE, SIZES, SWEEP
 
 from .. import figures
 from ..blocks import Block, Figure, Heading, Table, Text
 from ..runs import Run
 
-SHARE_TEXT = f"{100 * SHARE:g} %"
 COLUMNS = (*FOUR_BAR_COLUMNS, FIVE_BAR)
 LAST = 0.15  # s, length of the time axis
 SWEPT = tuple(cell for cell in CELLS if cell.table != "III" and cell.letter not in ("a", ""))

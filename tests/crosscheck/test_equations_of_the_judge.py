@@ -17,8 +17,8 @@ from crosscheck.judge.joint_residuals import (
     with_ground,
 )
 from crosscheck.judge.loads import Motion, wrenches
-from crosscheck.judge.terms import PARTS, terms_at, variants
-from crosscheck.judge.terms import accelerations as of_terms
+from crosscheck.judge.equations_of_motion import PARTS, terms_at, variants
+from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from mbref import rotations
 from mbref.scene import (
     Body,

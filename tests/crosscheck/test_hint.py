@@ -13,8 +13,8 @@ from crosscheck.conformance.mechanisms.specimens import specimens
 from crosscheck.conformance.runners import InProcess
 from crosscheck.conformance.suite import held_against
 from crosscheck.judge.constraints import scene_length
+from crosscheck.judge.equations_of_motion import accelerations, terms_at
 from crosscheck.judge.gauss_motion import gauss_motion
-from crosscheck.judge.terms import accelerations, terms_at
 
 PATH = Path(__file__).parents[2] / "examples" / "spatial_engine" / "spatial_engine.py"
 SPEC = importlib.util.spec_from_file_location("spatial_engine_with_defects", PATH)

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from crosscheck.conformance import explained
-from crosscheck.conformance.deep import AGREEMENT, Plan, Tally
+from crosscheck.conformance.many_mechanisms import AGREEMENT, Plan, Tally
 from crosscheck.conformance.properties import PROPERTIES
 from crosscheck.conformance.suite import FIRST, Conformance, Verdict, record_of
 from crosscheck.engine import engine_names

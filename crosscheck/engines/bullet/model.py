@@ -13,9 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from crosscheck.engines.shared.elementary_joints import Piece, pieces
 from crosscheck.engines.shared.fixed_steps import held_points
 from crosscheck.engines.shared.initial_velocities import initial_rates
-from crosscheck.engines.shared.pieces import Piece, pieces
 from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.shared.tree_reactions import LinkMotion
 from mbref import rotations

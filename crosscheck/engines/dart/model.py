@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.engines.shared.elementary_joints import Piece, assembled
 from crosscheck.engines.shared.fixed_steps import held_points
 from crosscheck.engines.shared.initial_velocities import initial_rates
 from crosscheck.engines.shared.joint_coordinates import joint_coordinates, rotation_vector
-from crosscheck.engines.shared.pieces import Piece, assembled
 from crosscheck.engines.shared.spanning_tree import BALL_JOINT, FREE, GROUND_LINK, SLIDE, TURN, Closure, Tree
 from crosscheck.engines.shared.terms import Terms
 from crosscheck.engines.shared.tree_reactions import LinkMotion

@@ -48,11 +48,12 @@ def leave_out_unused(mujoco: Any, model: Any) -> None:
 
 def prepare() -> None:
     """Compile the steppers and the C functions, or load them from numba's cache."""
-    from crosscheck.engines.mujoco import closures, rates
+    from crosscheck.engines.mujoco import rates
+    from crosscheck.engines.mujoco.compiled_projection import follow, settle
     from crosscheck.engines.shared.compiled import run
 
     run.prepare()
-    assert all(function.address for function in (rates.rates, closures.settle, closures.follow))
+    assert all(function.address for function in (rates.rates, settle, follow))
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ class CompiledRun:
         return trajectory(scene, times, system, self.start, put, sample, built, labels)
 
     def _dop853(self) -> Any:
-        from crosscheck.engines.mujoco.closures import settle
+        from crosscheck.engines.mujoco.compiled_projection import settle
         from crosscheck.engines.mujoco.rates import rates
         from crosscheck.engines.shared.compiled.dop853 import System
         from crosscheck.engines.shared.compiled.run import MOST_STEPS
@@ -104,7 +105,7 @@ class CompiledRun:
         )
 
     def _newton(self) -> Any:
-        from crosscheck.engines.mujoco.closures import follow
+        from crosscheck.engines.mujoco.compiled_projection import follow
         from crosscheck.engines.shared.compiled.newton import System
 
         tolerance = self.options["tolerance"]

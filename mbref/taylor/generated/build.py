@@ -22,7 +22,6 @@ from mbref.taylor.loads import varies
 from mbref.taylor.simd import WIDTH
 
 EXPAND_CODE, POWER_CODE, FACTORISE_CODE = "expand", "expand_by_power", "factorise"
-CODE_NAMES = EXPAND_CODE, POWER_CODE, FACTORISE_CODE, *corrections.POINTERS
 MOST_VECTORS = 2_000  # products of vectors that LLVM compiles in a second
 
 

@@ -1,4 +1,4 @@
-"""Comparison of a run with the motion that the default method follows.
+"""Other runs of a scene that follow a run: the comparison with the default method, and trials by `taylor`.
 
 Without projection only the accelerations keep a run on its branch. At a singular position the accelerations
 are ill-determined. A pseudo-inverse whose rank drops at the singular position lets the run continue along
@@ -6,17 +6,24 @@ another branch, without violating constraints or energy balance. Near a singular
 partitioning can also change the branch, if its dependent coordinates jump. A projected run may change branch
 where it came near a singular position, or where a coarse rank tolerance drops independent rows. Such runs
 count as completed only if they agree with the motion of the default method.
+
+A trial shows how far `taylor` follows a motion on which another method failed, so that advice is reliable.
 """
 
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass, replace
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from mbref.input_error import InputError
 from mbref.kernels.layout import SINGULAR_AHEAD
-from mbref.method import Method, crossing_method
+from mbref.method import MOST_BODIES, SERIES_METHOD, Method, crossing_method
 from mbref.motions.error_estimate import distances
+from mbref.scene.structure import bushings
 from mbref.simulation.start_run import start_run
 from mbref.stepping.limits import GENERIC, Limits
 from mbref.stepping.loop import DONE, LEFT_MOTION, UNDECIDED
@@ -29,6 +36,7 @@ OFF = (1e3, 1e-6)
 DROPS = 1e-10  # rank tolerance above which independent rows may be dropped
 NEAR = 0.1  # relative pivot below which a projected run was near a singular position
 COARSE = 0.1  # allowed distance (lengths or rad) of a run in fixed steps, whose error no tolerance limits
+MOST_TRIAL_STEPS = 2000  # largest number of steps of a trial, which takes a fraction of a second
 
 
 def compare_with_default(run: Run, ended: int) -> int:
@@ -79,3 +87,60 @@ def _distances(run: Run, other: Run, samples: int) -> np.ndarray:
         r.memory.loop.samples.coordinates[:samples].reshape(samples, run.model.nb, 7) for r in (run, other)
     )
     return distances((mine[..., :3], mine[..., 3:]), (theirs[..., :3], theirs[..., 3:]), run.model.length)
+
+
+_TRIALS: WeakKeyDictionary[Run, Trial | None] = WeakKeyDictionary()
+
+
+@dataclass(frozen=True)
+class Trial:
+    """End of a trial: whether the motion was completed, and the time reached, s."""
+
+    completed: bool
+    reached: float
+
+
+def trial_of(run: Run) -> Trial | None:
+    """Return the trial of a run, which is made once.
+
+    None for a run of `taylor` itself, for more than 100 bodies, for bushings, and before the kernels of
+    `taylor` are compiled.
+    """
+    if run not in _TRIALS:
+        _TRIALS[run] = _made(run)
+    return _TRIALS[run]
+
+
+def passes_with(run: Run, **changes: Any) -> bool | None:
+    """Return whether a run of `taylor` that ended UNDECIDED passes its last singular position with changed
+    limits.
+
+    None if the motion has more than 100 bodies, or if the run took more than MOST_TRIAL_STEPS steps.
+    """
+    steps = int(run.memory.equations.system.counts.steps)
+    if not run.method.is_series or len(run.scene.body) > MOST_BODIES or steps > MOST_TRIAL_STEPS:
+        return None
+    limits = replace(run.limits, code=GENERIC, most_steps=MOST_TRIAL_STEPS, **changes)
+    trial = start_run(run.scene, run.method, run.times, limits)
+    try:
+        status, _ = trial.stepper.advance(None)
+    except InputError:  # a requested branch that does not exist
+        return False
+    passed = len(trial.crossings) > len(run.crossings)
+    trial.release()
+    return passed or status != UNDECIDED
+
+
+def _made(run: Run) -> Trial | None:
+    if run.method.is_series or len(run.scene.body) > MOST_BODIES or bushings(run.scene):
+        return None
+    from mbref.taylor.preparation import KERNELS_OF_SERIES  # other methods do not import the series otherwise
+
+    if not all(kernel.is_kept for kernel in KERNELS_OF_SERIES):
+        return None
+    limits = Limits(code=GENERIC, most_steps=MOST_TRIAL_STEPS)
+    trial = start_run(run.scene, Method.parse(SERIES_METHOD), run.times, limits)
+    status, _ = trial.stepper.advance(None)
+    reached = float(trial.memory.loop.clock.time)
+    trial.release()
+    return Trial(status == DONE, reached)

@@ -8,7 +8,7 @@ from rich.box import SIMPLE
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.conformance.deep import Tally, about, check_of
+from crosscheck.conformance.many_mechanisms import Tally, about, check_of
 from crosscheck.conformance.suite import CANNOT, FAIL, OUTSIDE, PASS, RUN
 
 COLUMNS = (PASS, FAIL, CANNOT, OUTSIDE)
