@@ -9,6 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from crosscheck.judge import joint_coordinates, time_functions
+from crosscheck.judge.equations_of_motion import PARTS, terms_at, variants
+from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from crosscheck.judge.gauss_motion import accelerations, gauss_motion
 from crosscheck.judge.joint_loads import joint_wrenches, turning_loads
 from crosscheck.judge.joint_residuals import (
@@ -17,8 +19,6 @@ from crosscheck.judge.joint_residuals import (
     with_ground,
 )
 from crosscheck.judge.loads import Motion, wrenches
-from crosscheck.judge.equations_of_motion import PARTS, terms_at, variants
-from crosscheck.judge.equations_of_motion import accelerations as of_terms
 from mbref import rotations
 from mbref.scene import (
     Body,
