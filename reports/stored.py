@@ -31,12 +31,12 @@ SHAPES: dict[str, type[Run] | type[Truth]] = {
 def groups(folder: Path) -> list[SceneRuns]:
     """Return the runs of a folder by scene; raises FileNotFoundError if it has no scenes or records."""
     with unpacked(folder) as place:
+        if not (place / "records.jsonl").exists() or not (place / "scenes").is_dir():
+            raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
         return _groups(place)
 
 
 def _groups(folder: Path) -> list[SceneRuns]:
-    if not (folder / "records.jsonl").exists() or not (folder / "scenes").is_dir():
-        raise FileNotFoundError(f"{folder}: has no records.jsonl and scenes/ of a report")
     scenes = [Scene.from_file(path) for path in sorted((folder / "scenes").glob("*.toml"))]
     named = {scene.name: scene for scene in scenes}
     times = read(folder / "timings.jsonl", Timing)

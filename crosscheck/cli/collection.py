@@ -129,6 +129,8 @@ def stored_paper(out: Path) -> Paper:
     Raises FileNotFoundError if the folder has none.
     """
     with unpacked(out) as place:
+        if not (place / store.INDEX).exists():
+            raise FileNotFoundError(f"{out}: has no {store.INDEX} of a report")
         records, times = store.indexed(place), read(place / TIMINGS, Timing)
         timed = {label: with_time(record, times) for label, record in records.items()}
         return Paper(timed, illustration(place / ILLUSTRATION))

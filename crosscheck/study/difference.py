@@ -48,15 +48,17 @@ def load(path: str | Path) -> dict[Identity, Record]:
 
     Raises ValueError for a file without records.
     """
-    if Path(path).is_dir():
-        with unpacked(Path(path)) as place:
-            return _loaded(place / "records.jsonl")
-    return _loaded(Path(path))
+    given = Path(path)
+    if not given.is_dir():
+        return _loaded(given, given)
+    with unpacked(given) as place:
+        return _loaded(place / "records.jsonl", given / "records.jsonl")
 
 
-def _loaded(file: Path) -> dict[Identity, Record]:
+def _loaded(file: Path, named: Path) -> dict[Identity, Record]:
+    """Return the runs of a file; messages on a missing file name another path."""
     if not file.exists():
-        raise ValueError(f"{file}: no such file")
+        raise ValueError(f"{named}: no such file")
     times, records = read(file.parent / "timings.jsonl", Timing), list(looked_at(file).values())
     if any("asked" not in record for record in records):
         raise ValueError(

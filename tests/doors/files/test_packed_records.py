@@ -33,6 +33,12 @@ def test_a_packed_folder_renders_as_the_folder_itself_and_has_equal_records(tmp_
     assert (packed / "report.md").read_text() == (plain / "report.md").read_text()
 
 
+@pytest.mark.parametrize("words", [["--section", "paper"], []])
+def test_a_pack_without_the_records_of_a_section_is_named(words, capsys):
+    assert report(["--render", str(REPORTS / "stability"), *words]) == 2
+    assert str(REPORTS / "stability") in capsys.readouterr().err
+
+
 def test_a_damaged_pack_is_named_in_one_sentence(tmp_path, capsys):
     (tmp_path / "records.zip").write_bytes((REPORTS / "kinds" / "records.zip").read_bytes()[:-100])
     assert report(["--render", str(tmp_path)]) == 2
