@@ -118,6 +118,12 @@ def _findings(arguments: argparse.Namespace) -> int:
     return COMPLETED
 
 
+def _diagnose(arguments: argparse.Namespace) -> int:
+    from crosscheck.cli.diagnosing import diagnose
+
+    return diagnose(arguments)
+
+
 def _report(arguments: argparse.Namespace) -> int:
     return rendered(_report_options(arguments))
 
@@ -157,6 +163,7 @@ COMMANDS: Mapping[str, Callable[[argparse.Namespace], int]] = {
     "tune": tune,
     "verify": _verify,
     "findings": _findings,
+    "diagnose": _diagnose,
     "closed-loops": closed_loops,
     "convergence": convergence,
     "modes": modes,

@@ -1,9 +1,9 @@
-"""Parsers of the commands for defects and versions of engines: findings, diff and versions."""
+"""Parsers of the commands for defects and versions of engines: findings, diagnose, diff and versions."""
 
 from __future__ import annotations
 
 from crosscheck.cli.commands_of_motions import Commands, add_command
-from crosscheck.cli.options import MOST_MECHANISMS, add_duration, add_limits, add_reading
+from crosscheck.cli.options import MOST_MECHANISMS, add_duration, add_engines, add_limits, add_reading
 from mbref.command_line import whole
 
 
@@ -15,6 +15,21 @@ def add_findings(commands: Commands) -> None:
     parser.add_argument(
         "--recheck", action="store_true", help="run the proofs, and report which findings are still present"
     )
+
+
+def add_diagnose(commands: Commands) -> None:
+    """Add the parser of `crosscheck diagnose`."""
+    about = (
+        "show what engines cannot simulate of a mechanism, and which known defects they have there, each "
+        "tried on the mechanism by short runs; exit status 1 if a defect shows"
+    )
+    example = "crosscheck diagnose robot.xml --engine mujoco"
+    parser = add_command(commands, "diagnose", about, example)
+    about = "a built-in scene, a .toml, MJCF (.xml), URDF or SDF file"
+    parser.add_argument("scene", nargs="+", metavar="SCENE", help=about)
+    add_engines(parser)
+    parser.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+    add_reading(parser)
 
 
 def add_diff(commands: Commands) -> None:

@@ -6,12 +6,13 @@ import io
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from crosscheck.cli import request, scene_request, tables
 from crosscheck.cli.planning import Choice, plan
+from crosscheck.findings.at_model import Defect, defects
 from crosscheck.judge.reference.reference import SECONDS
 from crosscheck.judge.start import started
 from crosscheck.study.comparison import Collection, Notice, Wanted, collected
@@ -21,6 +22,7 @@ from crosscheck.study.grades import Judged, grade, judged
 from crosscheck.study.grid import TIME_LIMIT, Record
 from crosscheck.study.record_view import error, is_completed, public
 from crosscheck.study.search import selection
+from crosscheck.study.search.offers import settings
 from crosscheck.study.words.verdict import Verdict, verdict
 from mbref.files import write
 from mbref.scene import Scene
@@ -47,11 +49,14 @@ class Comparison:
         Name of the scene in commands.
     difference : str or None
         One sentence on the first engine whose mechanism differs. None if all agree.
+    defects : sequence of Defect
+        Known defects of engines that show at this mechanism (`crosscheck.findings.at_model`).
     """
 
     judged: Judged
     path: str
     difference: str | None
+    defects: Sequence[Defect] = ()
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -95,7 +100,7 @@ class Comparison:
         Returns
         -------
         dict
-            Scene, records, verdict, truth, and differences between the engines' mechanisms.
+            Scene, records, verdict, truth, differences between the engines' mechanisms, and known defects.
         """
         known = self.judged.truth
         truth = {**{name: known[name] for name in TRUTH}, "dead": known.get("dead")}
@@ -106,6 +111,7 @@ class Comparison:
             "truth": truth,
             "difference": self.difference,
             "differences": dict(self.judged.differences),
+            "defects": [one._asdict() for one in self.defects],
         }
 
     def save(self, path: str | Path) -> None:
@@ -126,7 +132,7 @@ class Comparison:
         write(path, json.dumps(self.document(), allow_nan=False) + "\n")
 
     def print(self, console: Console) -> None:
-        """Print the verdict, tables and a plot.
+        """Print the verdict, tables, a plot and known defects.
 
         Parameters
         ----------
@@ -134,6 +140,9 @@ class Comparison:
             The console on which they are printed.
         """
         tables.print_comparison(console, self.judged, self.verdict, self.path, with_ratio=not self._unlike)
+        for one in self.defects:
+            sentence = f"\nKnown defect: {one.sentence}; `crosscheck findings {one.finding}`"
+            console.print(sentence, markup=False, soft_wrap=True)
 
     def __str__(self) -> str:
         text = io.StringIO()
@@ -240,7 +249,8 @@ def comparisons(found: Collection, paths: dict[str, str], reference_time: float)
             differences |= force_differences(scene, group.records)
         first = next(iter(differences.values()), None)
         blamed = differences if group.truth["kind"] else {}
-        compared.append(Comparison(replace(group, differences=blamed), paths[scene.name], first))
+        known = defects(scene, list(group.engines()), partial(settings, scene=scene))
+        compared.append(Comparison(replace(group, differences=blamed), paths[scene.name], first, known))
     return compared
 
 

@@ -58,13 +58,38 @@ class Answer(NamedTuple):
 
 
 @dataclass(frozen=True)
+class When:
+    """Conditions under which a model can have a finding, and a remedy by which short runs try it.
+
+    Conditions are ``versions`` of the engine (empty: any), ``families`` of settings, a least number of
+    independent ``loops``, and one of the types of ``joints`` (empty: any). The remedy is another ``family``
+    (empty: the same one) and ``options``. The model has the finding if the remedy changes accelerations at
+    the start by more than ``above``, relative to the largest, and halves their error. Poses over ``seconds``
+    count if the engine gives no accelerations. ``says`` is the predicate of the sentence for the user, and
+    ``advice`` the remedy.
+    """
+
+    says: str
+    advice: str
+    families: Sequence[str]
+    above: float
+    versions: Sequence[str] = ()
+    loops: int = 0
+    joints: Sequence[str] = ()
+    family: str = ""
+    options: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
 class Finding:
     """``does`` is a sentence on what the engine does. ``right`` is a sentence on the right result, and on its
     source.
 
     The engine has the error if the number that the proof measures, in ``unit``, exceeds ``wrong_above``.
     ``measured`` was the number at ``version`` of ``package``; without it, rounding decides the number. If
-    ``crashes`` is set, the engine's process ended at that version, and no proof is stored.
+    ``crashes`` is set, the engine's process ended at that version, and no proof is stored. ``when`` has
+    conditions under which users hear of the finding at their own model (`at_model`).
     """
 
     name: str
@@ -82,6 +107,7 @@ class Finding:
     scene: str = ""
     family: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
+    when: When | None = None
 
     def recheck(self) -> Answer:
         """Run the proof against the installed version."""
@@ -125,4 +151,9 @@ class Finding:
 
 def findings() -> Sequence[Finding]:
     """Return the stored findings."""
-    return [Finding(**entry) for entry in tomllib.loads((FOLDER / "findings.toml").read_text())["finding"]]
+    return [_finding(entry) for entry in tomllib.loads((FOLDER / "findings.toml").read_text())["finding"]]
+
+
+def _finding(entry: Mapping[str, Any]) -> Finding:
+    when = {"when": When(**entry["when"])} if "when" in entry else {}
+    return Finding(**{**entry, **when})

@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from crosscheck.judge.constraints import scene_length
-from crosscheck.judge.gauss_principle import gauss
 from crosscheck.judge.metrics import at_samples, error_series, in_scene_order
-from crosscheck.judge.model_identity import acceleration_scale
+from crosscheck.judge.start_accelerations import starts
 from crosscheck.setting import ORIGIN
 from crosscheck.study.difference import ERROR_RATIO, Change, Identity, changes
 from crosscheck.study.grid import Record
@@ -101,39 +99,16 @@ def _of_motions(scene: Scene, old: Record, new: Record) -> Iterator[tuple[str, s
     before, after = (in_scene_order(scene, Trajectory.from_record(scene.name, r)) for r in (old, new))
     if not (len(before.times) and len(after.times)):
         return
-    first, second = (_start(scene, run) for run in (before, after))
-    if first is not None and second is not None:
-        scale = max(_size(first), _size(second), NOISE * acceleration_scale(scene))
-        if (apart := _size(second - first) / scale) > NOISE:
-            errors = _errors(scene, first, second)
-            yield "accelerations", f"at the start by {apart:.2g} of the largest{errors}"
-            return
+    found = starts(scene, before, after)
+    if found and found.apart > NOISE:
+        errors = "; error {:.2g} → {:.2g}".format(*found.errors) if scene.has_mass() else ""
+        yield "accelerations", f"at the start by {found.apart:.2g} of the largest{errors}"
+        return
     both = np.arange(min(len(before.times), len(after.times)))
     apart = float(error_series(scene, at_samples(before, both), at_samples(after, both)).max())
     known = [e for e in map(error, (old, new)) if math.isfinite(e)]
     if apart > max([NOISE, *(SHARE * e for e in known)]) and max(known, default=0.0) < LOST:
         yield "motion", f"by up to {apart:.2g} of the mechanism's length, or rad"
-
-
-def _start(scene: Scene, run: Trajectory) -> np.ndarray | None:
-    """Return the accelerations (2 nb, 3) at the first sample, m/s²; angular ones times the scene's length."""
-    if run.acceleration is None or run.angular_acceleration is None:
-        return None
-    return np.vstack([run.acceleration[0], scene_length(scene) * run.angular_acceleration[0]])
-
-
-def _errors(scene: Scene, first: np.ndarray, second: np.ndarray) -> str:
-    """Return the errors of two starts' accelerations by Gauss's principle, in words."""
-    if not scene.has_mass():
-        return ""
-    exact = gauss(scene)
-    scale = max(_size(exact), NOISE * acceleration_scale(scene))
-    before, after = (_size(of_run - exact) / scale for of_run in (first, second))
-    return f"; error {before:.2g} → {after:.2g}"
-
-
-def _size(vectors: np.ndarray) -> float:
-    return float(np.linalg.norm(vectors, axis=-1).max())
 
 
 def _of_checks(before: Mapping[str, Any], after: Mapping[str, Any]) -> Iterator[Found]:

@@ -33,7 +33,8 @@ def add(commands: Any) -> None:
         "reactions at t = 0; redundancy along the motion, which exchange of joints\n"
         "removes it, and the nearest singular position.",
         epilog="examples:\n  mbref diagnose five_bar\n  mbref diagnose mechanism.toml --json\n"
-        "  mbref diagnose mechanism.toml --start",
+        "  mbref diagnose mechanism.toml --start\n"
+        "  crosscheck diagnose mechanism.toml --engine mujoco    known defects of an engine there",
     )
     add_scene(diagnose)
     diagnose.add_argument("--start", action="store_true", help="at t = 0 only, without simulating")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from crosscheck.findings.finding import FOLDER, Finding, findings
+from crosscheck.findings.finding import FOLDER, Finding, When, findings
 
 from ..blocks import Block, Fold, Heading, Listing, Parts, Prose, Table, Within
 
@@ -23,8 +23,18 @@ def _measured(found: Finding) -> str:
     return f"{number} {found.unit}".strip()
 
 
+def _tried(found: Finding, when: When) -> str:
+    """Return the sentence on mechanisms on which `crosscheck diagnose` tries a finding."""
+    parts = [f"version {' or '.join(when.versions)}"] if when.versions else []
+    parts += [f"mechanisms of at least {when.loops} loop{'s' * (when.loops > 1)}"] if when.loops else []
+    parts += [f"joints of the type {' or '.join(when.joints)}"] if when.joints else []
+    command = f"`crosscheck diagnose SCENE --engine {found.engine}`"
+    return f"{command} tries it on your mechanism ({', '.join(parts)}). Remedy: {when.advice}."
+
+
 def _entry(found: Finding) -> list[Block]:
-    said = (f"{found.package} {found.version}. {found.does}", f"Right is: {found.right}", found.cause)
+    said = [f"{found.package} {found.version}. {found.does}", f"Right is: {found.right}", found.cause]
+    said += [_tried(found, found.when)] if found.when else []
     told: list[Block] = [Heading(found.name, 2), Prose("\n\n".join(said))]
     if found.crashes:
         return told

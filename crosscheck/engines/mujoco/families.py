@@ -154,7 +154,8 @@ def own_code(setting: Setting) -> str:
     step = options.get("step", DEFAULT_STEP)
     attributes = {"timestep": f"{step!r}"}
     if family == "defaults":
-        return f'<option timestep="{step!r}"/>'
+        kind = f' jacobian="{options["jacobian"]}"' if "jacobian" in options else ""
+        return f'<option timestep="{step!r}"{kind}/>'
     flags = {"autoreset": "disable"}
     integrator = STOCK.get(family, RK4).removeprefix("mjINT_")
     attributes |= {"integrator": NAMES.get(integrator, integrator), "jacobian": "dense"}

@@ -64,6 +64,7 @@ class Simulation:
         self.step = self._fixed
         self.forwards, self.parts = int(options.get("forward", 1)), bool(options.get("parts", False))
         if setting.family == "defaults":
+            change_options(mujoco, model, options)
             return
         if setting.family == CHOSEN:
             self._choose(options)

@@ -19,15 +19,8 @@ from crosscheck.versions.differences import Found, between
 from crosscheck.versions.environment import NotInstalled, Requirement
 from crosscheck.versions.library import defaults_of, used_names
 from crosscheck.versions.measured import Measured
-from mbref.scene import Body, Scene
-from tests.helpers.wheels import ENGINE, PACKAGE, SOURCE, write_wheel
-
-STONE = Scene(
-    name="stone",
-    gravity=(0.0, 0.0, -9.81),
-    duration=0.2,
-    body=(Body(name="stone", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 1.0, 2.0)),),
-)
+from tests.helpers.falling_engine import STONE, Falling
+from tests.helpers.wheels import ENGINE, PACKAGE, write_wheel
 
 
 def versions(folder: Path, *words: str) -> tuple[int, Any, str]:
@@ -41,11 +34,8 @@ def versions(folder: Path, *words: str) -> tuple[int, Any, str]:
 
 def measured(version: str, factor: float = 1.0, seconds: float = 1.0, card: str = "pass") -> Measured:
     """Return what a version does on the stone, and one verdict of the suite."""
-    there: dict[str, Any] = {}
-    exec(SOURCE.format(factor=factor, step=0.1, more=""), there)
-    there["Falling"].version = lambda self: version
     setting = Setting("plain", {"step": 1e-3})
-    run = there["ENGINE"].run(STONE, np.linspace(0.0, 0.2, 3), setting).to_record()
+    run = Falling().run(STONE, np.linspace(0.0, 0.2, 3), Setting("plain", {"factor": factor})).to_record()
     run |= {"asked": {"options": setting.options}, "metrics": {}, "cost": {"seconds": seconds}}
     verdict = {"scene": "pendulum", "card": "energy/1", "status": card, "measured": 0.1, "reason": ""}
     suite = {"verdicts": [verdict | {"allowed": 1.0}]}
@@ -91,7 +81,7 @@ def test_changed_gravity_default_and_lost_function_are_found_and_the_release_is_
     write_wheel(tmp_path, "1.0")
     write_wheel(tmp_path, "1.1", step=0.2)
     write_wheel(tmp_path, "1.2", factor=1.5, step=0.2)
-    write_wheel(tmp_path, "1.3", factor=1.5, step=0.2, more="")
+    write_wheel(tmp_path, "1.3", factor=1.5, step=0.2, fall="drop")
     status, found, said = versions(tmp_path, f"{PACKAGE}==1.0", f"{PACKAGE}==1.3", stone)
     assert status == 1, said
     kinds = {change["kind"]: change for change in found["changes"] if change["kind"] != "cost"}
